@@ -1,0 +1,279 @@
+"""An effect: one departure of a robot or world from its nominal model.
+
+An effect acts at exactly one stage of the signal path
+
+    command -> actuator -> body/contact -> sensor -> tracking
+
+and each stage is one abstract class here. Its parameters have a unit, bounds and a
+nominal value; at the nominal values the effect changes nothing, bit for bit. The same
+library serves as damage, as imperfect reality, as candidate explanation of a
+sim-to-real gap, and as correction of a simulator.
+
+One effect, one file in this directory; `registry` finds it by its `name`.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from bns.errors import BnsError, OutOfBoundsError, UnknownNameError
+
+STAGES = ("command", "actuator", "body", "sensor", "tracking")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that says how strong an effect is.
+
+    Attributes:
+        name: as written in text (`factor`).
+        unit: SI unit, "1" for a ratio.
+        nominal: the value at which the effect changes nothing (given the others).
+        low, high: bounds, inclusive.
+        doc: meaning in one line, with the source of the bounds or "assumed".
+        example: a value that makes the effect clearly felt (used by contract tests
+            and listings).
+        integer: whether only whole numbers make sense.
+    """
+
+    name: str
+    unit: str
+    nominal: float
+    low: float
+    high: float
+    doc: str
+    example: float
+    integer: bool = False
+
+    def check(self, effect: str, value: object) -> float:
+        """The value as a float inside the bounds.
+
+        Raises:
+            OutOfBoundsError: not a number, not finite, or outside the bounds.
+        """
+        try:
+            number = float(value)  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            number = float("nan")
+        whole = not self.integer or number == np.floor(number)
+        if not (np.isfinite(number) and self.low <= number <= self.high and whole):
+            unit = f"{self.unit}, whole numbers only" if self.integer else self.unit
+            raise OutOfBoundsError(
+                f"{effect}:{self.name}", value, self.low, self.high, unit
+            )
+        return number
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A setting with named alternatives (`wheel` = left, right, both)."""
+
+    name: str
+    options: tuple[str, ...]
+    default: str
+    doc: str
+
+    def check(self, effect: str, value: object) -> str:
+        """The value, one of the options.
+
+        Raises:
+            UnknownNameError: it is none of them.
+        """
+        if value not in self.options:
+            raise UnknownNameError(f"{effect}:{self.name}", str(value), self.options)
+        return str(value)
+
+
+@dataclass(frozen=True, eq=False)
+class ControlSignal:
+    """What reaches a robot's actuators during one trial, on the physics grid.
+
+    Attributes:
+        times: start of each physics step [s], shape ``(S,)``.
+        values: command in force at each step, shape ``(S, C)``, SI units.
+        command: index of that command in the list, shape ``(S,)``; -1 after the last.
+        channels: names of the C columns.
+        dt: physics step [s].
+    """
+
+    times: np.ndarray
+    values: np.ndarray
+    command: np.ndarray
+    channels: tuple[str, ...]
+    dt: float
+
+    def column(self, name: str) -> int:
+        """Column index of a channel."""
+        return self.channels.index(name)
+
+
+@dataclass(frozen=True, eq=False)
+class PoseSignal:
+    """What the tracker sees during one trial: samples on the observation grid.
+
+    Attributes:
+        times: time stamps [s], shape ``(T,)``.
+        poses: planar poses in the world frame, shape ``(T, 3)``; NaN = lost.
+        fine_times: the physics grid [s], shape ``(S + 1,)``, for delays.
+        fine_poses: true poses on it, shape ``(S + 1, 3)``.
+    """
+
+    times: np.ndarray
+    poses: np.ndarray
+    fine_times: np.ndarray
+    fine_poses: np.ndarray
+
+
+class Effect(ABC):
+    """One departure from the nominal model, with its parameter values.
+
+    Subclasses say what they are in class variables; they add no `__init__`.
+
+    Args:
+        values: parameter and choice values by name; missing ones take the
+            parameter's nominal value (the choice's default).
+
+    Raises:
+        UnknownNameError: a value for a parameter the effect does not have.
+        OutOfBoundsError: a value outside its bounds, or NaN.
+    """
+
+    name: ClassVar[str]
+    stage: ClassVar[str]
+    doc: ClassVar[str]  # one line: what departs from nominal
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    choices: ClassVar[tuple[Choice, ...]] = ()
+    robots: ClassVar[tuple[str, ...]] = ("wheeled",)  # kinds it makes sense for
+    random: ClassVar[bool] = False  # whether it draws from the generator
+    source: ClassVar[str] = ""  # page, paper or "assumed" for the model
+
+    def __init__(self, values: Mapping[str, Any] | None = None):
+        given = dict(values or {})
+        known = {item.name: item for item in (*self.parameters, *self.choices)}
+        for name in given:
+            if name not in known:
+                raise UnknownNameError(f"parameter of {self.name}", name, known)
+        self.values: dict[str, Any] = {}
+        for parameter in self.parameters:
+            value = given.get(parameter.name, parameter.nominal)
+            self.values[parameter.name] = parameter.check(self.name, value)
+        for choice in self.choices:
+            value = given.get(choice.name, choice.default)
+            self.values[choice.name] = choice.check(self.name, value)
+
+    def __getitem__(self, name: str) -> Any:
+        return self.values[name]
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and self.values == other.values  # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return hash((self.name, tuple(self.values.items())))
+
+    def __repr__(self) -> str:
+        return f"<Effect {self}>"
+
+    def __str__(self) -> str:
+        """The effect as text: ``name:parameter=value,...`` (parses back)."""
+        items = (
+            f"{name}={value:.10g}" if isinstance(value, float) else f"{name}={value}"
+            for name, value in self.values.items()
+        )
+        text = ",".join(items)
+        return f"{self.name}:{text}" if text else self.name
+
+    @property
+    def is_nominal(self) -> bool:
+        """Whether every parameter has its nominal value."""
+        return all(self.values[p.name] == p.nominal for p in self.parameters)
+
+    def scaled(self, severity: float) -> "Effect":
+        """The effect at a share of its strength: 0 nominal, 1 as given.
+
+        Raises:
+            BnsError: severity outside 0..1.
+        """
+        if not 0.0 <= severity <= 1.0:
+            raise BnsError(f"severity = {severity} is not allowed: give 0 to 1.")
+        values = dict(self.values)
+        for p in self.parameters:
+            value = p.nominal + severity * (values[p.name] - p.nominal)
+            values[p.name] = round(value) if p.integer else value
+        return type(self)(values)
+
+    def wheels(self) -> tuple[str, ...]:
+        """The wheels that the choice `wheel` names: ("left",), ("right",) or both."""
+        wheel = self.values.get("wheel", "both")
+        return ("left", "right") if wheel == "both" else (wheel,)
+
+
+class CommandEffect(Effect):
+    """Changes what the robot is told: a transform of the command signal."""
+
+    stage = "command"
+
+    @abstractmethod
+    def apply(
+        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        """The signal's values after the effect.
+
+        Args:
+            signal: the commands on the physics grid (not to be written to).
+            active: where in time the effect is on, shape ``(S,)``.
+            rng: the only source of randomness.
+
+        Returns:
+            New values, shape ``(S, C)``; equal to `signal.values` where not active.
+        """
+
+
+class ActuatorEffect(CommandEffect):
+    """Changes what the actuators make of a command: the same transform, later."""
+
+    stage = "actuator"
+
+
+class BodyEffect(Effect):
+    """Changes the robot or floor: an edit of the model before compilation."""
+
+    stage = "body"
+
+    @abstractmethod
+    def edit(self, spec: Any) -> None:
+        """Write the effect into `spec` (a `mujoco.MjSpec`), elements found by name.
+
+        Must keep the sizes of the model, so that models of one batch stay alike.
+        """
+
+
+class SensorEffect(Effect):
+    """Changes what a sensor reads: a transform of sensor samples."""
+
+    stage = "sensor"
+
+    @abstractmethod
+    def apply(
+        self,
+        times: np.ndarray,
+        readings: np.ndarray,
+        channels: tuple[str, ...],
+        active: np.ndarray,
+        rng: np.random.Generator,
+    ) -> np.ndarray:
+        """The readings after the effect, shape ``(T, n_sensors)`` as given."""
+
+
+class TrackingEffect(Effect):
+    """Changes what the tracker reports: poses, time stamps, drop-outs."""
+
+    stage = "tracking"
+
+    @abstractmethod
+    def apply(
+        self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Time stamps ``(T,)`` and poses ``(T, 3)`` after the effect."""
