@@ -37,6 +37,8 @@ class Parameter:
         example: a value that makes the effect clearly felt (used by contract tests
             and listings).
         integer: whether only whole numbers make sense.
+        scales: whether severity scales it; False for what is no strength but a place
+            or kind (a position, a direction), which stays as given.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Parameter:
     doc: str
     example: float
     integer: bool = False
+    scales: bool = True
 
     def check(self, effect: str, value: object) -> float:
         """The value as a float inside the bounds.
@@ -157,12 +160,12 @@ class Effect(ABC):
             if name not in known:
                 raise UnknownNameError(f"parameter of {self.name}", name, known)
         self.values: dict[str, Any] = {}
-        for parameter in self.parameters:
-            value = given.get(parameter.name, parameter.nominal)
-            self.values[parameter.name] = parameter.check(self.name, value)
         for choice in self.choices:
             value = given.get(choice.name, choice.default)
             self.values[choice.name] = choice.check(self.name, value)
+        for parameter in self.parameters:
+            value = given.get(parameter.name, parameter.nominal)
+            self.values[parameter.name] = parameter.check(self.name, value)
 
     def __getitem__(self, name: str) -> Any:
         return self.values[name]
@@ -179,7 +182,9 @@ class Effect(ABC):
     def __str__(self) -> str:
         """The effect as text: ``name:parameter=value,...`` (parses back)."""
         items = (
-            f"{name}={value:.10g}" if isinstance(value, float) else f"{name}={value}"
+            f"{name}={value!r}".removesuffix(".0")
+            if isinstance(value, float)
+            else f"{name}={value}"
             for name, value in self.values.items()
         )
         text = ",".join(items)
@@ -187,8 +192,10 @@ class Effect(ABC):
 
     @property
     def is_nominal(self) -> bool:
-        """Whether every parameter has its nominal value."""
-        return all(self.values[p.name] == p.nominal for p in self.parameters)
+        """Whether every parameter that severity scales has its nominal value."""
+        return all(
+            self.values[p.name] == p.nominal for p in self.parameters if p.scales
+        )
 
     def scaled(self, severity: float) -> "Effect":
         """The effect at a share of its strength: 0 nominal, 1 as given.
@@ -200,6 +207,8 @@ class Effect(ABC):
             raise BnsError(f"severity = {severity} is not allowed: give 0 to 1.")
         values = dict(self.values)
         for p in self.parameters:
+            if not p.scales or severity == 1.0:
+                continue
             value = p.nominal + severity * (values[p.name] - p.nominal)
             values[p.name] = round(value) if p.integer else value
         return type(self)(values)

@@ -1,0 +1,104 @@
+"""All effects by name: one file per effect in this directory, no list to edit.
+
+An effect is written in text as ``wheel_gain:wheel=left,factor=0.8`` and in TOML as a
+table ``{effect = "wheel_gain", wheel = "left", factor = 0.8}``.
+"""
+
+import inspect
+import pkgutil
+from collections.abc import Mapping
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+from bns.errors import BnsError, UnknownNameError
+from bns.worlds import effects as package
+from bns.worlds.effects.base import Effect
+
+EXAMPLE = "wheel_gain:wheel=left,factor=0.8"
+
+
+@cache
+def _classes() -> dict[str, type[Effect]]:
+    found: dict[str, type[Effect]] = {}
+    for info in pkgutil.iter_modules(package.__path__):
+        module = import_module(f"{package.__name__}.{info.name}")
+        for _, item in inspect.getmembers(module, inspect.isclass):
+            if (
+                issubclass(item, Effect)
+                and hasattr(item, "name")
+                and not inspect.isabstract(item)
+                and item.__module__ == module.__name__
+            ):
+                if item.name in found:
+                    raise BnsError(f"Two effects are called {item.name!r}; rename one.")
+                found[item.name] = item
+    return dict(sorted(found.items()))
+
+
+def names() -> tuple[str, ...]:
+    """Names of all effects, sorted."""
+    return tuple(_classes())
+
+
+def get(name: str) -> type[Effect]:
+    """The effect class called `name`.
+
+    Raises:
+        UnknownNameError: there is none.
+    """
+    if name not in _classes():
+        raise UnknownNameError("effect", name, names())
+    return _classes()[name]
+
+
+def make(name: str, **values: Any) -> Effect:
+    """The effect `name` with the given parameter and choice values.
+
+    Raises:
+        UnknownNameError: unknown effect, parameter or option.
+        OutOfBoundsError: a value outside its bounds.
+    """
+    return get(name)(values)
+
+
+def parse(text: str) -> Effect:
+    """The effect written in `text`, as ``NAME`` or ``NAME:parameter=value,...``.
+
+    A piece without ``=`` belongs to the value before it, so values may hold commas.
+
+    Raises:
+        BnsError: bad syntax, or what `make` raises.
+    """
+    name, colon, rest = text.strip().partition(":")
+    values: dict[str, str] = {}
+    last = ""
+    for piece in rest.split(",") if colon else ():
+        key, equals, value = (part.strip() for part in piece.partition("="))
+        if equals and key and key not in values:
+            values[key] = value
+            last = key
+        elif last and piece.strip() and not equals:
+            values[last] += f",{piece.strip()}"
+        else:
+            raise BnsError(
+                f"Effect {text!r} cannot be read at {piece!r}: write "
+                f"NAME:parameter=value,..., each parameter once, as in {EXAMPLE!r}."
+            )
+    return make(name.strip(), **values)
+
+
+def from_table(table: Mapping[str, Any]) -> Effect:
+    """The effect in a table with the key ``effect`` and its values.
+
+    Raises:
+        BnsError: no name in the table, or what `make` raises.
+    """
+    values = dict(table)
+    name = values.pop("effect", None)
+    if not isinstance(name, str):
+        raise BnsError(
+            f"Effect table {dict(table)!r} has no name: give "
+            '{effect = "wheel_gain", wheel = "left", factor = 0.8}.'
+        )
+    return get(name)(values)
