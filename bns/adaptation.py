@@ -1,0 +1,80 @@
+"""Adaptations to damage (thesis 4.2.8): what each run resets, and when.
+
+"On damage" adaptations are told when damage came, as in the dissertation: they act
+once, before the first trial that follows the first damaged one (until then nothing
+has been seen of it). All are settings of single runs in a batch.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bns.config import RunConfig
+from bns.units import metres_per_second
+
+
+@dataclass(frozen=True)
+class Resets:
+    """Which runs reset what before a trial; boolean arrays ``(R,)``."""
+
+    population: np.ndarray
+    simulator: np.ndarray
+    data: np.ndarray
+
+
+class Adaptations:
+    """The schedule of R runs.
+
+    Args:
+        configs: one per run.
+        onsets: first damaged trial of each run, -1 = none.
+    """
+
+    def __init__(self, configs: Sequence[RunConfig], onsets: Sequence[int]):
+        self.configs = list(configs)
+        self.onsets = np.asarray(onsets, dtype=np.int64)
+
+    def _setting(self, name: str) -> np.ndarray:
+        return np.array([getattr(c.adaptation, name) for c in self.configs])
+
+    @property
+    def windows(self) -> np.ndarray:
+        """Sliding window of each run [patterns], 0 = all."""
+        return self._setting("window")
+
+    def damage_known(self, trial: int) -> np.ndarray:
+        """Whether a run's damage has been felt before this trial, ``(R,)`` bool."""
+        return (self.onsets >= 0) & (trial > self.onsets)
+
+    def resets(self, trial: int) -> Resets:
+        """What is reset before `trial`.
+
+        The fresh simulator of `simulator_reset_every` = k comes before trials k, 2k...
+        """
+        told = (self.onsets >= 0) & (trial == self.onsets + 1)
+        restart = told & self._setting("restart")
+        every = self._setting("simulator_reset_every")
+        due = (every > 0) & (trial > 0) & (trial % np.maximum(every, 1) == 0)
+        return Resets(
+            population=restart | (told & self._setting("population_reset")),
+            simulator=restart | (told & self._setting("simulator_reset")) | due,
+            data=restart | (told & self._setting("data_reset")),
+        )
+
+    def mutation(self, trial: int) -> tuple[np.ndarray, np.ndarray]:
+        """Mutation rate ``(R,)`` and magnitude ``(R, 3)`` [m/s, m/s, s] at a trial."""
+        known = self.damage_known(trial)
+        rates, sizes = [], []
+        for config, damaged in zip(self.configs, known, strict=True):
+            evolution, after = config.evolution, config.adaptation
+            rate, size = evolution.mutation_rate, evolution.mutation_magnitude
+            grown = 1.0
+            if damaged and after.mutation_rate_after > 0:
+                rate = after.mutation_rate_after
+            if damaged and after.mutation_magnitude_after > 0:
+                grown = after.mutation_magnitude_after / size
+            speed = metres_per_second(size) * grown
+            rates.append(rate)
+            sizes.append([speed, speed, evolution.duration_magnitude * grown])
+        return np.array(rates, np.float32), np.array(sizes, np.float32)

@@ -1,0 +1,55 @@
+"""Which controller is tried in the world (thesis 2.8 step 1, 5.3.9)."""
+
+import torch
+from torch import Tensor
+
+from bns.chromosome import Population
+from bns.config import RunConfig
+from bns.draws import Draws
+from bns.errors import BnsError, UnknownNameError
+from bns.evaluation import Evaluator
+from bns.evolution import selection
+
+
+def choose(
+    config: RunConfig,
+    trial: int,
+    cost: Tensor,
+    population: Population,
+    theta: Tensor,
+    evaluator: Evaluator,
+    draws: Draws,
+) -> Tensor:
+    """Index of one controller a run, ``(R,)``.
+
+    tournament: the best of a random share `choose_tournament` of the population;
+    best: the lowest predicted cost; random: any; best-worst-random: the three in turn,
+    trial by trial (Parker 2000); disagreement: the one on which the ensemble's members
+    differ most, among the better half (Bongard 2006 picks tests this way).
+
+    Raises:
+        BnsError: disagreement without an ensemble.
+        UnknownNameError: no such rule.
+    """
+    kind = config.choose
+    if kind == "best-worst-random":
+        kind = ("best", "worst", "random")[trial % 3]
+    if kind == "best":
+        return cost.argmin(1)
+    if kind == "worst":
+        return cost.argmax(1)
+    if kind == "random":
+        return selection.random(cost, 1, draws).squeeze(1)
+    if kind == "tournament":
+        size = max(1, round(config.choose_tournament * cost.shape[1]))
+        return selection.tournament(cost, 1, size, draws).squeeze(1)
+    if kind == "disagreement":
+        if config.snn.kind != "ensemble":
+            raise BnsError(
+                "choose = 'disagreement' needs an ensemble; set snn.kind = 'ensemble'."
+            )
+        spread = evaluator.disagreement(theta, population)
+        good = cost <= cost.median(1, keepdim=True).values
+        return torch.where(good, spread, -1.0).argmax(1)
+    known = ("best", "tournament", "random", "best-worst-random", "disagreement")
+    raise UnknownNameError("choice", config.choose, known)

@@ -1,0 +1,125 @@
+"""Crossover of variable-length lists (thesis 2.3.7), batched.
+
+Parents are two `Population`s of the same shape; each pair makes one child that begins
+like the first. Cuts fall between commands and are drawn *independently* in the two
+parents, so that the child's length differs from both: with a shared cut or a fixed
+length the navigation task was never solved (see docs/choices.md).
+"""
+
+import torch
+from torch import Tensor
+
+from bns.chromosome import Population
+from bns.draws import Draws, whole_below
+from bns.errors import UnknownNameError
+
+
+def n_point(
+    first: Population, second: Population, cuts_first: Tensor, cuts_second: Tensor
+) -> Population:
+    """Alternate segments of two parents, cut at given points.
+
+    Args:
+        first, second: parents, genes ``(R, N, K, 3)``.
+        cuts_first: sorted cut points in the first parents' lists, ``(R, N, n)``.
+        cuts_second: the same in the second parents', ``(R, N, n)``.
+
+    Returns:
+        Children: segment 0 of the first parent, segment 1 of the second, and so on;
+        cut off at K commands, a childless pair (length 0) copies the first parent.
+    """
+    longest = first.genes.shape[2]
+    place = torch.arange(longest, device=first.genes.device)
+    parents = torch.cat([first.genes, second.genes], dim=2)
+    source = torch.zeros_like(first.genes[..., 0], dtype=torch.long)
+    filled = torch.zeros_like(first.lengths)
+    count = cuts_first.shape[-1]
+    for segment in range(count + 1):
+        own = segment % 2 == 0
+        cuts = cuts_first if own else cuts_second
+        ends = first.lengths if own else second.lengths
+        start = cuts[..., segment - 1] if segment else torch.zeros_like(ends)
+        stop = cuts[..., segment] if segment < count else ends
+        taken = stop - start
+        shift = (start - filled + (0 if own else longest)).unsqueeze(-1)
+        inside = (place >= filled.unsqueeze(-1)) & (
+            place < (filled + taken).unsqueeze(-1)
+        )
+        source = torch.where(inside, place + shift, source)
+        filled = filled + taken
+    empty = filled == 0
+    source = torch.where(empty.unsqueeze(-1), place, source)
+    lengths = torch.where(empty, first.lengths, filled.clamp(max=longest))
+    genes = parents.gather(2, source.unsqueeze(-1).expand(-1, -1, -1, 3))
+    child = Population(genes, lengths)
+    return child._replace(genes=genes * child.valid.unsqueeze(-1))
+
+
+def uniform(first: Population, second: Population, coins: Tensor) -> Population:
+    """Each gene from either parent with equal chance, where both have one.
+
+    Args:
+        first, second: parents.
+        coins: uniform numbers, ``(R, N, K, 3)``.
+
+    Returns:
+        Children of the first parents' lengths.
+    """
+    both = (first.valid & second.valid).unsqueeze(-1)
+    swap = both & (coins < 0.5)
+    return first._replace(genes=torch.where(swap, second.genes, first.genes))
+
+
+def simulated_binary(
+    first: Population, second: Population, coins: Tensor, eta: float
+) -> Population:
+    """Simulated binary crossover (eqs 2.15-2.17), where both parents have a gene.
+
+    Args:
+        first, second: parents.
+        coins: v_j of eq 2.17, uniform, ``(R, N, K, 3)``.
+        eta: distribution index.
+    """
+    power = 1.0 / (eta + 1.0)
+    spread = torch.where(
+        coins <= 0.5, (2 * coins) ** power, (0.5 / (1 - coins)) ** power
+    )
+    mixed = 0.5 * ((1 + spread) * first.genes + (1 - spread) * second.genes)
+    both = (first.valid & second.valid).unsqueeze(-1)
+    return first._replace(genes=torch.where(both, mixed, first.genes))
+
+
+def _cuts(lengths: Tensor, points: int, draws: Draws) -> Tensor:
+    drawn = draws.uniform(*lengths.shape, points)
+    return whole_below(drawn, lengths.unsqueeze(-1) + 1).sort(-1).values
+
+
+def cross(
+    kind: str,
+    first: Population,
+    second: Population,
+    draws: Draws,
+    *,
+    points: int = 2,
+    eta: float = 1.0,
+    fixed_length: bool = False,
+) -> Population:
+    """Crossover by name; `points` of n-point, `eta` of sbx.
+
+    Raises:
+        UnknownNameError: no such operator.
+    """
+    if kind in ("single-point", "n-point"):
+        number = 1 if kind == "single-point" else points
+        cuts_first = _cuts(first.lengths, number, draws)
+        cuts_second = cuts_first  # a shared cut keeps a fixed length
+        if not fixed_length:
+            cuts_second = _cuts(second.lengths, number, draws)
+        return n_point(first, second, cuts_first, cuts_second)
+    if kind == "uniform":
+        return uniform(first, second, draws.uniform(*first.genes.shape))
+    if kind == "sbx":
+        coins = draws.uniform(*first.genes.shape)
+        return simulated_binary(first, second, coins, eta)
+    known = ("single-point", "n-point", "uniform", "sbx")
+    raise UnknownNameError("crossover", kind, known)

@@ -1,0 +1,1 @@
+"""Simulator neural networks (SNN: simulator, never "spiking")."""

@@ -1,0 +1,113 @@
+"""Stacked one-hidden-layer networks: R runs of G networks as one tensor program.
+
+All weights of a run are one row of `theta`, shape ``(R, D)``, so that Rprop is
+elementwise over one tensor. Two shapes are used: G = 3 networks with one output each
+(thesis Fig 4.4: forward, left, turn), or an ensemble of G networks with all three
+outputs and dropout (thesis 7.2.4).
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from bns.config import SnnConfig
+from bns.draws import Draws
+from bns.snn.scaling import INPUTS, OUTPUTS
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Sizes of a stack: `groups` networks of `hidden` neurons, `outputs` each."""
+
+    groups: int
+    hidden: int
+    outputs: int
+    inputs: int = INPUTS
+
+    @classmethod
+    def of(cls, config: SnnConfig) -> "Shape":
+        """The stack a configuration asks for."""
+        if config.kind == "three":
+            return cls(groups=OUTPUTS, hidden=config.hidden, outputs=1)
+        return cls(groups=config.members, hidden=config.hidden, outputs=OUTPUTS)
+
+    @property
+    def units(self) -> int:
+        """Hidden neurons of all networks together."""
+        return self.groups * self.hidden
+
+    @property
+    def size(self) -> int:
+        """Weights of a run, D."""
+        first = self.units * (self.inputs + 1)
+        return first + self.groups * self.outputs * (self.hidden + 1)
+
+    def split(self, theta: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Views of `theta` (R, D).
+
+        Returns:
+            first weights ``(R, G*H, I)``, first biases ``(R, G*H, 1)``, second
+            weights ``(R, G, O, H)``, second biases ``(R, G, O, 1)``.
+        """
+        runs = theta.shape[0]
+        heads = self.groups * self.outputs
+        sizes = [self.units * self.inputs, self.units, heads * self.hidden, heads]
+        w1, b1, w2, b2 = theta.split(sizes, dim=1)
+        return (
+            w1.view(runs, self.units, self.inputs),
+            b1.view(runs, self.units, 1),
+            w2.view(runs, self.groups, self.outputs, self.hidden),
+            b2.view(runs, self.groups, self.outputs, 1),
+        )
+
+    def random(self, runs: int, draws: Draws) -> Tensor:
+        """Fresh weights, uniform in +-1/sqrt(fan in), ``(R, D)``."""
+        uniform = 2 * draws.uniform(runs, self.size) - 1
+        first = self.units * (self.inputs + 1)
+        scale = torch.full_like(uniform[0], self.hidden**-0.5)
+        scale[:first] = self.inputs**-0.5
+        return uniform * scale
+
+
+def hidden_layer(shape: Shape, theta: Tensor, inputs: Tensor) -> Tensor:
+    """Activations of the hidden neurons.
+
+    Args:
+        shape: sizes.
+        theta: weights ``(R, D)``.
+        inputs: ``(R, I, N)``.
+
+    Returns:
+        ``(R, G, H, N)``.
+    """
+    w1, b1, _, _ = shape.split(theta)
+    active = torch.baddbmm(b1, w1, inputs).sigmoid_()
+    return active.view(theta.shape[0], shape.groups, shape.hidden, -1)
+
+
+def forward(shape: Shape, theta: Tensor, inputs: Tensor) -> Tensor:
+    """Scaled outputs of every network.
+
+    Args:
+        shape: sizes.
+        theta: weights ``(R, D)``.
+        inputs: scaled inputs ``(R, I, N)``.
+
+    Returns:
+        ``(R, G, O, N)``.
+    """
+    _, _, w2, b2 = shape.split(theta)
+    return w2 @ hidden_layer(shape, theta, inputs) + b2
+
+
+def predict(shape: Shape, theta: Tensor, inputs: Tensor) -> Tensor:
+    """Scaled prediction: the three networks' outputs, or the ensemble's mean.
+
+    Returns:
+        ``(R, 3, N)``.
+    """
+    outputs = forward(shape, theta, inputs)
+    if shape.outputs == 1:
+        return outputs.squeeze(2)
+    return outputs.mean(1)

@@ -1,0 +1,91 @@
+"""Training by Rprop on full batches, all runs together.
+
+The gradient of a one-hidden-layer network is written out (tests compare it with
+autograd's), and Rprop follows `torch.optim.Rprop` step for step (tests compare the
+two), so that an epoch is a handful of batched products that torch can compile.
+"""
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from bns.snn.network import Shape, hidden_layer
+
+FIRST_STEP = 0.01  # torch.optim.Rprop's defaults
+SHRINK, GROW = 0.5, 1.2
+STEP_MIN, STEP_MAX = 1e-6, 50.0
+
+
+class RpropState(NamedTuple):
+    """Previous gradient and step size of every weight, each ``(R, D)``."""
+
+    previous: Tensor
+    step: Tensor
+
+    @classmethod
+    def fresh(cls, theta: Tensor) -> "RpropState":
+        """The state before the first epoch."""
+        return cls(torch.zeros_like(theta), torch.full_like(theta, FIRST_STEP))
+
+
+def gradient(
+    shape: Shape,
+    theta: Tensor,
+    inputs: Tensor,
+    targets: Tensor,
+    weight: Tensor,
+    keep: Tensor | None = None,
+) -> Tensor:
+    """Gradient of half the weighted sum of squared errors.
+
+    Args:
+        shape: sizes.
+        theta: weights ``(R, D)``.
+        inputs: ``(R, I, N)``.
+        targets: ``(R, G or 1, O, N)``.
+        weight: of each pattern, ``(R, 1, 1, N)``; 0 leaves one out.
+        keep: dropout factors of the hidden neurons ``(R, G, H, N)``, or None.
+
+    Returns:
+        ``(R, D)``.
+    """
+    runs = theta.shape[0]
+    _, _, w2, b2 = shape.split(theta)
+    active = hidden_layer(shape, theta, inputs)
+    shown = active if keep is None else active * keep
+    error = (w2 @ shown + b2 - targets) * weight
+    slope = (w2.transpose(2, 3) @ error) * (active * (1 - active))
+    if keep is not None:
+        slope = slope * keep
+    slope = slope.view(runs, shape.units, -1)
+    parts = [
+        slope @ inputs.transpose(1, 2),
+        slope.sum(2),
+        error @ shown.transpose(2, 3),
+        error.sum(3),
+    ]
+    return torch.cat([part.reshape(runs, -1) for part in parts], dim=1)
+
+
+def rprop(theta: Tensor, grad: Tensor, state: RpropState) -> tuple[Tensor, RpropState]:
+    """One Rprop step (Riedmiller and Braun 1993, as in `torch.optim.Rprop`)."""
+    agree = grad * state.previous
+    factor = torch.where(agree > 0, GROW, torch.where(agree < 0, SHRINK, 1.0))
+    step = (state.step * factor).clamp(STEP_MIN, STEP_MAX)
+    grad = torch.where(agree < 0, 0.0, grad)
+    return theta - grad.sign() * step, RpropState(grad, step)
+
+
+def epoch(
+    shape: Shape,
+    theta: Tensor,
+    state: RpropState,
+    inputs: Tensor,
+    targets: Tensor,
+    weight: Tensor,
+    keep: Tensor | None = None,
+) -> tuple[Tensor, RpropState]:
+    """One full-batch epoch; arguments as in `gradient`."""
+    grad = gradient(shape, theta, inputs, targets, weight, keep)
+    return rprop(theta, grad, state)

@@ -1,0 +1,112 @@
+"""Navigation tasks: objectives to reach in order, and how a path is scored.
+
+Scores are costs in the dissertation's unit, the centimetre (Algorithm 5, p. of
+section 4.2.4): lower is better.
+"""
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from bns.config import TaskConfig
+from bns.errors import UnknownNameError
+
+CENTIMETRES = 100.0  # [cm/m]
+
+ORDERS: dict[str, str] = {"simple": "ABCDA", "infinity": "ABEDCEA"}  # thesis 4.2.2
+
+
+def objectives(config: TaskConfig) -> dict[str, tuple[float, float]]:
+    """Positions of A to E on the board [m], the centre E being the origin.
+
+    The dissertation gives them in a picture only; the corners are an assumption:
+    A bottom right, B bottom left, C top left, D top right.
+    """
+    x, y = config.corner_x, config.corner_y
+    return {"A": (x, -y), "B": (-x, -y), "C": (-x, y), "D": (x, y), "E": (0.0, 0.0)}
+
+
+@dataclass(frozen=True)
+class NavigationTask:
+    """A fixed order of objectives.
+
+    Attributes:
+        goals: positions in order, shape ``(G, 2)`` [m].
+        config: how paths are scored.
+    """
+
+    goals: Tensor
+    config: TaskConfig
+
+    @classmethod
+    def of(cls, config: TaskConfig, device: str = "cpu") -> "NavigationTask":
+        """The task a configuration asks for.
+
+        Raises:
+            UnknownNameError: no such task.
+        """
+        if config.name not in ORDERS:
+            raise UnknownNameError("task", config.name, ORDERS)
+        places = objectives(config)
+        points = [places[letter] for letter in ORDERS[config.name]]
+        return cls(torch.tensor(points, device=device), config)
+
+    @property
+    def start(self) -> tuple[float, float, float]:
+        """Start pose in the world frame [m, m, rad]: E, heading `start_yaw`."""
+        return 0.0, 0.0, math.radians(self.config.start_yaw)
+
+    def score(self, positions: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
+        """Cost of paths and how many objectives each reached.
+
+        Args:
+            positions: position after each command in the world frame,
+                ``(..., K, 2)`` [m]; beyond a list's end it repeats the last one.
+            lengths: commands in each list, ``(...)``.
+
+        Returns:
+            cost ``(...)`` and objectives reached ``(...)`` (int64).
+        """
+        return score(
+            positions,
+            lengths,
+            self.goals.to(positions.dtype),
+            self.config.radius * CENTIMETRES,
+            self.config.penalty,
+            self.config.command_cost,
+            self.config.squared,
+            self.config.charge_unused,
+        )
+
+
+def score(
+    positions: Tensor,
+    lengths: Tensor,
+    goals: Tensor,
+    radius: float,
+    penalty: float,
+    command_cost: float,
+    squared: bool,
+    charge_unused: bool,
+) -> tuple[Tensor, Tensor]:
+    """Algorithm 5 with its two readings as switches; see `NavigationTask.score`.
+
+    Commands after the last objective cost nothing but `command_cost`; with
+    `charge_unused`, places beyond the list cost the standing robot's distance.
+    """
+    count = goals.shape[0]
+    active = torch.zeros_like(lengths)
+    total = command_cost * lengths.to(positions.dtype)
+    for place in range(positions.shape[-2]):
+        goal = goals[active.clamp(max=count - 1)]
+        offset = (positions[..., place, :] - goal) * CENTIMETRES
+        square = offset.square().sum(-1)
+        distance = square.sqrt()
+        used = place < lengths
+        counts = (active < count) & (used | charge_unused)
+        total = total + torch.where(counts, square if squared else distance, 0.0)
+        active = active + (used & (distance < radius) & (active < count))
+    missed = (count - active).to(positions.dtype)
+    return total + penalty * missed, active
