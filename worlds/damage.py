@@ -6,7 +6,7 @@ An event is written in text as
 
 ONSET and END are a trial, counted from 0, or a time within it, ``trial:seconds``:
 
-    wheel_gain:wheel=left,factor=0.8            always
+    wheel_gain:wheel=left,factor=0.8            always (onset in trial 0)
     wheel_gain:wheel=left,factor=0.8@30         from trial 30 on
     wheel_gain:wheel=left,factor=0.8@30:2.5s    from 2.5 s into trial 30 on
     wheel_gain:wheel=left,factor=0.8@30..60     in trials 30 to 59
@@ -24,9 +24,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from bns.errors import BnsError
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect
+
+from bns.errors import BnsError
 
 GRAMMAR = "NAME[:parameter=value,...][@ONSET[..END]][~RAMP][%PERIOD/ON]"
 EXAMPLE = "wheel_gain:wheel=left,factor=0.8@30"
@@ -146,7 +147,9 @@ class Event:
             for key, value in given.items()
             if key != "effect"
         }
-        return cls(registry.parse(given["effect"]), **schedule)
+        effect = registry.parse(given["effect"])
+        _refuse_weak(effect, [p for p in effect.values if f"{p}=" in given["effect"]])
+        return cls(effect, **schedule)
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> "Event":
@@ -159,6 +162,7 @@ class Event:
         """
         effect = {key: item for key, item in table.items() if key not in _TABLE_KEYS}
         schedule = {_TABLE_KEYS[key]: table[key] for key in table if key not in effect}
+        _refuse_weak(registry.from_table(effect), effect)
         return cls(registry.from_table(effect), **schedule)
 
     def __str__(self) -> str:
@@ -250,6 +254,16 @@ class Damage:
     def texts(self) -> tuple[str, ...]:
         """One text per event (parses back)."""
         return tuple(str(event) for event in self.events)
+
+
+def _refuse_weak(effect: Effect, given: Iterable[str]) -> None:
+    strengths = [item for item in effect.parameters if item.scales]
+    if effect.is_nominal and not any(item.name in given for item in strengths):
+        remedy = " or ".join(f"{item.name}={item.example:g}" for item in strengths)
+        raise BnsError(
+            f"Damage {effect.name!r} without a strength changes nothing: "
+            f"give for example {remedy}."
+        )
 
 
 def _moment(trial: int, time: float) -> str:

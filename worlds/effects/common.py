@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 import numpy as np
-
 from bns.worlds.effects.base import Choice, ControlSignal, Effect
 
 # [m/s per speed unit] Khepera III manual 2.2, p. 14 (firmware < 3): 144.01 units
@@ -13,9 +12,9 @@ SPEED_UNIT = 1e-3 / 144.01
 TOP_SPEED = 0.3334  # 48,000 units are 0.33331 m/s
 # [m/s] Smallest speed that the lab's controllers use, 8,000 units; below it a speed
 # gene means stop.
-MINIMUM_SPEED = round(8000 * SPEED_UNIT, 4)
+MINIMUM_SPEED = round(8000 * SPEED_UNIT, 6)
 # [m/s] Largest speed that the lab's controllers use, 17,500 units.
-MAXIMUM_SPEED = round(17500 * SPEED_UNIT, 4)
+MAXIMUM_SPEED = round(17500 * SPEED_UNIT, 6)
 
 WHEEL = Choice("wheel", ("left", "right", "both"), "both", "which wheel is affected")
 

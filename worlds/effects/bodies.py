@@ -1,0 +1,101 @@
+"""Where body effects find the parts of a wheeled robot in a `mujoco.MjSpec`.
+
+Only the wheels' body names are relied on, ``left_wheel`` and ``right_wheel``; the base,
+joints, geoms and actuators follow from them.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bns.errors import BnsError
+
+
+def wheel(spec: Any, side: str) -> Any:
+    """The wheel's body; `side` is "left" or "right".
+
+    Raises:
+        BnsError: the model has none.
+    """
+    body = spec.body(f"{side}_wheel")
+    if body is None:
+        raise BnsError(
+            f"Model {spec.modelname!r} has no body '{side}_wheel': this effect needs "
+            "a wheeled robot; see `bns robots`."
+        )
+    return body
+
+
+def base(spec: Any) -> Any:
+    """The body that carries the wheels."""
+    return wheel(spec, "left").parent
+
+
+def joint(spec: Any, side: str) -> Any:
+    """The wheel's joint."""
+    return wheel(spec, side).joints[0]
+
+
+def actuator(spec: Any, side: str) -> Any:
+    """The actuator that drives the wheel."""
+    target = joint(spec, side).name
+    return next(item for item in spec.actuators if item.target == target)
+
+
+def contact_geoms(body: Any) -> Iterator[Any]:
+    """The geoms of a body that can touch something."""
+    return (geom for geom in body.geoms if geom.contype or geom.conaffinity)
+
+
+@dataclass(frozen=True, eq=False)
+class Inertial:
+    """Mass properties of a body, in its own frame.
+
+    Attributes:
+        mass: [kg].
+        centre: centre of mass, shape ``(3,)`` [m].
+        inertia: about that centre, along the body's axes, shape ``(3, 3)`` [kg m2].
+    """
+
+    mass: float
+    centre: np.ndarray
+    inertia: np.ndarray
+
+    @classmethod
+    def of(cls, spec: Any, body: Any) -> "Inertial":
+        """As compiled, whether the model gives them or its geoms imply them."""
+        import mujoco
+
+        model = spec.copy().compile()
+        index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body.name)
+        rotation = np.empty(9)
+        mujoco.mju_quat2Mat(rotation, model.body_iquat[index])
+        axes = rotation.reshape(3, 3)
+        inertia = axes @ np.diag(model.body_inertia[index]) @ axes.T
+        return cls(float(model.body_mass[index]), model.body_ipos[index], inertia)
+
+    def plus_point(self, mass: float, position: np.ndarray) -> "Inertial":
+        """With a point mass [kg] added at `position` [m] (parallel-axis theorem)."""
+        total = self.mass + mass
+        centre = (self.mass * self.centre + mass * position) / total
+        inertia = (
+            self.inertia
+            + _point(self.mass, self.centre - centre)
+            + _point(mass, position - centre)
+        )
+        return Inertial(total, centre, inertia)
+
+    def write(self, body: Any) -> None:
+        """Into a body of an `MjSpec`, in place of what it had."""
+        i = self.inertia
+        body.explicitinertial = True
+        body.mass = self.mass
+        body.ipos = self.centre
+        body.iquat = [1, 0, 0, 0]
+        body.fullinertia = [i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
+
+
+def _point(mass: float, offset: np.ndarray) -> np.ndarray:
+    return mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))

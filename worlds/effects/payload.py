@@ -1,0 +1,50 @@
+"""Payload: the robot carries a mass that the model does not know."""
+
+from typing import Any
+
+import numpy as np
+from bns.worlds.effects import bodies
+from bns.worlds.effects.base import BodyEffect, Parameter
+
+
+def _place(name: str, nominal: float, low: float, high: float, doc: str) -> Parameter:
+    return Parameter(
+        name,
+        unit="m",
+        nominal=nominal,
+        low=low,
+        high=high,
+        doc=doc,
+        example=nominal,
+        scales=False,
+    )
+
+
+class Payload(BodyEffect):
+    """A point mass fixed to the base, added to its mass, centre and inertia."""
+
+    name = "payload"
+    doc = "the robot carries a mass that the model does not know"
+    source = "parallel-axis theorem; a point mass is assumed"
+    parameters = (
+        Parameter(
+            "mass",
+            unit="kg",
+            nominal=0.0,
+            low=0.0,
+            high=2.0,
+            doc="mass carried (the Khepera III itself: 0.69 kg); bounds assumed",
+            example=0.5,
+        ),
+        _place("x", 0.0, -0.065, 0.065, "ahead of the axle; bounds: the body's radius"),
+        _place("y", 0.0, -0.065, 0.065, "to the left; bounds: the body's radius"),
+        _place("z", 0.07, 0.0, 0.3, "above the floor; nominal: the top plate (69 mm)"),
+    )
+
+    def edit(self, spec: Any) -> None:
+        if self.is_nominal:
+            return
+        body = bodies.base(spec)
+        position = np.array([self["x"], self["y"], self["z"]])
+        inertial = bodies.Inertial.of(spec, body).plus_point(self["mass"], position)
+        inertial.write(body)
