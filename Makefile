@@ -1,0 +1,47 @@
+# make demo   train BNS against a damaged robot, leave runs/demo/ with a report
+# make test   run the test suite
+# make lint   formatting and lint checks
+# make clean  remove the environment and build leftovers (never runs/)
+#
+# Both first make .venv with everything in it, once; PYTHON=... chooses the Python.
+
+SHELL := /bin/sh
+VENV := .venv
+STAMP := $(VENV)/.installed
+BIN := $(VENV)/bin
+DEMO := runs/demo
+PYTHON ?=
+
+export OMP_NUM_THREADS ?= 1
+export RERUN_ANALYTICS ?= 0
+
+.PHONY: help demo test lint env clean
+
+help:
+	@sed -n '1,/^$$/s/^# \{0,1\}//p' Makefile
+
+demo: env
+	@if [ -e $(DEMO) ]; then \
+	  echo "Going on with what is in $(DEMO) (remove it to start afresh)."; \
+	  $(BIN)/bns run demo --out $(DEMO) --resume; \
+	else \
+	  $(BIN)/bns run demo --out $(DEMO); \
+	fi
+
+test: env
+	$(BIN)/python -m pytest
+
+lint: env
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+
+env: $(STAMP)
+
+$(STAMP): pyproject.toml setup.py constraints.txt
+	@sh .ci/venv $(VENV) $(PYTHON)
+	@echo "Installing into $(VENV) (some minutes, once) ..."
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[dev]'
+	@touch $@
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info

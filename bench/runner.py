@@ -1,0 +1,144 @@
+"""Find the benches, run one, keep its result."""
+
+import ast
+import json
+import math
+import os
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import redirect_stdout
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib import import_module
+from pathlib import Path
+
+from bench.result import Result
+from bench.versions import commit, machine, versions
+from bns.errors import BnsError, UnknownNameError
+
+HERE = Path(__file__).resolve().parent
+RESULTS = HERE / "results"
+CONSTANTS = ("DOC", "BAR")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bench:
+    """A bench as its source describes it; nothing of it is imported for this.
+
+    Attributes:
+        name: as given on the command line, with dashes.
+        module: importable name.
+        doc: what is measured.
+        bar: the bar as text.
+    """
+
+    name: str
+    module: str
+    doc: str
+    bar: str
+
+    def run(self, *, quick: bool) -> Result:
+        """Measure."""
+        return import_module(self.module).run(quick=quick)
+
+
+def discover(directory: Path = HERE) -> dict[str, Bench]:
+    """All benches by name: the modules that define `DOC`, `BAR` and `run`."""
+    found = (_read(path) for path in sorted(directory.glob("*.py")))
+    return {bench.name: bench for bench in found if bench}
+
+
+def find(name: str) -> Bench:
+    """The bench `name`.
+
+    Raises:
+        UnknownNameError: there is none.
+    """
+    benches = discover()
+    if name not in benches:
+        raise UnknownNameError("bench", name, benches)
+    return benches[name]
+
+
+def measure(bench: Bench, *, quick: bool) -> dict[str, object]:
+    """Run a bench and return its row, ready for JSON."""
+    made_with, at = versions(), commit()
+    started = time.perf_counter()
+    with redirect_stdout(sys.stderr):
+        result = bench.run(quick=quick)
+    seconds = time.perf_counter() - started
+    if not math.isfinite(result.figure):
+        raise BnsError(f"Bench {bench.name} measured {result.figure}, not a number.")
+    return {
+        "name": bench.name,
+        "figure": float(result.figure),
+        "unit": result.unit,
+        "bar": bench.bar,
+        "holds": None if result.holds is None else bool(result.holds),
+        "n": int(result.n),
+        "seconds": round(seconds, 2),
+        "command": f"python -m bench {bench.name}{' --quick' if quick else ''}",
+        "versions": made_with,
+        "machine": machine(),
+        "commit": at,
+        "date": datetime.now(UTC).strftime("%Y-%m-%d"),
+        "quick": quick,
+        "details": plain(result.details),
+    }
+
+
+def store(row: Mapping[str, object], directory: Path = RESULTS) -> Path:
+    """Write a row; a quick one goes to `quick/` and never replaces a full one."""
+    folder = directory / "quick" if row["quick"] else directory
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{row['name']}.json"
+    write(path, json.dumps(row, indent=1, allow_nan=False) + "\n")
+    return path
+
+
+def stored(*, quick: bool = False, directory: Path = RESULTS) -> dict[str, dict]:
+    """Rows kept so far, by name."""
+    folder = directory / "quick" if quick else directory
+    rows = (json.loads(path.read_text()) for path in sorted(folder.glob("*.json")))
+    return {row["name"]: row for row in rows}
+
+
+def write(path: Path, text: str) -> None:
+    """Replace a file in one step, so that a kill leaves the old or the new one."""
+    part = path.with_name(path.name + ".part")
+    part.write_text(text)
+    os.replace(part, path)
+
+
+def plain(value: object) -> object:
+    """A value as JSON can hold it: arrays to lists, what is not finite to null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [plain(item) for item in value]
+    return value
+
+
+def _read(path: Path) -> Bench | None:
+    tree = ast.parse(path.read_text(), filename=str(path))
+    has_run = any(isinstance(n, ast.FunctionDef) and n.name == "run" for n in tree.body)
+    texts = {
+        target.id: node.value.value
+        for node in tree.body
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant)
+        for target in node.targets
+        if isinstance(target, ast.Name) and target.id in CONSTANTS
+    }
+    if not has_run or set(texts) != set(CONSTANTS):
+        return None
+    return Bench(
+        name=path.stem.replace("_", "-"),
+        module=f"{__package__}.{path.stem}",
+        doc=texts["DOC"],
+        bar=texts["BAR"],
+    )
