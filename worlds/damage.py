@@ -24,10 +24,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from bns.errors import BnsError
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect
-
-from bns.errors import BnsError
 
 GRAMMAR = "NAME[:parameter=value,...][@ONSET[..END]][~RAMP][%PERIOD/ON]"
 EXAMPLE = "wheel_gain:wheel=left,factor=0.8@30"

@@ -1,6 +1,7 @@
 """Battery sag: the speed reached falls with time and with distance driven."""
 
 import numpy as np
+
 from bns.worlds.effects.base import ActuatorEffect, ControlSignal, Parameter
 
 

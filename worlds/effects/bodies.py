@@ -94,6 +94,7 @@ class Inertial:
         body.mass = self.mass
         body.ipos = self.centre
         body.iquat = [1, 0, 0, 0]
+        body.inertia = [0, 0, 0]  # the full matrix replaces it
         body.fullinertia = [i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
 
 

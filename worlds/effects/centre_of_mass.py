@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+
 from bns.worlds.effects import bodies
 from bns.worlds.effects.base import BodyEffect, Parameter
 

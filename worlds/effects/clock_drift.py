@@ -1,6 +1,7 @@
 """Clock drift: the tracker's clock is fast or slow."""
 
 import numpy as np
+
 from bns.worlds.effects.base import Parameter, PoseSignal, TrackingEffect
 
 

@@ -1,6 +1,7 @@
 """Command latency: commands reach the motors late."""
 
 import numpy as np
+
 from bns.worlds.effects.base import CommandEffect, ControlSignal, Parameter
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import numpy as np
+
 from bns.worlds.effects.base import Choice, ControlSignal, Effect
 
 # [m/s per speed unit] Khepera III manual 2.2, p. 14 (firmware < 3): 144.01 units

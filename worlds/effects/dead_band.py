@@ -1,6 +1,7 @@
 """Dead band: slow speeds give a stop."""
 
 import numpy as np
+
 from bns.worlds.effects.base import CommandEffect, ControlSignal, Parameter
 from bns.worlds.effects.common import WHEEL, columns
 

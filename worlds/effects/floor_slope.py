@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+
 from bns.worlds.effects.base import BodyEffect, Parameter
 
 

@@ -1,6 +1,7 @@
 """Motor lag: the wheels follow their commands as a first-order system."""
 
 import numpy as np
+
 from bns.worlds.effects.base import ActuatorEffect, ControlSignal, Parameter
 from bns.worlds.effects.common import WHEEL, columns, spans
 

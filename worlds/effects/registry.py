@@ -11,10 +11,9 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
+from bns.errors import BnsError, UnknownNameError
 from bns.worlds import effects as package
 from bns.worlds.effects.base import Effect
-
-from bns.errors import BnsError, UnknownNameError
 
 EXAMPLE = "wheel_gain:wheel=left,factor=0.8"
 

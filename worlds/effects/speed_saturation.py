@@ -1,6 +1,7 @@
 """Speed saturation: a wheel turns no faster than a limit."""
 
 import numpy as np
+
 from bns.worlds.effects.base import CommandEffect, ControlSignal, Parameter
 from bns.worlds.effects.common import TOP_SPEED, WHEEL, columns
 

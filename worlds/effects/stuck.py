@@ -1,6 +1,7 @@
 """What the two stuck-wheel effects share."""
 
 import numpy as np
+
 from bns.worlds.effects.base import Choice, CommandEffect, ControlSignal, Parameter
 from bns.worlds.effects.common import TOP_SPEED, WHEEL, columns
 

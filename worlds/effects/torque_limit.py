@@ -2,11 +2,10 @@
 
 from typing import Any
 
+from bns.errors import BnsError
 from bns.worlds.effects import bodies
 from bns.worlds.effects.base import BodyEffect, Parameter
 from bns.worlds.effects.common import WHEEL
-
-from bns.errors import BnsError
 
 
 class TorqueLimit(BodyEffect):

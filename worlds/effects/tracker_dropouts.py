@@ -1,6 +1,7 @@
 """Tracker drop-outs: samples are lost, singly or in bursts."""
 
 import numpy as np
+
 from bns.worlds.effects.base import Parameter, PoseSignal, TrackingEffect
 
 

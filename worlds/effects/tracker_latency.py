@@ -1,6 +1,7 @@
 """Tracker latency: the poses reported are old."""
 
 import numpy as np
+
 from bns.worlds.effects.base import Parameter, PoseSignal, TrackingEffect
 
 

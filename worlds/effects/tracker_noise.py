@@ -1,6 +1,7 @@
 """Tracker noise: reported poses scatter."""
 
 import numpy as np
+
 from bns.worlds.effects.base import Parameter, PoseSignal, TrackingEffect
 
 

@@ -1,6 +1,7 @@
 """Tracker rotation: the camera is turned against the board."""
 
 import numpy as np
+
 from bns.worlds.effects.base import Parameter, PoseSignal, TrackingEffect
 
 

@@ -1,6 +1,7 @@
 """Tracker scale: lengths are reported too long or too short."""
 
 import numpy as np
+
 from bns.worlds.effects.base import Parameter, PoseSignal, TrackingEffect
 
 

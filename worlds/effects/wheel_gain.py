@@ -1,6 +1,7 @@
 """Wheel gain: a wheel turns at a share of the speed it is told."""
 
 import numpy as np
+
 from bns.worlds.effects.base import CommandEffect, ControlSignal, Parameter
 from bns.worlds.effects.common import WHEEL, columns
 

@@ -1,6 +1,7 @@
 """Wheel intermittent: every m-th command of a wheel is lost."""
 
 import numpy as np
+
 from bns.worlds.effects.base import CommandEffect, ControlSignal, Parameter
 from bns.worlds.effects.common import TOP_SPEED, WHEEL, columns
 

@@ -1,0 +1,303 @@
+"""What every effect must keep to; a new effect is tested by being there."""
+
+import json
+import re
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from bns.errors import BnsError, OutOfBoundsError, UnknownNameError
+from bns.worlds.effects import listing, registry
+from bns.worlds.effects.base import STAGES, ControlSignal, PoseSignal
+
+ROVER = (Path(__file__).parent / "rover.xml").read_text()
+NAMES = registry.names()
+IN_TIME = [name for name in NAMES if registry.get(name).stage != "body"]
+OF_WHEELS = [
+    name
+    for name in NAMES
+    if any(choice.name == "wheel" for choice in registry.get(name).choices)
+]
+LASTING = {"clock_drift"}  # what a clock has gained stays when the drift ends
+STEPS, DT, SAMPLES = 600, 0.005, 31
+
+
+def frozen(array) -> np.ndarray:
+    array = np.array(array)
+    array.setflags(write=False)
+    return array
+
+
+@pytest.fixture
+def control() -> ControlSignal:
+    """Twelve random commands of 40 to 49 steps, then rest; read-only."""
+    rng = np.random.default_rng(1)
+    command = np.repeat(np.arange(12), rng.integers(40, 50, 12))
+    command = np.concatenate([command, -np.ones(STEPS - len(command), dtype=int)])
+    speeds = np.concatenate([rng.uniform(-0.12, 0.12, (12, 2)), np.zeros((1, 2))])
+    return ControlSignal(
+        times=frozen(np.arange(STEPS) * DT),
+        values=frozen(speeds[command]),
+        command=frozen(command),
+        channels=("left_speed", "right_speed"),
+        dt=DT,
+    )
+
+
+@pytest.fixture
+def track() -> PoseSignal:
+    """A smooth random path, sampled every 0.1 s; read-only."""
+    rng = np.random.default_rng(2)
+    fine_times = np.arange(STEPS + 1) * DT
+    fine_poses = np.cumsum(rng.normal(0.001, 0.001, (STEPS + 1, 3)), axis=0)
+    every = STEPS // (SAMPLES - 1)
+    return PoseSignal(
+        times=frozen(fine_times[::every]),
+        poses=frozen(fine_poses[::every]),
+        fine_times=frozen(fine_times),
+        fine_poses=frozen(fine_poses),
+    )
+
+
+@pytest.fixture
+def signals(control, track) -> dict:
+    return {"command": control, "actuator": control, "tracking": track}
+
+
+def compiled(effect=None) -> mujoco.MjModel:
+    spec = mujoco.MjSpec.from_string(ROVER)
+    if effect is not None:
+        effect.edit(spec)
+    return spec.compile()
+
+
+def as_bytes(model) -> bytes:
+    """Every field of a model."""
+    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return buffer.tobytes()
+
+
+def length(signals, effect) -> int:
+    return len(signals[effect.stage].times)
+
+
+def after(effect, signals, *, active=None, seed=0) -> tuple[np.ndarray, ...]:
+    """The arrays that the effect makes of the signal of its stage."""
+    signal = signals[effect.stage]
+    active = np.ones(len(signal.times), bool) if active is None else active
+    result = effect.apply(signal, active, np.random.default_rng(seed))
+    return result if isinstance(result, tuple) else (result,)
+
+
+def before(effect, signals) -> tuple[np.ndarray, ...]:
+    signal = signals[effect.stage]
+    tracking = effect.stage == "tracking"
+    return (signal.times, signal.poses) if tracking else (signal.values,)
+
+
+def same(some, others) -> bool:
+    return all(a.tobytes() == b.tobytes() for a, b in zip(some, others, strict=True))
+
+
+def unchanged(effect, signals) -> bool:
+    if effect.stage == "body":
+        return as_bytes(compiled(effect)) == as_bytes(compiled())
+    return same(after(effect, signals), before(effect, signals))
+
+
+@pytest.mark.parametrize("name", NAMES)
+class TestEveryEffect:
+    def test_says_what_it_is(self, name):
+        effect = registry.get(name)
+        assert effect.name == effect.__module__.rpartition(".")[2]
+        assert effect.stage in STAGES
+        assert effect.doc and "\n" not in effect.doc
+        assert effect.source and effect.robots and effect.parameters
+        for item in effect.parameters:
+            assert item.unit and item.doc
+            assert item.low <= item.nominal <= item.high
+            assert item.check(name, item.example) == item.example
+        assert any(item.scales for item in effect.parameters)
+
+    def test_nominal_changes_nothing_bit_for_bit(self, name, signals):
+        assert registry.make(name).is_nominal
+        assert unchanged(registry.make(name), signals)
+
+    def test_severity_zero_is_nominal_and_one_is_the_effect(self, name, signals):
+        effect = listing.example(registry.get(name))
+        assert effect.scaled(1) == effect
+        assert effect.scaled(0).is_nominal
+        assert unchanged(effect.scaled(0), signals)
+        with pytest.raises(BnsError, match=r"severity = 1\.5 .* 0 to 1"):
+            effect.scaled(1.5)
+
+    def test_example_changes_something(self, name, signals):
+        effect = listing.example(registry.get(name))
+        assert not effect.is_nominal
+        assert not unchanged(effect, signals)
+
+    def test_bounds_hold(self, name):
+        for item in registry.get(name).parameters:
+            reach = item.high - item.low
+            for bad in (item.low - reach, item.high + reach, float("nan"), "much"):
+                with pytest.raises(OutOfBoundsError) as caught:
+                    registry.make(name, **{item.name: bad})
+                message = str(caught.value)
+                assert f"{name}:{item.name} = {bad}" in message
+                assert f"from {item.low:g} to {item.high:g}" in message
+                assert item.unit in message or item.unit == "1"
+
+    def test_unknown_parameters_and_options_are_refused(self, name):
+        with pytest.raises(UnknownNameError, match=f"parameter of {name} 'strenght'"):
+            registry.make(name, strenght=1)
+        for choice in registry.get(name).choices:
+            with pytest.raises(UnknownNameError, match=choice.options[0]):
+                registry.make(name, **{choice.name: "nowhere"})
+
+    def test_text_and_table_read_back(self, name):
+        rng = np.random.default_rng(3)
+        kind = registry.get(name)
+        for _ in range(20):
+            values = {p.name: rng.uniform(p.low, p.high) for p in kind.parameters}
+            for item in kind.parameters:
+                if item.integer:
+                    values[item.name] = round(values[item.name])
+            values |= {c.name: str(rng.choice(c.options)) for c in kind.choices}
+            effect = kind(values)
+            assert registry.parse(str(effect)) == effect
+            assert registry.from_table({"effect": name, **effect.values}) == effect
+
+    def test_same_seed_same_bytes(self, name, signals):
+        effect = listing.example(registry.get(name))
+        if effect.stage == "body":
+            assert as_bytes(compiled(effect)) == as_bytes(compiled(effect))
+            return
+        first = after(effect, signals, seed=7)
+        assert same(first, after(effect, signals, seed=7))
+        assert same(first, after(effect, signals, seed=8)) != effect.random
+
+
+@pytest.mark.parametrize("name", IN_TIME)
+class TestEffectsOnSignals:
+    def test_nothing_changes_while_off(self, name, signals):
+        effect = listing.example(registry.get(name))
+        count = length(signals, effect)
+        active = np.zeros(count, bool)
+        active[count // 3 : 2 * count // 3] = True
+        off = ~active
+        if name in LASTING:
+            off[2 * count // 3 :] = False
+        for new, old in zip(
+            after(effect, signals, active=active), before(effect, signals), strict=True
+        ):
+            assert new[off].tobytes() == old[off].tobytes()
+        assert not same(after(effect, signals, active=active), before(effect, signals))
+
+    def test_result_is_its_own_memory_and_shape(self, name, signals):
+        for effect in (registry.make(name), listing.example(registry.get(name))):
+            for new, old in zip(
+                after(effect, signals), before(effect, signals), strict=True
+            ):
+                assert not np.shares_memory(new, old)
+                assert new.shape == old.shape and new.dtype == np.float64
+
+    def test_time_does_not_go_backwards(self, name, signals):
+        effect = listing.example(registry.get(name))
+        if effect.stage == "tracking":
+            times, _ = after(effect, signals)
+            assert (np.diff(times) >= 0).all()
+
+
+@pytest.mark.parametrize("name", OF_WHEELS)
+@pytest.mark.parametrize("wheel, other", [("left", "right"), ("right", "left")])
+def test_only_the_named_wheel_is_touched(name, wheel, other, signals):
+    example = listing.example(registry.get(name))
+    effect = registry.make(name, **{**example.values, "wheel": wheel})
+    if effect.stage == "body":
+        old, new = wheel_fields(compiled()), wheel_fields(compiled(effect))
+        assert old[other] == new[other]
+        assert old[wheel] != new[wheel]
+        return
+    signal = signals[effect.stage]
+    ((new,), (old,)) = after(effect, signals), before(effect, signals)
+    kept, moved = signal.column(f"{other}_speed"), signal.column(f"{wheel}_speed")
+    assert new[:, kept].tobytes() == old[:, kept].tobytes()
+    assert new[:, moved].tobytes() != old[:, moved].tobytes()
+
+
+def wheel_fields(model) -> dict[str, dict[str, bytes]]:
+    """Per wheel, every given (not derived) field of its elements."""
+    derived = ("invweight0", "M0", "acc0", "subtreemass")
+    fields = {}
+    for side in ("left", "right"):
+        body = model.body(f"{side}_wheel").id
+        joint = model.joint(f"{side}_wheel_joint")
+        index = {
+            "body": body,
+            "geom": model.body_geomadr[body],
+            "jnt": joint.id,
+            "dof": joint.dofadr[0],
+            "actuator": model.actuator(f"{side}_wheel").id,
+        }
+        fields[side] = {
+            key: getattr(model, key)[index[key.partition("_")[0]]].tobytes()
+            for key in dir(model)
+            if key.partition("_")[0] in index
+            and isinstance(getattr(model, key), np.ndarray)
+            and not key.endswith(derived)
+        }
+    return fields
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in NAMES if registry.get(name).stage == "body"]
+)
+def test_body_effects_keep_the_sizes_and_the_physics_sound(name):
+    model = compiled(listing.example(registry.get(name)))
+    assert len(as_bytes(model)) == len(as_bytes(compiled()))
+    data = mujoco.MjData(model)
+    data.ctrl[:] = 3.0  # [rad/s]
+    mujoco.mj_step(model, data, nstep=200)
+    assert np.isfinite(data.qpos).all()
+    assert not any(warning.number for warning in data.warning)
+
+
+def test_listing_is_plain_data_for_every_effect():
+    rows = listing.rows()
+    assert json.loads(json.dumps(rows)) == rows
+    assert sorted(row["name"] for row in rows) == list(NAMES)
+    stages = [STAGES.index(row["stage"]) for row in rows]
+    assert stages == sorted(stages)
+    for row in rows:
+        assert str(registry.parse(row["example"])) == row["example"]
+
+
+def test_unknown_effect_gets_a_suggestion():
+    with pytest.raises(UnknownNameError, match="Did you mean 'wheel_gain'"):
+        registry.get("wheel_gian")
+
+
+def test_a_piece_without_equals_belongs_to_the_value_before_it():
+    with pytest.raises(UnknownNameError, match="'left,right'"):
+        registry.parse("wheel_gain:wheel=left,right,factor=0.8")
+
+
+@pytest.mark.parametrize(
+    "text", ["wheel_gain:", "wheel_gain:0.8", "wheel_gain:=1", "wheel_gain:factor=1,,"]
+)
+def test_bad_text_is_refused_with_an_example(text):
+    with pytest.raises(BnsError, match=re.escape(registry.EXAMPLE)):
+        registry.parse(text)
+
+
+def test_a_parameter_given_twice_is_refused():
+    with pytest.raises(BnsError, match="each parameter once"):
+        registry.parse("wheel_gain:factor=0.5,factor=0.8")
+
+
+def test_a_table_without_a_name_is_refused():
+    with pytest.raises(BnsError, match="has no name"):
+        registry.from_table({"factor": 0.8})
