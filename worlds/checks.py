@@ -1,0 +1,66 @@
+"""Checks of what every world is given."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bns.errors import BnsError, OutOfBoundsError
+from bns.worlds.damage import Damage
+
+
+def bounded(name: str, value: float, low: float, high: float, unit: str) -> float:
+    """The number, if it is inside its bounds.
+
+    Raises:
+        OutOfBoundsError: it is not, or it is no number.
+    """
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = np.nan
+    if not low <= number <= high:
+        raise OutOfBoundsError(name, value, low, high, unit)
+    return number
+
+
+def checked_start(
+    start: Sequence[float], arena: tuple[float, float]
+) -> tuple[float, float, float]:
+    """The start pose, if it is inside the arena.
+
+    Raises:
+        BnsError: it is not three numbers.
+        OutOfBoundsError: it is not.
+    """
+    if len(start) != 3:
+        raise BnsError(f"start = {start} is not allowed: give (x, y, yaw) [m, m, rad].")
+    x, y, yaw = start
+    return (
+        bounded("start x", x, -arena[0] / 2, arena[0] / 2, "m"),
+        bounded("start y", y, -arena[1] / 2, arena[1] / 2, "m"),
+        bounded("start yaw", yaw, -1e3, 1e3, "rad"),
+    )
+
+
+def shared(
+    damage: Damage | tuple[Damage, ...], seeds: Sequence[int], robots: int
+) -> tuple[Sequence[Damage], Sequence[int]]:
+    """A damage and a seed for each of the robots.
+
+    Raises:
+        BnsError: there are other numbers of them, or a negative seed.
+    """
+    if isinstance(damage, Damage):
+        damage = (damage,) * robots
+    if len(damage) != robots:
+        raise BnsError(
+            f"{len(damage)} damages were given for {robots} robots: give one for "
+            "each, or a single one for all."
+        )
+    seeds = [int(seed) for seed in seeds] if len(seeds) else [0] * robots
+    if len(seeds) != robots or min(seeds, default=0) < 0:
+        raise BnsError(
+            f"seeds has {len(seeds)} entries for {robots} robots: give one "
+            "non-negative whole number for each, or none."
+        )
+    return damage, seeds

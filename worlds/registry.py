@@ -1,0 +1,91 @@
+"""All worlds by name; other packages add theirs by the entry point `bns.worlds`.
+
+A world is registered as a callable that takes settings by keyword and returns a
+`World`. An installed package does so in its `pyproject.toml`,
+
+    [project.entry-points."bns.worlds"]
+    my-world = "my_package.module:MyWorld"
+
+and a script with `register("my-world", MyWorld)`. The first line of the callable's
+docstring is its description.
+"""
+
+import inspect
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Any
+
+from bns.errors import BnsError, UnknownNameError
+from bns.worlds.world import World
+
+GROUP = "bns.worlds"
+_BUILT_IN = {
+    "mujoco": "bns.worlds.mujoco_world:MujocoWorld",
+    "static-snn": "bns.worlds.static_snn_world:StaticSnnWorld",
+}
+_registered: dict[str, Callable[..., World]] = {}
+
+
+def register(name: str, factory: Callable[..., World]) -> None:
+    """Make a world known under a name.
+
+    Raises:
+        BnsError: the name is taken by another one.
+    """
+    if name in names() and _registered.get(name) is not factory:
+        raise BnsError(f"A world called {name!r} exists already; take another name.")
+    _registered[name] = factory
+
+
+@cache
+def _installed() -> dict[str, Any]:
+    return {entry.name: entry for entry in entry_points(group=GROUP)}
+
+
+def names() -> tuple[str, ...]:
+    """Names of all worlds, sorted."""
+    return tuple(sorted({*_BUILT_IN, *_installed(), *_registered}))
+
+
+def get(name: str) -> Callable[..., World]:
+    """What makes the world called `name`.
+
+    Raises:
+        UnknownNameError: there is none.
+    """
+    if name in _registered:
+        return _registered[name]
+    if name in _BUILT_IN:
+        module, _, attribute = _BUILT_IN[name].partition(":")
+        return getattr(import_module(module), attribute)
+    if name in _installed():
+        return _installed()[name].load()
+    raise UnknownNameError("world", name, names())
+
+
+def describe() -> dict[str, str]:
+    """One line about each world, by name."""
+    docs = {name: inspect.getdoc(get(name)) or "" for name in names()}
+    return {name: doc.split("\n", 1)[0] for name, doc in docs.items()}
+
+
+def make(name: str, **settings: Any) -> World:
+    """The world called `name`.
+
+    Args:
+        name: of the world.
+        settings: keyword arguments of the world.
+
+    Raises:
+        UnknownNameError: no such world, or it has no such setting.
+        BnsError: a setting that the world refuses.
+    """
+    factory = get(name)
+    parameters = inspect.signature(factory).parameters
+    if not any(p.kind is p.VAR_KEYWORD for p in parameters.values()):
+        for setting in settings:
+            if setting not in parameters:
+                raise UnknownNameError(f"setting of {name}", setting, parameters)
+    return factory(**settings)
