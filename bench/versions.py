@@ -3,29 +3,25 @@
 import os
 import platform
 import subprocess
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from bns import __version__
+from bns.versions import PACKAGES, package, processor
+
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("bns-testbed", "mujoco", "numpy", "scipy", "torch", "pyarrow", "rerun-sdk")
 
 
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that can move a figure."""
-    found = {"python": platform.python_version()}
-    for package in PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "absent"
-    return found
+    found = {"bns": __version__, "python": platform.python_version()}
+    return found | {name: package(name) or "not installed" for name in PACKAGES}
 
 
 def machine() -> dict[str, str | int | float]:
     """Kind of machine: nothing that names it."""
     return {
         "system": f"{platform.system()} {platform.machine()}",
-        "processor": _processor(),
+        "processor": processor(),
         "cores": len(os.sched_getaffinity(0)),
         "memory_gib": round(_memory_bytes() / 2**30, 1),
     }
@@ -48,16 +44,6 @@ def commit() -> str:
         ":(exclude)bench/results",
     )
     return f"{head}-dirty" if changed else head
-
-
-def _processor() -> str:
-    try:
-        text = Path("/proc/cpuinfo").read_text()
-    except OSError:
-        return platform.processor() or "unknown"
-    lines = (line.partition(":") for line in text.splitlines())
-    names = [value.strip() for key, _, value in lines if key.strip() == "model name"]
-    return names[0] if names else platform.machine()
 
 
 def _memory_bytes() -> int:
