@@ -8,7 +8,8 @@ from bns.worlds.effects.base import Parameter, PoseSignal, TrackingEffect
 class ClockDrift(TrackingEffect):
     """Time stamps gain on true time while the effect is on, and keep what they gained.
 
-    The clock is right at the start of each trial.
+    The clock is right at the start of each trial. List it after `tracker_latency`,
+    which looks poses up by their time stamps.
     """
 
     name = "clock_drift"
