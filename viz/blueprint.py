@@ -1,0 +1,113 @@
+"""The layout under which a recording opens."""
+
+LIVE_TIMELINE, TRIAL_TIMELINE = "sim_time", "trial"
+"""Time within the trials shown [s]; number of the trial."""
+
+CHARTS = (
+    ("charts/fitness", "Fitness over trials (log10, lower is better)"),
+    ("charts/diversity", "Diversity of the population over trials"),
+    ("charts/snn_error", "SNN position error over trials [mm per command]"),
+)
+"""Static bar charts over trials: entity and title."""
+
+CURVES = (
+    ("curves/fitness", "Fitness"),
+    ("curves/reached", "Objectives reached"),
+    ("curves/diversity", "Diversity"),
+    ("curves/snn_error", "SNN error"),
+)
+"""The same as curves on the timeline `trial`."""
+
+BACKGROUND = (27, 30, 36)
+
+
+def blueprint(
+    half_width: float, half_depth: float, *, seconds: float = 0.0, follow: bool = False
+):
+    """The layout: the world on the left, learning on the right.
+
+    The camera looks from the front (negative y) down on a board of the given size.
+
+    Args:
+        half_width: half the extent of what matters along x [m].
+        half_depth: the same along y [m].
+        seconds: length of what is shown on `sim_time` [s]; 0 = not known.
+        follow: open on the timeline `trial` and follow its end (live streams).
+    """
+    import rerun.blueprint as rrb
+
+    left = rrb.Vertical(
+        _world(rrb, half_width, half_depth),
+        rrb.StateTimelineView(
+            origin="/moment", name="Which trial is on", time_view=_axis(rrb, seconds)
+        ),
+        rrb.TimeSeriesView(
+            origin="/wheels",
+            name="Wheel speeds as sent [m/s]",
+            axis_x=_axis(rrb, seconds),
+            plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+        ),
+        row_shares=[6, 1.1, 1.9],
+    )
+    right = rrb.Tabs(
+        rrb.Vertical(
+            *(_bars(rrb, path, name) for path, name in CHARTS),
+            name="Over trials",
+        ),
+        rrb.Vertical(
+            *(_curve(rrb, path, name) for path, name in CURVES),
+            name="Curves (choose the timeline 'trial')",
+        ),
+        rrb.TextDocumentView(origin="/about", name="How to read this"),
+        active_tab=1 if follow else 0,
+    )
+    return rrb.Blueprint(
+        rrb.Horizontal(left, right, column_shares=[3, 2]),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline=TRIAL_TIMELINE if follow else LIVE_TIMELINE,
+            play_state="following" if follow else "paused",
+        ),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _bars(rrb, path: str, name: str):
+    hidden = rrb.PlotLegend(visible=False)
+    return rrb.BarChartView(origin=path, name=name, plot_legend=hidden)
+
+
+def _axis(rrb, seconds: float):
+    """The time axis over all that is shown, or None where that is not known."""
+    if seconds <= 0:
+        return None
+    span = rrb.TimeRange(
+        rrb.TimeRangeBoundary.absolute(seconds=0.0),
+        rrb.TimeRangeBoundary.absolute(seconds=seconds),
+    )
+    return rrb.TimeAxis(view_range=span)
+
+
+def _world(rrb, half_width: float, half_depth: float):
+    """The 3D view with its camera."""
+    away = max(half_width, 1.4 * half_depth)
+    return rrb.Spatial3DView(
+        origin="/world",
+        name="World",
+        background=list(BACKGROUND),
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(
+            position=(0.0, -1.15 * away, 1.5 * away),
+            look_target=(0.0, -0.05, 0.0),
+            eye_up=(0, 0, 1),
+        ),
+    )
+
+
+def _curve(rrb, path: str, name: str):
+    return rrb.TimeSeriesView(
+        origin=path, name=name, plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop)
+    )

@@ -1,0 +1,85 @@
+"""Figures over trials in a recording: bars that are always seen, curves on `trial`."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bns.record import RunRecord
+from bns.viz import style
+from bns.viz.blueprint import TRIAL_TIMELINE
+from bns.viz.choices import Choice
+
+MILLIMETRES = 1000.0
+DEGREES = 180.0 / np.pi
+
+_CURVES = {
+    "curves/fitness/tried_in_the_world": ("fitness", 1.0, style.SKY),
+    "curves/fitness/foreseen_by_the_snn": ("fitness_predicted", 1.0, style.PURPLE),
+    "curves/reached/objectives": ("reached", 1.0, style.GREEN),
+    "curves/diversity/equation_4_1": ("diversity_41", 1.0, style.SKY),
+    "curves/snn_error/forward_mm": ("snn_forward", MILLIMETRES, style.SKY),
+    "curves/snn_error/left_mm": ("snn_left", MILLIMETRES, style.ORANGE),
+    "curves/snn_error/turn_deg": ("snn_turn", DEGREES, style.PURPLE),
+}
+"""Entity: column, factor to the unit shown, colour."""
+
+
+def log_bars(stream, record: RunRecord, replicate: int, chosen: Sequence[Choice]):
+    """Log one bar a trial for fitness, diversity and SNN error, as statics.
+
+    A chart over trials could not be seen while the time line counts seconds; bars
+    are on no time line. A series each for the trials before damage, after it, and
+    for every chosen trial.
+    """
+    import rerun as rr
+
+    fitness = np.log10(np.maximum(record["fitness"][replicate], 1.0))
+    error = np.hypot(record["snn_forward"], record["snn_left"])[replicate]
+    values = {
+        "charts/fitness": fitness,
+        "charts/diversity": record["diversity_41"][replicate],
+        "charts/snn_error": error * MILLIMETRES,
+    }
+    for path, series in values.items():
+        for name, colour, member in _groups(record, replicate, chosen):
+            bars = np.where(member, np.nan_to_num(series), 0.0)
+            stream.log(
+                f"{path}/{name}",
+                rr.BarChart(bars, color=style.rgb(colour)),
+                static=True,
+            )
+
+
+def _groups(record: RunRecord, replicate: int, chosen: Sequence[Choice]):
+    """(name, colour, which trials) of each series of bars."""
+    number = np.arange(record.trials)
+    shown = np.isin(number, [choice.trial for choice in chosen])
+    onset = int(record.damage_onset[replicate])
+    onset = onset if onset >= 0 else record.trials
+    yield "undamaged", style.GREY, ~shown & (number < onset)
+    if onset < record.trials:
+        yield "damaged", "#8a4a1c", ~shown & (number >= onset)
+    for choice in chosen:
+        yield f"trial_{choice.trial}", choice.colour, number == choice.trial
+
+
+def send_curves(stream, record: RunRecord, replicate: int) -> None:
+    """Send the same figures and more as curves on the timeline `trial`."""
+    import rerun as rr
+
+    index = [rr.TimeColumn(TRIAL_TIMELINE, sequence=np.arange(record.trials))]
+    for path, (column, factor, colour) in _CURVES.items():
+        stream.log(
+            path,
+            rr.SeriesLines(
+                names=path.rsplit("/", 1)[1].replace("_", " "),
+                colors=style.rgb(colour),
+                widths=2.0,
+            ),
+            static=True,
+        )
+        stream.send_columns(
+            path,
+            index,
+            rr.Scalars.columns(scalars=record[column][replicate] * factor),
+        )

@@ -1,0 +1,194 @@
+"""The chosen trials of a recording, laid one after another in time."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from bns.record import RunRecord
+from bns.viz import geometry, style
+from bns.viz.blueprint import LIVE_TIMELINE, TRIAL_TIMELINE
+from bns.viz.choices import Choice
+from bns.viz.paths import arcs, dashes, listed
+from bns.worlds.trial import Trial
+
+GAP = 1.0
+"""s of pause between two trials"""
+
+RATE = 30.0
+"""poses per second kept"""
+
+_ARC_SAMPLES = 12
+_TRAIL = 0.005
+"""m; half the width of a trail"""
+_HEIGHT = 0.004
+"""m above the floor at which trails are drawn"""
+
+
+def send(
+    stream,
+    record: RunRecord,
+    replicate: int,
+    chosen: Sequence[Choice],
+    trials: Mapping[int, Trial],
+    model,
+) -> None:
+    """Log robot, trails, wheel speeds and moments of the chosen trials.
+
+    Args:
+        stream: a `rerun.RecordingStream`.
+        record: the batch.
+        replicate: which of its runs.
+        chosen: the trials to show, in this order.
+        trials: densely sampled trials by number, where there are any.
+        model: compiled scene.
+    """
+    start, states, colours = 0.0, [], []
+    for choice in chosen:
+        at = (replicate, choice.trial)
+        times, poses, qpos = _samples(record, at, trials.get(choice.trial), model)
+        index = _times(start + times)
+        geometry.send_poses(stream, model, index, qpos)
+        _trails(stream, choice, poses, listed(record.predicted[at]), start)
+        _wheels(stream, record.sent[at], start)
+        states.append((start, f"trial {choice.trial}: {choice.label}"))
+        colours.append(choice.colour)
+        start += float(times[-1]) + GAP
+    _states(stream, states, colours, start)
+    _every_trial(stream, record, replicate)
+
+
+def duration(record: RunRecord, replicate: int, chosen: Sequence[Choice]) -> float:
+    """How long the chosen trials take one after another, pauses included [s]."""
+    sent = record.sent[replicate, [choice.trial for choice in chosen], :, 2]
+    return float(np.nansum(sent)) + GAP * len(chosen)
+
+
+def _samples(record, at, trial: Trial | None, model):
+    """Times from the trial's start [s], planar poses and qpos of one trial."""
+    if trial is None:
+        return _sparse(record, at, model)
+    step = np.diff(trial.times, prepend=-np.inf)
+    keep = np.flatnonzero(np.isfinite(trial.poses_world).all(axis=1) & (step > 0))
+    keep = keep[_thin(trial.times[keep])]
+    times, poses = trial.times[keep] - trial.times[0], trial.poses_world[keep]
+    if "qpos" in trial.truth:
+        qpos = np.asarray(trial.truth["qpos"])[keep]
+        if qpos.shape[1] == model.nq:
+            return times, poses, qpos
+    return times, poses, geometry.planar_qpos(model, poses)
+
+
+def _sparse(record, at, model):
+    poses = listed(record.poses[at])
+    durations = record.sent[at][: len(poses) - 1, 2]
+    ends = np.concatenate([[0.0], np.cumsum(durations)])
+    times = np.interp(
+        np.arange((len(poses) - 1) * _ARC_SAMPLES + 1) / _ARC_SAMPLES,
+        np.arange(len(poses)),
+        ends,
+    )
+    poses = arcs(poses, _ARC_SAMPLES)
+    return times, poses, geometry.planar_qpos(model, poses)
+
+
+def _thin(times: np.ndarray) -> np.ndarray:
+    """Indices of samples at most `RATE` a second, the last one included."""
+    slot = np.floor((times - times[0]) * RATE + 1e-9)
+    keep = np.diff(slot, prepend=-1.0) > 0
+    keep[-1] = True
+    return np.flatnonzero(keep)
+
+
+def _times(seconds):
+    import rerun as rr
+
+    return [rr.TimeColumn(LIVE_TIMELINE, duration=np.atleast_1d(seconds))]
+
+
+def _lift(poses: np.ndarray) -> np.ndarray:
+    return np.column_stack([poses[:, :2], np.full(len(poses), _HEIGHT)])
+
+
+def _trails(stream, choice: Choice, poses, predicted, start: float) -> None:
+    """The real trail for good, the predicted one from the trial's start on."""
+    import rerun as rr
+
+    colour = style.rgb(choice.colour)
+    root = f"world/trails/trial_{choice.trial:03d}"
+    stream.log(
+        f"{root}/real",
+        rr.LineStrips3D([_lift(poses)], colors=[colour], radii=_TRAIL),
+        static=True,
+    )
+    if len(predicted) < 2:
+        return
+    strips = dashes(_lift(arcs(predicted, _ARC_SAMPLES)))
+    stream.log(
+        f"{root}/predicted",
+        rr.LineStrips3D(strips, colors=[colour], radii=_TRAIL * 0.6),
+        static=True,
+    )
+
+
+def _wheels(stream, sent: np.ndarray, start: float) -> None:
+    """Wheel speeds as sent, a step for each command and zero in the pause."""
+    import rerun as rr
+
+    sent = sent[np.isfinite(sent).all(axis=1)]
+    begin = start + np.concatenate([[0.0], np.cumsum(sent[:, 2])])
+    for column, wheel in enumerate(("left", "right")):
+        values = np.append(sent[:, column], 0.0)
+        stream.send_columns(
+            f"wheels/{wheel}", _times(begin), rr.Scalars.columns(scalars=values)
+        )
+        stream.log(
+            f"wheels/{wheel}",
+            rr.SeriesLines(
+                names=wheel,
+                colors=style.rgb((style.SKY, style.ORANGE)[column]),
+                widths=(4.0, 1.5)[column],
+                interpolation_mode=rr.components.InterpolationMode.StepAfter,
+            ),
+            static=True,
+        )
+
+
+def _states(stream, states, colours, end: float) -> None:
+    """The lane that says which trial is on."""
+    import rerun as rr
+
+    names = [name for _, name in states]
+    stream.log(
+        "moment",
+        rr.StateConfiguration(values=names, colors=[style.rgb(c) for c in colours]),
+        static=True,
+    )
+    stream.send_columns(
+        "moment",
+        _times(np.array([*(time for time, _ in states), end])),
+        rr.StateChange.columns(state=[*names, ""]),
+    )
+
+
+def _every_trial(stream, record: RunRecord, replicate: int) -> None:
+    """Real and predicted path of every trial, on the timeline `trial`."""
+    import rerun as rr
+
+    for name, poses, colour in (
+        ("real", record.poses[replicate], style.BLACK),
+        ("predicted", record.predicted[replicate], style.PURPLE),
+    ):
+        paths = [listed(rows) for rows in poses]
+        numbers = [n for n, rows in enumerate(paths) if len(rows) > 1]
+        if not numbers:
+            continue
+        strips = [_lift(arcs(paths[n], 4)) for n in numbers]
+        stream.send_columns(
+            f"world/each_trial/{name}",
+            [rr.TimeColumn(TRIAL_TIMELINE, sequence=numbers)],
+            rr.LineStrips3D.columns(
+                strips=strips,
+                colors=[style.rgb(colour)] * len(numbers),
+                radii=[_TRAIL * 0.6] * len(numbers),
+            ),
+        )

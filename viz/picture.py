@@ -1,0 +1,122 @@
+"""Pictures of recordings, without a display."""
+
+import os
+import socket
+import sys
+import sysconfig
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from bns.errors import BnsError, FormatError, MissingDependencyError
+from bns.viz.blueprint import LIVE_TIMELINE, TRIAL_TIMELINE
+
+INSTALL = "apt-get install mesa-vulkan-drivers"
+"""What a Debian system lacks when there is no Vulkan."""
+
+_ICD = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d")
+_SETTLE = 6
+"""s for the viewer to load the recording and draw it"""
+
+
+def save(
+    rrd: str | Path, png: str | Path, *, trial: int | None = None, at: float = 0.0
+) -> list[str]:
+    """Draw a recording as it opens in the viewer, 1920 x 1080.
+
+    Args:
+        rrd: the recording.
+        png: file to write.
+        trial: show this trial on the timeline `trial`; by default the robot's
+            motion on `sim_time` is shown.
+        at: time on `sim_time` [s].
+
+    Returns:
+        Warnings that views of the recording reported; none if all is well.
+
+    Raises:
+        FormatError: there is no such recording.
+        MissingDependencyError: the viewer or Vulkan is missing.
+        BnsError: the viewer did not draw.
+    """
+    rrd, png = Path(rrd).resolve(), Path(png).resolve()
+    if not rrd.is_file():
+        raise FormatError(f"{rrd} is not a recording: there is no such file.")
+    with _viewer() as viewer:
+        viewer.open(str(rrd))
+        _go(viewer, trial, at)
+        time.sleep(_SETTLE)
+        viewer.save_screenshot(str(png))
+        reports = [
+            f"{view.name}: {report}"
+            for view in viewer.get_state().views
+            for report in view.reports
+        ]
+    if not png.is_file() or png.stat().st_size == 0:
+        raise BnsError(f"The viewer wrote no picture to {png}; is there disk space?")
+    return reports
+
+
+def missing() -> MissingDependencyError | None:
+    """What keeps `save` from working here, or None."""
+    if executable() is None:
+        return MissingDependencyError(
+            "A picture of a recording", "the Rerun viewer", "pip install rerun-sdk"
+        )
+    if sys.platform == "linux" and not _vulkan():
+        return MissingDependencyError(
+            "A picture of a recording without a display", "a Vulkan driver", INSTALL
+        )
+    return None
+
+
+def executable() -> str | None:
+    """Path of the `rerun` program that belongs to this Python."""
+    name = "rerun.exe" if sys.platform == "win32" else "rerun"
+    path = Path(sysconfig.get_path("scripts")) / name
+    return str(path) if path.is_file() else None
+
+
+def free_port() -> int:
+    """A TCP port that nothing listens on at this moment."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def _vulkan() -> bool:
+    named = os.environ.get("VK_DRIVER_FILES") or os.environ.get("VK_ICD_FILENAMES")
+    if named:
+        return any(Path(part).is_file() for part in named.split(os.pathsep))
+    return any(any(Path(place).glob("*.json")) for place in _ICD)
+
+
+def _go(viewer, trial: int | None, at: float) -> None:
+    if trial is None:
+        viewer.set_time(LIVE_TIMELINE, duration=at, play_state="paused")
+    else:
+        viewer.set_time(TRIAL_TIMELINE, sequence=trial, play_state="paused")
+
+
+@contextmanager
+def _viewer() -> Iterator:
+    """A headless viewer that is gone afterwards."""
+    problem = missing()
+    if problem:
+        raise problem
+    from rerun.experimental import ViewerClient
+
+    os.environ.setdefault("RERUN_ANALYTICS", "0")
+    try:
+        with ViewerClient.spawn(
+            headless=True,
+            port=free_port(),
+            hide_welcome_screen=True,
+            executable_path=executable(),
+        ) as viewer:
+            yield viewer
+    except (RuntimeError, ConnectionError, TimeoutError) as error:
+        raise BnsError(
+            f"The Rerun viewer did not draw ({error}); if Vulkan is missing, {INSTALL}."
+        ) from error

@@ -1,0 +1,83 @@
+"""Colours and plot settings that all pictures share.
+
+Colours are those of Okabe and Ito (2008), which stay apart for the three common
+kinds of colour blindness; lightness differs too, so that they survive grey print.
+"""
+
+from contextlib import contextmanager
+from typing import NamedTuple
+
+BLACK = "#222222"
+GREY = "#7a7a7a"
+BLUE = "#0072B2"
+ORANGE = "#E69F00"
+GREEN = "#009E73"
+VERMILION = "#D55E00"
+PURPLE = "#CC79A7"
+SKY = "#56B4E9"
+YELLOW = "#F0E442"
+
+CYCLE = (BLUE, ORANGE, GREEN, PURPLE, VERMILION, SKY, BLACK)
+"""Colours of runs that are compared, in order."""
+
+BEFORE, DAMAGED, AFTER = BLUE, VERMILION, GREEN
+"""Colours of the three moments of a run: before damage, just damaged, recovered."""
+
+DAMAGE = VERMILION
+"""Colour of the mark at which damage begins."""
+
+_RC = {
+    "font.family": ["DejaVu Sans"],
+    "font.size": 9.5,
+    "axes.titlesize": 10.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": GREY,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.8,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "figure.dpi": 100,
+    "savefig.dpi": 150,
+    "figure.facecolor": "white",
+    "svg.fonttype": "none",
+    "svg.hashsalt": "bns",
+}
+
+
+class Size(NamedTuple):
+    """Width and height of a figure [inch]."""
+
+    width: float
+    height: float
+
+
+WIDE = Size(7.0, 3.1)
+SQUARE = Size(7.0, 4.4)
+
+
+@contextmanager
+def plotting():
+    """Matplotlib without a display, in the common style; yields `Figure`.
+
+    Figures are made from the class, never through pyplot, so that nothing is kept
+    alive and threads do not meet.
+    """
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(_RC):
+        yield Figure
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """The three bytes of ``#rrggbb``."""
+    return tuple(int(colour[at : at + 2], 16) for at in (1, 3, 5))
