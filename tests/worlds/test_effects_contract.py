@@ -286,16 +286,18 @@ def test_a_piece_without_equals_belongs_to_the_value_before_it():
 
 
 @pytest.mark.parametrize(
-    "text", ["wheel_gain:", "wheel_gain:0.8", "wheel_gain:=1", "wheel_gain:factor=1,,"]
+    "text",
+    [
+        "wheel_gain:",
+        "wheel_gain:0.8",
+        "wheel_gain:=1",
+        "wheel_gain:factor=1,,",
+        "wheel_gain:factor=1,factor=1",
+    ],
 )
 def test_bad_text_is_refused_with_an_example(text):
     with pytest.raises(BnsError, match=re.escape(registry.EXAMPLE)):
         registry.parse(text)
-
-
-def test_a_parameter_given_twice_is_refused():
-    with pytest.raises(BnsError, match="each parameter once"):
-        registry.parse("wheel_gain:factor=0.5,factor=0.8")
 
 
 def test_a_table_without_a_name_is_refused():
