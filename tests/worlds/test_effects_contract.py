@@ -285,19 +285,10 @@ def test_a_piece_without_equals_belongs_to_the_value_before_it():
         registry.parse("wheel_gain:wheel=left,right,factor=0.8")
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "wheel_gain:",
-        "wheel_gain:0.8",
-        "wheel_gain:=1",
-        "wheel_gain:factor=1,,",
-        "wheel_gain:factor=1,factor=1",
-    ],
-)
-def test_bad_text_is_refused_with_an_example(text):
+@pytest.mark.parametrize("rest", ["", "0.8", "=1", "factor=1,,", "factor=1,factor=0.5"])
+def test_bad_text_is_refused_with_an_example(rest):
     with pytest.raises(BnsError, match=re.escape(registry.EXAMPLE)):
-        registry.parse(text)
+        registry.parse(f"wheel_gain:{rest}")
 
 
 def test_a_table_without_a_name_is_refused():
