@@ -1,0 +1,76 @@
+"""The documentation is true: its links lead somewhere and its Python runs."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.sources import ROOT
+
+LEFT_OUT = {".venv", ".git", "build", "dist", "runs", "node_modules"}
+PAGES = sorted(
+    p for p in ROOT.rglob("*.md") if not LEFT_OUT & set(p.relative_to(ROOT).parts)
+)
+FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
+HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
+
+
+def ids(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+def prose(page: Path) -> str:
+    return FENCE.sub("", page.read_text(encoding="utf-8"))
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    found = FENCE.findall(page.read_text(encoding="utf-8"))
+    return [text for name, text in found if name == language]
+
+
+def anchors(page: Path) -> set[str]:
+    titles = HEADING.findall(prose(page))
+    plain = (re.sub(r"[^\w\- ]", "", title.lower()) for title in titles)
+    return {title.strip().replace(" ", "-") for title in plain}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=ids)
+def test_links_lead_somewhere(page):
+    for link in LINK.findall(prose(page)):
+        if re.match(r"[a-z]+:", link):
+            continue
+        target, _, anchor = link.partition("#")
+        path = (page.parent / target) if target else page
+        assert path.exists(), f"{ids(page)} links to {link}, which is not there"
+        if anchor and path.suffix == ".md":
+            assert anchor in anchors(path), f"{ids(page)}: no heading for {link}"
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "python")], ids=ids)
+def test_python_in_the_page_runs(page, run_python, tmp_path):
+    script = tmp_path / "page.py"
+    script.write_text("\n".join(blocks(page, "python")), encoding="utf-8")
+    run_python(script, limit=120)
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "toml")], ids=ids)
+def test_toml_in_the_page_is_a_configuration(page, tmp_path):
+    from bns import loading
+
+    for number, text in enumerate(blocks(page, "toml")):
+        path = tmp_path / f"{number}.toml"
+        path.write_text(text, encoding="utf-8")
+        loading.from_file(path)
+
+
+def test_every_page_of_docs_is_in_the_index():
+    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    for page in (ROOT / "docs").glob("*.md"):
+        assert page.name == "index.md" or f"({page.name})" in index, page.name
+
+
+def test_the_readme_links_to_docs_results_and_the_way_to_contribute():
+    links = set(LINK.findall((ROOT / "README.md").read_text(encoding="utf-8")))
+    wanted = {"docs/index.md", "CONTRIBUTING.md", "bench/results/README.md", "LICENSE"}
+    assert wanted <= links
