@@ -37,8 +37,10 @@ class Placed:
 
     def __str__(self) -> str:
         text = str(self.effect)
-        if self.start > 0 or np.isfinite(self.stop):
-            text += f" from {self.start:g} s to {self.stop:g} s"
+        if self.start > 0:
+            text += f" from {self.start:g} s"
+        if np.isfinite(self.stop):
+            text += f" to {self.stop:g} s"
         return text
 
 

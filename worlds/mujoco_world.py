@@ -126,8 +126,15 @@ class MujocoWorld:
         every = max(self.sample_dt / self.dt, 1.0)
         sampled, boundaries = observe.sample_steps(plan.counts, every)
         poses = observe.planar(free, self.start[2])
+        grid = np.arange(len(poses)) * self.dt
         times, seen = observe.tracked(
-            poses, sampled, self.dt, plan.stages.tracking, plan.seed, trial
+            poses[sampled],
+            grid[sampled],
+            poses,
+            grid,
+            plan.stages.tracking,
+            plan.seed,
+            trial,
         )
         hidden = motion.states[sampled] if self.truth else None
         return Trial(

@@ -66,9 +66,10 @@ def outcome(free: np.ndarray, arena: tuple[float, float], diverged: bool) -> Out
 
 
 def tracked(
+    poses: np.ndarray,
+    times: np.ndarray,
     fine_poses: np.ndarray,
-    sampled: np.ndarray,
-    dt: float,
+    fine_times: np.ndarray,
     effects: Sequence[Placed],
     seed: int,
     trial: int,
@@ -76,21 +77,19 @@ def tracked(
     """What the tracker reports.
 
     Args:
-        fine_poses: true poses on the physics grid, shape ``(S + 1, 3)``.
-        sampled: steps after which there is a sample, shape ``(T,)``.
-        dt: physics step [s].
+        poses: true poses of the samples, shape ``(T, 3)``.
+        times: of the samples [s], shape ``(T,)``.
+        fine_poses: true poses on a finer grid, shape ``(S, 3)``.
+        fine_times: of that grid [s], shape ``(S,)``.
         effects: tracking effects, in the order in which they act.
         seed, trial: of their generators.
 
     Returns:
         time stamps ``(T,)`` and poses ``(T, 3)``.
     """
-    times, poses = sampled * dt, fine_poses[sampled]
-    if effects:
-        fine_times = np.arange(len(fine_poses)) * dt
+    stamps = times
     for placed in effects:
-        given = PoseSignal(times, poses, fine_times, fine_poses)
-        active = placed.active(sampled * dt)
+        given = PoseSignal(stamps, poses, fine_times, fine_poses)
         rng = placed.generator(seed, trial)
-        times, poses = placed.effect.apply(given, active, rng)
-    return times, poses
+        stamps, poses = placed.effect.apply(given, placed.active(times), rng)
+    return stamps, poses

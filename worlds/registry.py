@@ -71,6 +71,15 @@ def describe() -> dict[str, str]:
     return {name: doc.split("\n", 1)[0] for name, doc in docs.items()}
 
 
+def settings(name: str) -> tuple[str, ...]:
+    """Names of the settings that `make` takes for a world.
+
+    Raises:
+        UnknownNameError: no such world.
+    """
+    return tuple(inspect.signature(get(name)).parameters)
+
+
 def make(name: str, **settings: Any) -> World:
     """The world called `name`.
 
