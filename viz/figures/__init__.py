@@ -1,0 +1,23 @@
+"""Figures of runs: one file each, one function each that returns a matplotlib Figure.
+
+Figures over trials take a mapping from label to `RunRecord`, so that runs can be
+laid over one another; figures of one run take its record.
+"""
+
+from bns.viz.figures.displacement import displacement
+from bns.viz.figures.diversity import diversity
+from bns.viz.figures.fitness import fitness
+from bns.viz.figures.path import path
+from bns.viz.figures.snn_error import snn_error
+from bns.viz.figures.solved import solved
+from bns.viz.figures.waits import waits
+
+__all__ = [
+    "displacement",
+    "diversity",
+    "fitness",
+    "path",
+    "snn_error",
+    "solved",
+    "waits",
+]

@@ -1,0 +1,31 @@
+"""Objectives reached and share of runs that solve, over trials."""
+
+from collections.abc import Mapping
+
+from bns.record import RunRecord
+from bns.viz import style
+from bns.viz.figures import bands
+
+
+def solved(runs: Mapping[str, RunRecord]):
+    """Left: objectives reached (median, middle half). Right: share of runs solving."""
+    from bns.viz.scene import order
+
+    with style.plotting() as figure_class:
+        figure = figure_class(figsize=style.WIDE, layout="constrained")
+        left, right = figure.subplots(1, 2)
+        for label, record, colour in bands.coloured(runs):
+            bands.band(left, record["reached"], colour, label)
+            share = 100 * record["solved"].mean(axis=0)
+            right.plot(share, color=colour, label=label, drawstyle="steps-mid")
+        goals = max(len(order(record)) for record in runs.values())
+        left.set_ylim(-0.15, goals + 0.15)
+        left.set_yticks(range(goals + 1))
+        left.set_title("Objectives reached", pad=14)
+        right.set_ylim(-3, 103)
+        right.set_ylabel("% of runs")
+        right.set_title("Runs whose trial solved the task", pad=14)
+        for axes in (left, right):
+            bands.mark_damage(axes, runs)
+            bands.finish(axes, runs, legend=axes is right)
+    return figure
