@@ -1,0 +1,190 @@
+"""The arena: a white board under an overhead camera, with objectives to show."""
+
+from collections.abc import Mapping
+from typing import Any
+
+SIZE = (2.7, 1.8)
+"""m; area that the camera tracks, along x and y (thesis 4.2.6); its centre is the
+origin"""
+
+RADIUS = 0.09
+"""m; within it an objective counts as reached (thesis, Algorithm 5)"""
+
+CAMERA_HEIGHT = 2.4
+"""m; of the overhead camera above the board (assumed: a ceiling)"""
+
+_RIM = 0.015  # m; width of the frame drawn around the board (assumed)
+_DISC = 0.0004  # m; half the height at which an objective is drawn
+_BOARD = (0.95, 0.95, 0.94, 1.0)
+_GROUND = (0.47, 0.49, 0.52, 1.0)
+_FRAME = (0.30, 0.31, 0.33, 1.0)
+_REACH = (0.99, 0.83, 0.35, 1.0)
+_INK = (0.13, 0.15, 0.20, 1.0)
+
+# Letters as strokes in a box from (-1, -1) to (1, 1).
+_STROKES = {
+    "A": [(-0.8, -1, 0, 1), (0, 1, 0.8, -1), (-0.45, -0.25, 0.45, -0.25)],
+    "B": [
+        (-0.7, -1, -0.7, 1),
+        (-0.7, 1, 0.4, 1),
+        (0.4, 1, 0.6, 0.5),
+        (0.6, 0.5, 0.3, 0.05),
+        (-0.7, 0.05, 0.3, 0.05),
+        (0.3, 0.05, 0.7, -0.5),
+        (0.7, -0.5, 0.4, -1),
+        (0.4, -1, -0.7, -1),
+    ],
+    "C": [
+        (0.7, 0.75, 0.2, 1),
+        (0.2, 1, -0.35, 0.9),
+        (-0.35, 0.9, -0.7, 0.4),
+        (-0.7, 0.4, -0.7, -0.4),
+        (-0.7, -0.4, -0.35, -0.9),
+        (-0.35, -0.9, 0.2, -1),
+        (0.2, -1, 0.7, -0.75),
+    ],
+    "D": [
+        (-0.7, -1, -0.7, 1),
+        (-0.7, 1, 0.2, 1),
+        (0.2, 1, 0.7, 0.45),
+        (0.7, 0.45, 0.7, -0.45),
+        (0.7, -0.45, 0.2, -1),
+        (0.2, -1, -0.7, -1),
+    ],
+    "E": [
+        (-0.6, -1, -0.6, 1),
+        (-0.6, 1, 0.7, 1),
+        (-0.6, 0, 0.5, 0),
+        (-0.6, -1, 0.7, -1),
+    ],
+}
+
+
+def spec(
+    objectives: Mapping[str, tuple[float, float]] | None = None,
+    *,
+    radius: float = RADIUS,
+) -> Any:
+    """The arena without a robot, as a `mujoco.MjSpec`.
+
+    Args:
+        objectives: places to show [m], by name.
+        radius: of their discs [m].
+    """
+    import mujoco
+
+    made = mujoco.MjSpec()
+    made.modelname = "arena"
+    furnish(made, objectives=objectives or {}, radius=radius)
+    return made
+
+
+def furnish(
+    spec: Any,
+    *,
+    objectives: Mapping[str, tuple[float, float]],
+    radius: float = RADIUS,
+    visuals: bool = True,
+) -> None:
+    """Put a robot that has no floor yet on the board.
+
+    Adds the geom `floor` (an endless plane: leaving the board is no fall) and, for
+    each objective, a site `objective_<name>`. Nothing else that it adds can be touched.
+
+    Args:
+        spec: a `mujoco.MjSpec`; changed.
+        objectives: places to show [m], by name.
+        radius: of their discs [m].
+        visuals: with lights, cameras and what only shows.
+    """
+    import mujoco
+
+    floor = spec.worldbody.add_geom(
+        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[*_half(), 0.05]
+    )
+    floor.contype, floor.conaffinity, floor.rgba = 0, 1, _BOARD
+    for name, (x, y) in objectives.items():
+        spec.worldbody.add_site(name=f"objective_{name}", pos=[x, y, 0], group=4)
+    if not visuals:
+        return
+    _light(spec)
+    _cameras(spec)
+    _surround(spec)
+    for name, (x, y) in objectives.items():
+        _objective(spec, name, x, y, radius)
+
+
+def _half() -> tuple[float, float]:
+    return SIZE[0] / 2, SIZE[1] / 2
+
+
+def _shown(spec: Any, **settings: Any) -> None:
+    """Add a geom to the world that only shows."""
+    spec.worldbody.add_geom(contype=0, conaffinity=0, group=2, **settings)
+
+
+def _light(spec: Any) -> None:
+    import mujoco
+
+    light = spec.worldbody.add_light(name="lamp", pos=[0, 0, 3], dir=[-0.25, 0.4, -1])
+    light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+    light.diffuse, light.specular = [0.5] * 3, [0.15] * 3
+    head = spec.visual.headlight
+    head.ambient, head.diffuse, head.specular = [0.45] * 3, [0.35] * 3, [0.0] * 3
+    spec.stat.center, spec.stat.extent = [0, 0, 0], 1.6
+    spec.visual.map.znear, spec.visual.map.zfar = 0.01, 20
+    spec.visual.quality.shadowsize = 4096
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1280
+
+
+def _cameras(spec: Any) -> None:
+    """`overhead` sees the whole board, `perspective` looks across it."""
+    import mujoco
+    import numpy as np
+
+    half_height = _half()[1] * 1.06  # a margin of 6 %
+    fovy = np.degrees(2 * np.arctan(half_height / CAMERA_HEIGHT))
+    spec.worldbody.add_camera(name="overhead", pos=[0, 0, CAMERA_HEIGHT], fovy=fovy)
+    camera = spec.worldbody.add_camera(name="perspective", pos=[0.75, -1.75, 1.3])
+    camera.fovy = 45
+    camera.alt.type = mujoco.mjtOrientation.mjORIENTATION_XYAXES
+    camera.alt.xyaxes = [0.919, 0.394, 0, -0.222, 0.517, 0.826]
+
+
+def _surround(spec: Any) -> None:
+    """A frame around the board and the ground that it lies on."""
+    import mujoco
+
+    box, (x, y) = mujoco.mjtGeom.mjGEOM_BOX, _half()
+    _shown(
+        spec, name="ground", type=box, size=[4, 4, 0.01], pos=[0, 0, -0.03],
+        rgba=_GROUND,
+    )  # fmt: skip
+    for side, place, size in (
+        ("right", [x + _RIM, 0], [_RIM, y + 2 * _RIM]),
+        ("left", [-x - _RIM, 0], [_RIM, y + 2 * _RIM]),
+        ("top", [0, y + _RIM], [x, _RIM]),
+        ("bottom", [0, -y - _RIM], [x, _RIM]),
+    ):
+        _shown(
+            spec, name=f"frame_{side}", type=box, size=[*size, 0.01],
+            pos=[*place, -0.009], rgba=_FRAME,
+        )  # fmt: skip
+
+
+def _objective(spec: Any, name: str, x: float, y: float, radius: float) -> None:
+    """A disc of the radius within which it counts as reached, and its letter."""
+    import mujoco
+
+    _shown(
+        spec, name=f"disc_{name}", type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[radius, _DISC, 0], pos=[x, y, 0], rgba=_REACH,
+    )  # fmt: skip
+    scale = 0.38 * radius
+    for index, stroke in enumerate(_STROKES.get(name, [])):
+        ends = [x + scale * stroke[0], y + scale * stroke[1], _DISC]
+        ends += [x + scale * stroke[2], y + scale * stroke[3], _DISC]
+        _shown(
+            spec, name=f"letter_{name}_{index}", type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            size=[0.09 * scale, 0, 0], fromto=ends, rgba=_INK,
+        )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Khepera III: MJCF, numbers, device units, calibration."""

@@ -1,0 +1,148 @@
+"""What a robot model is to the rest of the project: `RobotModel`."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from bns.errors import FormatError
+
+FACTS = "robot.toml"
+
+
+class ChannelName(NamedTuple):
+    """A commanded quantity and its unit."""
+
+    name: str
+    unit: str
+
+
+class CommandChannel(NamedTuple):
+    """What the robot can be told, one number at a time.
+
+    Attributes:
+        name: "left_speed".
+        unit: SI.
+        low, high: smallest and largest value that the robot accepts.
+        actuator: name of the actuator that it goes to.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    actuator: str
+
+
+class Wheel(NamedTuple):
+    """Names of one driven wheel's parts in the model."""
+
+    body: str
+    joint: str
+    geom: str
+    actuator: str
+
+
+class Option(NamedTuple):
+    """A choice that `models.spec` offers for this robot.
+
+    Attributes:
+        doc: one line.
+        default: what the XML holds.
+        headings: per alternative, heading [deg] of each sensor site it turns.
+    """
+
+    doc: str
+    default: str
+    headings: Mapping[str, Mapping[str, float]]
+
+
+@dataclass(frozen=True, eq=False)
+class RobotModel:
+    """One robot directory: its files, and the names of what is in its model.
+
+    Attributes:
+        name: of the robot and of its directory.
+        kind: "wheeled" or "legged".
+        doc: one line.
+        directory: where `<name>.xml`, `scene.xml` and the rest lie.
+        commands: what it can be told, in the order of the model's controls.
+        ctrl_per_command: control units per unit of command; for wheels 1 / nominal
+            radius: 1 m/s becomes so many rad/s.
+        base_body: the body that carries everything.
+        base_joint: its free joint.
+        tracker_site: what an overhead camera tracks.
+        picture: camera of the scene for the portrait.
+        sensor_sites: in the order of the robot's readings; they look along their z.
+        wheels: driven wheels by side, "left" and "right".
+        caster_geom: "" where there is none.
+        options: what else `models.spec` takes.
+    """
+
+    name: str
+    kind: str
+    doc: str
+    directory: Path
+    commands: tuple[CommandChannel, ...]
+    ctrl_per_command: float
+    base_body: str
+    base_joint: str
+    tracker_site: str
+    picture: str
+    sensor_sites: tuple[str, ...] = ()
+    wheels: Mapping[str, Wheel] = field(default_factory=dict)
+    caster_geom: str = ""
+    options: Mapping[str, Option] = field(default_factory=dict)
+
+    @property
+    def channels(self) -> tuple[ChannelName, ...]:
+        """Names and units of the commands."""
+        return tuple(ChannelName(c.name, c.unit) for c in self.commands)
+
+    @property
+    def limits(self) -> np.ndarray:
+        """Largest magnitude of each command, shape ``(C,)``, SI units."""
+        return np.array([max(-c.low, c.high) for c in self.commands])
+
+    @property
+    def actuators(self) -> dict[str, str]:
+        """Name of the actuator that each command goes to."""
+        return {c.name: c.actuator for c in self.commands}
+
+    @property
+    def xml(self) -> Path:
+        """The robot alone."""
+        return self.directory / f"{self.name}.xml"
+
+    @property
+    def scene(self) -> Path:
+        """The robot with a floor and a light."""
+        return self.directory / "scene.xml"
+
+
+def read(directory: Path) -> RobotModel:
+    """The robot described in a directory's `robot.toml`.
+
+    Raises:
+        FormatError: it is not TOML, or an entry is missing or unknown.
+    """
+    file = directory / FACTS
+    try:
+        facts = tomllib.loads(file.read_text(encoding="utf-8"))
+        facts["commands"] = tuple(CommandChannel(**c) for c in facts["commands"])
+        wheels = facts.get("wheels", {})
+        facts["wheels"] = {side: Wheel(**wheel) for side, wheel in wheels.items()}
+        options = facts.get("options", {})
+        facts["options"] = {name: Option(**item) for name, item in options.items()}
+        facts["sensor_sites"] = tuple(facts.get("sensor_sites", ()))
+        if "nominal_wheel_radius" in facts:
+            facts["ctrl_per_command"] = 1.0 / facts.pop("nominal_wheel_radius")
+        return RobotModel(name=directory.name, directory=directory, **facts)
+    except (tomllib.TOMLDecodeError, KeyError, TypeError) as error:
+        raise FormatError(
+            f"{file} does not describe a robot ({error}); compare it with that of "
+            "another robot."
+        ) from error
