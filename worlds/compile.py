@@ -23,7 +23,7 @@ def compiled(robot: str, effects: tuple[BodyEffect, ...] = ()) -> Compiled:
         robot: name of the robot model.
         effects: edits, in order.
     """
-    spec = models.spec(robot)
+    spec = models.spec(robot, visuals=False)
     for effect in effects:
         effect.edit(spec)
     return Compiled(spec.compile())

@@ -68,6 +68,7 @@ class MujocoWorld:
     ):
         self.model = models.robot(robot)
         self.robot, self.name, self.truth = robot, name, truth
+        self._channels, self._limits = self.model.channels, self.model.limits
         self.damage = active.per_robot(damage)
         self.reality = active.as_damage(reality)
         given = self.damage if isinstance(self.damage, tuple) else (self.damage,)
@@ -106,15 +107,15 @@ class MujocoWorld:
         ]
 
     def _plan(self, commands: Commands, stages: Stages, trial: int, seed: int) -> _Plan:
-        robot, dt = self.model, self.dt
-        control.check(commands, robot.channels, robot.limits, self.robot)
+        dt = self.dt
+        control.check(commands, self._channels, self._limits, self.robot)
         counts = control.steps(commands.durations, dt)
         if stages.control:
             given = control.signal(commands, counts, dt)
             values = control.disturbed(given, stages.control, seed, trial)
         else:
             values = np.repeat(commands.values, counts, axis=0)
-        values = values * robot.ctrl_per_command
+        values = values * self.model.ctrl_per_command
         segments = compile.segments(self.robot, stages.body, values, dt)
         begin = compile.start_state(segments[0].compiled, self.start)
         return _Plan(commands, stages, seed, counts, Job(begin, segments))
