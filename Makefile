@@ -12,7 +12,6 @@ BIN := $(VENV)/bin
 DEMO := runs/demo
 PYTHON ?=
 
-export OMP_NUM_THREADS ?= 1
 export RERUN_ANALYTICS ?= 0
 
 .PHONY: help demo test lint env clean
@@ -21,12 +20,7 @@ help:
 	@sed -n '1,/^$$/s/^# \{0,1\}//p' Makefile
 
 demo: env
-	@if [ -e $(DEMO) ]; then \
-	  echo "Going on with what is in $(DEMO) (remove it to start afresh)."; \
-	  $(BIN)/bns run demo --out $(DEMO) --resume; \
-	else \
-	  $(BIN)/bns run demo --out $(DEMO); \
-	fi
+	$(BIN)/bns run demo --out $(DEMO) --resume
 
 test: env
 	$(BIN)/python -m pytest
