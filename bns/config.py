@@ -44,11 +44,11 @@ class TaskConfig:
 class ControllerConfig:
     """Open-loop controllers: variable-length lists of (left, right, duration)."""
 
-    max_commands: int = 24
+    max_commands: int = 36
     """longest list"""
     initial_min: int = 4
     """shortest list in a random population"""
-    initial_max: int = 16
+    initial_max: int = 24
     """longest list in a random population"""
     speed_low: float = 5000.0
     """smallest speed gene [speed units]; below `dead_band` it means stop"""
@@ -175,6 +175,8 @@ class RunConfig:
     """trials in the world, per run"""
     replicates: int = 30
     """runs in the batch"""
+    record_replicates: int = 3
+    """replicates of which all samples are kept, for pictures and datasets"""
     seed: int = 0
     """master seed"""
     compiled: Literal["auto", "yes", "no"] = "auto"

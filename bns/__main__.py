@@ -1,0 +1,30 @@
+"""`bns` and `python -m bns`."""
+
+import sys
+from collections.abc import Sequence
+
+from bns.cli import dispatch
+from bns.errors import BnsError
+
+WRONG_INPUT = 2
+INTERRUPTED = 130
+"""as shells report a program stopped by Ctrl-C"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command; what a user can cause gives one line and exit code 2."""
+    try:
+        return dispatch(list(sys.argv[1:] if argv is None else argv))
+    except BnsError as error:
+        print(f"bns: {' '.join(str(error).split())}", file=sys.stderr)
+        return WRONG_INPUT
+    except KeyboardInterrupt:
+        print("bns: interrupted.", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:  # the reader of our output has gone (`bns ... | head`)
+        sys.stderr.close()
+        return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

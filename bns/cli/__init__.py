@@ -1,0 +1,55 @@
+"""The command line: one module per family of verbs, imported when it is called."""
+
+from collections.abc import Sequence
+from importlib import import_module
+
+from bns import __version__
+from bns.errors import UnknownNameError
+
+VERBS = {
+    "run": ("run", "train a preset or a TOML file"),
+    "report": ("report", "write one self-contained HTML report on runs"),
+    "compare": ("compare", "medians, intervals, p values and effect sizes of runs"),
+    "view": ("view", "open a run's recording, or make a picture of it"),
+    "presets": ("lists", "list the presets"),
+    "worlds": ("lists", "list the worlds"),
+    "robots": ("lists", "list the robot models"),
+    "effects": ("lists", "list the effects with parameters, units and ranges"),
+    "doctor": ("doctor", "check this machine and say what to install"),
+}
+"""verb -> module of this package, and what it does in one line"""
+
+GOODBYE = "`bns VERB --help` is the manual of a verb."
+
+
+def dispatch(argv: Sequence[str]) -> int:
+    """Run the verb in `argv`; gives the exit code.
+
+    Raises:
+        BnsError: what the user gave cannot be used.
+    """
+    verb, rest = (argv[0], list(argv[1:])) if argv else ("--help", [])
+    if verb in ("-h", "--help", "help"):
+        print(_manual())
+        return 0
+    if verb in ("-V", "--version"):
+        print(f"bns {__version__}")
+        return 0
+    if verb not in VERBS:
+        raise UnknownNameError("command", verb, VERBS)
+    return import_module(f"bns.cli.{VERBS[verb][0]}").main(verb, rest)
+
+
+def _manual() -> str:
+    lines = [
+        "usage: bns VERB [...]",
+        "",
+        "Robots that learn their own simulator, in a physics world.",
+        "",
+        *(f"  {verb:<9} {doc}" for verb, (_, doc) in VERBS.items()),
+        "",
+        "  --version  print the version",
+        "",
+        GOODBYE,
+    ]
+    return "\n".join(lines)

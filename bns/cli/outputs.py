@@ -1,0 +1,123 @@
+"""What `bns run` leaves beside the data, and what it says at the end."""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from bns import stats
+from bns.config import RunConfig
+from bns.errors import BnsError
+from bns.record import RunRecord
+
+RECORDING = "recording.rrd"
+REPORT = "report.html"
+
+
+@contextmanager
+def live(choice: str, config: RunConfig) -> Iterator[Callable | None]:
+    """What streams each trial to a viewer, where that was asked for."""
+    if choice != "live":
+        yield None
+        return
+    from bns.viz import live as viewer
+
+    with viewer.stream(config) as on_trial:
+        yield on_trial
+
+
+def write(
+    record: RunRecord, out: Path, *, recording: bool = True, report: bool = True
+) -> None:
+    """Write recording and report, then say where everything is."""
+    made = {"data": out}
+    if report:
+        made |= _try("report", lambda: write_report([out], out / REPORT))
+    if recording:
+        made |= _try("recording", lambda: write_recording(record, out / RECORDING))
+    print(summary(record))
+    for name, path in made.items():
+        print(f"{name + ':':<11}{path}")
+
+
+def write_report(directories: list[Path], path: Path) -> Path:
+    """The HTML report on runs."""
+    from bns.viz import report
+
+    report.write(directories, path)
+    return path
+
+
+def write_recording(record: RunRecord, path: Path) -> Path:
+    """The recording of the most typical replicate whose samples were kept."""
+    from bns.viz import choices, recording
+    from bns.worlds import dataset
+
+    os.environ.setdefault("RERUN_ANALYTICS", "0")
+    kept = min(record.config.record_replicates, record.replicates)
+    replicate = choices.typical(record if not kept else _first(record, kept))
+    dense = {}
+    if kept:
+        trials = dataset.read(Path(record.directory) / "dataset")
+        dense = dict(enumerate(trials[replicate::kept]))
+    recording.write(record, dense, path, replicate=replicate)
+    return path
+
+
+def summary(record: RunRecord) -> str:
+    """What happened, in words."""
+    solved = stats.trials_to_solve(record)
+    lines = [f"{record.trials} trials of {record.replicates} runs."]
+    lines.append(_sentence("Solved", solved, "at trial"))
+    recovered = stats.trials_to_recover(record)
+    if np.isnan(recovered).all():
+        lines.append("No damage.")
+    else:
+        onset = int(record.damage_onset.max())
+        damage = "; ".join(record.config.world.damage)
+        lines.append(f"Damage from trial {onset + 1} on ({damage}).")
+        lines.append(_sentence("Recovered", recovered, "after trials"))
+    return "\n".join(lines)
+
+
+def _sentence(word: str, values: np.ndarray, unit: str) -> str:
+    reached = np.isfinite(values)
+    text = f"{word} by {reached.sum()} of {len(values)}"
+    if not reached.any():
+        return f"{text}."
+    middle = stats.median_interval(values)
+    return (
+        f"{text}, {unit} {number(middle.value)} in the median "
+        f"(95 % interval {number(middle.low)} to {number(middle.high)}), counted from 1."
+    )
+
+
+def number(value: float) -> str:
+    """A count in words: whole where it is, "never" for infinity."""
+    return "never" if value == np.inf else f"{value:g}"
+
+
+def _first(record: RunRecord, runs: int) -> RunRecord:
+    from dataclasses import replace
+
+    return replace(
+        record,
+        columns={name: value[:runs] for name, value in record.columns.items()},
+        sent=record.sent[:runs],
+        poses=record.poses[:runs],
+        predicted=record.predicted[:runs],
+        damage_onset=record.damage_onset[:runs],
+    )
+
+
+def _try(name: str, make: Callable[[], Path]) -> dict[str, Path]:
+    """A picture that fails must not take the data with it."""
+    import sys
+
+    try:
+        return {name: make()}
+    except BnsError as error:
+        print(f"bns: no {name}: {error}", file=sys.stderr)
+        return {}

@@ -1,0 +1,122 @@
+"""`bns run`: train a preset, a TOML file, or go on with a run directory."""
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from bns.cli.parse import parse
+from bns.config import RunConfig
+from bns.errors import BnsError, FormatError, UnknownNameError
+
+STOPPED = 130
+"""exit code of a run that Ctrl-C stopped after a whole trial"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arguments:
+    """Train a learner: `bns run PRESET`, `bns run FILE.toml`, or go on with a run:
+    `bns run DIRECTORY --resume`. Every setting below can be given; what is not given
+    comes from the preset or file. Ctrl-C stops after the trial that is going on;
+    --resume goes on from there.
+    """
+
+    source: tyro.conf.Positional[str]
+    """a preset (see `bns presets`), a TOML file, or a run directory"""
+    out: str = ""
+    """directory for the results (default: runs/NAME)"""
+    resume: bool = False
+    """go on with the run in the directory"""
+    rerun: Literal["save", "live", "off"] = "save"
+    """save: write recording.rrd; live: stream to a viewer as well; off: neither"""
+    report: bool = True
+    """write report.html at the end"""
+    config: Annotated[RunConfig, tyro.conf.arg(name="")] = field(
+        default_factory=RunConfig
+    )
+
+
+def main(verb: str, argv: list[str]) -> int:
+    """Run the verb; gives the exit code."""
+    if not argv or argv[0] in ("-h", "--help"):
+        parse(Arguments, argv, prog="bns run")
+    if argv[0].startswith("-"):
+        raise BnsError(
+            f"{argv[0]} comes too early: give a preset or TOML file first, as in "
+            f"`bns run demo {argv[0]} ...`. See bns run --help."
+        )
+    config, out = source(argv[0])
+    start = Arguments(source=argv[0], config=config, out=out)
+    given = parse(Arguments, argv, prog="bns run", default=start)
+    return execute(given)
+
+
+def source(text: str) -> tuple[RunConfig, str]:
+    """The configuration a preset, file or run directory gives, and where it goes.
+
+    Raises:
+        BnsError: there is none of that name.
+    """
+    from bns import loading, presets
+
+    path = Path(text)
+    if path.is_dir() and text not in presets.names():
+        from bns.store import RunStore
+
+        return RunStore.open(path).config, text
+    if path.suffix == ".toml" or path.is_file():
+        if not path.exists():
+            raise FormatError(f"There is no file {text}: give a TOML file or a preset.")
+        return loading.from_file(path), f"runs/{path.stem}"
+    if text not in presets.names():
+        raise UnknownNameError("preset", text, presets.names())
+    return presets.load(text), f"runs/{text}"
+
+
+def execute(given: Arguments) -> int:
+    """Train, draw, and say what happened."""
+    from bns.cli import outputs
+    from bns.run import train
+
+    out = Path(given.out)
+    with (
+        outputs.live(given.rerun, given.config) as on_trial,
+        until_interrupted() as stop,
+    ):
+        record = train(
+            given.config,
+            out,
+            resume=given.resume,
+            progress=True,
+            on_trial=on_trial,
+            stop=stop,
+        )
+    if record.trials < given.config.trials:
+        print(
+            f"Stopped after {record.trials} of {given.config.trials} trials. "
+            f"Go on with: bns run {out} --resume"
+        )
+        return STOPPED
+    outputs.write(record, out, recording=given.rerun != "off", report=given.report)
+    return 0
+
+
+@contextmanager
+def until_interrupted() -> Iterator[object]:
+    """Gives a question: was Ctrl-C pressed? Pressed twice, it stops at once."""
+    pressed: list[int] = []
+
+    def note(*_: object) -> None:
+        if pressed:
+            raise KeyboardInterrupt
+        pressed.append(1)
+
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield lambda: bool(pressed)
+    finally:
+        signal.signal(signal.SIGINT, before)

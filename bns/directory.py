@@ -1,0 +1,61 @@
+"""Whether a directory is free for a run, or is one."""
+
+from pathlib import Path
+from typing import Any
+
+from bns import files
+from bns.errors import BnsError, FormatError
+
+FORMAT = "bns-run"
+SCHEMA = 1
+
+
+def check_free(directory: Path) -> None:
+    """Refuse a directory that holds anything.
+
+    Raises:
+        BnsError: it holds a run (go on with --resume) or something else.
+    """
+    if not directory.exists():
+        return
+    if not directory.is_dir():
+        raise BnsError(f"{directory} is a file: give another --out.")
+    held = [p.name for p in directory.iterdir() if not _harmless(p.name)]
+    if "run.json" in held:
+        raise BnsError(
+            f"{directory} holds a run already: add --resume to go on with it, "
+            "or give another --out."
+        )
+    if held:
+        raise FormatError(
+            f"{directory} is not empty and holds no run ({min(held)}, ...): "
+            "give another --out. Nothing was changed."
+        )
+
+
+def _harmless(name: str) -> bool:
+    """What a run killed before its first whole file leaves behind."""
+    return name.startswith(files.TEMPORARY) or name == "config.toml"
+
+
+def read_head(directory: Path) -> dict[str, Any]:
+    """The content of a run directory's run.json.
+
+    Raises:
+        FormatError: not a run directory, damaged, or written by a newer version.
+    """
+    path = directory / "run.json"
+    if not path.exists():
+        raise FormatError(
+            f"{directory} is not a run directory (it has no run.json): give one that "
+            "`bns run` made. Nothing was changed."
+        )
+    head = files.read_json(path)
+    if head.get("format") != FORMAT or type(head.get("schema")) is not int:
+        raise FormatError(f"{path} is not a run of bns. Nothing was changed.")
+    if head["schema"] > SCHEMA:
+        raise FormatError(
+            f"{path} has schema {head['schema']}, this version reads up to {SCHEMA}: "
+            "install a newer bns. Nothing was changed."
+        )
+    return head

@@ -1,0 +1,45 @@
+"""Configurations by name: one TOML file each, only what differs from the defaults."""
+
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from bns.config import RunConfig
+from bns.errors import UnknownNameError
+
+
+@cache
+def names() -> tuple[str, ...]:
+    """The presets that exist, sorted."""
+    entries = files(__name__).iterdir()
+    return tuple(
+        sorted(
+            e.name.removesuffix(".toml") for e in entries if e.name.endswith(".toml")
+        )
+    )
+
+
+def describe(name: str) -> str:
+    """What the preset is, in one line."""
+    return str(_content(name)["description"])
+
+
+def load(name: str) -> RunConfig:
+    """The configuration of a preset.
+
+    Raises:
+        UnknownNameError: there is no such preset.
+    """
+    from bns.loading import from_mapping
+
+    content = _content(name)
+    content.pop("description")
+    return from_mapping({**content, "preset": name})
+
+
+def _content(name: str) -> dict[str, Any]:
+    from bns.loading import read_toml
+
+    if name not in names():
+        raise UnknownNameError("preset", name, names())
+    return read_toml(files(__name__) / f"{name}.toml")

@@ -1,0 +1,254 @@
+"""Train: the loop of trials, stored after each one and resumable."""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bns import files, versions
+from bns.batch import Batch, check_world, resolve
+from bns.config import RunConfig
+from bns.directory import check_free
+from bns.errors import BnsError
+from bns.loading import differences
+from bns.progress import Progress
+from bns.record import RunRecord
+from bns.step import Step, assemble
+from bns.store import RunStore
+from bns.validate import check
+from bns.worlds.damage import Damage
+from bns.worlds.trial import Trial
+
+OnTrial = Callable[[int, Step, list[Trial]], None]
+
+
+def train(
+    config: RunConfig,
+    out: Path | str | None = None,
+    *,
+    resume: bool = False,
+    progress: bool = False,
+    on_trial: OnTrial | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> RunRecord:
+    """Train all replicates of a configuration.
+
+    Args:
+        config: the experiment.
+        out: directory to store the run in; None keeps it in memory.
+        resume: go on with the run in `out`, if there is one.
+        progress: show it on the standard error stream.
+        on_trial: called after every trial with its number, what was learned, and
+            the trial of every replicate.
+        stop: asked before every trial; True ends the run there.
+
+    Returns:
+        The record: all trials, or those done when `stop` said so.
+
+    Raises:
+        BnsError: a setting that is not allowed, a directory that is not free, holds
+            another configuration or cannot be written.
+    """
+    check(config)
+    check_world(config)
+    store = _store(config, Path(out), resume=resume) if out is not None else None
+    try:
+        if store and store.finished:
+            store.clean()
+            return store.record()
+        return _loop(config, store, progress=progress, on_trial=on_trial, stop=stop)
+    finally:
+        if store:
+            store.close()
+
+
+def train_many(
+    configs: Sequence[RunConfig],
+    *,
+    progress: bool = False,
+    on_trial: OnTrial | None = None,
+) -> list[RunRecord]:
+    """Train several configurations as one batch, in memory.
+
+    Args:
+        configs: they may differ in `adaptation` and `world` only.
+        progress: show it on the standard error stream.
+        on_trial: as for `train`; the runs of all configurations, one after another.
+
+    Raises:
+        BnsError: a setting that is not allowed, or configurations too different.
+    """
+    for config in configs:
+        check_world(check(config))
+    settled, mode = _settle(configs)
+    batch = Batch(settled, [make_world(config) for config in settled])
+    steps: list[Step] = []
+    with Progress(configs[0], enabled=progress) as bar:
+        for trial in range(configs[0].trials):
+            step, tried = batch.advance(trial)
+            steps.append(step)
+            bar.update(trial, step)
+            if on_trial:
+                on_trial(trial, step, tried)
+    made = versions.collect()
+    return [
+        assemble(
+            config,
+            [step.part(batch.part(index)) for step in steps],
+            versions=made,
+            **facts(config, mode),
+        )
+        for index, config in enumerate(configs)
+    ]
+
+
+def make_world(config: RunConfig, directory: Path | None = None) -> Any:
+    """The world of a configuration.
+
+    Args:
+        config: says which, where the robot starts, and what is wrong with it.
+        directory: where a static SNN world keeps its nets; None trains them anew.
+    """
+    from bns.tasks import NavigationTask
+    from bns.worlds import registry
+
+    more: dict[str, Any] = {}
+    if config.world.name == "static-snn":
+        more["nets"] = _nets(config, directory)
+    return registry.make(
+        config.world.name,
+        robot=config.world.robot,
+        damage=config.world.damage,
+        reality=config.world.reality,
+        sample_dt=config.world.sample_dt,
+        threads=config.threads,
+        start=NavigationTask.of(config.task).start,
+        **more,
+    )
+
+
+def facts(config: RunConfig, mode: str) -> dict[str, Any]:
+    """What a record says of the world beside the configuration."""
+    damage = Damage.parse(config.world.damage)
+    return {
+        "conditions": {
+            "damage": list(damage.texts()),
+            "reality": list(Damage.parse(config.world.reality).texts()),
+            "mode": mode,
+        },
+        "damage_onset": np.full(config.replicates, damage.first_trial, np.int64),
+    }
+
+
+def _settle(configs: Sequence[RunConfig]) -> tuple[list[RunConfig], str]:
+    settled = [resolve(config) for config in configs]
+    modes = {mode for _, mode in settled}
+    return [config for config, _ in settled], modes.pop()
+
+
+def _store(config: RunConfig, out: Path, *, resume: bool) -> RunStore:
+    """The store of a run: a new one, or the one to go on with."""
+    if resume and (out / "run.json").exists():
+        store = RunStore.open(out)
+        differing = differences(config, store.config)
+        if differing:
+            key, (here, there) = next(iter(differing.items()))
+            raise BnsError(
+                f"{out} was made with {key} = {there!r}, not {here!r}: resume with the "
+                f"configuration it has ({out}/config.toml), or give another --out."
+            )
+        store.lock()
+        files.remove_temporary(out)
+        files.remove_temporary(out / "steps")
+        return store
+    check_free(out)
+    _, mode = resolve(config)
+    known = facts(config, mode)
+    return RunStore(out, config, mode, versions.collect(), **known)
+
+
+def _loop(
+    config: RunConfig,
+    store: RunStore | None,
+    *,
+    progress: bool,
+    on_trial: OnTrial | None,
+    stop: Callable[[], bool] | None,
+) -> RunRecord:
+    settled, mode = resolve(config, store.mode if store else "")
+    batch = _batch(settled, store)
+    memory: list[Step] = []
+    done = _restore(batch, store)
+    with Progress(config, done=done, enabled=progress) as bar:
+        for trial in range(done, config.trials):
+            if stop and stop():
+                break
+            started = time.perf_counter()
+            step, tried = batch.advance(trial, recorded=config.record_replicates)
+            if store:
+                _keep(store, trial, step, batch.learner.state(), started)
+            else:
+                memory.append(step)
+            bar.update(trial, step)
+            if on_trial:
+                on_trial(trial, step, tried)
+            done = trial + 1
+    if store:
+        return store.finish() if done == config.trials else store.record()
+    return assemble(config, memory, versions=versions.collect(), **facts(config, mode))
+
+
+def _batch(config: RunConfig, store: RunStore | None) -> Batch:
+    """Learner and world; a new directory is made once both are known to be possible."""
+    if store is None:
+        return Batch([config], [make_world(config)])
+    needs_directory = config.world.name == "static-snn"
+    if needs_directory and not store.exists:
+        store.create()
+    batch = Batch([config], [make_world(config, store.directory)])
+    if not store.exists:
+        store.create()
+    return batch
+
+
+def _restore(batch: Batch, store: RunStore | None) -> int:
+    """Put the learner where the run stopped; gives the trials done."""
+    done, state = store.read_state() if store else (0, {})
+    if done:
+        batch.learner.restore(state)
+    if store:
+        store.note(event="resume" if done else "start", trials_done=done)
+    return done
+
+
+def _keep(
+    store: RunStore,
+    trial: int,
+    step: Step,
+    state: Mapping[str, np.ndarray],
+    started: float,
+) -> None:
+    computed = time.perf_counter()
+    store.write_step(trial, step)
+    store.write_state(trial + 1, state)
+    stored = time.perf_counter()
+    store.note(
+        trial=trial,
+        seconds=round(computed - started, 6),
+        storing=round(stored - computed, 6),
+    )
+
+
+def _nets(config: RunConfig, directory: Path | None) -> Any:
+    """Nets of the static SNN world, from the run's directory if they are there."""
+    from bns import static_snn
+
+    path = directory / "static_snn.npz" if directory else None
+    if path and path.exists():
+        return static_snn.StaticNets.from_arrays(files.read_npz(path))
+    nets = static_snn.nets_for(config)
+    if path:
+        files.write_npz(path, nets.to_arrays())
+    return nets

@@ -1,0 +1,104 @@
+"""Bounds of every number in a configuration, and what must fit together."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from typing import Any, NamedTuple
+
+from bns.config import RunConfig
+from bns.errors import BnsError, OutOfBoundsError
+
+
+class Bound(NamedTuple):
+    """Smallest and largest value allowed, and their unit ("1" = a plain number)."""
+
+    low: float
+    high: float
+    unit: str = "1"
+
+
+_SPEED = "speed units"
+BOUNDS = {
+    "task.corner_x": Bound(0.05, 1.30, "m"),  # the board is 2.7 m x 1.8 m
+    "task.corner_y": Bound(0.05, 0.85, "m"),
+    "task.radius": Bound(0.005, 0.5, "m"),
+    "task.penalty": Bound(0, 1e9),
+    "task.command_cost": Bound(0, 1e6, "cm"),
+    "task.start_yaw": Bound(-360, 360, "deg"),
+    "controller.max_commands": Bound(1, 200, "commands"),
+    "controller.initial_min": Bound(1, 200, "commands"),
+    "controller.initial_max": Bound(1, 200, "commands"),
+    "controller.speed_low": Bound(-43000, 43000, _SPEED),  # 0.3 m/s, assumed
+    "controller.speed_high": Bound(-43000, 43000, _SPEED),
+    "controller.dead_band": Bound(0, 43000, _SPEED),
+    "controller.duration_low": Bound(0.05, 60, "s"),
+    "controller.duration_high": Bound(0.05, 60, "s"),
+    "evolution.population": Bound(2, 100_000, "individuals"),
+    "evolution.generations": Bound(0, 100_000, "generations"),
+    "evolution.tournament": Bound(1, 100_000, "individuals"),
+    "evolution.crossover_points": Bound(1, 200, "cuts"),
+    "evolution.sbx_eta": Bound(0, 1000),
+    "evolution.mutation_rate": Bound(0, 1),
+    "evolution.mutation_magnitude": Bound(0, 86000, _SPEED),
+    "evolution.duration_magnitude": Bound(0, 60, "s"),
+    "evolution.elitism": Bound(0, 100_000, "individuals"),
+    "evolution.headless_chicken": Bound(0, 1),
+    "snn.hidden": Bound(1, 4096, "neurons"),
+    "snn.members": Bound(1, 100, "networks"),
+    "snn.dropout": Bound(0, 0.95),
+    "snn.epochs": Bound(0, 1_000_000, "epochs"),
+    "adaptation.window": Bound(0, 10_000_000, "patterns"),
+    "adaptation.simulator_reset_every": Bound(0, 1_000_000, "trials"),
+    "adaptation.mutation_rate_after": Bound(0, 1),
+    "adaptation.mutation_magnitude_after": Bound(0, 86000, _SPEED),
+    "world.sample_dt": Bound(0.005, 10, "s"),
+    "choose_tournament": Bound(0, 1),
+    "evolve_from": Bound(0, 1_000_000, "trials"),
+    "trials": Bound(1, 1_000_000, "trials"),
+    "replicates": Bound(1, 10_000, "runs"),
+    "record_replicates": Bound(0, 10_000, "runs"),
+    "seed": Bound(0, 2**63 - 1),
+    "threads": Bound(1, 1024, "threads"),
+}
+
+_ORDERED = (
+    ("controller.initial_min", "controller.initial_max"),
+    ("controller.initial_max", "controller.max_commands"),
+    ("controller.speed_low", "controller.speed_high"),
+    ("controller.duration_low", "controller.duration_high"),
+    ("evolution.tournament", "evolution.population"),
+    ("evolution.elitism", "evolution.population"),
+)
+
+
+def leaves(config: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Every setting of a configuration tree as (dotted name, value)."""
+    for field in fields(config):
+        value = getattr(config, field.name)
+        if is_dataclass(value):
+            yield from leaves(value, f"{prefix}{field.name}.")
+        else:
+            yield prefix + field.name, value
+
+
+def check(config: RunConfig) -> RunConfig:
+    """The configuration, if every number is inside its bounds and they fit together.
+
+    Raises:
+        OutOfBoundsError: a number outside its bounds, or not finite.
+        BnsError: two settings that contradict each other.
+    """
+    values = dict(leaves(config))
+    for name, value in values.items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            continue
+        bound = BOUNDS.get(name, Bound(-math.inf, math.inf))
+        if not (math.isfinite(value) and bound.low <= value <= bound.high):
+            raise OutOfBoundsError(name, value, *bound)
+    for lower, upper in _ORDERED:
+        if values[lower] > values[upper]:
+            raise BnsError(
+                f"{lower} = {values[lower]} is larger than {upper} = {values[upper]}: "
+                f"raise {upper} or lower {lower}."
+            )
+    return config
