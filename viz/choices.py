@@ -86,7 +86,7 @@ def _with_damage(record: RunRecord, replicate: int, onset: int) -> list[Choice]:
     if onset + 1 < record.trials:
         later = np.flatnonzero(solved[onset + 1 :])
         best = later[0] if len(later) else _lowest(fitness[onset + 1 :])
-        label = "recovered" if len(later) else "best after damage (not recovered)"
+        label = "recovered" if len(later) else "best after damage (unsolved)"
         found.append(Choice(onset + 1 + int(best), label, style.AFTER))
     return found
 

@@ -1,23 +1,171 @@
-"""Key figures of a run, in numbers and in words."""
+"""Key figures of a batch of runs, as numbers and in words."""
+
+import math
+from dataclasses import dataclass
 
 import numpy as np
 
+from bns import stats
 from bns.record import RunRecord
+from bns.stats import Interval
+from bns.viz.charts import DEGREES, MILLIMETRES
+
+NEVER = "never"
 
 
-def to_solve(record: RunRecord) -> np.ndarray:
-    """Trials until the first solved one, that one included, ``(R,)``; inf = never."""
-    return _first(record["solved"] > 0)
+@dataclass(frozen=True)
+class Facts:
+    """What happened in a batch of R runs over T trials.
+
+    Attributes:
+        label: name of the batch in comparisons.
+        runs: R.
+        trials: T.
+        solved: runs that solved before the damage (or at all, undamaged).
+        to_solve: trials until the first solved one, median and interval.
+        onset: first damaged trial, counted from 0; None without damage.
+        recovered: runs that recovered.
+        to_recover: trials from the onset until solved again, median and interval.
+        last_solved: runs whose last trial solved the task.
+    """
+
+    label: str
+    runs: int
+    trials: int
+    solved: int
+    to_solve: Interval
+    onset: int | None
+    recovered: int
+    to_recover: Interval | None
+    last_solved: int
+
+    @classmethod
+    def of(cls, record: RunRecord, label: str = "") -> "Facts":
+        """The facts of a record."""
+        waits, back = stats.trials_to_solve(record), stats.trials_to_recover(record)
+        hit = ~np.isnan(back)
+        onset = int(record.damage_onset[hit].min()) if hit.any() else None
+        before = waits <= (record.trials if onset is None else onset)
+        return cls(
+            label=label,
+            runs=record.replicates,
+            trials=record.trials,
+            solved=int(before.sum()),
+            to_solve=stats.median_interval(np.where(before, waits, np.inf)),
+            onset=onset,
+            recovered=int(np.isfinite(back).sum()),
+            to_recover=stats.median_interval(back[hit]) if hit.any() else None,
+            last_solved=int((record["solved"][:, -1] > 0).sum()),
+        )
 
 
-def to_recover(record: RunRecord) -> np.ndarray:
-    """Trials from the onset until the first solved one, ``(R,)``; inf = never."""
-    counts = np.full(record.replicates, np.inf)
-    for at, onset in enumerate(record.damage_onset):
-        if 0 <= onset < record.trials:
-            counts[at] = _first(record["solved"][at : at + 1, onset:] > 0)[0]
-    return counts
+def interval(value: Interval | None) -> str:
+    """A median and its interval: ``12 (95 % interval 9 to 15)``."""
+    if value is None:
+        return "-"
+    if not math.isfinite(value.value):
+        return NEVER
+    text = f"{value.value:g}"
+    if not math.isfinite(value.low):
+        return f"{text} (too few runs for an interval)"
+    high = f"{value.high:g}" if math.isfinite(value.high) else NEVER
+    return f"{text} (95 % interval {value.low:g} to {high})"
 
 
-def _first(done: np.ndarray) -> np.ndarray:
-    return np.where(done.any(axis=1), done.argmax(axis=1) + 1.0, np.inf)
+def sentences(record: RunRecord, facts: Facts) -> list[str]:
+    """What was run and what happened, in plain sentences."""
+    config = record.config
+    runs = "One run" if facts.runs == 1 else f"{facts.runs} runs"
+    found = [
+        f"{runs} of the {config.task.name} task by a {config.world.robot} in the "
+        f"{config.world.name} world, {facts.trials} trials each.",
+        _solving(facts),
+    ]
+    if facts.onset is not None:
+        found.append(_damage(record, facts.onset))
+        found.append(_recovering(facts))
+    return found
+
+
+def _solving(facts: Facts) -> str:
+    when = "" if facts.onset is None else " before the damage"
+    if facts.solved == 0:
+        return f"None solved the task{when}."
+    text = f"{facts.solved} of {facts.runs} solved the task{when}"
+    if math.isfinite(facts.to_solve.value):
+        text += f"; the median run needed {interval(facts.to_solve)} trials"
+    return text + "."
+
+
+def _damage(record: RunRecord, onset: int) -> str:
+    damage = " and ".join(record.config.world.damage) or "damage"
+    number = onset + 1
+    return f"From its {_ordinal(number)} trial on the robot was damaged: {damage}."
+
+
+def _recovering(facts: Facts) -> str:
+    if facts.recovered == 0:
+        left = facts.trials - facts.onset
+        return f"None recovered within the {left} trials that were left."
+    text = f"{facts.recovered} of {facts.runs} recovered"
+    if facts.to_recover and math.isfinite(facts.to_recover.value):
+        text += f"; the median run needed {interval(facts.to_recover)} trials"
+    return text + "."
+
+
+def rows(record: RunRecord, facts: Facts) -> list[tuple[str, str, str]]:
+    """The table of key figures: name, value, explanation."""
+    found = [
+        (
+            "Solved" + ("" if facts.onset is None else " before damage"),
+            f"{facts.solved} of {facts.runs} runs",
+            "all objectives reached in one trial",
+        ),
+        ("Trials to solve", interval(facts.to_solve), "median over all runs"),
+    ]
+    if facts.onset is not None:
+        found += [
+            (
+                "Recovered",
+                f"{facts.recovered} of {facts.runs} runs",
+                "all objectives reached again, while damaged",
+            ),
+            (
+                "Trials to recover",
+                interval(facts.to_recover),
+                "median over all runs, counted from the first damaged trial",
+            ),
+        ]
+    last = f"{facts.last_solved} of {facts.runs} runs"
+    found.append(("Solved in the last trial", last, "whether it lasts"))
+    return found + _errors(record, facts)
+
+
+def _errors(record: RunRecord, facts: Facts) -> list[tuple[str, str, str]]:
+    """SNN error at the moments that matter."""
+    moments = [("in the first trial", 0), ("in the last trial", record.trials - 1)]
+    if facts.onset is not None:
+        at = facts.onset
+        moments[1:1] = [("just before damage", at - 1), ("in the onset trial", at)]
+    position = np.hypot(record["snn_forward"], record["snn_left"]) * MILLIMETRES
+    turn = record["snn_turn"] * DEGREES
+    return [
+        (
+            f"SNN error {name}",
+            f"{_median(position[:, trial]):.3g} mm, {_median(turn[:, trial]):.3g} deg",
+            "RMS per command before training on it, median over runs",
+        )
+        for name, trial in moments
+        if trial >= 0
+    ]
+
+
+def _median(values: np.ndarray) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if len(finite) else math.nan
+
+
+def _ordinal(number: int) -> str:
+    if number % 100 in (11, 12, 13):
+        return f"{number}th"
+    return f"{number}{ {1: 'st', 2: 'nd', 3: 'rd'}.get(number % 10, 'th') }"

@@ -55,6 +55,7 @@ def send(
         start += float(times[-1]) + GAP
     _states(stream, states, colours, start)
     _every_trial(stream, record, replicate)
+    _robot_at_ends(stream, record, replicate, model)
 
 
 def duration(record: RunRecord, replicate: int, chosen: Sequence[Choice]) -> float:
@@ -182,7 +183,7 @@ def _every_trial(stream, record: RunRecord, replicate: int) -> None:
         numbers = [n for n, rows in enumerate(paths) if len(rows) > 1]
         if not numbers:
             continue
-        strips = [_lift(arcs(paths[n], 4)) for n in numbers]
+        strips = [_lift(arcs(paths[n])) for n in numbers]
         stream.send_columns(
             f"world/each_trial/{name}",
             [rr.TimeColumn(TRIAL_TIMELINE, sequence=numbers)],
@@ -192,3 +193,15 @@ def _every_trial(stream, record: RunRecord, replicate: int) -> None:
                 radii=[_TRAIL * 0.6] * len(numbers),
             ),
         )
+
+
+def _robot_at_ends(stream, record: RunRecord, replicate: int, model) -> None:
+    """The robot where each trial left it, on the timeline `trial`."""
+    import rerun as rr
+
+    ends = [listed(poses)[-1:] for poses in record.poses[replicate]]
+    numbers = [n for n, end in enumerate(ends) if len(end)]
+    if numbers:
+        qpos = geometry.planar_qpos(model, np.concatenate([ends[n] for n in numbers]))
+        index = [rr.TimeColumn(TRIAL_TIMELINE, sequence=numbers)]
+        geometry.send_poses(stream, model, index, qpos)

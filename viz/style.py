@@ -48,7 +48,7 @@ _RC = {
     "figure.dpi": 100,
     "savefig.dpi": 150,
     "figure.facecolor": "white",
-    "svg.fonttype": "none",
+    "svg.fonttype": "path",
     "svg.hashsalt": "bns",
 }
 

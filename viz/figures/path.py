@@ -26,7 +26,7 @@ def path(
     replicate = typical(record) if replicate is None else replicate
     chosen = choose(record, replicate) if choices is None else choices
     with style.plotting() as figure_class:
-        figure = figure_class(figsize=(7.0, 3.15), layout="constrained")
+        figure = figure_class(figsize=(7.0, 3.4), layout="compressed")
         panels = figure.subplots(
             1, len(chosen), squeeze=False, sharex=True, sharey=True
         )

@@ -4,8 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from bns import stats
 from bns.record import RunRecord
-from bns.viz import facts, style
+from bns.viz import style
 from bns.viz.figures import bands
 
 
@@ -19,10 +20,12 @@ def waits(runs: Mapping[str, RunRecord]):
         damaged = bool(bands.onsets(runs))
         panels = figure.subplots(1, 1 + damaged, squeeze=False, sharey=True)[0]
         for label, record, colour in bands.coloured(runs):
-            _steps(panels[0], facts.to_solve(record), record.trials, colour, label)
+            _steps(
+                panels[0], stats.trials_to_solve(record), record.trials, colour, label
+            )
             if damaged:
                 left = record.trials - max(record.damage_onset.min(), 0)
-                _steps(panels[1], facts.to_recover(record), left, colour, label)
+                _steps(panels[1], stats.trials_to_recover(record), left, colour, label)
         titles = ("Solved for the first time", "Recovered from the damage")
         units = ("trials from the start", "trials from the damage")
         for axes, title, unit in zip(panels, titles, units, strict=False):
@@ -38,6 +41,7 @@ def waits(runs: Mapping[str, RunRecord]):
 
 
 def _steps(axes, counts: np.ndarray, longest: int, colour: str, label: str) -> None:
+    counts = counts[~np.isnan(counts)]
     finite = np.sort(counts[np.isfinite(counts)])
     x = np.concatenate([[0.0], finite, [longest]])
     share = np.arange(len(finite) + 1) / max(len(counts), 1)

@@ -1,0 +1,173 @@
+"""One self-contained HTML page about one batch of runs, or about several."""
+
+import base64
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from bns import files, loading
+from bns.errors import BnsError
+from bns.record import RunRecord
+from bns.viz import comparison, facts, figures, scene, style
+from bns.viz.captions import CAPTIONS, TITLES
+
+ALL_RUNS = ("fitness", "solved", "waits", "snn_error", "diversity")
+"""Figures that lay several batches over one another."""
+
+ONE_RUN = (
+    "path",
+    "fitness",
+    "solved",
+    "waits",
+    "snn_error",
+    "displacement",
+    "diversity",
+)
+"""Figures of the report of a single batch, in order."""
+
+
+def write(
+    sources: Sequence[str | Path | RunRecord] | Mapping[str, RunRecord] | str | Path,
+    out_html: str | Path,
+) -> Path:
+    """Write the report of one batch, or the comparison of several.
+
+    Args:
+        sources: run directories or records, one or more; a mapping gives the labels
+            that a comparison shows.
+        out_html: file to write; no other file is needed to read it.
+
+    Returns:
+        The path written.
+
+    Raises:
+        BnsError: there is nothing to report on.
+        FormatError: a directory is not a finished run.
+    """
+    runs = _runs(sources)
+    if not runs:
+        raise BnsError("A report needs at least one run: give its directory.")
+    page = _template().render(_context(runs))
+    files.write_bytes(Path(out_html), page.encode())
+    return Path(out_html)
+
+
+def _runs(sources) -> dict[str, RunRecord]:
+    if isinstance(sources, Mapping):
+        return dict(sources)
+    if isinstance(sources, str | Path | RunRecord):
+        sources = [sources]
+    records = [
+        source if isinstance(source, RunRecord) else _load(source) for source in sources
+    ]
+    return dict(zip(_labels(records), records, strict=True))
+
+
+def _load(directory: str | Path) -> RunRecord:
+    from bns.store import load
+
+    return load(directory)
+
+
+def _labels(records: Sequence[RunRecord]) -> list[str]:
+    """Directory names, else presets; numbered where they are the same."""
+    names = [
+        Path(record.directory).name or record.config.preset or record.config.task.name
+        for record in records
+    ]
+    return [
+        name if names.count(name) == 1 else f"{name} ({at + 1})"
+        for at, name in enumerate(names)
+    ]
+
+
+def _context(runs: Mapping[str, RunRecord]) -> dict:
+    """What the template fills in."""
+    batches = [_batch(label, record) for label, record in runs.items()]
+    several = len(runs) > 1
+    context = {
+        "several": several,
+        "batches": batches,
+        "title": " against ".join(runs) if several else batches[0]["name"],
+        "figures": _shared_figures(runs) if several else _own_figures(runs),
+    }
+    if several:
+        context["comparison"] = comparison.table(runs)
+        context["differences"] = comparison.differences(runs)
+        context["paths"] = [
+            (label, picture(figures.path(record))) for label, record in runs.items()
+        ]
+        context["path_caption"] = _caption("path", next(iter(runs.values())))
+    return context
+
+
+def _batch(label: str, record: RunRecord) -> dict:
+    found = facts.Facts.of(record, label)
+    return {
+        "label": label,
+        "name": record.config.preset or f"{record.config.task.name} task",
+        "sentences": facts.sentences(record, found),
+        "rows": facts.rows(record, found),
+        "toml": loading.to_toml(record.config),
+        "versions": sorted(record.versions.items()),
+        "conditions": sorted(
+            (key, comparison.text(value)) for key, value in record.conditions.items()
+        ),
+        "directory": Path(record.directory).name,
+        "seed": record.config.seed,
+    }
+
+
+def _own_figures(runs: Mapping[str, RunRecord]) -> list[dict]:
+    record = next(iter(runs.values()))
+    alone = {"path": figures.path, "displacement": figures.displacement}
+    return [
+        _entry(
+            name,
+            record,
+            alone[name](record) if name in alone else getattr(figures, name)(runs),
+        )
+        for name in ONE_RUN
+    ]
+
+
+def _shared_figures(runs: Mapping[str, RunRecord]) -> list[dict]:
+    first = next(iter(runs.values()))
+    return [_entry(name, first, getattr(figures, name)(runs)) for name in ALL_RUNS]
+
+
+def _entry(name: str, record: RunRecord, figure) -> dict:
+    return {
+        "name": name,
+        "title": TITLES[name],
+        "caption": _caption(name, record),
+        "image": picture(figure),
+    }
+
+
+def _caption(name: str, record: RunRecord) -> str:
+    goals = scene.order(record)
+    return CAPTIONS[name].format(
+        order=", ".join(goals), goals=len(goals), penalty=record.config.task.penalty
+    )
+
+
+def picture(figure) -> str:
+    """A figure as a `data:` address of an SVG, the same bytes every time."""
+    buffer = io.BytesIO()
+    with style.plotting():
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
+
+
+def _template():
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("bns.viz", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("report.html")
