@@ -54,7 +54,7 @@ def start_state(scene: Compiled, start: tuple[float, float, float]) -> np.ndarra
         mujoco.mj_setState(model, data, motion.states[-1], STATE)
         data.time = 0.0
         data.qvel[:] = 0.0
-        data.qpos[place][:2] = start[:2]
+        data.qpos[place] = _posed(data.qpos[place], start)
         mujoco.mj_getState(model, data, state, STATE)
     state.setflags(write=False)
     return state
@@ -63,7 +63,10 @@ def start_state(scene: Compiled, start: tuple[float, float, float]) -> np.ndarra
 def _posed(free: np.ndarray, start: tuple[float, float, float]) -> np.ndarray:
     """A free joint's (7,) values moved to a planar pose, its height and tilt kept."""
     x, y, yaw = start
-    turn, turned = np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)]), np.empty(4)
+    w, i, j, k = free[3:]
+    angle = yaw - np.arctan2(2 * (w * k + i * j), 1 - 2 * (j * j + k * k))
+    turn = np.array([np.cos(angle / 2), 0, 0, np.sin(angle / 2)])
+    turned = np.empty(4)
     mujoco.mju_mulQuat(turned, turn, free[3:])
     return np.concatenate([[x, y, free[2]], turned])
 

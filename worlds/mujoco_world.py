@@ -17,7 +17,7 @@ from bns.worlds.trial import Commands, Trial
 STAGES = ("command", "actuator", "body", "tracking")
 
 
-class _Plan(NamedTuple):
+class Plan(NamedTuple):
     """One robot's trial before it is run."""
 
     commands: Commands
@@ -93,6 +93,17 @@ class MujocoWorld:
             BnsError: numbers of commands, seeds and damages disagree; commands that
                 the robot cannot be told.
         """
+        plans = self.plan(commands, trial=trial, seeds=seeds)
+        motions = self._pool.map([plan.job for plan in plans])
+        return [
+            self._observe(plan, motion, trial)
+            for plan, motion in zip(plans, motions, strict=True)
+        ]
+
+    def plan(
+        self, commands: Sequence[Commands], *, trial: int = 0, seeds: Sequence[int] = ()
+    ) -> list[Plan]:
+        """What `run` hands to the physics, for benches and tests; arguments alike."""
         damages, seeds = shared(self.damage, seeds, len(commands))
         at: dict[int, Stages] = {}
         plans = []
@@ -100,13 +111,9 @@ class MujocoWorld:
             if id(damage) not in at:
                 at[id(damage)] = Stages.of(self.reality.at(0), damage.at(trial))
             plans.append(self._plan(item, at[id(damage)], trial, seed))
-        motions = self._pool.map([plan.job for plan in plans])
-        return [
-            self._observe(plan, motion, trial)
-            for plan, motion in zip(plans, motions, strict=True)
-        ]
+        return plans
 
-    def _plan(self, commands: Commands, stages: Stages, trial: int, seed: int) -> _Plan:
+    def _plan(self, commands: Commands, stages: Stages, trial: int, seed: int) -> Plan:
         dt = self.dt
         control.check(commands, self._channels, self._limits, self.robot)
         counts = control.steps(commands.durations, dt)
@@ -118,9 +125,9 @@ class MujocoWorld:
         values = values * self.model.ctrl_per_command
         segments = compile.segments(self.robot, stages.body, values, dt)
         begin = compile.start_state(segments[0].compiled, self.start)
-        return _Plan(commands, stages, seed, counts, Job(begin, segments))
+        return Plan(commands, stages, seed, counts, Job(begin, segments))
 
-    def _observe(self, plan: _Plan, motion: Motion, trial: int) -> Trial:
+    def _observe(self, plan: Plan, motion: Motion, trial: int) -> Trial:
         scene = plan.job.segments[0].compiled.model
         place = compile.free_joint(scene)
         free = motion.states[:, 1 + place.start : 1 + place.stop]
