@@ -114,18 +114,20 @@ def make_world(config: RunConfig, directory: Path | None = None) -> Any:
     from bns.tasks import NavigationTask
     from bns.worlds import registry
 
-    more: dict[str, Any] = {}
-    if config.world.name == "static-snn":
-        more["nets"] = _nets(config, directory)
+    name = config.world.name
+    settings: dict[str, Any] = {
+        "robot": config.world.robot,
+        "damage": config.world.damage,
+        "reality": config.world.reality,
+        "start": NavigationTask.of(config.task).start,
+    }
+    if name == "static-snn":
+        return registry.make(name, nets=_nets(config, directory), **settings)
     return registry.make(
-        config.world.name,
-        robot=config.world.robot,
-        damage=config.world.damage,
-        reality=config.world.reality,
+        name,
         sample_dt=config.world.sample_dt,
         threads=config.threads,
-        start=NavigationTask.of(config.task).start,
-        **more,
+        **settings,
     )
 
 
@@ -244,11 +246,12 @@ def _keep(
 def _nets(config: RunConfig, directory: Path | None) -> Any:
     """Nets of the static SNN world, from the run's directory if they are there."""
     from bns import static_snn
+    from bns.worlds.static_nets import StaticNets
 
     path = directory / "static_snn.npz" if directory else None
     if path and path.exists():
-        return static_snn.StaticNets.from_arrays(files.read_npz(path))
+        return StaticNets.load(path)
     nets = static_snn.nets_for(config)
     if path:
-        files.write_npz(path, nets.to_arrays())
+        files.replace(path, nets.save)
     return nets

@@ -33,7 +33,6 @@ from bns.directory import FORMAT, SCHEMA, check_free, read_head
 from bns.errors import BnsError, FormatError
 from bns.record import RunRecord
 from bns.step import ARRAYS, Step, assemble
-from bns.worlds.trial import Trial
 
 _DONE = "trials_done"
 
@@ -224,13 +223,20 @@ class RunStore:
         )
 
     def _write_dataset(self, steps: Sequence[Step]) -> None:
-        path = self.directory / "dataset"
-        trials: list[Trial] = [t for step in steps for t in step.trials]
-        if trials:
-            from bns.worlds import dataset
+        trials = [trial for step in steps for trial in step.trials]
+        if not trials:
+            return
+        from bns.worlds import dataset
 
-            files.remove_tree(path)
-            files.replace(path, lambda to: dataset.write(to, trials))
+        path = self.directory / "dataset"
+        files.remove_tree(path)  # a killed process finished it, but not the run
+        dataset.write(
+            path,
+            trials,
+            replicates=[r for step in steps for r in range(len(step.trials))],
+            provenance={"preset": self.config.preset, "seed": self.config.seed}
+            | dict(self.versions),
+        )
 
 
 def load(directory: Path | str) -> RunRecord:

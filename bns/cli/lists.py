@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from bns.cli.parse import parse
 from bns.cli.tables import show
@@ -53,10 +52,8 @@ def robots() -> Rows:
     rows = []
     for name in models.names():
         robot = models.robot(name)
-        limits: Any = getattr(robot, "limits", ())
         told = [
-            f"{channel.name} {low:g} to {high:g} {channel.unit}"
-            for channel, (low, high) in zip(robot.channels, limits, strict=False)
+            f"{c.name} {c.low:.4g} to {c.high:.4g} {c.unit}" for c in robot.commands
         ]
         rows.append([name, robot.kind, ", ".join(told), robot.doc])
     return ["robot", "kind", "commands", "what it is"], rows

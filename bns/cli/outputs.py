@@ -60,8 +60,9 @@ def write_recording(record: RunRecord, path: Path) -> Path:
     replicate = choices.typical(record if not kept else _first(record, kept))
     dense = {}
     if kept:
-        trials = dataset.read(Path(record.directory) / "dataset")
-        dense = dict(enumerate(trials[replicate::kept]))
+        found = dataset.read(Path(record.directory) / "dataset")
+        known = zip(found.replicates, found.numbers, found.trials, strict=True)
+        dense = {number: trial for run, number, trial in known if run == replicate}
     recording.write(record, dense, path, replicate=replicate)
     return path
 
@@ -90,7 +91,8 @@ def _sentence(word: str, values: np.ndarray, unit: str) -> str:
     middle = stats.median_interval(values)
     return (
         f"{text}, {unit} {number(middle.value)} in the median "
-        f"(95 % interval {number(middle.low)} to {number(middle.high)}), counted from 1."
+        f"(95 % interval {number(middle.low)} to {number(middle.high)}), "
+        "counted from 1."
     )
 
 
