@@ -1,0 +1,67 @@
+"""Define an effect of your own and damage a robot with it.
+
+    python examples/05_own_effect.py
+
+In the package an effect is one file in `worlds/effects/`, found by its name. Outside,
+an object of the class does: worlds take it wherever they take an effect as text.
+"""
+
+import argparse
+
+import numpy as np
+
+from bns.worlds import registry
+from bns.worlds.damage import Damage, Event
+from bns.worlds.effects.base import CommandEffect, Parameter
+from bns.worlds.trial import Commands
+
+
+class LooseWheel(CommandEffect):
+    """The left wheel slips on its axle, more in the first moment of every command."""
+
+    name = "loose_wheel"
+    doc = "the left wheel slips at the start of every command"
+    source = "assumed"
+    parameters = (
+        Parameter(
+            "slip",
+            unit="s",
+            nominal=0.0,
+            low=0.0,
+            high=2.0,
+            doc="time constant of the slip; bounds assumed",
+            example=0.3,
+        ),
+    )
+
+    def apply(self, signal, active, rng):
+        """Let the speed of the left wheel come up slowly in each command."""
+        values = signal.values.copy()
+        if self["slip"] == 0.0:  # nominal: change nothing, bit for bit
+            return values
+        _, first, which = np.unique(
+            signal.command, return_index=True, return_inverse=True
+        )
+        since = signal.times - signal.times[first][which]
+        left = signal.column("left_speed")
+        share = 1.0 - np.exp(-since / self["slip"])
+        values[active, left] *= share[active]
+        return values
+
+
+parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+parser.add_argument("--quick", action="store_true", help="one strength only")
+strengths = (0.2,) if parser.parse_args().quick else (0.0, 0.1, 0.2, 0.4)
+
+commands = Commands(np.full((3, 2), 0.12), np.full(3, 1.0))  # straight, [m/s], [s]
+for slip in strengths:
+    # From trial 2 on, as `@2` would say in text.
+    damage = Damage((Event(LooseWheel({"slip": slip}), onset_trial=2),))
+    world = registry.make("mujoco", robot="khepera3", damage=damage)
+    for trial in (1, 2):
+        (done,) = world.run([commands], trial=trial)
+        x, y, yaw = done.poses_world[-1]
+        print(
+            f"{damage.texts()[0]:26} trial {trial}: ends at ({x:.3f}, {y:.3f}) m, "
+            f"turned {np.degrees(yaw):.0f} deg; record: {done.conditions['damage']}"
+        )
