@@ -35,6 +35,6 @@ print("after command    x [m]    y [m]   yaw [deg]")
 for number, (x, y, yaw) in enumerate(trial.command_poses_world):
     print(f"{number:13d} {x:8.3f} {y:8.3f} {np.degrees(yaw):11.1f}")
 
-# A square ends where it began, were it not for the motors' lag: each turn falls short.
+# The square does not close: the wheels lag behind their commands.
 missing = 90 * sides - np.degrees(trial.poses_world[-1, 2])
-print(f"The turns fall short by {missing:.1f} deg: the wheels need time to speed up.")
+print(f"At the end {missing:.1f} deg are missing to {sides} quarter turns.")
