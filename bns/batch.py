@@ -8,7 +8,6 @@ import numpy as np
 
 from bns import seeding
 from bns.config import RunConfig
-from bns.errors import BnsError
 from bns.step import Step
 from bns.worlds.damage import Damage
 from bns.worlds.trial import Commands, Trial
@@ -109,22 +108,22 @@ def resolve(config: RunConfig, mode: str = "") -> tuple[RunConfig, str]:
     return replace(config, compiled="yes" if mode == "compiled" else "no"), mode
 
 
-def check_world(config: RunConfig) -> None:
+def check_world(config: RunConfig, *, named: bool = True) -> None:
     """Refuse a world, robot, damage or reality that does not exist.
+
+    Args:
+        config: says which.
+        named: whether world and robot are found by their names.
 
     Raises:
         UnknownNameError: no such name.
         BnsError: a text that cannot be read, a value out of bounds.
     """
-    from bns import models
-    from bns.worlds import registry
+    if named:
+        from bns import models
+        from bns.worlds import registry
 
-    registry.get(config.world.name)
-    models.robot(config.world.robot)
-    onset = Damage.parse(config.world.damage).first_trial
+        registry.get(config.world.name)
+        models.robot(config.world.robot)
+    Damage.parse(config.world.damage)
     Damage.parse(config.world.reality)
-    if onset >= config.trials:
-        raise BnsError(
-            f"world.damage sets in at trial {onset}, the run has {config.trials} "
-            "trials (0 is the first): raise --trials or lower the onset."
-        )

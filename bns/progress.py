@@ -2,6 +2,8 @@
 
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -18,26 +20,29 @@ class Progress:
 
     Args:
         config: of the run.
-        done: trials done already.
         enabled: False shows nothing.
     """
 
-    def __init__(self, config: RunConfig, *, done: int = 0, enabled: bool = True):
-        self.total, self.first = config.trials, done
+    def __init__(self, config: RunConfig, *, enabled: bool = True):
+        self.total, self.first = config.trials, 0
         self.name = config.preset or config.task.name
         self.enabled = enabled
         self.solved = np.zeros(config.replicates, dtype=bool)
         self.bar: Any = None
         self.started = self.spoke = time.monotonic()
 
-    def __enter__(self) -> "Progress":
+    @contextmanager
+    def start(self, done: int = 0) -> Iterator[None]:
+        """Show progress inside the block; `done` trials lie behind already."""
+        self.first = done
+        self.started = self.spoke = time.monotonic()
         if self.enabled and sys.stderr.isatty():
             self._start_bar()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self.bar:
-            self.bar.stop()
+        try:
+            yield
+        finally:
+            if self.bar:
+                self.bar.stop()
 
     def _start_bar(self) -> None:
         from rich.console import Console

@@ -20,6 +20,7 @@ from bns.store import RunStore
 from bns.validate import check
 from bns.worlds.damage import Damage
 from bns.worlds.trial import Trial
+from bns.worlds.world import World
 
 OnTrial = Callable[[int, Step, list[Trial]], None]
 
@@ -28,6 +29,7 @@ def train(
     config: RunConfig,
     out: Path | str | None = None,
     *,
+    world: World | None = None,
     resume: bool = False,
     progress: bool = False,
     on_trial: OnTrial | None = None,
@@ -38,6 +40,8 @@ def train(
     Args:
         config: the experiment.
         out: directory to store the run in; None keeps it in memory.
+        world: where trials happen; None makes the one the configuration names. Its
+            damage has to be that of the configuration.
         resume: go on with the run in `out`, if there is one.
         progress: show it on the standard error stream.
         on_trial: called after every trial with its number, what was learned, and
@@ -52,13 +56,21 @@ def train(
             another configuration or cannot be written.
     """
     check(config)
-    check_world(config)
+    check_world(config, named=world is None)
     store = _store(config, Path(out), resume=resume) if out is not None else None
     try:
         if store and store.finished:
             store.clean()
             return store.record()
-        return _loop(config, store, progress=progress, on_trial=on_trial, stop=stop)
+        settled, mode = resolve(config, store.mode if store else "")
+        batch = _batch(settled, store, world)
+        shown = Progress(config, enabled=progress)
+        steps = _loop(config, batch, store, shown, on_trial, stop or _never)
+        if store is None:
+            made = versions.collect()
+            return assemble(config, steps, versions=made, **facts(config, mode))
+        done, _ = store.read_state()
+        return store.finish() if done == config.trials else store.record()
     finally:
         if store:
             store.close()
@@ -85,7 +97,8 @@ def train_many(
     settled, mode = _settle(configs)
     batch = Batch(settled, [make_world(config) for config in settled])
     steps: list[Step] = []
-    with Progress(configs[0], enabled=progress) as bar:
+    bar = Progress(configs[0], enabled=progress)
+    with bar.start():
         for trial in range(configs[0].trials):
             step, tried = batch.advance(trial)
             steps.append(step)
@@ -104,7 +117,7 @@ def train_many(
     ]
 
 
-def make_world(config: RunConfig, directory: Path | None = None) -> Any:
+def make_world(config: RunConfig, directory: Path | None = None) -> World:
     """The world of a configuration.
 
     Args:
@@ -173,19 +186,18 @@ def _store(config: RunConfig, out: Path, *, resume: bool) -> RunStore:
 
 def _loop(
     config: RunConfig,
+    batch: Batch,
     store: RunStore | None,
-    *,
-    progress: bool,
+    progress: Progress,
     on_trial: OnTrial | None,
-    stop: Callable[[], bool] | None,
-) -> RunRecord:
-    settled, mode = resolve(config, store.mode if store else "")
-    batch = _batch(settled, store)
+    stop: Callable[[], bool],
+) -> list[Step]:
+    """All trials that are left; without a store their steps are kept and returned."""
     memory: list[Step] = []
     done = _restore(batch, store)
-    with Progress(config, done=done, enabled=progress) as bar:
+    with progress.start(done):
         for trial in range(done, config.trials):
-            if stop and stop():
+            if stop():
                 break
             started = time.perf_counter()
             step, tried = batch.advance(trial, recorded=config.record_replicates)
@@ -193,23 +205,24 @@ def _loop(
                 _keep(store, trial, step, batch.learner.state(), started)
             else:
                 memory.append(step)
-            bar.update(trial, step)
+            progress.update(trial, step)
             if on_trial:
                 on_trial(trial, step, tried)
-            done = trial + 1
-    if store:
-        return store.finish() if done == config.trials else store.record()
-    return assemble(config, memory, versions=versions.collect(), **facts(config, mode))
+    return memory
 
 
-def _batch(config: RunConfig, store: RunStore | None) -> Batch:
+def _never() -> bool:
+    return False
+
+
+def _batch(config: RunConfig, store: RunStore | None, world: World | None) -> Batch:
     """Learner and world; a new directory is made once both are known to be possible."""
     if store is None:
-        return Batch([config], [make_world(config)])
-    needs_directory = config.world.name == "static-snn"
-    if needs_directory and not store.exists:
+        return Batch([config], [world or make_world(config)])
+    keeps_nets = world is None and config.world.name == "static-snn"
+    if keeps_nets and not store.exists:
         store.create()
-    batch = Batch([config], [make_world(config, store.directory)])
+    batch = Batch([config], [world or make_world(config, store.directory)])
     if not store.exists:
         store.create()
     return batch

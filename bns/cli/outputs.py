@@ -70,16 +70,21 @@ def write_recording(record: RunRecord, path: Path) -> Path:
 def summary(record: RunRecord) -> str:
     """What happened, in words."""
     solved = stats.trials_to_solve(record)
-    lines = [f"{record.trials} trials of {record.replicates} runs."]
+    lines = [
+        f"{record.trials} trials of {record.replicates} runs; trials count from 1."
+    ]
     lines.append(_sentence("Solved", solved, "at trial"))
-    recovered = stats.trials_to_recover(record)
-    if np.isnan(recovered).all():
+    onset, damage = int(record.damage_onset.max()), record.config.world.damage
+    if onset < 0:
         lines.append("No damage.")
+    elif onset >= record.trials:
+        lines.append(
+            f"Damage from trial {onset + 1} on was not met: {'; '.join(damage)}."
+        )
     else:
-        onset = int(record.damage_onset.max())
-        damage = "; ".join(record.config.world.damage)
-        lines.append(f"Damage from trial {onset + 1} on ({damage}).")
-        lines.append(_sentence("Recovered", recovered, "after trials"))
+        lines.append(f"Damage from trial {onset + 1} on: {'; '.join(damage)}.")
+        recovered = stats.trials_to_recover(record)
+        lines.append(_sentence("Recovered", recovered, "within trials"))
     return "\n".join(lines)
 
 
@@ -89,10 +94,11 @@ def _sentence(word: str, values: np.ndarray, unit: str) -> str:
     if not reached.any():
         return f"{text}."
     middle = stats.median_interval(values)
+    if middle.low == -np.inf:
+        return f"{text}, {unit} {number(middle.value)} in the median."
     return (
         f"{text}, {unit} {number(middle.value)} in the median "
-        f"(95 % interval {number(middle.low)} to {number(middle.high)}), "
-        "counted from 1."
+        f"(95 % interval {number(middle.low)} to {number(middle.high)})."
     )
 
 

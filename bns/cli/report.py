@@ -1,0 +1,36 @@
+"""`bns report`: one self-contained HTML file on one or more runs."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from bns.cli.parse import parse
+from bns.errors import BnsError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arguments:
+    """Write a report on runs: one HTML file that opens offline."""
+
+    directories: tyro.conf.Positional[tuple[str, ...]]
+    """run directories, finished or not"""
+    out: str = ""
+    """file to write; without it report.html in the first directory"""
+
+
+def main(verb: str, argv: list[str]) -> int:
+    """Run the verb; gives the exit code."""
+    given = parse(Arguments, argv, prog="bns report")
+    if not given.directories:
+        raise BnsError("No run was given: give one or more run directories.")
+    from bns.cli.outputs import REPORT, write_report
+    from bns.store import load
+
+    directories = [Path(directory) for directory in given.directories]
+    for directory in directories:
+        if load(directory).trials == 0:
+            raise BnsError(f"{directory} has no trial yet: let it run for a while.")
+    path = Path(given.out) if given.out else directories[0] / REPORT
+    print(write_report(directories, path))
+    return 0

@@ -1,0 +1,82 @@
+"""`bns view`: open a run's recording, or make a picture of it."""
+
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from bns.cli.parse import parse
+from bns.errors import BnsError, MissingDependencyError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arguments:
+    """Open a run's recording in the Rerun viewer, or draw it to a file."""
+
+    directory: tyro.conf.Positional[str]
+    """a run directory, or a recording (.rrd)"""
+    png: str = ""
+    """write a picture to this file instead; needs no display"""
+
+
+def main(verb: str, argv: list[str]) -> int:
+    """Run the verb; gives the exit code."""
+    given = parse(Arguments, argv, prog="bns view")
+    os.environ.setdefault("RERUN_ANALYTICS", "0")
+    recording = find(Path(given.directory))
+    if given.png:
+        from bns.viz import picture
+
+        for report in picture.save(recording, given.png):
+            print(f"bns: the viewer says: {report}", file=sys.stderr)
+        print(given.png)
+        return 0
+    return show(recording)
+
+
+def find(path: Path) -> Path:
+    """The recording of a run, written now if it was not before.
+
+    Raises:
+        BnsError: neither a run nor a recording, or a run without a trial.
+    """
+    from bns.cli.outputs import RECORDING, write_recording
+    from bns.store import load
+
+    if path.suffix == ".rrd":
+        if not path.is_file():
+            raise BnsError(f"There is no recording {path}: give a run directory.")
+        return path
+    record = load(path)
+    recording = path / RECORDING
+    if recording.exists() and record.trials == record.config.trials:
+        return recording
+    if record.trials == 0:
+        raise BnsError(f"{path} has no trial yet: let it run for a while.")
+    return write_recording(record, recording)
+
+
+def show(recording: Path) -> int:
+    """Open the viewer and leave it open.
+
+    Raises:
+        BnsError: there is no display.
+        MissingDependencyError: there is no viewer.
+    """
+    import subprocess
+
+    from bns.viz import picture
+
+    if sys.platform == "linux" and not any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    ):
+        raise BnsError(
+            f"No display to open {recording} on: make a picture with --png FILE, or "
+            "copy the file to a machine that has one."
+        )
+    viewer = picture.executable()
+    if viewer is None:
+        raise MissingDependencyError("bns view", "rerun-sdk", "pip install rerun-sdk")
+    return subprocess.call([viewer, str(recording)])

@@ -1,0 +1,184 @@
+"""What this machine has, what is known to be bad, what to install."""
+
+import os
+import platform
+import shutil
+from collections.abc import Callable
+from ctypes.util import find_library
+from glob import glob
+from typing import Literal, NamedTuple
+
+from bns import versions
+
+State = Literal["ok", "missing", "bad", "note"]
+
+REQUIRED = (
+    "mujoco", "numpy", "scipy", "torch", "rerun-sdk", "pyarrow", "tyro", "rich",
+    "matplotlib", "jinja2",
+)  # fmt: skip
+OPTIONAL = {
+    "dm-control": "dm_env worlds",
+    "gymnasium": "Gymnasium worlds",
+    "pyserial": "a Khepera on a serial port",
+    "opencv-python-headless": "overhead tracking",
+    "dynamixel-sdk": "a hexapod on its bus",
+}
+"""package -> what needs it"""
+
+
+class Finding(NamedTuple):
+    """One thing looked at.
+
+    Attributes:
+        what: was looked at.
+        state: ok, missing (a feature is), bad (must be changed), note.
+        found: in words.
+        remedy: what to do, empty if nothing.
+    """
+
+    what: str
+    state: State
+    found: str
+    remedy: str = ""
+
+
+def examine() -> list[Finding]:
+    """Look at everything; changes nothing."""
+    checks: tuple[Callable[[], list[Finding]], ...] = (
+        _python, _packages, _optional, pins, _graphics, _compiler, _machine, _ports,
+    )  # fmt: skip
+    return [finding for check in checks for finding in check()]
+
+
+def _python() -> list[Finding]:
+    version = platform.python_version()
+    good = (3, 11) <= tuple(map(int, platform.python_version_tuple()[:2])) < (3, 14)
+    remedy = "" if good else "use Python 3.11, 3.12 or 3.13"
+    return [Finding("Python", "ok" if good else "bad", version, remedy)]
+
+
+def _packages() -> list[Finding]:
+    found = []
+    for name in REQUIRED:
+        version = versions.package(name)
+        if version:
+            found.append(Finding(name, "ok", version))
+        else:
+            remedy = f"pip install {name}"
+            found.append(Finding(name, "bad", "not installed", remedy))
+    return found
+
+
+def _optional() -> list[Finding]:
+    found = []
+    for name, needed_by in OPTIONAL.items():
+        version = versions.package(name)
+        if version:
+            found.append(Finding(name, "ok", version))
+        else:
+            remedy = f"for {needed_by}: pip install {name}"
+            found.append(Finding(name, "note", "not installed", remedy))
+    return found
+
+
+def pins(package: Callable[[str], str] = versions.package) -> list[Finding]:
+    """Combinations of versions that are known to go wrong.
+
+    Args:
+        package: gives the version of a package, empty if it is not installed.
+    """
+    mujoco, control = package("mujoco"), package("dm-control")
+    found = []
+    if mujoco == "4.0.0":
+        found.append(
+            Finding(
+                "mujoco pin",
+                "bad",
+                "4.0.0: wrong accelerations with the sparse solver",
+                'pip install "mujoco[sysid]>=3.17,<4"',
+            )
+        )
+    if mujoco.startswith("4.") and control:
+        found.append(
+            Finding(
+                "dm-control pin",
+                "bad",
+                f"dm-control {control} does not work with mujoco {mujoco}",
+                'pip install "mujoco[sysid]>=3.17,<4"',
+            )
+        )
+    return found or [Finding("known-bad versions", "ok", "none installed")]
+
+
+def _graphics() -> list[Finding]:
+    if platform.system() != "Linux":
+        return [Finding("graphics", "note", "of the system, not looked at")]
+    gl = {name: find_library(name) for name in ("EGL", "OSMesa", "GL")}
+    have = [name for name, path in gl.items() if path]
+    off_screen = bool(gl["EGL"] or gl["OSMesa"])
+    drivers = glob("/usr/share/vulkan/icd.d/*.json") + glob("/etc/vulkan/icd.d/*.json")
+    display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    return [
+        Finding(
+            "OpenGL off screen",
+            "ok" if off_screen else "missing",
+            ", ".join(have) or "none",
+            "" if off_screen else _apt("libegl1 libegl-mesa0 libgl1-mesa-dri"),
+        ),
+        Finding(
+            "MUJOCO_GL",
+            "note",
+            os.environ.get("MUJOCO_GL", "not set"),
+            "" if display or "MUJOCO_GL" in os.environ else "export MUJOCO_GL=egl",
+        ),
+        Finding(
+            "Vulkan",
+            "ok" if drivers else "missing",
+            f"{len(drivers)} drivers",
+            "" if drivers else _apt("mesa-vulkan-drivers"),
+        ),
+        Finding(
+            "display",
+            "ok" if display else "note",
+            display or "none",
+            "" if display else "pictures: bns view DIR --png FILE",
+        ),
+    ]
+
+
+def _compiler() -> list[Finding]:
+    names = ("g++", "clang++", "c++")
+    path = next((p for p in map(shutil.which, names) if p), None)
+    if path:
+        return [Finding("C++ compiler", "ok", path)]
+    remedy = f"long runs are up to twice as fast with it: {_apt('g++')}"
+    return [Finding("C++ compiler", "missing", "none", remedy)]
+
+
+def _machine() -> list[Finding]:
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 0
+    cores = cores or os.cpu_count() or 1
+    free = shutil.disk_usage(".").free / 2**30
+    return [
+        Finding("cores", "ok", f"{cores} ({versions.processor()})"),
+        Finding(
+            "disk here",
+            "ok" if free > 1 else "missing",
+            f"{free:.1f} GiB free",
+            "" if free > 1 else "a run needs up to 0.1 GiB; free some space",
+        ),
+    ]
+
+
+def _ports() -> list[Finding]:
+    ports = sorted(glob("/dev/ttyUSB*") + glob("/dev/ttyACM*") + glob("/dev/rfcomm*"))
+    shut = [port for port in ports if not os.access(port, os.R_OK | os.W_OK)]
+    if not ports:
+        return [Finding("serial ports", "note", "none", "needed for real robots only")]
+    remedy = f"no permission: usermod -aG dialout {os.environ.get('USER', 'USER')}"
+    state: State = "missing" if shut else "ok"
+    return [Finding("serial ports", state, ", ".join(ports), remedy if shut else "")]
+
+
+def _apt(packages: str) -> str:
+    return f"apt-get install {packages}"
