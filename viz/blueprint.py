@@ -36,8 +36,9 @@ def blueprint(
     """
     import rerun.blueprint as rrb
 
+    world = _world(rrb, half_width, half_depth)
     left = rrb.Vertical(
-        _world(rrb, half_width, half_depth),
+        world,
         rrb.StateTimelineView(
             origin="/moment", name="Which trial is on", time_view=_axis(rrb, seconds)
         ),
@@ -49,20 +50,22 @@ def blueprint(
         ),
         row_shares=[6, 1.1, 1.9],
     )
+    curves = rrb.Vertical(
+        *(_curve(rrb, path, name) for path, name in CURVES),
+        name="Curves (choose the timeline 'trial')",
+    )
     right = rrb.Tabs(
         rrb.Vertical(
             *(_bars(rrb, path, name) for path, name in CHARTS),
             name="Over trials",
         ),
-        rrb.Vertical(
-            *(_curve(rrb, path, name) for path, name in CURVES),
-            name="Curves (choose the timeline 'trial')",
-        ),
+        curves,
         rrb.TextDocumentView(origin="/about", name="How to read this"),
-        active_tab=1 if follow else 0,
+        active_tab=0,
     )
+    parts = (world, curves) if follow else (left, right)
     return rrb.Blueprint(
-        rrb.Horizontal(left, right, column_shares=[3, 2]),
+        rrb.Horizontal(*parts, column_shares=[3, 2]),
         rrb.TimePanel(
             state="collapsed",
             timeline=TRIAL_TIMELINE if follow else LIVE_TIMELINE,

@@ -1,6 +1,6 @@
 """Figures over trials in a recording: bars that are always seen, curves on `trial`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -63,23 +63,30 @@ def _groups(record: RunRecord, replicate: int, chosen: Sequence[Choice]):
         yield f"trial_{choice.trial}", choice.colour, number == choice.trial
 
 
-def send_curves(stream, record: RunRecord, replicate: int) -> None:
-    """Send the same figures and more as curves on the timeline `trial`."""
+def log_curve_styles(stream) -> None:
+    """Log names and colours of the curves that `send_curves` sends."""
     import rerun as rr
 
-    index = [rr.TimeColumn(TRIAL_TIMELINE, sequence=np.arange(record.trials))]
-    for path, (column, factor, colour) in _CURVES.items():
+    for path, (_, _, colour) in _CURVES.items():
+        name = path.rsplit("/", 1)[1].replace("_", " ")
         stream.log(
             path,
-            rr.SeriesLines(
-                names=path.rsplit("/", 1)[1].replace("_", " "),
-                colors=style.rgb(colour),
-                widths=2.0,
-            ),
+            rr.SeriesLines(names=name, colors=style.rgb(colour), widths=2.0),
             static=True,
         )
-        stream.send_columns(
-            path,
-            index,
-            rr.Scalars.columns(scalars=record[column][replicate] * factor),
-        )
+
+
+def send_curves(stream, numbers: np.ndarray, columns: Mapping[str, np.ndarray]):
+    """Send figures over trials as curves on the timeline `trial`.
+
+    Args:
+        stream: a `rerun.RecordingStream`.
+        numbers: numbers of the N trials.
+        columns: those of one replicate, as in `RunRecord.columns`, ``(N,)`` each.
+    """
+    import rerun as rr
+
+    index = [rr.TimeColumn(TRIAL_TIMELINE, sequence=numbers)]
+    for path, (column, factor, _) in _CURVES.items():
+        values = np.asarray(columns[column]) * factor
+        stream.send_columns(path, index, rr.Scalars.columns(scalars=values))

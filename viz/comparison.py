@@ -66,9 +66,7 @@ def _figures(fact: Facts) -> list[str]:
 
 
 def _short(text: str) -> str:
-    return text.replace("95 % interval ", "").replace(
-        " (too few runs for an interval)", ""
-    )
+    return text.replace("95 % interval ", "")
 
 
 def _waits(record: RunRecord) -> np.ndarray:

@@ -9,6 +9,7 @@ from bns import stats
 from bns.record import RunRecord
 from bns.stats import Interval
 from bns.viz.charts import DEGREES, MILLIMETRES
+from bns.worlds.damage import Event
 
 NEVER = "never"
 
@@ -65,11 +66,15 @@ def interval(value: Interval | None) -> str:
         return "-"
     if not math.isfinite(value.value):
         return NEVER
-    text = f"{value.value:g}"
+    return f"{value.value:g}{_spread(value)}"
+
+
+def _spread(value: Interval) -> str:
+    """The interval in brackets; nothing where there are too few runs for one."""
     if not math.isfinite(value.low):
-        return f"{text} (too few runs for an interval)"
+        return ""
     high = f"{value.high:g}" if math.isfinite(value.high) else NEVER
-    return f"{text} (95 % interval {value.low:g} to {high})"
+    return f" (95 % interval {value.low:g} to {high})"
 
 
 def sentences(record: RunRecord, facts: Facts) -> list[str]:
@@ -87,20 +92,31 @@ def sentences(record: RunRecord, facts: Facts) -> list[str]:
     return found
 
 
+def _needed(value: Interval) -> str:
+    return f"needed {value.value:g} trials{_spread(value)}"
+
+
 def _solving(facts: Facts) -> str:
     when = "" if facts.onset is None else " before the damage"
     if facts.solved == 0:
         return f"None solved the task{when}."
     text = f"{facts.solved} of {facts.runs} solved the task{when}"
     if math.isfinite(facts.to_solve.value):
-        text += f"; the median run needed {interval(facts.to_solve)} trials"
+        text += f"; the median run {_needed(facts.to_solve)}"
     return text + "."
 
 
 def _damage(record: RunRecord, onset: int) -> str:
-    damage = " and ".join(record.config.world.damage) or "damage"
-    number = onset + 1
-    return f"From its {_ordinal(number)} trial on the robot was damaged: {damage}."
+    known = [f"{_doc(text)} ({text})" for text in record.config.world.damage]
+    damage = "; ".join(known) or "how is not in the settings"
+    return (
+        f"From trial {onset} on (the first is trial 0) the robot was damaged: {damage}."
+    )
+
+
+def _doc(text: str) -> str:
+    """What an effect does, in its own words."""
+    return Event.parse(text).effect.doc
 
 
 def _recovering(facts: Facts) -> str:
@@ -109,7 +125,7 @@ def _recovering(facts: Facts) -> str:
         return f"None recovered within the {left} trials that were left."
     text = f"{facts.recovered} of {facts.runs} recovered"
     if facts.to_recover and math.isfinite(facts.to_recover.value):
-        text += f"; the median run needed {interval(facts.to_recover)} trials"
+        text += f"; the median run {_needed(facts.to_recover)}"
     return text + "."
 
 
@@ -152,20 +168,18 @@ def _errors(record: RunRecord, facts: Facts) -> list[tuple[str, str, str]]:
     return [
         (
             f"SNN error {name}",
-            f"{_median(position[:, trial]):.3g} mm, {_median(turn[:, trial]):.3g} deg",
-            "RMS per command before training on it, median over runs",
+            f"{_plain(position[:, trial])} mm, {_plain(turn[:, trial])} deg",
+            "RMS per command, before training on it; median over runs" * (at == 0),
         )
-        for name, trial in moments
+        for at, (name, trial) in enumerate(moments)
         if trial >= 0
     ]
 
 
-def _median(values: np.ndarray) -> float:
+def _plain(values: np.ndarray) -> str:
+    """Median of what is finite, to three digits, never with an exponent."""
     finite = values[np.isfinite(values)]
-    return float(np.median(finite)) if len(finite) else math.nan
-
-
-def _ordinal(number: int) -> str:
-    if number % 100 in (11, 12, 13):
-        return f"{number}th"
-    return f"{number}{ {1: 'st', 2: 'nd', 3: 'rd'}.get(number % 10, 'th') }"
+    if not len(finite):
+        return "?"
+    middle = float(np.median(finite))
+    return f"{middle:.0f}" if middle >= 100 else f"{middle:.3g}"

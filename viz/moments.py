@@ -54,8 +54,6 @@ def send(
         colours.append(choice.colour)
         start += float(times[-1]) + GAP
     _states(stream, states, colours, start)
-    _every_trial(stream, record, replicate)
-    _robot_at_ends(stream, record, replicate, model)
 
 
 def duration(record: RunRecord, replicate: int, chosen: Sequence[Choice]) -> float:
@@ -171,37 +169,50 @@ def _states(stream, states, colours, end: float) -> None:
     )
 
 
-def _every_trial(stream, record: RunRecord, replicate: int) -> None:
-    """Real and predicted path of every trial, on the timeline `trial`."""
+def send_paths(stream, numbers, real: np.ndarray, predicted: np.ndarray) -> None:
+    """Send real and foreseen path of each of N trials, on the timeline `trial`.
+
+    Args:
+        stream: a `rerun.RecordingStream`.
+        numbers: numbers of the trials.
+        real: ``(N, K + 1, 3)`` poses, NaN beyond a list's end.
+        predicted: the same as the SNN foresaw it.
+    """
     import rerun as rr
 
     for name, poses, colour in (
-        ("real", record.poses[replicate], style.BLACK),
-        ("predicted", record.predicted[replicate], style.PURPLE),
+        ("real", real, style.BLACK),
+        ("predicted", predicted, style.PURPLE),
     ):
-        paths = [listed(rows) for rows in poses]
-        numbers = [n for n, rows in enumerate(paths) if len(rows) > 1]
-        if not numbers:
+        paths = [(n, listed(rows)) for n, rows in zip(numbers, poses, strict=True)]
+        paths = [(n, _lift(arcs(rows))) for n, rows in paths if len(rows) > 1]
+        if not paths:
             continue
-        strips = [_lift(arcs(paths[n])) for n in numbers]
         stream.send_columns(
             f"world/each_trial/{name}",
-            [rr.TimeColumn(TRIAL_TIMELINE, sequence=numbers)],
+            [rr.TimeColumn(TRIAL_TIMELINE, sequence=[n for n, _ in paths])],
             rr.LineStrips3D.columns(
-                strips=strips,
-                colors=[style.rgb(colour)] * len(numbers),
-                radii=[_TRAIL * 0.6] * len(numbers),
+                strips=[rows for _, rows in paths],
+                colors=[style.rgb(colour)] * len(paths),
+                radii=[_TRAIL * 0.6] * len(paths),
             ),
         )
 
 
-def _robot_at_ends(stream, record: RunRecord, replicate: int, model) -> None:
-    """The robot where each trial left it, on the timeline `trial`."""
+def send_ends(stream, numbers, poses: np.ndarray, model) -> None:
+    """Send the robot where each trial left it, on the timeline `trial`.
+
+    Args:
+        stream: a `rerun.RecordingStream`.
+        numbers: numbers of the trials.
+        poses: ``(N, K + 1, 3)``, NaN beyond a list's end.
+        model: compiled scene.
+    """
     import rerun as rr
 
-    ends = [listed(poses)[-1:] for poses in record.poses[replicate]]
-    numbers = [n for n, end in enumerate(ends) if len(end)]
-    if numbers:
-        qpos = geometry.planar_qpos(model, np.concatenate([ends[n] for n in numbers]))
-        index = [rr.TimeColumn(TRIAL_TIMELINE, sequence=numbers)]
+    ends = [(n, listed(rows)) for n, rows in zip(numbers, poses, strict=True)]
+    ends = [(n, rows[-1]) for n, rows in ends if len(rows)]
+    if ends:
+        qpos = geometry.planar_qpos(model, np.stack([pose for _, pose in ends]))
+        index = [rr.TimeColumn(TRIAL_TIMELINE, sequence=[n for n, _ in ends])]
         geometry.send_poses(stream, model, index, qpos)

@@ -5,8 +5,13 @@ next. Everything is written in columns on explicit streams.
 """
 
 from collections.abc import Mapping, Sequence
+from hashlib import sha256
 from pathlib import Path
 
+import numpy as np
+
+from bns import loading
+from bns.config import RunConfig
 from bns.record import RunRecord
 from bns.viz import charts, moments, scene
 from bns.viz.blueprint import blueprint
@@ -47,32 +52,40 @@ def write(
     replicate = typical(record) if replicate is None else replicate
     chosen = tuple(choices) if choices is not None else choose(record, replicate)
     model = scene.compiled(record.config.world.robot) if model is None else model
-    stream = open_stream(f"{record.config.preset or 'run'} / replicate {replicate}")
+    stream = open_stream(record.config, replicate)
     seconds = moments.duration(record, replicate, chosen)
-    layout = blueprint(*scene.extent(record), seconds=seconds)
+    layout = blueprint(*scene.extent(record.config), seconds=seconds)
     stream.save(str(path), default_blueprint=layout)
     stream.send_recording_name(
         f"{record.config.preset or record.config.task.name} / replicate {replicate}"
     )
     stream.send_property("run", rr.AnyValues(**_properties(record, replicate)))
-    scene.log_static(stream, record, model)
+    scene.log_static(stream, record.config, model)
     moments.send(stream, record, replicate, chosen, _by_number(trials), model)
     charts.log_bars(stream, record, replicate, chosen)
-    charts.send_curves(stream, record, replicate)
+    numbers = np.arange(record.trials)
+    columns = {name: values[replicate] for name, values in record.columns.items()}
+    charts.log_curve_styles(stream)
+    charts.send_curves(stream, numbers, columns)
+    moments.send_paths(
+        stream, numbers, record.poses[replicate], record.predicted[replicate]
+    )
+    moments.send_ends(stream, numbers, record.poses[replicate], model)
     stream.log("about", _about(record, replicate, chosen), static=True)
     stream.flush()
     stream.disconnect()
     return Path(path)
 
 
-def open_stream(identity: str):
-    """A stream without wall-clock timelines and without a start time of its own.
+def open_stream(config: RunConfig, replicate: int):
+    """A named stream without wall-clock timelines or a start time of its own.
 
-    Args:
-        identity: recording id; the same id means the same recording.
+    The same configuration and replicate are the same recording to the viewer.
     """
     import rerun as rr
 
+    digest = sha256(loading.to_toml(config).encode()).hexdigest()[:12]
+    identity = f"{digest}-{replicate}"
     stream = rr.RecordingStream("bns", recording_id=identity, send_properties=False)
     stream.set_log_time_enabled(False)
     stream.set_log_tick_enabled(False)

@@ -88,7 +88,7 @@ def _context(runs: Mapping[str, RunRecord]) -> dict:
     context = {
         "several": several,
         "batches": batches,
-        "title": " against ".join(runs) if several else batches[0]["name"],
+        "title": _title(list(runs)) if several else batches[0]["name"],
         "figures": _shared_figures(runs) if several else _own_figures(runs),
     }
     if several:
@@ -99,6 +99,12 @@ def _context(runs: Mapping[str, RunRecord]) -> dict:
         ]
         context["path_caption"] = _caption("path", next(iter(runs.values())))
     return context
+
+
+def _title(labels: Sequence[str]) -> str:
+    if len(labels) <= 3:
+        return " against ".join(labels)
+    return f"{len(labels)} batches, against {labels[0]}"
 
 
 def _batch(label: str, record: RunRecord) -> dict:
@@ -146,7 +152,7 @@ def _entry(name: str, record: RunRecord, figure) -> dict:
 
 
 def _caption(name: str, record: RunRecord) -> str:
-    goals = scene.order(record)
+    goals = scene.order(record.config)
     return CAPTIONS[name].format(
         order=", ".join(goals), goals=len(goals), penalty=record.config.task.penalty
     )

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bns.record import RunRecord
+from bns.config import RunConfig
 from bns.viz import geometry, style
 
 MARGIN = 0.25
@@ -19,42 +19,41 @@ def compiled(robot: str):
     return models.scene_spec(robot).compile()
 
 
-def objectives(record: RunRecord) -> dict[str, tuple[float, float]]:
+def objectives(config: RunConfig) -> dict[str, tuple[float, float]]:
     """Positions of the objectives that the run's task uses [m]."""
     from bns.tasks import ORDERS
     from bns.tasks import objectives as places
 
-    config = record.config.task
-    order = ORDERS[config.name]
-    return {name: at for name, at in places(config).items() if name in order}
+    used = ORDERS[config.task.name]
+    return {name: at for name, at in places(config.task).items() if name in used}
 
 
-def order(record: RunRecord) -> str:
+def order(config: RunConfig) -> str:
     """Names of the objectives in the order in which they are to be reached."""
     from bns.tasks import ORDERS
 
-    return ORDERS[record.config.task.name]
+    return ORDERS[config.task.name]
 
 
-def extent(record: RunRecord) -> tuple[float, float]:
+def extent(config: RunConfig) -> tuple[float, float]:
     """Half width and half depth of what matters [m]."""
-    places = np.abs(list(objectives(record).values()))
+    places = np.abs(list(objectives(config).values()))
     return tuple(float(edge) for edge in places.max(axis=0) + MARGIN)
 
 
-def log_static(stream, record: RunRecord, model) -> None:
+def log_static(stream, config: RunConfig, model) -> None:
     """Log coordinates, shapes and objectives.
 
     Args:
         stream: a `rerun.RecordingStream`.
-        record: whose task's objectives are shown.
+        config: whose task's objectives are shown.
         model: a compiled `mujoco.MjModel`.
     """
     import rerun as rr
 
     stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     geometry.log_static(stream, model)
-    places, radius = objectives(record), record.config.task.radius
+    places, radius = objectives(config), config.task.radius
     names = list(places)
     centres = np.array([(*places[name], _DISC / 2) for name in names])
     count = len(names)

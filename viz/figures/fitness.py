@@ -32,7 +32,7 @@ def _steps(axes, record: RunRecord) -> None:
     """Lines at the cost of one and of all objectives missed."""
     from bns.viz.scene import order
 
-    penalty, count = record.config.task.penalty, len(order(record))
+    penalty, count = record.config.task.penalty, len(order(record.config))
     if penalty <= 0:
         return
     for missed in (1, count):

@@ -47,7 +47,7 @@ def _objectives(axes, record: RunRecord) -> None:
     from matplotlib.patches import Circle
 
     radius = record.config.task.radius
-    for name, (x, y) in scene.objectives(record).items():
+    for name, (x, y) in scene.objectives(record.config).items():
         axes.add_patch(Circle((x, y), radius, color=style.YELLOW, alpha=0.55, lw=0))
         axes.annotate(name, (x, y), ha="center", va="center", fontweight="bold")
 

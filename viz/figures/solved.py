@@ -18,7 +18,7 @@ def solved(runs: Mapping[str, RunRecord]):
             bands.band(left, record["reached"], colour, label)
             share = 100 * record["solved"].mean(axis=0)
             right.plot(share, color=colour, label=label, drawstyle="steps-mid")
-        goals = max(len(order(record)) for record in runs.values())
+        goals = max(len(order(record.config)) for record in runs.values())
         left.set_ylim(-0.15, goals + 0.15)
         left.set_yticks(range(goals + 1))
         left.set_title("Objectives reached", pad=14)
