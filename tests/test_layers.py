@@ -7,15 +7,18 @@ import pytest
 from tests.sources import modules
 
 BASE = {"bns", "bns.errors", "bns.seeding"}
+LOW = {"base", "models", "worlds"}
+HIGH = LOW | {"gap", "hardware", "learner", "experiment"}
 MAY_IMPORT = {
     "base": {"base"},
     "models": {"base", "models"},
-    "worlds": {"base", "models", "worlds"},
-    "gap": {"base", "models", "worlds", "gap"},
-    "hardware": {"base", "models", "worlds", "hardware"},
-    "learner": {"base", "learner", "worlds"},
-    "viz": {"base", "models", "worlds", "gap", "hardware", "learner", "viz"},
-    "cli": {"base", "models", "worlds", "gap", "hardware", "learner", "viz", "cli"},
+    "worlds": LOW,
+    "gap": LOW | {"gap"},
+    "hardware": LOW | {"hardware"},
+    "learner": {"base", "learner", "experiment", "worlds"},
+    "experiment": LOW | {"learner", "experiment"},
+    "viz": HIGH | {"viz"},
+    "cli": HIGH | {"viz", "cli"},
 }
 PROTOCOL = {
     "bns.worlds",
@@ -26,17 +29,19 @@ PROTOCOL = {
 }
 """all that the learner may know of worlds"""
 
-MAY_MAKE_WORLDS = {"bns.run", "bns.loading", "bns.batch", "bns.static_snn"}
-"""modules beside the learner that set experiments up, so they reach the registry"""
+EXPERIMENT = {"bns.run", "bns.batch", "bns.loading", "bns.static_snn", "bns.doctor"}
+"""modules around the learner that set experiments up: they make worlds by name"""
 
 
 def layer(name: str) -> str:
     if name in BASE:
         return "base"
+    if name in EXPERIMENT:
+        return "experiment"
     second = name.split(".")[1]
     if second in ("models", "worlds", "gap", "hardware", "viz"):
         return second
-    return "cli" if second in ("cli", "__main__", "doctor") else "learner"
+    return "cli" if second in ("cli", "__main__") else "learner"
 
 
 def ours(names) -> list[str]:
@@ -61,13 +66,29 @@ def test_imports_point_one_way(module):
 
 @pytest.mark.parametrize("module", LEARNER, ids=lambda module: module.name)
 def test_the_learner_sees_the_world_protocol_alone(module):
-    seen = [n for n in ours(module.imports) if layer(n) == "worlds"]
-    if module.name in MAY_MAKE_WORLDS:
-        seen = [n for n in seen if n != "bns.worlds.registry"]
-    assert set(seen) <= PROTOCOL, f"{module.name} imports {set(seen) - PROTOCOL}"
+    seen = {n for n in ours(module.imports) if layer(n) == "worlds"}
+    assert seen <= PROTOCOL, f"{module.name} imports {seen - PROTOCOL}"
+
+
+def test_the_learner_does_not_reach_what_makes_worlds():
+    reached, waiting = set(), {"bns.learner"}
+    while waiting:
+        name = waiting.pop()
+        reached.add(name)
+        known = set(ours(modules()[name].imports)) & set(modules())
+        waiting |= {n for n in known - reached if layer(n) != "worlds"}
+    assert len(reached) > 5
+    assert not reached & EXPERIMENT
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.name)
+def test_no_concrete_world_and_no_mujoco_outside_their_place(module):
     packages = {name.split(".")[0] for name in module.imports}
-    assert "mujoco" not in packages, f"{module.name} imports mujoco"
-    assert "rerun" not in packages, f"{module.name} imports rerun"
+    if layer(module.name) in ("base", "learner", "experiment"):
+        assert "mujoco" not in packages, f"{module.name} imports mujoco"
+        assert "rerun" not in packages, f"{module.name} imports rerun"
+        concrete = [n for n in ours(module.imports) if n.endswith("_world")]
+        assert not concrete, f"{module.name} imports {concrete}: ask the registry"
 
 
 @pytest.mark.parametrize("module", MODULES, ids=lambda module: module.name)
