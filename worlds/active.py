@@ -1,6 +1,6 @@
 """Which effects hold for one robot in one trial, sorted by stage."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,12 +62,19 @@ class Stages:
 
     @classmethod
     def of(
-        cls, reality: Sequence[ActiveEffect], damage: Sequence[ActiveEffect]
+        cls, reality: Damage, damage: Damage, trial: int, duration: float
     ) -> "Stages":
-        """Sort what holds by stage, reality before damage within each."""
+        """What holds in a trial, sorted by stage, reality before damage within each.
+
+        Args:
+            reality, damage: with their schedules.
+            trial: counted from 0.
+            duration: of the trial [s]; what sets in later is left out.
+        """
+        origins = {"reality": reality, "damage": damage}
         placed = {
-            "reality": _placed("reality", reality),
-            "damage": _placed("damage", damage),
+            origin: _placed(origin, given.at(trial, duration))
+            for origin, given in origins.items()
         }
         both = placed["reality"] + placed["damage"]
         stage = {
@@ -110,7 +117,8 @@ def as_damage(given: Damage | str | Effect | Iterable[str | Effect]) -> Damage:
     """
     if isinstance(given, Damage):
         return given
-    items = (given,) if isinstance(given, str | Effect) else given
+    alone = isinstance(given, str | Effect) or not isinstance(given, Iterable)
+    items: Iterable = (given,) if alone else given
     return sum((_one(item) for item in items), Damage.none())
 
 
@@ -134,9 +142,9 @@ def per_robot(given: object) -> Damage | tuple[Damage, ...]:
         given: a `Damage` or effects (texts, objects) for all; or a sequence holding
             one such thing (a `Damage` or a sequence of effects) per robot.
     """
-    if isinstance(given, Damage | str | Effect):
-        return as_damage(given)
-    items = tuple(given)  # type: ignore[arg-type]
+    if isinstance(given, Damage | str | Effect) or not isinstance(given, Iterable):
+        return as_damage(given)  # type: ignore[arg-type]
+    items = tuple(given)
     if all(isinstance(item, str | Effect) for item in items):
         return as_damage(items)
     return tuple(as_damage(item) for item in items)

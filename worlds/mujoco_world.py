@@ -37,8 +37,8 @@ class MujocoWorld:
         robot: name of the robot model, see `bns robots`.
         damage: what is wrong with the robots, by trial: one `Damage` (or effects as
             text or objects) for all, or a sequence of such with one per robot.
-        reality: effects that always hold: how this world departs from the nominal
-            model from the start.
+        reality: effects that always hold (unless they have a schedule): how this
+            world departs from the nominal model, which is no damage.
         sample_dt: time between two samples of the tracker [s]; the end of each
             command is sampled as well.
         threads: of the physics.
@@ -105,17 +105,15 @@ class MujocoWorld:
     ) -> list[Plan]:
         """What `run` hands to the physics, for benches and tests; arguments alike."""
         damages, seeds = shared(self.damage, seeds, len(commands))
-        at: dict[int, Stages] = {}
-        plans = []
-        for item, damage, seed in zip(commands, damages, seeds, strict=True):
-            if id(damage) not in at:
-                at[id(damage)] = Stages.of(self.reality.at(0), damage.at(trial))
-            plans.append(self._plan(item, at[id(damage)], trial, seed))
-        return plans
+        return [
+            self._plan(item, damage, trial, seed)
+            for item, damage, seed in zip(commands, damages, seeds, strict=True)
+        ]
 
-    def _plan(self, commands: Commands, stages: Stages, trial: int, seed: int) -> Plan:
+    def _plan(self, commands: Commands, damage: Damage, trial: int, seed: int) -> Plan:
         dt = self.dt
         control.check(commands, self._channels, self._limits, self.robot)
+        stages = Stages.of(self.reality, damage, trial, commands.duration)
         counts = control.steps(commands.durations, dt)
         if stages.control:
             given = control.signal(commands, counts, dt)

@@ -28,7 +28,7 @@ class StaticSnnWorld:
         nets: the networks, or a file of them; None = an ideal two-wheeled robot.
         robot: name of the robot model whose commands they take.
         damage: as in `MujocoWorld`, command, actuator and tracking effects only.
-        reality: effects that always hold, likewise.
+        reality: effects that always hold (unless they have a schedule), likewise.
         start: pose at the start of each trial in the world frame [m, m, rad].
         noise: standard deviation of a displacement, forward, left [m], turn [rad].
         arena: size of the board along x and y [m], its centre the world's origin.
@@ -81,14 +81,13 @@ class StaticSnnWorld:
         """
         damages, seeds = shared(self.damage, seeds, len(commands))
         return [
-            self._run(
-                item, Stages.of(self.reality.at(0), damage.at(trial)), seed, trial
-            )
+            self._run(item, damage, trial, seed)
             for item, damage, seed in zip(commands, damages, seeds, strict=True)
         ]
 
-    def _run(self, commands: Commands, stages: Stages, seed: int, trial: int) -> Trial:
+    def _run(self, commands: Commands, damage: Damage, trial: int, seed: int) -> Trial:
         control.check(commands, self.model.channels, self.model.limits, self.robot)
+        stages = Stages.of(self.reality, damage, trial, commands.duration)
         speeds = _speeds(commands, stages, seed, trial)
         before = np.vstack([np.zeros((1, 2)), speeds[:-1]])
         moved = self.nets(np.column_stack([before, speeds, commands.durations]))
