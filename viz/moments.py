@@ -45,7 +45,7 @@ def send(
     start, states, colours = 0.0, [], []
     for choice in chosen:
         at = (replicate, choice.trial)
-        times, poses, qpos = _samples(record, at, trials.get(choice.trial), model)
+        times, poses, qpos = samples(record, at, trials.get(choice.trial), model)
         index = _times(start + times)
         geometry.send_poses(stream, model, index, qpos)
         _trails(stream, choice, poses, listed(record.predicted[at]), start)
@@ -62,7 +62,7 @@ def duration(record: RunRecord, replicate: int, chosen: Sequence[Choice]) -> flo
     return float(np.nansum(sent)) + GAP * len(chosen)
 
 
-def _samples(record, at, trial: Trial | None, model):
+def samples(record, at, trial: Trial | None, model):
     """Times from the trial's start [s], planar poses and qpos of one trial."""
     if trial is None:
         return _sparse(record, at, model)

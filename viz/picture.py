@@ -16,8 +16,8 @@ INSTALL = "apt-get install mesa-vulkan-drivers"
 """What a Debian system lacks when there is no Vulkan."""
 
 _ICD = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d")
-_SETTLE = 6
-"""s for the viewer to load the recording and draw it"""
+_SETTLE = 6.0
+"""s for the viewer to load the recording, draw it, and drop its welcome note"""
 
 
 def save(
@@ -43,14 +43,14 @@ def save(
     rrd, png = Path(rrd).resolve(), Path(png).resolve()
     if not rrd.is_file():
         raise FormatError(f"{rrd} is not a recording: there is no such file.")
-    with _viewer() as viewer:
-        viewer.open(str(rrd))
-        _go(viewer, trial, at)
+    with viewer() as shown:
+        shown.open(str(rrd))
+        _go(shown, trial, at)
         time.sleep(_SETTLE)
-        viewer.save_screenshot(str(png))
+        shown.save_screenshot(str(png))
         reports = [
             f"{view.name}: {report}"
-            for view in viewer.get_state().views
+            for view in shown.get_state().views
             for report in view.reports
         ]
     if not png.is_file() or png.stat().st_size == 0:
@@ -100,7 +100,7 @@ def _go(viewer, trial: int | None, at: float) -> None:
 
 
 @contextmanager
-def _viewer() -> Iterator:
+def viewer() -> Iterator:
     """A headless viewer that is gone afterwards."""
     problem = missing()
     if problem:

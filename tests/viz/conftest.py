@@ -31,7 +31,7 @@ def drive(pose, left, right, duration, steps=1):
         x, y, yaw = poses[-1]
         dt = duration / steps
         turn = (right - left) / AXLE * dt
-        ahead = (right + left) / 2 * dt
+        ahead = (right + left) / 2 * dt * np.sinc(turn / 2 / np.pi)  # the chord
         middle = yaw + turn / 2
         poses.append(
             np.array(

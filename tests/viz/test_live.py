@@ -1,0 +1,51 @@
+"""A live view that fails is said once and does not stop the run."""
+
+import logging
+
+import numpy as np
+import pytest
+
+from bns.step import ARRAYS, Step
+from bns.viz import live, picture
+
+pytest.importorskip("rerun")
+
+
+def step(record, trial):
+    return Step(
+        {name: values[:, trial] for name, values in record.columns.items()},
+        {name: getattr(record, name)[:, trial] for name in ARRAYS},
+    )
+
+
+def test_without_a_display_it_warns_once_and_goes_on(record, monkeypatch, caplog):
+    monkeypatch.setattr(live, "_no_display", lambda: True)
+    with (
+        caplog.at_level(logging.WARNING),
+        live.stream(record.config) as on_trial,
+    ):
+        for trial in range(3):
+            on_trial(trial, step(record, trial), [])
+    assert len(caplog.records) == 1
+    assert "no display" in caplog.text
+
+
+def test_unexpected_data_do_not_stop_the_run(record, monkeypatch, caplog):
+    monkeypatch.setattr(live.Stream, "_open", lambda self, url: None)
+    shown = live.Stream(record.config)
+    shown.on_trial(0, Step({}, {"poses": np.zeros((1, 1, 3))}))
+    assert shown.failed
+
+
+def test_trials_reach_a_viewer(record):
+    problem = picture.missing()
+    if problem:
+        pytest.skip(str(problem))
+    with (
+        picture.viewer() as viewer,
+        live.stream(record.config, url=viewer.url) as on_trial,
+    ):
+        for trial in range(3):
+            on_trial(trial, step(record, trial), [])
+        state = viewer.get_state()
+    assert {view.name for view in state.views} >= {"World", "Fitness"}
