@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from bns.errors import UnknownNameError
-from bns.models.robot import FACTS, CommandChannel, RobotModel, Wheel, read
+from bns.models.robot_model import FACTS, CommandChannel, RobotModel, Wheel, read
 
 __all__ = [
     "CommandChannel",

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from bns.errors import UnknownNameError
-from bns.models.robot import RobotModel
+from bns.models.robot_model import RobotModel
 
 
 def load(

@@ -126,14 +126,19 @@ def _shown(spec: Any, **settings: Any) -> None:
 def _light(spec: Any) -> None:
     import mujoco
 
-    light = spec.worldbody.add_light(name="lamp", pos=[0, 0, 3], dir=[-0.25, 0.4, -1])
-    light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
-    light.diffuse, light.specular = [0.5] * 3, [0.15] * 3
+    light = spec.worldbody.add_light(
+        name="lamp", pos=[0.4, -0.6, 2.6], dir=[-0.15, 0.23, -1]
+    )
+    light.type = mujoco.mjtLightType.mjLIGHT_SPOT
+    light.cutoff, light.exponent = 80, 0
+    light.attenuation = [1, 0, 0]
+    light.diffuse, light.specular = [0.38] * 3, [0.1] * 3
     head = spec.visual.headlight
-    head.ambient, head.diffuse, head.specular = [0.45] * 3, [0.35] * 3, [0.0] * 3
+    head.ambient, head.diffuse, head.specular = [0.42] * 3, [0.2] * 3, [0.0] * 3
     spec.stat.center, spec.stat.extent = [0, 0, 0], 1.6
-    spec.visual.map.znear, spec.visual.map.zfar = 0.01, 20
-    spec.visual.quality.shadowsize = 4096
+    spec.visual.map.znear, spec.visual.map.zfar = 0.05, 6
+    quality = spec.visual.quality
+    quality.shadowsize, quality.numslices, quality.numstacks = 4096, 72, 32
     spec.visual.global_.offwidth, spec.visual.global_.offheight = 1920, 1280
 
 
@@ -145,10 +150,10 @@ def _cameras(spec: Any) -> None:
     half_height = _half()[1] * 1.06  # a margin of 6 %
     fovy = np.degrees(2 * np.arctan(half_height / CAMERA_HEIGHT))
     spec.worldbody.add_camera(name="overhead", pos=[0, 0, CAMERA_HEIGHT], fovy=fovy)
-    camera = spec.worldbody.add_camera(name="perspective", pos=[0.75, -1.75, 1.3])
+    camera = spec.worldbody.add_camera(name="perspective", pos=[1.05, -2.25, 1.55])
     camera.fovy = 45
     camera.alt.type = mujoco.mjtOrientation.mjORIENTATION_XYAXES
-    camera.alt.xyaxes = [0.919, 0.394, 0, -0.222, 0.517, 0.826]
+    camera.alt.xyaxes = [0.906, 0.423, 0, -0.249, 0.534, 0.808]
 
 
 def _surround(spec: Any) -> None:
@@ -157,7 +162,7 @@ def _surround(spec: Any) -> None:
 
     box, (x, y) = mujoco.mjtGeom.mjGEOM_BOX, _half()
     _shown(
-        spec, name="ground", type=box, size=[4, 4, 0.01], pos=[0, 0, -0.03],
+        spec, name="ground", type=box, size=[6, 6, 0.01], pos=[0, 0, -0.03],
         rgba=_GROUND,
     )  # fmt: skip
     for side, place, size in (
