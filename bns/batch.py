@@ -8,6 +8,7 @@ import numpy as np
 
 from bns import seeding
 from bns.config import RunConfig
+from bns.errors import BnsError
 from bns.step import Step
 from bns.worlds.damage import Damage
 from bns.worlds.trial import Commands, Trial
@@ -106,6 +107,25 @@ def resolve(config: RunConfig, mode: str = "") -> tuple[RunConfig, str]:
 
         mode = "compiled" if should_compile(config) else "eager"
     return replace(config, compiled="yes" if mode == "compiled" else "no"), mode
+
+
+def check_device(name: str) -> None:
+    """Refuse a torch device that is not there.
+
+    Raises:
+        BnsError: no such device here.
+    """
+    if name == "cpu":
+        return
+    import torch
+
+    try:
+        torch.empty(0, device=name)
+    except (RuntimeError, AssertionError, NotImplementedError):
+        raise BnsError(
+            f"device = {name!r} is not available here: give cpu, or install a torch "
+            "for that device (see `bns doctor` for the one that is installed)."
+        ) from None
 
 
 def check_world(config: RunConfig, *, named: bool = True) -> None:

@@ -87,9 +87,10 @@ def compare(records: Sequence[RunRecord], names: Sequence[str] = ()) -> Comparis
     Raises:
         BnsError: fewer than two runs, or one that is not finished.
     """
-    names = list(names) or labels(records)
     if len(records) < 2:
-        raise BnsError(f"{len(records)} run was given: give two or more to compare.")
+        given = "1 run was" if records else "0 runs were"
+        raise BnsError(f"{given} given: give two or more to compare.")
+    names = list(names) or labels(records)
     for name, record in zip(names, records, strict=True):
         if record.trials < record.config.trials:
             raise BnsError(

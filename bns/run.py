@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bns import files, versions
-from bns.batch import Batch, check_world, resolve
+from bns.batch import Batch, check_device, check_world, resolve
 from bns.config import RunConfig
 from bns.directory import check_free
 from bns.errors import BnsError
@@ -56,6 +56,7 @@ def train(
             another configuration or cannot be written.
     """
     check(config)
+    check_device(config.device)
     check_world(config, named=world is None)
     store = _store(config, Path(out), resume=resume) if out is not None else None
     try:
@@ -93,6 +94,7 @@ def train_many(
         BnsError: a setting that is not allowed, or configurations too different.
     """
     for config in configs:
+        check_device(config.device)
         check_world(check(config))
     settled, mode = _settle(configs)
     batch = Batch(settled, [make_world(config) for config in settled])

@@ -11,7 +11,8 @@ import tyro
 from bns.errors import BnsError
 
 T = TypeVar("T")
-_BOX = re.compile(r"^[\s╭╮╰╯│─]+|[\s╭╮╰╯│─]+$")
+_FRAME = " │╭╮╰╯"
+_RULE = re.compile(r"[─-]{8,}")
 
 
 def parse(
@@ -36,13 +37,21 @@ def parse(
 
 
 def _one_line(box: str) -> str:
-    """What tyro's box says, without the box and its pointers to more help."""
+    """What tyro's box says, without the box, its title and pointers to more help.
+
+    The box is a title and parts with rules between them; on a terminal that knows
+    UTF-8 the title is part of the frame, elsewhere a line above the first rule.
+    """
+    lines = [line.strip(_FRAME) for line in box.splitlines()]
+    lines = [line for line in lines if line][1:]  # without the title
+    if lines and _RULE.fullmatch(lines[0]):
+        lines = lines[1:]
     parts: list[list[str]] = [[]]
-    for line in box.splitlines()[1:]:
-        if re.fullmatch(r"│ ─+ │", line.strip()):
+    for line in lines:
+        if _RULE.fullmatch(line):
             parts.append([])
-        elif text := _BOX.sub("", line):
-            parts[-1].append(text)
+        else:
+            parts[-1].append(line)
     said = " ".join(parts[0]).rstrip(".") + "."
     for part in parts[1:]:
         if len(part) > 1 and part[0].startswith("Perhaps you meant"):

@@ -42,7 +42,14 @@ class Arguments:
 
 def main(verb: str, argv: list[str]) -> int:
     """Run the verb; gives the exit code."""
-    if not argv or argv[0] in ("-h", "--help"):
+    if not argv:
+        from bns import presets
+
+        raise BnsError(
+            f"Nothing to run: give a preset ({', '.join(presets.names())}), a TOML "
+            "file or a run directory. See bns run --help."
+        )
+    if argv[0] in ("-h", "--help"):
         parse(Arguments, argv, prog="bns run")
     if argv[0].startswith("-"):
         raise BnsError(

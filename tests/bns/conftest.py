@@ -1,17 +1,20 @@
 """What tests of runs share: the fake learner in the place of the real one."""
 
 import sys
-from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
+
+@pytest.fixture(autouse=True)
+def one_commit(monkeypatch):
+    """Someone may commit between a run and the run it is compared with."""
+    monkeypatch.setattr("bns.versions.commit", lambda: "test")
 
 
 @pytest.fixture
 def fakes(monkeypatch):
     """The module `fakes`, its learner in the place of the real one."""
-    import fakes
+    from tests.bns import fakes
 
     fakes.learner_modules(lambda name, m: monkeypatch.setitem(sys.modules, name, m))
     return fakes

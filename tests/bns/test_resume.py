@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from contents import contents
 
 from bns import files
 from bns.config import (
@@ -20,6 +19,7 @@ from bns.config import (
 from bns.errors import BnsError
 from bns.run import train
 from bns.store import load
+from tests.bns.contents import contents
 
 FAKES = Path(__file__).parent / "fakes.py"
 KILLED = -9

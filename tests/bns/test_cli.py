@@ -1,0 +1,240 @@
+"""The command line, driven with right and wrong input."""
+
+import json
+import os
+import signal
+import sys
+
+import pytest
+
+from bns import presets
+from bns.__main__ import INTERRUPTED, WRONG_INPUT, main
+from bns.cli import VERBS
+from bns.cli.run import STOPPED, until_interrupted
+from bns.doctor import pins
+from bns.store import load
+
+TINY = [
+    "--trials", "3", "--replicates", "2", "--record-replicates", "1",
+    "--evolution.population", "8", "--evolution.generations", "1",
+    "--snn.epochs", "2", "--compiled", "no", "--threads", "1",
+]  # fmt: skip
+
+
+def said(capsys, *argv, code=0):
+    """What a command prints, its exit code being `code`."""
+    assert main([str(word) for word in argv]) == code
+    captured = capsys.readouterr()
+    return captured.err if code == WRONG_INPUT else captured.out
+
+
+@pytest.fixture
+def run(fakes, tmp_path):
+    """A finished run of the fake learner."""
+    fakes.train(tmp_path / "run")
+    return tmp_path / "run"
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_help_is_a_manual(capsys, verb):
+    with pytest.raises(SystemExit) as end:
+        main([verb, "--help"])
+    assert not end.value.code
+    assert f"usage: bns {verb}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("argv", [[], ["--help"], ["-h"]])
+def test_help_lists_every_verb(capsys, argv):
+    text = said(capsys, *argv)
+    assert all(f"  {verb} " in text for verb in VERBS)
+
+
+def test_version(capsys):
+    assert said(capsys, "--version") == "bns 0.1.0\n"
+
+
+def test_help_of_a_preset_shows_its_values(capsys):
+    with pytest.raises(SystemExit):
+        main(["run", "demo", "--help"])
+    text = " ".join(capsys.readouterr().out.split())
+    assert f"(default: {presets.load('demo').replicates})" in text
+    assert "an objective is reached within this distance [m]" in text
+
+
+@pytest.mark.parametrize("verb", ["presets", "worlds", "robots", "effects"])
+def test_lists_name_what_exists(capsys, verb):
+    known = {
+        "presets": "khepera-simple",
+        "worlds": "static-snn",
+        "robots": "khepera3",
+        "effects": "wheel_gain",
+    }
+    assert known[verb] in said(capsys, verb)
+    rows = json.loads(said(capsys, verb, "--json"))
+    assert known[verb] in [next(iter(row.values())) for row in rows]
+    assert all(list(row.values())[-1] for row in rows), "a line without a meaning"
+
+
+def test_effects_have_units_and_ranges(capsys):
+    rows = json.loads(said(capsys, "effects", "--json"))
+    names = [row["parameter"] for row in rows]
+    row = rows[names.index("factor", [r["effect"] for r in rows].index("wheel_gain"))]
+    assert row["unit"] == "1" and "nominal 1" in row["range"]
+
+
+WRONG = {
+    "no such verb": (["rum"], "Unknown command 'rum'. Did you mean 'run'? Available"),
+    "nothing to run": (["run"], "Nothing to run: give a preset (demo, "),
+    "device": (
+        ["run", "demo", "--device", "warp"],
+        "device = 'warp' is not available here: give cpu",
+    ),
+    "option first": (["run", "--trials", "3"], "comes too early: give a preset"),
+    "preset": (["run", "khepera-simpel"], "Did you mean 'khepera-simple'?"),
+    "file": (["run", "no.toml"], "There is no file no.toml"),
+    "option": (
+        ["run", "demo", "--evolution.populatoin", "3"],
+        "Unrecognized options: --evolution.populatoin, 3. Did you mean --evolution.",
+    ),
+    "choice": (["run", "demo", "--evolution.selection", "x"], "('tournament',"),
+    "type": (["run", "demo", "--trials", "abc"], "Error parsing --trials"),
+    "bound": (
+        ["run", "demo", "--task.radius", "5"],
+        "task.radius = 5.0 m is not allowed: give a number from 0.005 to 0.5 m",
+    ),
+    "nan": (["run", "demo", "--task.radius", "nan"], "task.radius = nan m is not"),
+    "world": (["run", "demo", "--world.name", "mujco"], "Did you mean 'mujoco'?"),
+    "robot": (["run", "demo", "--world.robot", "khepera"], "Did you mean 'khepera3'?"),
+    "effect": (["run", "demo", "--world.damage", "weel_gain"], "mean 'wheel_gain'?"),
+    "parameter": (
+        ["run", "demo", "--world.damage", "wheel_gain:factr=0.8"],
+        "Unknown parameter of wheel_gain 'factr'. Did you mean 'factor'?",
+    ),
+    "effect's bound": (
+        ["run", "demo", "--world.reality", "wheel_gain:factor=9"],
+        "wheel_gain:factor = 9",
+    ),
+    "damage's grammar": (
+        ["run", "demo", "--world.damage", "wheel_gain@soon"],
+        "cannot be read: write NAME",
+    ),
+    "foreign directory": (["run", "demo", "--out", "."], "not empty and holds no run"),
+    "no directory": (["report", "nowhere"], "nowhere is not a run directory"),
+    "nothing to report": (["report"], "No run was given"),
+    "one to compare": (["compare", "run"], "1 run was given: give two or more"),
+    "none to compare": (["compare"], "0 runs were given"),
+    "no recording": (["view", "no.rrd"], "There is no recording no.rrd"),
+    "nothing to view": (["view"], "Missing from bns view"),
+    "an argument too many": (["worlds", "mujoco"], "Unrecognized options: mujoco"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_input_is_one_line_and_changes_nothing(
+    capsys, run, monkeypatch, tmp_path, case
+):
+    argv, message = WRONG[case]
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
+    text = said(capsys, *argv, code=WRONG_INPUT)
+    assert message in text
+    assert text.startswith("bns: ") and text.count("\n") == 1
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "utf-8"])
+def test_a_bad_option_is_one_line_on_any_terminal(run_python, encoding):
+    words = ["-m", "bns", "run", "demo", "--evolution.populatoin", "3"]
+    text = run_python(*words, code=WRONG_INPUT, PYTHONIOENCODING=encoding)
+    assert text == (
+        "bns: Unrecognized options: --evolution.populatoin, 3. Did you mean "
+        "--evolution.population? See bns run --help.\n"
+    )
+
+
+def test_view_without_a_display_says_what_to_do(capsys, tmp_path, monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    (tmp_path / "x.rrd").write_bytes(b"")
+    text = said(capsys, "view", tmp_path / "x.rrd", code=WRONG_INPUT)
+    assert "No display" in text and "--png FILE" in text
+
+
+def test_run_to_the_end_and_once_more(capsys, tmp_path):
+    out = tmp_path / "out"
+    quiet = ["--rerun", "off", "--no-report"]
+    text = said(capsys, "run", "demo", "--out", out, *quiet, *TINY)
+    assert f"data:      {out}" in text
+    assert "3 trials of 2 runs" in text and "was not met" in text
+    assert load(out).config.preset == "demo"
+    again = said(capsys, "run", "demo", "--out", out, *quiet, *TINY, code=WRONG_INPUT)
+    assert "holds a run already: add --resume" in again
+    assert "3 trials of 2 runs" in said(capsys, "run", out, "--resume", *quiet)
+    other = said(
+        capsys, "run", out, "--resume", "--seed", "5", *quiet, code=WRONG_INPUT
+    )
+    assert "seed = 0, not 5" in other
+
+
+def test_compare_prints_tables_and_json(capsys, fakes, run, tmp_path):
+    fakes.train(tmp_path / "other", config=fakes.longer(5))
+    text = said(capsys, "compare", run, tmp_path / "other")
+    assert "p (Holm)" in text and "A12" in text and "recover" in text
+    found = json.loads(said(capsys, "compare", run, tmp_path / "other", "--json"))
+    assert {pair["measure"] for pair in found["pairs"]} == {
+        "observation", "solve", "recover",
+    }  # fmt: skip
+
+
+def test_interrupted_run_says_how_to_go_on(capsys, fakes, tmp_path, monkeypatch):
+    out = tmp_path / "run"
+    begun = fakes.train(out, stop=lambda: True)
+
+    def interrupted(config, out, *, stop, **_):
+        os.kill(os.getpid(), signal.SIGINT)
+        assert stop()
+        return begun
+
+    monkeypatch.setattr("bns.run.train", interrupted)
+    text = said(capsys, "run", "demo", "--out", out, code=STOPPED)
+    assert f"bns run {out} --resume" in text
+
+
+def test_second_interrupt_stops_at_once(monkeypatch):
+    def twice():
+        with until_interrupted() as stop:
+            os.kill(os.getpid(), signal.SIGINT)
+            assert stop()
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        twice()
+    monkeypatch.setitem(VERBS, "presets", ("nothing", ""))
+    monkeypatch.setattr("bns.__main__.dispatch", lambda argv: twice())
+    assert main(["presets"]) == INTERRUPTED
+
+
+def test_doctor_looks_at_everything(capsys):
+    rows = json.loads(said(capsys, "doctor", "--json"))
+    looked_at = {row["what"] for row in rows}
+    assert {"mujoco", "Vulkan", "C++ compiler", "cores", "serial ports"} <= looked_at
+    assert all(row["what to do"] for row in rows if row["state"] in ("bad", "missing"))
+    assert "Ready to run." in said(capsys, "doctor")
+
+
+@pytest.mark.parametrize(
+    ("installed", "bad"),
+    [
+        ({"mujoco": "3.17.0", "dm-control": "1.0.50"}, []),
+        ({"mujoco": "4.0.0"}, ["mujoco pin"]),
+        ({"mujoco": "4.0.1", "dm-control": "1.0.50"}, ["dm-control pin"]),
+        (
+            {"mujoco": "4.0.0", "dm-control": "1.0.50"},
+            ["mujoco pin", "dm-control pin"],
+        ),
+    ],
+)
+def test_known_bad_pins(installed, bad):
+    found = pins(lambda name: installed.get(name, ""))
+    assert [finding.what for finding in found if finding.state == "bad"] == bad

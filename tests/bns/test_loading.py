@@ -1,0 +1,136 @@
+"""Configurations: what is read, what is refused, what comes back."""
+
+import inspect
+import re
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+
+from bns import config, loading, presets
+from bns.config import RunConfig, WorldConfig
+from bns.errors import BnsError, FormatError, OutOfBoundsError, UnknownNameError
+from bns.validate import BOUNDS, check, leaves
+from bns.worlds.damage import Damage
+
+
+def test_every_number_has_bounds_and_every_bound_a_number():
+    numbers = {
+        name
+        for name, value in leaves(RunConfig())
+        if isinstance(value, int | float) and not isinstance(value, bool)
+    }
+    assert numbers == set(BOUNDS)
+
+
+def test_defaults_are_allowed():
+    assert check(RunConfig()) == RunConfig()
+
+
+def _changed(tree, name, value):
+    head, _, rest = name.partition(".")
+    inner = _changed(getattr(tree, head), rest, value) if rest else value
+    return replace(tree, **{head: inner})
+
+
+@pytest.mark.parametrize("name", BOUNDS)
+def test_values_out_of_bounds_name_bound_and_unit(name):
+    low, high, unit = BOUNDS[name]
+    given = dict(leaves(RunConfig()))[name]
+    step = 1 if isinstance(given, int) else 1e-3
+    bad = [low - step, high + max(step, high * 1e-3), float("nan"), float("inf")]
+    for value in bad:
+        with pytest.raises(OutOfBoundsError) as caught:
+            check(_changed(RunConfig(), name, value))
+        said = str(caught.value)
+        assert said.startswith(f"{name} = ") and f"{high:g}" in said
+        assert unit == "1" or unit in said
+
+
+def test_settings_that_contradict_each_other():
+    wrong = {"controller": {"initial_max": 12, "initial_min": 13}}
+    with pytest.raises(BnsError, match=r"initial_min = 13 is larger than .* = 12"):
+        loading.from_mapping(wrong)
+
+
+@pytest.mark.parametrize(
+    ("content", "match"),
+    [
+        ({"evolution": {"populatoin": 3}}, "setting 'evolution.populatoin'.*mean 'evo"),
+        ({"evolutoin": {}}, "setting 'evolutoin'. Did you mean 'evolution'"),
+        ({"choose": "bset"}, "choose 'bset'. Did you mean 'best'"),
+        ({"trials": 3.5}, "trials = 3.5 is not allowed: give a whole number"),
+        ({"trials": True}, "trials = True is not allowed: give a whole number"),
+        ({"task": 3}, "task = 3 is not allowed: it is a table"),
+        ({"task": {"radius": "wide"}}, "radius = 'wide' is not .*: give a number"),
+        ({"snn": {"warm_start": 1}}, "warm_start = 1 is not allowed: give true or"),
+        ({"world": {"damage": [3]}}, "world.damage: 3 is not allowed"),
+        ({"world": {"damage": 3}}, "world.damage = 3 is not allowed: give a list"),
+        ({"world": {"name": 3}}, "world.name = 3 is not allowed: give text"),
+    ],
+)
+def test_wrong_content_is_one_message(content, match):
+    with pytest.raises(BnsError, match=match):
+        loading.from_mapping(content)
+
+
+def test_unknown_key_is_an_unknown_name():
+    with pytest.raises(UnknownNameError):
+        loading.from_mapping({"tirals": 3})
+
+
+def test_toml_there_and_back(tmp_path):
+    given = replace(
+        RunConfig(seed=2**60, trials=7),
+        world=WorldConfig(damage=('wheel_gain:wheel="left"', "ö\\n"), sample_dt=0.05),
+    )
+    (tmp_path / "x.toml").write_text(loading.to_toml(given), encoding="utf-8")
+    assert loading.from_file(tmp_path / "x.toml") == given
+    assert loading.from_mapping(loading.to_mapping(given)) == given
+
+
+def test_file_may_start_from_a_preset(tmp_path):
+    text = 'description = "mine"\npreset = "khepera-simple"\ntrials = 45\n'
+    (tmp_path / "mine.toml").write_text(text)
+    found = loading.from_file(tmp_path / "mine.toml")
+    assert found == replace(presets.load("khepera-simple"), trials=45)
+
+
+def test_damage_may_be_a_table(tmp_path):
+    text = '[[world.damage]]\neffect = "wheel_gain"\nfactor = 0.8\nonset = 30\n'
+    (tmp_path / "mine.toml").write_text(text)
+    damage = loading.from_file(tmp_path / "mine.toml").world.damage
+    assert damage == ("wheel_gain:wheel=both,factor=0.8@30",)
+
+
+@pytest.mark.parametrize("text", ["trials = ", None])
+def test_files_that_are_none(tmp_path, text):
+    if text is not None:
+        (tmp_path / "mine.toml").write_text(text)
+    with pytest.raises(FormatError, match="cannot be read as TOML"):
+        loading.from_file(tmp_path / "mine.toml")
+
+
+def test_differences_name_the_key():
+    one, other = RunConfig(), loading.from_mapping({"task": {"radius": 0.1}})
+    assert loading.differences(one, other) == {"task.radius": (0.09, 0.1)}
+
+
+@pytest.mark.parametrize("name", presets.names())
+def test_presets_are_valid_and_described(name):
+    assert presets.load(name).preset == name
+    assert 20 <= len(presets.describe(name)) <= 100
+    Damage.parse(presets.load(name).world.damage)
+
+
+def test_unknown_preset_is_suggested():
+    with pytest.raises(UnknownNameError, match="mean 'khepera-simple'"):
+        presets.load("kephera-simple")
+
+
+def test_every_setting_is_documented():
+    """The text under each field is the manual that `bns run --help` prints."""
+    lines = inspect.getsource(config).splitlines()
+    for line, after in pairwise(lines):
+        if re.match(r"    [a-z_]+: .* = ", line) and "default_factory" not in line:
+            assert after.startswith('    """'), line
