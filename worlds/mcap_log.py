@@ -1,6 +1,7 @@
 """Samples of named fields from an MCAP log."""
 
 import json
+import struct
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ import numpy as np
 
 from bns.errors import BnsError, FormatError, MissingDependencyError
 
+_BROKEN = (OSError, EOFError, struct.error, json.JSONDecodeError, UnicodeDecodeError)
 STAMPS = ("log_time", "publish_time")  # [ns], of the message itself
 
 
@@ -33,7 +35,9 @@ def samples(
         BnsError: a column that is not written as above.
     """
     places = {
-        name: _place(name, text) for name, text in columns.items() if text not in STAMPS
+        name: _place(name, text)
+        for name, text in columns.items()
+        if text not in STAMPS or name == clock
     }
     logs = _messages(path, {topic for topic, _ in places.values()})
     moments = np.array([stamps[0] for stamps, _ in logs[places[clock][0]]], float)
@@ -86,7 +90,7 @@ def _messages(path: Path, topics: set[str]) -> dict[str, list]:
                 stamps = (message.log_time, message.publish_time)
                 value = decoders[channel.id](message.data)
                 found[channel.topic].append((stamps, value))
-    except (OSError, McapError, json.JSONDecodeError) as error:
+    except (*_BROKEN, McapError) as error:
         raise FormatError(f"{path} cannot be read as MCAP ({error}).") from None
     for topic, log in found.items():
         if not log:
