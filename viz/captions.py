@@ -10,7 +10,8 @@ CAPTIONS = {
         "One run, chosen as the typical one. Solid: where the robot went. Dashed: "
         "where its simulator network (SNN) had said it would go. Discs are the "
         "objectives, reached in the order {order}; within their radius counts as "
-        "reached. When solid and dashed part, the SNN is wrong about the robot."
+        "reached; what follows the last one is faint. Paths are cut at the board's "
+        "edge. Where solid and dashed part, the SNN is wrong about the robot."
     ),
     "fitness": (
         "Cost of the controller tried in each trial, lower is better, on a "
@@ -23,7 +24,7 @@ CAPTIONS = {
         "trial reached them all. " + BAND
     ),
     "waits": (
-        "Share of runs that had solved the task after so many trials (left), and, "
+        "Share of runs that had solved the task before the damage (left), and, "
         "counted from the first damaged trial, that had solved it again (right). A "
         "curve that ends below 100 % tells of runs that never did. The dotted line "
         "drops from the median."
@@ -36,7 +37,8 @@ CAPTIONS = {
     "displacement": (
         "Each dot is one command: the motion the SNN foresaw against the motion that "
         "came. On the diagonal the SNN is right; a cloud off the diagonal shows what "
-        "the damage changed, and the dots of the last trials whether it was learned."
+        "the damage changed, and the dots of the last trials whether it was learned. "
+        "Dots beyond the frame are drawn at its edge."
     ),
     "diversity": (
         "How different the controllers in the population are, by the three measures "

@@ -48,11 +48,14 @@ def typical(record: RunRecord) -> int:
     """The replicate to show when none is asked for.
 
     Of the replicates that recovered (or, undamaged, that solved): the one that took
-    the median number of trials. If none did: the one with the lowest fitness at the
-    end.
+    the median number of trials. Those that had not solved before the damage count
+    only if all recovered ones are such. If none recovered: the one with the lowest
+    fitness at the end.
     """
     waits = [_wait(record, replicate) for replicate in range(record.replicates)]
     done = [(wait, index) for index, wait in enumerate(waits) if wait is not None]
+    whole = [entry for entry in done if _solved_before(record, entry[1])]
+    done = whole or done
     if not done:
         return int(np.nanargmin(record["fitness"][:, -1]))
     return sorted(done)[(len(done) - 1) // 2][1]
@@ -72,6 +75,11 @@ def _wait(record: RunRecord, replicate: int) -> int | None:
     start = max(int(record.damage_onset[replicate]), 0)
     solved = np.flatnonzero(record["solved"][replicate, start:])
     return int(solved[0]) if len(solved) else None
+
+
+def _solved_before(record: RunRecord, replicate: int) -> bool:
+    onset = int(record.damage_onset[replicate])
+    return onset <= 0 or bool(record["solved"][replicate, :onset].any())
 
 
 def _with_damage(record: RunRecord, replicate: int, onset: int) -> list[Choice]:

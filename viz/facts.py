@@ -43,21 +43,27 @@ class Facts:
     @classmethod
     def of(cls, record: RunRecord, label: str = "") -> "Facts":
         """The facts of a record."""
-        waits, back = stats.trials_to_solve(record), stats.trials_to_recover(record)
+        waits, back = to_solve(record), stats.trials_to_recover(record)
         hit = ~np.isnan(back)
         onset = int(record.damage_onset[hit].min()) if hit.any() else None
-        before = waits <= (record.trials if onset is None else onset)
         return cls(
             label=label,
             runs=record.replicates,
             trials=record.trials,
-            solved=int(before.sum()),
-            to_solve=stats.median_interval(np.where(before, waits, np.inf)),
+            solved=int(np.isfinite(waits).sum()),
+            to_solve=stats.median_interval(waits),
             onset=onset,
             recovered=int(np.isfinite(back).sum()),
             to_recover=stats.median_interval(back[hit]) if hit.any() else None,
             last_solved=int((record["solved"][:, -1] > 0).sum()),
         )
+
+
+def to_solve(record: RunRecord) -> np.ndarray:
+    """Trials until first solved, ``(R,)``; inf = never, or not before the damage."""
+    waits = stats.trials_to_solve(record)
+    onset = np.where(record.damage_onset < 0, record.trials, record.damage_onset)
+    return np.where(waits <= onset, waits, np.inf)
 
 
 def interval(value: Interval | None) -> str:

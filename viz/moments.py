@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bns.record import RunRecord
-from bns.viz import geometry, style
+from bns.viz import geometry, scene, style
 from bns.viz.blueprint import LIVE_TIMELINE, TRIAL_TIMELINE
 from bns.viz.choices import Choice
 from bns.viz.paths import arcs, dashes, listed
@@ -48,7 +48,10 @@ def send(
         times, poses, qpos = samples(record, at, trials.get(choice.trial), model)
         index = _times(start + times)
         geometry.send_poses(stream, model, index, qpos)
-        _trails(stream, choice, poses, listed(record.predicted[at]), start)
+        done = _finish(record, at, times)
+        foreseen = listed(record.predicted[at])
+        foreseen = foreseen[: scene.finish(record.config, foreseen) + 1]
+        _trails(stream, choice, poses, done, foreseen)
         _wheels(stream, record.sent[at], start)
         states.append((start, f"trial {choice.trial}: {choice.label}"))
         colours.append(choice.colour)
@@ -108,23 +111,35 @@ def _lift(poses: np.ndarray) -> np.ndarray:
     return np.column_stack([poses[:, :2], np.full(len(poses), _HEIGHT)])
 
 
-def _trails(stream, choice: Choice, poses, predicted, start: float) -> None:
-    """The real trail for good, the predicted one from the trial's start on."""
+def _finish(record: RunRecord, at, times: np.ndarray) -> int:
+    """Sample at which the task was done; the last one if it was not."""
+    poses = listed(record.poses[at])
+    done = scene.finish(record.config, poses)
+    ends = np.cumsum(record.sent[at][: len(poses) - 1, 2])
+    if not 0 < done < len(poses) - 1:
+        return len(times) - 1
+    return min(int(np.searchsorted(times, ends[done - 1])), len(times) - 1)
+
+
+def _trails(stream, choice: Choice, poses, done: int, predicted) -> None:
+    """Real and foreseen trail; the real one is thin after the last objective."""
     import rerun as rr
 
     colour = style.rgb(choice.colour)
     root = f"world/trails/trial_{choice.trial:03d}"
+    strips = [_lift(poses[: done + 1]), _lift(poses[done:])]
+    radii = [_TRAIL, _TRAIL / 4]
     stream.log(
         f"{root}/real",
-        rr.LineStrips3D([_lift(poses)], colors=[colour], radii=_TRAIL),
+        rr.LineStrips3D(strips, colors=[colour] * 2, radii=radii),
         static=True,
     )
     if len(predicted) < 2:
         return
-    strips = dashes(_lift(arcs(predicted, _ARC_SAMPLES)))
+    pieces = dashes(_lift(arcs(predicted, _ARC_SAMPLES)))
     stream.log(
         f"{root}/predicted",
-        rr.LineStrips3D(strips, colors=[colour], radii=_TRAIL * 0.6),
+        rr.LineStrips3D(pieces, colors=[colour], radii=_TRAIL / 2),
         static=True,
     )
 

@@ -118,7 +118,8 @@ def _about(record: RunRecord, replicate: int, chosen: Sequence[Choice]):
         "",
         "**World.** Solid trails are where the robot went, dashed trails where its "
         "simulator network (SNN) said it would go. Discs are the objectives; their "
-        "size is the distance within which one counts as reached. Press play: the "
+        "size is the distance within which one counts as reached; a solid trail gets "
+        "thin once all are. Press play: the "
         "robot drives through the trials below, one after another.",
         "",
         *(f"- trial {choice.trial}: {choice.label}" for choice in chosen),

@@ -4,6 +4,7 @@ import numpy as np
 
 from bns.config import RunConfig
 from bns.viz import geometry, style
+from bns.viz.paths import reached
 
 MARGIN = 0.25
 """m of board shown around the outermost objectives"""
@@ -33,6 +34,14 @@ def order(config: RunConfig) -> str:
     from bns.tasks import ORDERS
 
     return ORDERS[config.task.name]
+
+
+def finish(config: RunConfig, poses_world: np.ndarray) -> int:
+    """Row of `poses_world` at which the task was done; the last one if it was not."""
+    places = objectives(config)
+    goals = np.array([places[name] for name in order(config)])
+    rows = reached(poses_world, goals, config.task.radius)
+    return rows[-1] if len(rows) == len(goals) else len(poses_world) - 1
 
 
 def extent(config: RunConfig) -> tuple[float, float]:

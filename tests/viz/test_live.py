@@ -1,6 +1,7 @@
 """A live view that fails is said once and does not stop the run."""
 
 import logging
+import time
 
 import numpy as np
 import pytest
@@ -47,5 +48,8 @@ def test_trials_reach_a_viewer(record):
     ):
         for trial in range(3):
             on_trial(trial, step(record, trial), [])
-        state = viewer.get_state()
-    assert {view.name for view in state.views} >= {"World", "Fitness"}
+        names, tries = set(), 0
+        while not names and (tries := tries + 1) < 40:
+            time.sleep(0.25)
+            names = {view.name for view in viewer.get_state().views}
+    assert names >= {"World", "Fitness"}

@@ -9,6 +9,11 @@ from bns.viz import scene, style
 from bns.viz.choices import Choice, choose, typical
 from bns.viz.paths import arcs, listed
 
+BOARD = np.array([1.35, 0.9])
+"""m; half the arena's board (thesis 4.2.1), beyond which paths are cut"""
+
+_FORESEEN = {"color": style.BLACK, "linewidth": 1.3, "ls": (0, (3, 2))}
+
 
 def path(
     record: RunRecord,
@@ -33,10 +38,11 @@ def path(
         for axes, choice in zip(panels[0], chosen, strict=True):
             _objectives(axes, record)
             at = (replicate, choice.trial)
-            _paths(axes, record.poses[at], record.predicted[at], choice.colour)
+            _paths(axes, record, at, choice.colour)
             axes.set_title(f"trial {choice.trial}\n{choice.label}", color=choice.colour)
             axes.set_xlabel("x [m]")
             axes.set_aspect("equal", "box")
+        _limits(panels[0, 0], record, [(replicate, c.trial) for c in chosen])
         panels[0, 0].set_ylabel("y [m]")
         handles, labels = panels[0, -1].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=4)
@@ -52,20 +58,42 @@ def _objectives(axes, record: RunRecord) -> None:
         axes.annotate(name, (x, y), ha="center", va="center", fontweight="bold")
 
 
-def _paths(axes, real: np.ndarray, predicted: np.ndarray, colour: str) -> None:
-    for poses, ls, width, label in (
-        (listed(predicted), (0, (3, 2)), 1.3, "as the SNN foresaw it"),
-        (listed(real), "-", 2.0, "as the robot drove"),
+def _paths(axes, record: RunRecord, at: tuple[int, int], colour: str) -> None:
+    """Foreseen and real path; what follows the last objective is faint."""
+    for poses, line, label in (
+        (record.predicted[at], _FORESEEN, "as the SNN foresaw it"),
+        (record.poses[at], {"color": colour, "linewidth": 2.0}, "as the robot drove"),
     ):
+        poses = listed(poses)
         if len(poses) < 2:
             continue
-        line = arcs(poses)
-        shade = style.BLACK if ls != "-" else colour
-        axes.plot(*line[:, :2].T, color=shade, ls=ls, linewidth=width, label=label)
+        done = scene.finish(record.config, poses)
+        axes.plot(*arcs(poses[: done + 1])[:, :2].T, label=label, **line)
+        if done + 1 < len(poses):
+            axes.plot(*arcs(poses[done:])[:, :2].T, alpha=0.3, **line)
+    real = listed(record.poses[at])
     if len(real):
+        end = real[scene.finish(record.config, real), :2]
         axes.plot(*real[0, :2], "o", color=style.BLACK, markersize=5, label="start")
-    end = listed(real)
-    if len(end):
-        axes.plot(
-            *end[-1, :2], "s", color=colour, mec=style.BLACK, markersize=5, label="end"
-        )
+        axes.plot(*end, "s", color=colour, mec=style.BLACK, markersize=5, label="end")
+
+
+def _until_done(record: RunRecord, at: tuple[int, int]) -> np.ndarray:
+    """The real path up to the last objective; the start alone if there is none."""
+    poses = listed(record.poses[at])
+    if len(poses) < 2:
+        return np.zeros((1, 3))
+    return arcs(poses[: scene.finish(record.config, poses) + 1])
+
+
+def _limits(axes, record: RunRecord, shown) -> None:
+    """The objectives and the paths, but nothing beyond the board."""
+    half = np.array(scene.extent(record.config))
+    paths = np.concatenate([_until_done(record, at)[:, :2] for at in shown])
+    low = np.minimum(-half, np.maximum(paths.min(axis=0) - 0.05, -BOARD))
+    high = np.maximum(half, np.minimum(paths.max(axis=0) + 0.05, BOARD))
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    wide, tall = high - low
+    panel = 6.3 / len(shown)
+    axes.figure.set_figheight(min(panel * tall / wide, 4.0) + 1.25)

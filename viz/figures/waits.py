@@ -6,7 +6,7 @@ import numpy as np
 
 from bns import stats
 from bns.record import RunRecord
-from bns.viz import style
+from bns.viz import facts, style
 from bns.viz.figures import bands
 
 
@@ -20,12 +20,12 @@ def waits(runs: Mapping[str, RunRecord]):
         damaged = bool(bands.onsets(runs))
         panels = figure.subplots(1, 1 + damaged, squeeze=False, sharey=True)[0]
         for label, record, colour in bands.coloured(runs):
-            _steps(
-                panels[0], stats.trials_to_solve(record), record.trials, colour, label
-            )
+            start = int(record.damage_onset.min()) if damaged else record.trials
+            start = start if 0 <= start <= record.trials else record.trials
+            _steps(panels[0], facts.to_solve(record), start, colour, label)
             if damaged:
-                left = record.trials - max(record.damage_onset.min(), 0)
-                _steps(panels[1], stats.trials_to_recover(record), left, colour, label)
+                back, left = stats.trials_to_recover(record), record.trials - start
+                _steps(panels[1], back, left, colour, label)
         titles = ("Solved for the first time", "Recovered from the damage")
         units = ("trials from the start", "trials from the damage")
         for axes, title, unit in zip(panels, titles, units, strict=False):

@@ -1,0 +1,123 @@
+"""Reports: one file, true in words, complete."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bns.errors import BnsError, FormatError
+from bns.stats import Interval
+from bns.viz import comparison, facts, figures, report
+
+
+@pytest.fixture(scope="module")
+def page(record, tmp_path_factory):
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    return report.write(record, path).read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def unpictured(monkeypatch):
+    """Reports without drawing, for tests of their text."""
+    monkeypatch.setattr(report, "picture", lambda figure: "data:image/svg+xml,")
+
+
+def test_it_needs_nothing_else(page):
+    sources = re.findall(r'(?:src|href)="([^"]{0,30})', page)
+    assert sources and all(source.startswith("data:image/svg") for source in sources)
+    assert "<script" not in page and "@import" not in page
+
+
+def test_it_says_what_happened(page, record):
+    solved = np.isfinite(facts.to_solve(record)).sum()
+    assert f"{solved} of 5 solved the task before the damage" in page
+    assert "From trial 20 on" in page
+    assert "a wheel turns at a share of the speed it is told" in page
+    assert "5 of 5 recovered; the median run needed" in page
+
+
+def test_every_figure_has_a_caption_and_a_text_for_who_cannot_see_it(page):
+    assert page.count("<figcaption>") == page.count("<img") == len(report.ONE_RUN)
+    assert page.count('alt="') == len(report.ONE_RUN)
+
+
+def test_it_can_be_reproduced(page):
+    assert "bns run config.toml" in page
+    assert "replicates = 5" in page and "3.17.0" in page
+
+
+def test_a_figure_gives_the_same_bytes_every_time(record):
+    one, two = (report.picture(figures.solved({"a": record})) for _ in range(2))
+    assert one == two
+
+
+def test_text_is_escaped(record, tmp_path, unpictured):
+    config = replace(record.config, preset="<b>x</b>")
+    made = report.write(replace(record, config=config), tmp_path / "a.html")
+    text = made.read_text(encoding="utf-8")
+    assert "<b>x</b>" not in text and "&lt;b&gt;x" in text
+
+
+def test_several_runs_are_compared(record, tmp_path, unpictured):
+    config = replace(record.config, seed=7)
+    other = replace(record, config=config, columns=record.columns)
+    made = report.write({"one": record, "two": other}, tmp_path / "a.html")
+    text = made.read_text(encoding="utf-8")
+    assert "one against two" in text and "Side by side" in text
+    assert '<th scope="row">seed</th><td>0</td><td>7</td>' in text
+    assert "0.50 (" in text  # A12 of equal samples
+
+
+def test_runs_of_the_same_name_are_told_apart(record, tmp_path, unpictured):
+    made = report.write([record, record], tmp_path / "a.html").read_text("utf-8")
+    assert "khepera-simple (1)" in made and "khepera-simple (2)" in made
+    assert "The settings are the same" in made
+
+
+def test_nothing_to_report_on(tmp_path):
+    with pytest.raises(BnsError, match="at least one run"):
+        report.write([], tmp_path / "a.html")
+
+
+def test_a_directory_that_is_no_run(tmp_path):
+    with pytest.raises(FormatError, match="not a run directory"):
+        report.write([tmp_path], tmp_path / "a.html")
+    assert not (tmp_path / "a.html").exists()
+
+
+def test_a_solution_after_the_damage_is_not_a_solution_before_it(record):
+    solved = np.zeros((2, 6))
+    solved[0, 1] = solved[0, 5] = solved[1, 4] = 1
+    made = replace(
+        record,
+        columns={name: value[:2, :6] for name, value in record.columns.items()}
+        | {"solved": solved},
+        sent=record.sent[:2, :6],
+        damage_onset=np.array([3, 3]),
+    )
+    found = facts.Facts.of(made)
+    assert (found.solved, found.recovered, found.onset) == (1, 2, 3)
+    assert facts.to_solve(made).tolist() == [2.0, np.inf]
+    assert found.to_recover.value == 2.5
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (Interval(12, 9, 15), "12 (95 % interval 9 to 15)"),
+        (Interval(12, 9, np.inf), "12 (95 % interval 9 to never)"),
+        (Interval(12, -np.inf, np.inf), "12"),
+        (Interval(np.inf, 3, np.inf), "never"),
+        (None, "-"),
+    ],
+)
+def test_intervals_in_words(value, text):
+    assert facts.interval(value) == text
+
+
+def test_an_undamaged_run_is_compared_on_trials_to_solve(record):
+    never = np.full(record.replicates, -1)
+    healthy = replace(record, damage_onset=never)
+    rows = comparison.table({"a": healthy, "b": healthy})["rows"]
+    assert rows[1][4:8] == ["-", "-", "1.0000", "1.0000"]
