@@ -4,7 +4,7 @@ LIVE_TIMELINE, TRIAL_TIMELINE = "sim_time", "trial"
 """Time within the trials shown [s]; number of the trial."""
 
 CHARTS = (
-    ("charts/fitness", "Fitness over trials (log10, lower is better)"),
+    ("charts/fitness", "Fitness over trials (log10, lower is better; brown: damaged)"),
     ("charts/diversity", "Diversity of the population over trials"),
     ("charts/snn_error", "SNN position error over trials [mm per command]"),
 )

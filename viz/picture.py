@@ -2,12 +2,14 @@
 
 import os
 import socket
+import subprocess
 import sys
 import sysconfig
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from bns.errors import BnsError, FormatError, MissingDependencyError
 from bns.viz.blueprint import LIVE_TIMELINE, TRIAL_TIMELINE
@@ -16,6 +18,8 @@ INSTALL = "apt-get install mesa-vulkan-drivers"
 """What a Debian system lacks when there is no Vulkan."""
 
 _ICD = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d")
+_START = 20.0
+"""s for the viewer to start, and to end"""
 _SETTLE = 6.0
 """s for the viewer to load the recording, draw it, and drop its welcome note"""
 
@@ -101,22 +105,55 @@ def _go(viewer, trial: int | None, at: float) -> None:
 
 @contextmanager
 def viewer() -> Iterator:
-    """A headless viewer that is gone afterwards."""
+    """A headless viewer that only this machine can reach; gone afterwards.
+
+    Raises:
+        MissingDependencyError: the viewer or Vulkan is missing.
+        BnsError: it did not start, or did not answer.
+    """
     problem = missing()
     if problem:
         raise problem
     from rerun.experimental import ViewerClient
 
-    os.environ.setdefault("RERUN_ANALYTICS", "0")
-    try:
-        with ViewerClient.spawn(
-            headless=True,
-            port=free_port(),
-            hide_welcome_screen=True,
-            executable_path=executable(),
-        ) as viewer:
-            yield viewer
-    except (RuntimeError, ConnectionError, TimeoutError) as error:
-        raise BnsError(
-            f"The Rerun viewer did not draw ({error}); if Vulkan is missing, {INSTALL}."
-        ) from error
+    port = free_port()
+    command = [executable(), "--headless", "--bind", "127.0.0.1", "--port", str(port)]
+    environment = os.environ | {"RERUN_ANALYTICS": "0"}
+    with TemporaryFile() as said:
+        process = subprocess.Popen(
+            [*command, "--hide-welcome-screen"],
+            env=environment,
+            stdout=said,
+            stderr=said,
+        )
+        try:
+            _await(process, port)
+            yield ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+        except (RuntimeError, ConnectionError, TimeoutError) as error:
+            raise _explain(error, said) from error
+        finally:
+            process.terminate()
+            process.wait(timeout=_START)
+
+
+def _await(process: subprocess.Popen, port: int) -> None:
+    """Wait until the viewer listens."""
+    until = time.monotonic() + _START
+    while time.monotonic() < until:
+        if process.poll() is not None:
+            raise RuntimeError(f"it ended with exit code {process.returncode}")
+        with socket.socket() as probe:
+            if probe.connect_ex(("127.0.0.1", port)) == 0:
+                return
+        time.sleep(0.05)
+    raise TimeoutError(f"it did not start within {_START:g} s")
+
+
+def _explain(error: Exception, said) -> BnsError:
+    """What failed, as an error of ours."""
+    said.seek(0)
+    if b"panicked at" in said.read():
+        return MissingDependencyError(
+            "A picture of a recording without a display", "a working Vulkan", INSTALL
+        )
+    return BnsError(f"The Rerun viewer did not draw: {error}. Try again.")

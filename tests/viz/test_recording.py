@@ -122,3 +122,15 @@ def test_missing_vulkan_says_what_to_install(rrd, tmp_path, monkeypatch):
     monkeypatch.setattr(picture, "_vulkan", lambda: False)
     with pytest.raises(MissingDependencyError, match="mesa-vulkan-drivers"):
         picture.save(rrd, tmp_path / "run.png")
+
+
+def test_broken_vulkan_says_what_to_install(rrd, tmp_path, monkeypatch):
+    problem = picture.missing()
+    if problem:
+        pytest.skip(str(problem))
+    driver = tmp_path / "driver.json"
+    driver.write_text("{}")
+    monkeypatch.setenv("VK_DRIVER_FILES", str(driver))
+    monkeypatch.setenv("WGPU_BACKEND", "vulkan")
+    with pytest.raises(MissingDependencyError, match="mesa-vulkan-drivers"):
+        picture.save(rrd, tmp_path / "run.png")
