@@ -64,6 +64,19 @@ def test_toml_in_the_page_is_a_configuration(page, tmp_path):
         loading.from_file(path)
 
 
+def test_commands_in_the_pages_exist():
+    from bench.runner import discover
+    from bns.cli import VERBS
+
+    benches = {*discover(), "list", "table", "NAME"}
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        verbs = re.findall(r"(?:^|[`/])bns ([a-z]\w*)", text, re.MULTILINE)
+        assert set(verbs) <= set(VERBS), ids(page)
+        names = re.findall(r"python -m bench ([\w-]+)", text)
+        assert set(names) <= benches, ids(page)
+
+
 def test_every_page_of_docs_is_in_the_index():
     index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
     for page in (ROOT / "docs").glob("*.md"):
