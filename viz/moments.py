@@ -46,6 +46,8 @@ def send(
     for choice in chosen:
         at = (replicate, choice.trial)
         times, poses, qpos = samples(record, at, trials.get(choice.trial), model)
+        if not len(times):
+            continue  # nothing was seen of it
         index = _times(start + times)
         geometry.send_poses(stream, model, index, qpos)
         done = _finish(record, at, times)
@@ -72,7 +74,7 @@ def samples(record, at, trial: Trial | None, model):
     step = np.diff(trial.times, prepend=-np.inf)
     keep = np.flatnonzero(np.isfinite(trial.poses_world).all(axis=1) & (step > 0))
     keep = keep[_thin(trial.times[keep])]
-    times, poses = trial.times[keep] - trial.times[0], trial.poses_world[keep]
+    times, poses = trial.times[keep] - trial.times[:1], trial.poses_world[keep]
     if "qpos" in trial.truth:
         qpos = np.asarray(trial.truth["qpos"])[keep]
         if qpos.shape[1] == model.nq:
@@ -82,6 +84,8 @@ def samples(record, at, trial: Trial | None, model):
 
 def _sparse(record, at, model):
     poses = listed(record.poses[at])
+    if not len(poses):
+        return np.empty(0), poses, np.empty((0, model.nq))
     durations = record.sent[at][: len(poses) - 1, 2]
     ends = np.concatenate([[0.0], np.cumsum(durations)])
     times = np.interp(
@@ -95,6 +99,8 @@ def _sparse(record, at, model):
 
 def _thin(times: np.ndarray) -> np.ndarray:
     """Indices of samples at most `RATE` a second, the last one included."""
+    if not len(times):
+        return np.empty(0, dtype=int)
     slot = np.floor((times - times[0]) * RATE + 1e-9)
     keep = np.diff(slot, prepend=-1.0) > 0
     keep[-1] = True

@@ -21,14 +21,17 @@ def band(axes, values: np.ndarray, colour: str, label: str, *, mean: bool = Fals
         label: in the legend.
         mean: draw the mean, too, dotted.
     """
-    trial = np.arange(values.shape[1])
+    trial = np.flatnonzero(np.isfinite(values).any(axis=0))
+    values = np.where(np.isfinite(values), values, np.nan)[:, trial]
+    if not len(trial):
+        return
     low, middle, high = np.nanpercentile(values, (SPREAD[0], 50, SPREAD[1]), axis=0)
     axes.fill_between(trial, low, high, color=colour, alpha=0.18, linewidth=0)
-    axes.plot(trial, middle, color=colour, label=label)
+    alone = {"marker": "o", "markersize": 4} if len(trial) == 1 else {}
+    axes.plot(trial, middle, color=colour, label=label, **alone)
     if mean:
-        axes.plot(
-            trial, np.nanmean(values, axis=0), color=colour, linewidth=1.0, ls=":"
-        )
+        average = np.nanmean(values, axis=0)
+        axes.plot(trial, average, color=colour, linewidth=1.0, ls=":")
 
 
 def mark_damage(axes, runs: Mapping[str, RunRecord], *, text: bool = True) -> None:
@@ -49,8 +52,14 @@ def mark_damage(axes, runs: Mapping[str, RunRecord], *, text: bool = True) -> No
 
 def onsets(runs: Mapping[str, RunRecord]) -> list[int]:
     """Trials from which any replicate of any run was damaged, each once."""
-    found = np.concatenate([record.damage_onset for record in runs.values()])
-    return sorted({int(onset) for onset in found if onset >= 0})
+    return sorted(
+        {
+            int(onset)
+            for record in runs.values()
+            for onset in record.damage_onset
+            if 0 <= onset < record.trials
+        }
+    )
 
 
 def finish(axes, runs: Mapping[str, RunRecord], *, legend: bool = True) -> None:
