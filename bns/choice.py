@@ -39,10 +39,11 @@ def choose(
     if kind == "worst":
         return cost.argmax(1)
     if kind == "random":
-        return selection.random(cost, 1, draws).squeeze(1)
+        return selection.random(cost, draws.uniform(len(cost), 1, 1)).squeeze(1)
     if kind == "tournament":
         size = max(1, round(config.choose_tournament * cost.shape[1]))
-        return selection.tournament(cost, 1, size, draws).squeeze(1)
+        coins = draws.uniform(len(cost), 1, size)
+        return selection.tournament(cost, coins).squeeze(1)
     if kind == "disagreement":
         if config.snn.kind != "ensemble":
             raise BnsError(

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from bns.config import ControllerConfig
-from bns.draws import Draws
+from bns.draws import Draws, whole_below
 from bns.units import metres_per_second
 from bns.worlds.trial import Commands
 
@@ -71,10 +71,15 @@ class Encoding:
 
     def random(self, runs: int, population: int, draws: Draws) -> Population:
         """Uniformly random genes, uniformly random lengths."""
-        shape = (runs, population, self.max_commands, 3)
+        lengths = draws.uniform(runs, population)
+        genes = draws.uniform(runs, population, self.max_commands, 3)
+        return self.individuals(genes, lengths)
+
+    def individuals(self, coins: Tensor, coins_lengths: Tensor) -> Population:
+        """Random individuals from uniform numbers ``(R, P, K, 3)`` and ``(R, P)``."""
         shortest, longest = self.initial
-        lengths = shortest + draws.below(longest + 1 - shortest, runs, population)
-        genes = self.low + draws.uniform(*shape) * (self.high - self.low)
+        lengths = shortest + whole_below(coins_lengths, longest + 1 - shortest)
+        genes = self.low + coins * (self.high - self.low)
         drawn = Population(genes, lengths)
         return drawn._replace(genes=genes * drawn.valid.unsqueeze(-1))
 

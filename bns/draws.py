@@ -33,16 +33,6 @@ class Draws:
             return torch.rand(shape, generator=self._torch, device=self.device)
         return torch.from_numpy(self._numpy.random(shape, dtype=np.float32))
 
-    def normal(self, *shape: int) -> Tensor:
-        """Standard normal numbers, float32."""
-        if self._torch is not None:
-            return torch.randn(shape, generator=self._torch, device=self.device)
-        return torch.from_numpy(self._numpy.standard_normal(shape, dtype=np.float32))
-
-    def below(self, limit: int | Tensor, *shape: int) -> Tensor:
-        """Whole numbers uniform in 0..limit-1, int64 (limit broadcasts to shape)."""
-        return whole_below(self.uniform(*shape), limit)
-
     def state(self) -> np.ndarray:
         """The stream's state as bytes, shape ``(n,)`` uint8."""
         if self._torch is not None:
@@ -69,4 +59,6 @@ class Draws:
 def whole_below(uniform: Tensor, limit: int | Tensor) -> Tensor:
     """Uniform numbers in [0, 1) as whole numbers 0..limit-1, int64."""
     whole = (uniform * limit).long()
-    return torch.minimum(whole, torch.as_tensor(limit, device=whole.device) - 1)
+    if isinstance(limit, int):
+        return whole.clamp(max=limit - 1)
+    return torch.minimum(whole, limit - 1)

@@ -14,42 +14,63 @@ from bns.tasks import NavigationTask
 
 @dataclass(frozen=True)
 class Evaluator:
-    """What a population is worth according to the SNN."""
+    """What a population is worth according to the SNN.
+
+    A command's effect depends on the one before it alone, so all commands of all
+    individuals are predicted at once; only composing them is sequential. Inside, the
+    individual is the last axis, so that every step works on contiguous memory.
+    """
 
     encoding: Encoding
     scaling: Scaling
     shape: Shape
     task: NavigationTask
 
-    def displacements(self, theta: Tensor, population: Population) -> Tensor:
-        """Predicted displacement of each command, ``(R, P, K, 3)`` [m, m, rad].
-
-        A command depends on the one before it alone, so all are predicted at once.
-        Places beyond a list give no motion.
-        """
-        runs, count, longest, _ = population.genes.shape
-        scaled = self._inputs(population)
-        outputs = predict(self.shape, theta, scaled)
-        outputs = outputs.view(runs, 3, count, longest).permute(0, 2, 3, 1)
-        moved = outputs * self.scaling.output
-        return torch.where(population.valid.unsqueeze(-1), moved, 0.0)
-
-    def _inputs(self, population: Population) -> Tensor:
+    def inputs(self, population: Population) -> Tensor:
+        """Scaled network inputs, ``(R, 5, K * P)``, the individual varying fastest."""
         decoded = self.encoding.decode(population.genes)
         scaled = self.scaling.inputs(decoded)
-        return scaled.flatten(1, 2).transpose(1, 2).contiguous()
+        return scaled.permute(0, 3, 2, 1).flatten(2).contiguous()
+
+    def path(
+        self, theta: Tensor, inputs: Tensor, lengths: Tensor, *, fused: bool = False
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Predicted x, y [m] and yaw [rad] after each command, each ``(R, K, P)``.
+
+        Beyond a list's end the robot stands.
+
+        Args:
+            theta: weights ``(R, D)``.
+            inputs: as `inputs` gives them.
+            lengths: commands of each individual ``(R, P)``.
+            fused: use the form of the network meant for compilation.
+        """
+        runs, count = lengths.shape
+        outputs = predict(self.shape, theta, inputs, fused=fused)
+        moved = outputs.view(runs, 3, -1, count)
+        places = torch.arange(moved.shape[2], device=lengths.device)[:, None]
+        used = places < lengths.unsqueeze(1)
+        steps = [
+            torch.where(used, moved[:, axis] * self.scaling.output[axis], 0.0)
+            for axis in range(3)
+        ]
+        return integrate(*steps, self.task.start, dim=1)
+
+    def judge(
+        self, theta: Tensor, inputs: Tensor, lengths: Tensor, *, fused: bool = False
+    ) -> Tensor:
+        """Predicted cost ``(R, P)`` from inputs; arguments as in `path`."""
+        x, y, _ = self.path(theta, inputs, lengths, fused=fused)
+        return self.task.score(x.movedim(1, 0), y.movedim(1, 0), lengths)[0]
 
     def cost(self, theta: Tensor, population: Population) -> Tensor:
-        """Predicted cost, ``(R, P)``."""
-        moved = self.displacements(theta, population)
-        positions, _ = integrate(moved, self.task.start)
-        return self.task.score(positions, population.lengths)[0]
+        """Predicted cost of a population, ``(R, P)``."""
+        return self.judge(theta, self.inputs(population), population.lengths)
 
     def poses(self, theta: Tensor, population: Population) -> Tensor:
         """Predicted pose at the start and after each command, ``(R, P, K + 1, 3)``."""
-        moved = self.displacements(theta, population)
-        positions, headings = integrate(moved, self.task.start)
-        after = torch.cat([positions, headings.unsqueeze(-1)], dim=-1)
+        path = self.path(theta, self.inputs(population), population.lengths)
+        after = torch.stack(path, dim=-1).transpose(1, 2)
         start = torch.tensor(self.task.start, dtype=after.dtype, device=after.device)
         return torch.cat([start.expand_as(after[:, :, :1]), after], dim=2)
 
@@ -59,7 +80,7 @@ class Evaluator:
         Returns:
             ``(R, P)``; needs an ensemble (an SNN of kind "ensemble").
         """
-        runs, count, longest, _ = population.genes.shape
-        outputs = forward(self.shape, theta, self._inputs(population))
-        spread = outputs.var(1, unbiased=False).sum(1).view(runs, count, longest)
-        return torch.where(population.valid, spread, 0.0).sum(-1)
+        runs, count = population.lengths.shape
+        outputs = forward(self.shape, theta, self.inputs(population))
+        spread = outputs.var(1, unbiased=False).sum(1).view(runs, -1, count)
+        return torch.where(population.valid.transpose(1, 2), spread, 0.0).sum(1)

@@ -6,7 +6,6 @@ and the record says which ran.
 """
 
 import shutil
-from collections.abc import Callable
 from functools import partial
 
 import torch
@@ -17,7 +16,7 @@ from bns.config import RunConfig
 from bns.draws import Draws
 from bns.errors import MissingDependencyError
 from bns.evaluation import Evaluator
-from bns.evolution.generation import Breeder, Rates
+from bns.evolution.generation import Breeder, Coins, Rates
 from bns.snn import training
 from bns.snn.network import forward
 
@@ -42,60 +41,87 @@ def should_compile(config: RunConfig) -> bool:
 
 
 class InnerLoops:
-    """Evolution and training of R runs."""
+    """Evolution and training of R runs.
 
-    def __init__(self, config: RunConfig, evaluator: Evaluator, breeder: Breeder):
+    Args:
+        config: the runs' configuration.
+        evaluator: what a population is worth inside the SNN.
+        breeder: makes the next generation.
+        draws: source of randomness, shared with the learner.
+    """
+
+    def __init__(
+        self,
+        config: RunConfig,
+        evaluator: Evaluator,
+        breeder: Breeder,
+        draws: Draws,
+    ):
         self.config = config
         self.evaluator = evaluator
         self.breeder = breeder
+        self.draws = draws
         self.compiled = should_compile(config)
-        self._cost: Callable[..., Tensor] = self._cost_of
+        self._breed, self._judge = self._bred, self.evaluator.judge
         self._epoch = partial(training.epoch, evaluator.shape)
         if self.compiled:
             torch._dynamo.config.cache_size_limit = 64
-            self._cost = torch.compile(self._cost_of, dynamic=False)
+            judge = partial(self.evaluator.judge, fused=True)
+            # two regions: in one, the compiler would compute the inputs anew for
+            # every hidden neuron
+            self._breed = torch.compile(self._bred, dynamic=False)
+            self._judge = torch.compile(judge, dynamic=False)
             self._epoch = torch.compile(self._epoch, dynamic=False)
-
-    def _cost_of(self, theta: Tensor, genes: Tensor, lengths: Tensor) -> Tensor:
-        return self.evaluator.cost(theta, Population(genes, lengths))
 
     def cost(self, theta: Tensor, population: Population) -> Tensor:
         """Predicted cost ``(R, P)``."""
-        return self._cost(theta, population.genes, population.lengths)
+        return self.evaluator.cost(theta, population)
+
+    def _bred(
+        self, population: Population, cost: Tensor, rates: Rates, coins: Coins
+    ) -> tuple[Population, Tensor]:
+        bred = self.breeder.breed(population, cost, rates, coins)
+        return bred, self.evaluator.inputs(bred)
 
     def evolve(
         self, theta: Tensor, population: Population, cost: Tensor, rates: Rates
     ) -> tuple[Population, Tensor]:
         """All generations between two trials; gives the population and its costs."""
         for _ in range(self.config.evolution.generations):
-            population = self.breeder.breed(population, cost, rates)
-            cost = self.cost(theta, population)
+            coins = self.breeder.draw(len(cost), self.draws)
+            population, inputs = self._breed(population, cost, rates, coins)
+            cost = self._judge(theta, inputs, population.lengths)
         return population, cost
 
     def train(
-        self,
-        theta: Tensor,
-        inputs: Tensor,
-        targets: Tensor,
-        weight: Tensor,
-        draws: Draws,
+        self, theta: Tensor, inputs: Tensor, targets: Tensor, weight: Tensor
     ) -> tuple[Tensor, Tensor]:
-        """Train the SNNs; gives the weights and the mean squared error ``(R,)``."""
+        """Train the SNNs from fresh step sizes.
+
+        Args:
+            theta: weights ``(R, D)``.
+            inputs: scaled inputs ``(R, 5, N)``.
+            targets: scaled displacements ``(R, 3, N)``.
+            weight: 1 for a pattern, 0 for padding, ``(R, 1, 1, N)``.
+
+        Returns:
+            new weights, and the mean squared error after training ``(R,)``.
+        """
         shape = self.evaluator.shape
         shaped = targets.unsqueeze(2) if shape.outputs == 1 else targets.unsqueeze(1)
-        keep = None
-        if self.config.snn.kind == "ensemble" and self.config.snn.dropout > 0:
-            keep = partial(self._dropout, draws, inputs.shape)
+        drop = self.config.snn.kind == "ensemble" and self.config.snn.dropout > 0
         state = training.RpropState.fresh(theta)
         for _ in range(self.config.snn.epochs):
-            factors = keep() if keep is not None else None
-            theta, state = self._epoch(theta, state, inputs, shaped, weight, factors)
+            keep = self._dropout(inputs) if drop else None
+            theta, state = self._epoch(theta, state, inputs, shaped, weight, keep)
         error = (forward(shape, theta, inputs) - shaped) * weight
         patterns = weight.sum((1, 2, 3)).clamp(min=1.0)
         heads = shape.groups * shape.outputs
         return theta, error.square().sum((1, 2, 3)) / (patterns * heads)
 
-    def _dropout(self, draws: Draws, size: torch.Size) -> Tensor:
+    def _dropout(self, inputs: Tensor) -> Tensor:
+        """Factors of the hidden neurons: 0, or 1 / (1 - rate)."""
         shape, rate = self.evaluator.shape, self.config.snn.dropout
-        coins = draws.uniform(size[0], shape.groups, shape.hidden, size[2])
+        runs, _, patterns = inputs.shape
+        coins = self.draws.uniform(runs, shape.groups, shape.hidden, patterns)
         return (coins >= rate).float() / (1.0 - rate)

@@ -77,8 +77,8 @@ class Learner:
         self.shape = Shape.of(config.snn)
         self.evaluator = Evaluator(self.encoding, self.scaling, self.shape, self.task)
         fixed = config.controller.fixed_length
-        breeder = Breeder(config.evolution, self.encoding, fixed, self.draws)
-        self.inner = InnerLoops(config, self.evaluator, breeder)
+        breeder = Breeder(config.evolution, self.encoding, fixed)
+        self.inner = InnerLoops(config, self.evaluator, breeder, self.draws)
         self.adaptations = Adaptations(configs, onsets)
         self.buffer = patterns.PatternBuffer(self.runs, self.adaptations.windows)
         self.population = self._random_population()
@@ -190,14 +190,14 @@ class Learner:
     def _score(self, trials: Sequence[Trial]) -> tuple[np.ndarray, np.ndarray]:
         longest = self.config.controller.max_commands
         task = NavigationTask.of(self.config.task)
-        places = np.zeros((len(trials), longest, 2))
+        places = np.zeros((2, longest, len(trials)))
         for run, trial in enumerate(trials):
             seen = _filled(trial.command_poses_world[:, :2])
             count = len(trial.commands)
-            places[run, :count] = seen[1:]
-            places[run, count:] = seen[-1]
+            places[:, :count, run] = seen[1:].T
+            places[:, count:, run] = seen[-1:].T
         lengths = torch.tensor([len(t.commands) for t in trials])
-        cost, reached = task.score(torch.from_numpy(places), lengths)
+        cost, reached = task.score(*torch.from_numpy(places), lengths)
         return cost.numpy(), reached.double().numpy()
 
     def _learn(self, tried: Sequence[Trial]) -> dict[str, np.ndarray]:
@@ -228,9 +228,7 @@ class Learner:
             return
         which = which.to(self.config.device)
         inputs, targets, weight = self.buffer.tensors(self.config.device)
-        trained, loss = self.inner.train(
-            self.theta, inputs, targets, weight, self.draws
-        )
+        trained, loss = self.inner.train(self.theta, inputs, targets, weight)
         self.theta = torch.where(which[:, None], trained, self.theta)
         self.loss = torch.where(which.cpu(), loss.cpu(), self.loss)
 

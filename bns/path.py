@@ -1,28 +1,30 @@
 """From displacements in the body frame to a path in the world frame, batched."""
 
-import torch
 from torch import Tensor
 
 
 def integrate(
-    displacements: Tensor, start: tuple[float, float, float]
-) -> tuple[Tensor, Tensor]:
-    """Compose body-frame displacements.
+    forward: Tensor,
+    left: Tensor,
+    turn: Tensor,
+    start: tuple[float, float, float],
+    dim: int = -1,
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Compose body-frame displacements along one axis.
 
     Args:
-        displacements: ``(..., K, 3)`` forward [m], left [m], turn [rad].
+        forward, left: displacements of each command [m], any equal shapes.
+        turn: the same [rad].
         start: pose in the world frame [m, m, rad].
+        dim: the axis along which commands follow each other.
 
     Returns:
-        positions ``(..., K, 2)`` [m] and headings ``(..., K)`` [rad] after each
-        command, in the world frame.
+        x, y [m] and yaw [rad] in the world frame after each command.
     """
     x, y, yaw = start
-    turn = displacements[..., 2]
-    after = yaw + turn.cumsum(-1)
+    after = yaw + turn.cumsum(dim)
     before = after - turn
     cos, sin = before.cos(), before.sin()
-    forward, left = displacements[..., 0], displacements[..., 1]
-    px = x + (cos * forward - sin * left).cumsum(-1)
-    py = y + (sin * forward + cos * left).cumsum(-1)
-    return torch.stack([px, py], dim=-1), after
+    px = x + (cos * forward - sin * left).cumsum(dim)
+    py = y + (sin * forward + cos * left).cumsum(dim)
+    return px, py, after

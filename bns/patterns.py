@@ -25,7 +25,7 @@ class PatternBuffer:
         self.targets = [np.zeros((0, 3), np.float32) for _ in range(runs)]
 
     def append(self, run: int, inputs: np.ndarray, targets: np.ndarray) -> None:
-        """Add a trial's patterns, ``(K, 5)`` and ``(K, 3)``, scaled; old ones slide out."""
+        """Add a trial's patterns ``(K, 5)`` and ``(K, 3)``; old ones slide out."""
         keep = self.windows[run] or None
         for store, new in ((self.inputs, inputs), (self.targets, targets)):
             joined = np.concatenate([store[run], new.astype(np.float32)])

@@ -58,55 +58,46 @@ class NavigationTask:
         """Start pose in the world frame [m, m, rad]: E, heading `start_yaw`."""
         return 0.0, 0.0, math.radians(self.config.start_yaw)
 
-    def score(self, positions: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
+    def score(self, x: Tensor, y: Tensor, lengths: Tensor) -> tuple[Tensor, Tensor]:
         """Cost of paths and how many objectives each reached.
 
         Args:
-            positions: position after each command in the world frame,
-                ``(..., K, 2)`` [m]; beyond a list's end it repeats the last one.
+            x, y: position after each command in the world frame, ``(K, ...)`` [m];
+                beyond a list's end they repeat the last one.
             lengths: commands in each list, ``(...)``.
 
         Returns:
             cost ``(...)`` and objectives reached ``(...)`` (int64).
         """
-        return score(
-            positions,
-            lengths,
-            self.goals.to(positions.dtype),
-            self.config.radius * CENTIMETRES,
-            self.config.penalty,
-            self.config.command_cost,
-            self.config.squared,
-            self.config.charge_unused,
-        )
+        return score(x, y, lengths, self.goals.tolist(), self.config)
 
 
 def score(
-    positions: Tensor,
+    x: Tensor,
+    y: Tensor,
     lengths: Tensor,
-    goals: Tensor,
-    radius: float,
-    penalty: float,
-    command_cost: float,
-    squared: bool,
-    charge_unused: bool,
+    goals: list[list[float]],
+    config: TaskConfig,
 ) -> tuple[Tensor, Tensor]:
     """Algorithm 5 with its two readings as switches; see `NavigationTask.score`.
 
     Commands after the last objective cost nothing but `command_cost`; with
     `charge_unused`, places beyond the list cost the standing robot's distance.
     """
-    count = goals.shape[0]
+    count, radius = len(goals), config.radius * CENTIMETRES
     active = torch.zeros_like(lengths)
-    total = command_cost * lengths.to(positions.dtype)
-    for place in range(positions.shape[-2]):
-        goal = goals[active.clamp(max=count - 1)]
-        offset = (positions[..., place, :] - goal) * CENTIMETRES
-        square = offset.square().sum(-1)
+    total = config.command_cost * lengths.to(x.dtype)
+    for place in range(x.shape[0]):
+        goal_x, goal_y = torch.zeros_like(total), torch.zeros_like(total)
+        for number, (east, north) in enumerate(goals):
+            goal_x = torch.where(active == number, east, goal_x)
+            goal_y = torch.where(active == number, north, goal_y)
+        dx = (x[place] - goal_x) * CENTIMETRES
+        dy = (y[place] - goal_y) * CENTIMETRES
+        square = dx.square() + dy.square()
         distance = square.sqrt()
-        used = place < lengths
-        counts = (active < count) & (used | charge_unused)
-        total = total + torch.where(counts, square if squared else distance, 0.0)
-        active = active + (used & (distance < radius) & (active < count))
-    missed = (count - active).to(positions.dtype)
-    return total + penalty * missed, active
+        open_goal, used = active < count, place < lengths
+        counts = open_goal & used if not config.charge_unused else open_goal
+        total = total + torch.where(counts, square if config.squared else distance, 0.0)
+        active = active + (used & open_goal & (distance < radius))
+    return total + config.penalty * (count - active).to(x.dtype), active

@@ -10,8 +10,10 @@ import torch
 from torch import Tensor
 
 from bns.chromosome import Population
-from bns.draws import Draws, whole_below
+from bns.draws import whole_below
 from bns.errors import UnknownNameError
+
+KINDS = ("n-point", "sbx", "single-point", "uniform")
 
 
 def n_point(
@@ -89,37 +91,53 @@ def simulated_binary(
     return first._replace(genes=torch.where(both, mixed, first.genes))
 
 
-def _cuts(lengths: Tensor, points: int, draws: Draws) -> Tensor:
-    drawn = draws.uniform(*lengths.shape, points)
-    return whole_below(drawn, lengths.unsqueeze(-1) + 1).sort(-1).values
+def coins_needed(kind: str, points: int, genes_shape: tuple[int, ...]) -> tuple:
+    """Shape of the uniform numbers that `cross` takes for N pairs, ``(R, N, ...)``.
+
+    Raises:
+        UnknownNameError: no such operator.
+    """
+    if kind not in KINDS:
+        raise UnknownNameError("crossover", kind, KINDS)
+    runs, pairs = genes_shape[:2]
+    if kind == "single-point":
+        return runs, pairs, 2
+    if kind == "n-point":
+        return runs, pairs, 2 * points
+    return genes_shape
 
 
 def cross(
     kind: str,
     first: Population,
     second: Population,
-    draws: Draws,
+    coins: Tensor,
     *,
-    points: int = 2,
     eta: float = 1.0,
     fixed_length: bool = False,
 ) -> Population:
-    """Crossover by name; `points` of n-point, `eta` of sbx.
+    """Crossover by name.
+
+    Args:
+        kind: operator.
+        first, second: parents.
+        coins: uniform numbers of the shape `coins_needed` gives.
+        eta: distribution index of sbx.
+        fixed_length: both parents are cut at the same places.
 
     Raises:
         UnknownNameError: no such operator.
     """
     if kind in ("single-point", "n-point"):
-        number = 1 if kind == "single-point" else points
-        cuts_first = _cuts(first.lengths, number, draws)
-        cuts_second = cuts_first  # a shared cut keeps a fixed length
-        if not fixed_length:
-            cuts_second = _cuts(second.lengths, number, draws)
+        mine, theirs = coins.chunk(2, dim=-1)
+        cuts_first = whole_below(mine, first.lengths.unsqueeze(-1) + 1).sort(-1).values
+        limit = second.lengths.unsqueeze(-1) + 1
+        cuts_second = whole_below(theirs, limit).sort(-1).values
+        if fixed_length:
+            cuts_second = cuts_first
         return n_point(first, second, cuts_first, cuts_second)
     if kind == "uniform":
-        return uniform(first, second, draws.uniform(*first.genes.shape))
+        return uniform(first, second, coins)
     if kind == "sbx":
-        coins = draws.uniform(*first.genes.shape)
         return simulated_binary(first, second, coins, eta)
-    known = ("single-point", "n-point", "uniform", "sbx")
-    raise UnknownNameError("crossover", kind, known)
+    raise UnknownNameError("crossover", kind, KINDS)

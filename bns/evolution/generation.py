@@ -1,6 +1,11 @@
-"""One generation: elites, parents, crossover, mutation (thesis Algorithm 1)."""
+"""One generation: elites, parents, crossover, mutation (thesis Algorithm 1).
+
+A generation is a pure function of the population, its costs and uniform numbers drawn
+beforehand (`Coins`), so that it can be compiled as a whole and tested number by number.
+"""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
@@ -11,8 +16,7 @@ from bns.draws import Draws
 from bns.evolution import crossover, mutation, selection
 
 
-@dataclass(frozen=True)
-class Rates:
+class Rates(NamedTuple):
     """Mutation settings, one per run.
 
     Attributes:
@@ -24,6 +28,26 @@ class Rates:
     magnitude: Tensor
 
 
+class Coins(NamedTuple):
+    """Uniform numbers of one generation, N children a run.
+
+    Attributes:
+        parents: ``(R, 2 N, tournament)``.
+        chicken: which second parents are fresh ones, ``(R, N)``.
+        fresh: genes of the fresh ones, ``(R, F, K, 3)``; F = 0 without them.
+        fresh_lengths: ``(R, F)``.
+        crossover: as the operator needs.
+        mutation: ``(R, N, K, 3)``.
+    """
+
+    parents: Tensor
+    chicken: Tensor
+    fresh: Tensor
+    fresh_lengths: Tensor
+    crossover: Tensor
+    mutation: Tensor
+
+
 @dataclass(frozen=True)
 class Breeder:
     """Makes the next population from the present one and its costs."""
@@ -31,63 +55,78 @@ class Breeder:
     config: EvolutionConfig
     encoding: Encoding
     fixed_length: bool
-    draws: Draws
 
-    def breed(self, population: Population, cost: Tensor, rates: Rates) -> Population:
+    def draw(self, runs: int, draws: Draws) -> Coins:
+        """The random numbers of one generation.
+
+        Fresh individuals (headless chicken) are a pool twice the expected number;
+        were more wanted, one would serve twice.
+        """
+        config = self.config
+        count = config.population - config.elitism
+        genes = (runs, count, self.encoding.max_commands, 3)
+        pool = 0
+        if config.headless_chicken > 0:
+            pool = max(1, int(2 * config.headless_chicken * count))
+        needed = crossover.coins_needed(
+            config.crossover, config.crossover_points, genes
+        )
+        return Coins(
+            parents=draws.uniform(runs, 2 * count, config.tournament),
+            chicken=draws.uniform(runs, count),
+            fresh=draws.uniform(runs, pool, *genes[2:]),
+            fresh_lengths=draws.uniform(runs, pool),
+            crossover=draws.uniform(*needed),
+            mutation=draws.uniform(*genes),
+        )
+
+    def breed(
+        self, population: Population, cost: Tensor, rates: Rates, coins: Coins
+    ) -> Population:
         """The next generation.
 
         Args:
             population: P individuals of R runs.
             cost: ``(R, P)``, lower is better.
             rates: mutation settings.
+            coins: this generation's random numbers.
 
         Returns:
             The elites unchanged, then P - elitism children.
         """
         config = self.config
-        count = cost.shape[1] - config.elitism
-        parents = selection.select(
-            config.selection, cost, 2 * count, config.tournament, self.draws
-        )
-        first = _take(population, parents[:, :count])
-        second = _take(population, parents[:, count:])
-        second = self._headless_chicken(second)
+        parents = selection.select(config.selection, cost, coins.parents)
+        mothers, fathers = parents.chunk(2, dim=1)
+        first, second = take(population, mothers), take(population, fathers)
         children = crossover.cross(
             config.crossover,
             first,
-            second,
-            self.draws,
-            points=config.crossover_points,
+            self._headless_chicken(second, coins),
+            coins.crossover,
             eta=config.sbx_eta,
             fixed_length=self.fixed_length,
         )
-        children = self._mutate(children, rates)
+        children = self._mutate(children, rates, coins.mutation)
         return self._with_elites(population, cost, children)
 
-    def _headless_chicken(self, second: Population) -> Population:
-        """Replace second parents by fresh random individuals, with a probability.
-
-        The fresh ones come from a pool twice the expected number; were more wanted,
-        one would serve twice.
-        """
-        chance = self.config.headless_chicken
-        if chance <= 0:
+    def _headless_chicken(self, second: Population, coins: Coins) -> Population:
+        """Replace second parents by fresh random individuals, with a probability."""
+        if coins.fresh.shape[1] == 0:
             return second
-        runs, count = second.lengths.shape
-        pool = self.encoding.random(runs, max(1, int(2 * chance * count)), self.draws)
-        chosen = self.draws.uniform(runs, count) < chance
-        rank = (chosen.cumsum(1) - 1).clamp(min=0) % pool.lengths.shape[1]
-        fresh = _take(pool, rank)
+        pool = self.encoding.individuals(coins.fresh, coins.fresh_lengths)
+        chosen = coins.chicken < self.config.headless_chicken
+        rank = (chosen.long().cumsum(1) - 1).clamp(min=0) % pool.lengths.shape[1]
+        fresh = take(pool, rank)
         return Population(
             torch.where(chosen[:, :, None, None], fresh.genes, second.genes),
             torch.where(chosen, fresh.lengths, second.lengths),
         )
 
-    def _mutate(self, children: Population, rates: Rates) -> Population:
+    def _mutate(self, children: Population, rates: Rates, coins: Tensor) -> Population:
         genes = mutation.mutate(
             self.config.mutation,
             children.genes,
-            self.draws.uniform(*children.genes.shape),
+            coins,
             rates.rate,
             rates.magnitude,
             self.encoding.low,
@@ -101,14 +140,21 @@ class Breeder:
         if self.config.elitism == 0:
             return children
         order = cost.topk(self.config.elitism, dim=1, largest=False).indices
-        elites = _take(population, order)
+        elites = take(population, order)
         return Population(
             torch.cat([elites.genes, children.genes], dim=1),
             torch.cat([elites.lengths, children.lengths], dim=1),
         )
 
 
-def _take(population: Population, index: Tensor) -> Population:
+def take(population: Population, index: Tensor) -> Population:
     """Individuals by index ``(R, N)``."""
-    rows = torch.arange(index.shape[0], device=index.device)[:, None]
-    return Population(population.genes[rows, index], population.lengths[rows, index])
+    places = whole_index(index, population.genes.shape)
+    return Population(
+        population.genes.gather(1, places), population.lengths.gather(1, index)
+    )
+
+
+def whole_index(index: Tensor, shape: torch.Size) -> Tensor:
+    """An index ``(R, N)`` expanded to gather genes of `shape` (R, P, K, 3)."""
+    return index[:, :, None, None].expand(-1, -1, shape[2], shape[3])

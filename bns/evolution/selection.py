@@ -1,36 +1,43 @@
 """Selection of individuals by cost (thesis 2.3.6), batched over runs.
 
-Each operator takes ``cost`` of shape ``(R, P)`` and returns indices ``(R, N)``.
+Each operator takes ``cost`` of shape ``(R, P)`` and uniform numbers `coins`, one row of
+them per individual to select, and returns indices ``(R, N)``.
 """
 
 import torch
 from torch import Tensor
 
-from bns.draws import Draws
+from bns.draws import whole_below
 from bns.errors import UnknownNameError
 
+KINDS = ("best", "random", "roulette", "tournament")
 
-def tournament(cost: Tensor, count: int, size: int, draws: Draws) -> Tensor:
-    """The best of `size` individuals drawn at random (with replacement)."""
-    runs, population = cost.shape
-    entrants = draws.below(population, runs, count, size)
-    rows = torch.arange(runs, device=cost.device)[:, None, None]
+
+def tournament(cost: Tensor, coins: Tensor) -> Tensor:
+    """The best of `size` individuals drawn at random (with replacement).
+
+    Args:
+        cost: ``(R, P)``.
+        coins: ``(R, N, size)``.
+    """
+    entrants = whole_below(coins, cost.shape[1])
+    rows = torch.arange(cost.shape[0], device=cost.device)[:, None, None]
     winner = cost[rows, entrants].argmin(-1, keepdim=True)
     return entrants.gather(-1, winner).squeeze(-1)
 
 
-def best(cost: Tensor, count: int) -> Tensor:
-    """The best individual, `count` times."""
-    return cost.argmin(1, keepdim=True).expand(-1, count)
+def best(cost: Tensor, coins: Tensor) -> Tensor:
+    """The best individual every time; `coins` ``(R, N, ...)`` only says how often."""
+    return cost.argmin(1, keepdim=True).expand(-1, coins.shape[1])
 
 
-def random(cost: Tensor, count: int, draws: Draws) -> Tensor:
-    """Any individual, with equal chance."""
-    return draws.below(cost.shape[1], cost.shape[0], count)
+def random(cost: Tensor, coins: Tensor) -> Tensor:
+    """Any individual, with equal chance; `coins` ``(R, N, ...)``."""
+    return whole_below(coins[..., 0], cost.shape[1])
 
 
-def roulette(cost: Tensor, count: int, draws: Draws) -> Tensor:
-    """Chance proportional to fitness (eq 2.14).
+def roulette(cost: Tensor, coins: Tensor) -> Tensor:
+    """Chance proportional to fitness (eq 2.14); `coins` ``(R, N, ...)``.
 
     Costs are turned into fitness as worst cost minus cost, so the worst individual
     is never drawn; where all are equal, every one has the same chance.
@@ -39,24 +46,23 @@ def roulette(cost: Tensor, count: int, draws: Draws) -> Tensor:
     total = fitness.sum(1, keepdim=True)
     share = torch.where(total > 0, fitness / total, 1.0 / cost.shape[1])
     edges = share.double().cumsum(1)
-    spins = draws.uniform(cost.shape[0], count).double() * edges[:, -1:]
-    found = torch.searchsorted(edges, spins, right=True)
+    spins = coins[..., 0].double() * edges[:, -1:]
+    found = torch.searchsorted(edges, spins.contiguous(), right=True)
     return found.clamp(max=cost.shape[1] - 1)
 
 
-def select(kind: str, cost: Tensor, count: int, size: int, draws: Draws) -> Tensor:
-    """Selection by name; `size` is the tournament's.
+def select(kind: str, cost: Tensor, coins: Tensor) -> Tensor:
+    """Selection by name; the last axis of `coins` is the tournament's size.
 
     Raises:
         UnknownNameError: no such operator.
     """
-    if kind == "tournament":
-        return tournament(cost, count, size, draws)
-    if kind == "best":
-        return best(cost, count)
-    if kind == "random":
-        return random(cost, count, draws)
-    if kind == "roulette":
-        return roulette(cost, count, draws)
-    known = ("tournament", "best", "random", "roulette")
-    raise UnknownNameError("selection", kind, known)
+    if kind not in KINDS:
+        raise UnknownNameError("selection", kind, KINDS)
+    operators = {
+        "best": best,
+        "random": random,
+        "roulette": roulette,
+        "tournament": tournament,
+    }
+    return operators[kind](cost, coins)

@@ -86,28 +86,52 @@ def hidden_layer(shape: Shape, theta: Tensor, inputs: Tensor) -> Tensor:
     return active.view(theta.shape[0], shape.groups, shape.hidden, -1)
 
 
-def forward(shape: Shape, theta: Tensor, inputs: Tensor) -> Tensor:
+def fused_hidden_layer(shape: Shape, theta: Tensor, inputs: Tensor) -> Tensor:
+    """The same as `hidden_layer`, written as a sum that a compiler fuses.
+
+    Compiled, it never writes the activations to memory and is two to three times
+    faster on large batches; not compiled, it is slower.
+    """
+    w1, b1, _, _ = shape.split(theta)
+    total = b1 + w1[:, :, :1] * inputs[:, :1]
+    for i in range(1, shape.inputs):
+        total = total + w1[:, :, i : i + 1] * inputs[:, i : i + 1]
+    return total.sigmoid().view(theta.shape[0], shape.groups, shape.hidden, -1)
+
+
+def forward(
+    shape: Shape, theta: Tensor, inputs: Tensor, *, fused: bool = False
+) -> Tensor:
     """Scaled outputs of every network.
 
     Args:
         shape: sizes.
         theta: weights ``(R, D)``.
         inputs: scaled inputs ``(R, I, N)``.
+        fused: use the form meant for compilation.
 
     Returns:
         ``(R, G, O, N)``.
     """
     _, _, w2, b2 = shape.split(theta)
-    return w2 @ hidden_layer(shape, theta, inputs) + b2
+    if not fused:
+        return w2 @ hidden_layer(shape, theta, inputs) + b2
+    active = fused_hidden_layer(shape, theta, inputs)
+    heads = [
+        (active * w2[:, :, head, :, None]).sum(2) for head in range(shape.outputs)
+    ]
+    return torch.stack(heads, dim=2) + b2
 
 
-def predict(shape: Shape, theta: Tensor, inputs: Tensor) -> Tensor:
+def predict(
+    shape: Shape, theta: Tensor, inputs: Tensor, *, fused: bool = False
+) -> Tensor:
     """Scaled prediction: the three networks' outputs, or the ensemble's mean.
 
     Returns:
         ``(R, 3, N)``.
     """
-    outputs = forward(shape, theta, inputs)
+    outputs = forward(shape, theta, inputs, fused=fused)
     if shape.outputs == 1:
         return outputs.squeeze(2)
     return outputs.mean(1)
