@@ -13,15 +13,30 @@ MILLIMETRES = 1000.0
 DEGREES = 180.0 / np.pi
 
 _CURVES = {
-    "curves/fitness/tried_in_the_world": ("fitness", 1.0, style.SKY),
-    "curves/fitness/foreseen_by_the_snn": ("fitness_predicted", 1.0, style.PURPLE),
-    "curves/reached/objectives": ("reached", 1.0, style.GREEN),
-    "curves/diversity/equation_4_1": ("diversity_41", 1.0, style.SKY),
-    "curves/snn_error/forward_mm": ("snn_forward", MILLIMETRES, style.SKY),
-    "curves/snn_error/left_mm": ("snn_left", MILLIMETRES, style.ORANGE),
-    "curves/snn_error/turn_deg": ("snn_turn", DEGREES, style.PURPLE),
+    "curves/fitness/tried_in_the_world": (
+        "fitness",
+        1.0,
+        style.SKY,
+        "tried in the world",
+    ),
+    "curves/fitness/foreseen_by_the_snn": (
+        "fitness_predicted",
+        1.0,
+        style.PURPLE,
+        "foreseen by the SNN",
+    ),
+    "curves/reached/objectives": ("reached", 1.0, style.GREEN, "objectives"),
+    "curves/diversity/equation_4_1": ("diversity_41", 1.0, style.SKY, "equation 4.1"),
+    "curves/snn_error/forward_mm": (
+        "snn_forward",
+        MILLIMETRES,
+        style.SKY,
+        "forward [mm]",
+    ),
+    "curves/snn_error/left_mm": ("snn_left", MILLIMETRES, style.ORANGE, "left [mm]"),
+    "curves/snn_error/turn_deg": ("snn_turn", DEGREES, style.PURPLE, "turn [deg]"),
 }
-"""Entity: column, factor to the unit shown, colour."""
+"""Entity: column, factor to the unit shown, colour, name."""
 
 
 def log_bars(stream, record: RunRecord, replicate: int, chosen: Sequence[Choice]):
@@ -67,8 +82,7 @@ def log_curve_styles(stream) -> None:
     """Log names and colours of the curves that `send_curves` sends."""
     import rerun as rr
 
-    for path, (_, _, colour) in _CURVES.items():
-        name = path.rsplit("/", 1)[1].replace("_", " ")
+    for path, (_, _, colour, name) in _CURVES.items():
         stream.log(
             path,
             rr.SeriesLines(names=name, colors=style.rgb(colour), widths=2.0),
@@ -87,6 +101,6 @@ def send_curves(stream, numbers: np.ndarray, columns: Mapping[str, np.ndarray]):
     import rerun as rr
 
     index = [rr.TimeColumn(TRIAL_TIMELINE, sequence=numbers)]
-    for path, (column, factor, _) in _CURVES.items():
+    for path, (column, factor, *_) in _CURVES.items():
         values = np.asarray(columns[column]) * factor
         stream.send_columns(path, index, rr.Scalars.columns(scalars=values))
