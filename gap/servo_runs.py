@@ -103,7 +103,9 @@ def runs(trials: Sequence[Trial], *, seconds: float, dt: float = DT) -> Runs:
 def _row(trial: Trial, fine: np.ndarray, grid: np.ndarray) -> tuple:
     times, angle = trial.times, trial.channel("angle")
     if times[-1] < grid[-1] - 3 * SAMPLE:
-        raise BnsError(f"A servo trial lasts {times[-1]:.2f} s, less than {grid[-1]:g}.")
+        raise BnsError(
+            f"A servo trial lasts {times[-1]:.2f} s, less than {grid[-1]:g}."
+        )
     index = np.searchsorted(times[:-1], fine + 1e-9, side="right") - 1
     names = [channel.name for channel in trial.commands.channels]
     told = trial.commands.values[np.maximum(index, 0)]

@@ -8,7 +8,8 @@ Known faults, and what is done: the lever's own mass is missing from the metadat
 at 0.10 m, 50 g at 0.15 m, added as `arm_mass`); the metadata's voltage is not that of
 the supply (the median of the servo's own reading is `voltage`, the other is kept as
 `voltage_told`); `load` is always zero and left out, as are `torque` and `current`,
-whose units are unclear; angles come in steps of a 12-bit encoder (`quantisation`).
+whose units are unclear; lost packets read as -pi for one sample and are mended
+(`lost_samples` counts them); angles come in steps of a 12-bit encoder (`quantisation`).
 """
 
 import csv
@@ -49,7 +50,7 @@ def read(
 
     Conditions of each trial: run, mass [kg], lever [m], arm_mass [kg], gain (firmware
     units), voltage and voltage_told [V], quantisation [rad], trajectory, repeat (number
-    among the runs of the same mass, lever, gain and trajectory).
+    among the runs of the same mass, lever, gain and trajectory), lost_samples.
 
     Args:
         directory: where the files lie.
@@ -93,6 +94,7 @@ def _trial(
     row: Mapping[str, str], repeat: int, table: np.ndarray, names: list[str]
 ) -> Trial:
     columns = {key: table[:, names.index(name)] for key, name in SOURCES.items()}
+    columns["angle"], lost = servo.despiked(columns["angle"])
     try:
         lever, mass = float(row["length"]), float(row["mass"])
         gain, told = float(row["kp"]), float(row["vin"])
@@ -109,5 +111,6 @@ def _trial(
         "quantisation": QUANTISATION,
         "trajectory": row["trajectory"],
         "repeat": repeat,
+        "lost_samples": lost,
     }
     return servo.trial(columns, CHANNELS, conditions=conditions, where=row["file"])

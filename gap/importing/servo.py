@@ -10,6 +10,7 @@ from bns.worlds.trial import Channel, Commands, Trial
 
 GOAL_CHANNELS = (Channel("goal", "rad"), Channel("torque_on", "1"))
 ROBOT = "servo_pendulum"
+SPIKE = 0.3  # [rad] assumed: a servo turns less than 0.1 rad in three samples of 10 ms
 SPARE_BITS = 1 << 16  # an int16 that was read as unsigned is this much too large
 
 
@@ -17,6 +18,23 @@ def signed(raw: np.ndarray) -> np.ndarray:
     """Undo the wrap of 16-bit numbers that were stored as unsigned: 65535 is -1."""
     raw = np.asarray(raw, dtype=np.float64)
     return np.where(raw >= SPARE_BITS // 2, raw - SPARE_BITS, raw)
+
+
+def despiked(angle: np.ndarray) -> tuple[np.ndarray, int]:
+    """Angles with lone wrong samples replaced, and how many they were.
+
+    A packet that was lost reads as raw 0, for a single sample: more than `SPIKE` from
+    the median of its seven neighbours, which no servo does. It becomes the mean of its
+    good neighbours.
+    """
+    angle = np.asarray(angle, dtype=np.float64)
+    near = np.lib.stride_tricks.sliding_window_view(np.pad(angle, 3, mode="edge"), 7)
+    wrong = np.abs(angle - np.median(near, axis=1)) > SPIKE
+    if not wrong.any() or wrong.all():
+        return angle, 0
+    index = np.arange(len(angle))
+    mended = np.where(wrong, np.interp(index, index[~wrong], angle[~wrong]), angle)
+    return mended, int(wrong.sum())
 
 
 def trial(
@@ -39,7 +57,9 @@ def trial(
     """
     times = np.asarray(columns["time"], dtype=np.float64)
     if len(times) < 2:
-        raise FormatError(f"{where} has {len(times)} samples; a run needs two at least.")
+        raise FormatError(
+            f"{where} has {len(times)} samples; a run needs two at least."
+        )
     wanted = ("time", "goal", "torque_on", *(channel.name for channel in channels))
     for name in wanted:
         if not np.isfinite(columns[name]).all():
