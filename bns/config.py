@@ -70,7 +70,7 @@ class EvolutionConfig:
 
     population: int = 100
     """individuals"""
-    generations: int = 60
+    generations: int = 80
     """generations between two trials in the world (silent)"""
     selection: Selection = "tournament"
     """parents"""
@@ -146,7 +146,8 @@ class WorldConfig:
     robot: str = "khepera3"
     """robot model, see `bns robots`"""
     damage: tuple[str, ...] = ()
-    """effects with onset, hidden from the learner: wheel_gain:wheel=left,factor=0.8@30"""
+    """effects with onset, hidden from the learner; see `bns effects`:
+    wheel_gain:wheel=left,factor=0.8@30"""
     reality: tuple[str, ...] = ()
     """effects that always hold (an imperfect reality)"""
     sample_dt: float = 0.1

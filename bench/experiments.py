@@ -1,0 +1,128 @@
+"""The experiments that several benches share: each is run once, resumable, and kept.
+
+Runs lie in `runs/bench/<name>-<key>/`, the key being that of the configuration, so a
+changed default makes a new run. Two workers with one thread each train them.
+"""
+
+import json
+import os
+from collections.abc import Iterable, Mapping
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, replace
+from hashlib import sha256
+from multiprocessing import get_context
+from pathlib import Path
+
+from bench.versions import ROOT
+from bns.config import AdaptationConfig, RunConfig, WorldConfig
+from bns.record import RunRecord
+
+RUNS = ROOT / "runs" / "bench"
+WORKERS = 2
+ONSET = 30  # trial of the damage (dissertation, section 4.3.1)
+REPLICATES = 30
+DAMAGES = {
+    "left-20": "wheel_gain:wheel=left,factor=0.8",
+    "right-20": "wheel_gain:wheel=right,factor=0.8",
+    "left-50": "wheel_gain:wheel=left,factor=0.5",
+    "right-50": "wheel_gain:wheel=right,factor=0.5",
+}
+QUICK = {"replicates": 6, "trials": 12}
+
+
+def undamaged(problem: str, world: str = "mujoco") -> RunConfig:
+    """The preset of a problem, without damage."""
+    from bns import presets
+
+    config = presets.load(f"khepera-{problem}")
+    trials = 30 if problem == "simple" else 60
+    return _named(
+        replace(config, trials=trials, world=WorldConfig(name=world)),
+        f"{problem}-{world}",
+    )
+
+
+def damaged(damage: str, *, world: str = "mujoco", **adaptation: object) -> RunConfig:
+    """The simple problem with one of `DAMAGES` from trial 30 on.
+
+    Args:
+        damage: key of `DAMAGES`.
+        world: name of the world.
+        adaptation: fields of `AdaptationConfig`.
+    """
+    from bns import presets
+
+    config = replace(
+        presets.load("khepera-simple"),
+        trials=100,
+        adaptation=AdaptationConfig(**adaptation),
+        world=WorldConfig(name=world, damage=(f"{DAMAGES[damage]}@{ONSET}",)),
+    )
+    words = [f"{key}={value}" for key, value in sorted(adaptation.items())]
+    return _named(config, "-".join([damage, world, *words]))
+
+
+def _named(config: RunConfig, name: str) -> RunConfig:
+    """The configuration with a seed of its own, from its name."""
+    seed = int.from_bytes(sha256(name.encode()).digest()[:4], "little")
+    return replace(
+        config,
+        preset=name,
+        seed=seed,
+        replicates=REPLICATES,
+        record_replicates=0,
+        threads=1,
+        compiled="auto",
+    )
+
+
+def directory(config: RunConfig) -> Path:
+    """Where a configuration's run is kept."""
+    text = json.dumps(asdict(config), sort_keys=True)
+    return RUNS / f"{config.preset}-{sha256(text.encode()).hexdigest()[:8]}"
+
+
+def records(
+    configs: Iterable[RunConfig], *, quick: bool = False
+) -> Mapping[str, RunRecord]:
+    """Records by configuration name, training what is missing.
+
+    Args:
+        configs: made by `undamaged` or `damaged`.
+        quick: few replicates and trials, for a look that takes seconds.
+    """
+    wanted = list(configs)
+    if quick:
+        wanted = [_quick(config) for config in wanted]
+    RUNS.mkdir(parents=True, exist_ok=True)
+    spawn = get_context("spawn")
+    with ProcessPoolExecutor(WORKERS, mp_context=spawn) as pool:
+        waiting = {pool.submit(_train, config): config for config in wanted}
+        for done in as_completed(waiting):
+            done.result()
+    from bns.store import load
+
+    return {config.preset: load(directory(config)) for config in wanted}
+
+
+def _quick(config: RunConfig) -> RunConfig:
+    onset = QUICK["trials"] // 2
+    damage = tuple(
+        text.replace(f"@{ONSET}", f"@{onset}") for text in config.world.damage
+    )
+    evolution = replace(config.evolution, population=50, generations=30)
+    return replace(
+        config,
+        **QUICK,
+        evolution=evolution,
+        snn=replace(config.snn, epochs=100),
+        world=replace(config.world, damage=damage),
+        compiled="no",
+    )
+
+
+def _train(config: RunConfig) -> None:
+    os.environ["OMP_NUM_THREADS"] = "1"
+    from bns.run import train
+
+    train(config, directory(config), resume=True)
