@@ -1,6 +1,6 @@
 """The servo law: what a position servo on a lever does with a goal, as named numbers.
 
-    goal -> delay, lag -> error -> duty -> torque -> friction -> lever and mass -> encoder
+    goal -> delay, lag -> error -> duty -> torque -> friction -> lever -> encoder
 
 With the angle q from hanging, the speed w and the goal g as it arrives:
 

@@ -193,8 +193,6 @@ class _State:
         met = np.abs(gap) >= half
         common = (rotor * rotor_speed + self.carried * lever) / whole
         self.speed = np.where(touching, joint, np.where(met, common, lever))
-        self.motor_speed = np.where(
-            touching, joint, np.where(met, common, rotor_speed)
-        )
+        self.motor_speed = np.where(touching, joint, np.where(met, common, rotor_speed))
         self.gap = np.where(touching, self.gap, np.clip(gap, -half, half))
         self.angle = self.angle + dt * self.speed

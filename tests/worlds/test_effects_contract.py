@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError, OutOfBoundsError, UnknownNameError
+from bns.worlds import servo_law
 from bns.worlds.effects import listing, registry
-from bns.worlds.effects.base import STAGES, ControlSignal, PoseSignal
+from bns.worlds.effects.base import STAGES, ControlSignal, PoseSignal, ServoEffect
 
 ROVER = (Path(__file__).parent / "rover.xml").read_text()
 NAMES = registry.names()
-IN_TIME = [name for name in NAMES if registry.get(name).stage != "body"]
+SERVO = [name for name in NAMES if issubclass(registry.get(name), ServoEffect)]
+ON_SIGNALS = [name for name in NAMES if name not in SERVO]
+IN_TIME = [name for name in ON_SIGNALS if registry.get(name).stage != "body"]
 OF_WHEELS = [
     name
     for name in NAMES
@@ -102,7 +105,20 @@ def same(some, others) -> bool:
     return all(a.tobytes() == b.tobytes() for a, b in zip(some, others, strict=True))
 
 
+def servo_numbers() -> dict[str, np.ndarray]:
+    """A law of three runs and two candidates, every number well inside its bounds."""
+    return servo_law.law(
+        {
+            name: np.full((3, 2), (item.low + 3 * item.high) / 4)
+            for name, item in servo_law.NUMBERS.items()
+        }
+    )
+
+
 def unchanged(effect, signals) -> bool:
+    if isinstance(effect, ServoEffect):
+        law = servo_numbers()
+        return same(effect.change(law).values(), law.values())
     if effect.stage == "body":
         return as_bytes(compiled(effect)) == as_bytes(compiled())
     return same(after(effect, signals), before(effect, signals))
@@ -172,6 +188,11 @@ class TestEveryEffect:
 
     def test_same_seed_same_bytes(self, name, signals):
         effect = listing.example(registry.get(name))
+        if isinstance(effect, ServoEffect):
+            law = servo_numbers()
+            first = effect.change(law).values()
+            assert same(first, effect.change(law).values()) and not effect.random
+            return
         if effect.stage == "body":
             assert as_bytes(compiled(effect)) == as_bytes(compiled(effect))
             return
@@ -253,7 +274,7 @@ def wheel_fields(model) -> dict[str, dict[str, bytes]]:
 
 
 @pytest.mark.parametrize(
-    "name", [name for name in NAMES if registry.get(name).stage == "body"]
+    "name", [name for name in ON_SIGNALS if registry.get(name).stage == "body"]
 )
 def test_body_effects_keep_the_sizes_and_the_physics_sound(name):
     model = compiled(listing.example(registry.get(name)))
@@ -263,6 +284,17 @@ def test_body_effects_keep_the_sizes_and_the_physics_sound(name):
     mujoco.mj_step(model, data, nstep=200)
     assert np.isfinite(data.qpos).all()
     assert not any(warning.number for warning in data.warning)
+
+
+@pytest.mark.parametrize("name", SERVO)
+def test_servo_effects_change_one_number_and_keep_it_in_bounds(name):
+    law, kind = servo_numbers(), registry.get(name)
+    changed = listing.example(kind).change(law)
+    assert list(changed) == list(law)
+    assert sum(not np.array_equal(changed[key], law[key]) for key in law) == 1
+    for item in kind.parameters:
+        for value in (item.low, item.high):
+            servo_law.law(registry.make(name, **{item.name: value}).change(law))
 
 
 def test_listing_is_plain_data_for_every_effect():

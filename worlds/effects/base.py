@@ -259,6 +259,22 @@ class BodyEffect(Effect):
         """
 
 
+class ServoEffect(Effect):
+    """Changes numbers of the servo law (`bns.worlds.servo_law`).
+
+    A servo closes a loop around its own encoder, so its gain, friction, delay or play
+    can not be written as a transform of a signal that is known beforehand, nor as an
+    edit of a model alone. All of them are numbers of one law, at whatever stage of the
+    signal path they act; `stage` says which. Subclasses set it.
+    """
+
+    robots = ("servo",)
+
+    @abstractmethod
+    def change(self, law: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """The law after the effect: every number by name, arrays of any shape."""
+
+
 class SensorEffect(Effect):
     """Changes what a sensor reads: a transform of sensor samples."""
 
