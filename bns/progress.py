@@ -2,6 +2,7 @@
 
 import sys
 import time
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -13,6 +14,9 @@ from bns.step import Step
 
 QUIET_SECONDS = 30.0
 """time between two lines where there is no terminal"""
+
+RECENT = 8
+"""trials whose median time gives the estimate; the first ones compile"""
 
 
 class Progress:
@@ -29,13 +33,14 @@ class Progress:
         self.enabled = enabled
         self.solved = np.zeros(config.replicates, dtype=bool)
         self.bar: Any = None
-        self.started = self.spoke = time.monotonic()
+        self.before = self.spoke = time.monotonic()
+        self.seconds: deque[float] = deque(maxlen=RECENT)
 
     @contextmanager
     def start(self, done: int = 0) -> Iterator[None]:
         """Show progress inside the block; `done` trials lie behind already."""
         self.first = done
-        self.started = self.spoke = time.monotonic()
+        self.before = self.spoke = time.monotonic()
         if self.enabled and sys.stderr.isatty():
             self._start_bar()
         try:
@@ -72,16 +77,18 @@ class Progress:
         """Show that a trial is done."""
         if not self.enabled:
             return
+        now = time.monotonic()
+        self.seconds.append(now - self.before)
+        self.before = now
         self.solved[: len(step.columns["solved"])] |= (
             step.columns["solved"][: len(self.solved)] > 0
         )
         text = self.describe(step)
         if self.bar:
             self.bar.update(self.task, completed=trial + 1, description=text)
-        elif time.monotonic() - self.spoke >= QUIET_SECONDS:
-            self.spoke = time.monotonic()
-            each = (self.spoke - self.started) / (trial + 1 - self.first)
-            left = each * (self.total - trial - 1)
+        elif now - self.spoke >= QUIET_SECONDS:
+            self.spoke = now
+            left = float(np.median(self.seconds)) * (self.total - trial - 1)
             print(
                 f"{self.name}: trial {trial + 1} of {self.total}, "
                 f"about {left:.0f} s left, {text}",

@@ -238,3 +238,12 @@ def test_doctor_looks_at_everything(capsys):
 def test_known_bad_pins(installed, bad):
     found = pins(lambda name: installed.get(name, ""))
     assert [finding.what for finding in found if finding.state == "bad"] == bad
+
+
+def test_progress_without_a_terminal_is_a_line_now_and_then(capsys, fakes, monkeypatch):
+    monkeypatch.setattr("bns.progress.QUIET_SECONDS", 0.0)
+    fakes.train(None, progress=True)
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 4
+    assert lines[0].startswith("fake: trial 1 of 4, about ") and " s left" in lines[0]
+    assert lines[3].endswith(", damaged")
