@@ -1,0 +1,99 @@
+"""The ceiling: direct evolution in the damaged world, no SNN in between."""
+
+import json
+from dataclasses import asdict, replace
+
+import numpy as np
+import torch
+
+from bench import experiments
+from bns import seeding
+from bns.chromosome import Encoding, Population
+from bns.config import RunConfig
+from bns.draws import Draws
+from bns.evolution.generation import Breeder, Rates
+from bns.tasks import NavigationTask
+from bns.units import metres_per_second
+
+RUNS = 2
+GENERATIONS = 60
+
+
+def reached(damage: str) -> dict[str, object]:
+    """What direct evolution reaches on one damage; kept, since it takes minutes.
+
+    Args:
+        damage: key of `experiments.DAMAGES`.
+
+    Returns:
+        runs, how many solved the simple problem, generations each took, best cost.
+    """
+    config = experiments.damaged(damage, window=150)
+    place = experiments.RUNS / f"ceiling-{experiments.directory(config).name}.json"
+    if place.exists():
+        return json.loads(place.read_text())
+    found = _search(replace(config, threads=2), damage)
+    place.parent.mkdir(parents=True, exist_ok=True)
+    place.write_text(json.dumps(found))
+    return found
+
+
+def _search(config: RunConfig, damage: str) -> dict[str, object]:
+    from bns.run import make_world
+
+    torch.set_num_threads(1)
+    always = tuple(text.split("@")[0] for text in config.world.damage)
+    world = make_world(replace(config, world=replace(config.world, damage=always)))
+    encoding = Encoding.of(config.controller)
+    task = NavigationTask.of(config.task)
+    draws = Draws(seeding.integer(config.seed, "ceiling"))
+    breeder = Breeder(config.evolution, encoding, False)
+    population = encoding.random(RUNS, config.evolution.population, draws)
+    rates = _rates(config)
+    solved_at: list[int | None] = [None] * RUNS
+    for generation in range(GENERATIONS):
+        cost, goals = _in_world(world, encoding, task, population)
+        for run in np.flatnonzero((goals == len(task.goals)).any(1)):
+            solved_at[run] = solved_at[run] or generation + 1
+        if all(solved_at):
+            break
+        coins = breeder.draw(RUNS, draws)
+        population = breeder.breed(population, cost, rates, coins)
+    return {
+        "runs": RUNS,
+        "solved": sum(at is not None for at in solved_at),
+        "generations": solved_at,
+        "best cost": [round(float(value), 1) for value in cost.min(1).values],
+        "settings": asdict(config.evolution),
+    }
+
+
+def _rates(config: RunConfig) -> Rates:
+    speed = metres_per_second(config.evolution.mutation_magnitude)
+    size = [speed, speed, config.evolution.duration_magnitude]
+    return Rates(
+        torch.full((RUNS,), config.evolution.mutation_rate),
+        torch.tensor([size] * RUNS),
+    )
+
+
+def _in_world(
+    world, encoding: Encoding, task: NavigationTask, population: Population
+) -> tuple[torch.Tensor, np.ndarray]:
+    """Cost ``(R, P)`` and objectives reached of every individual, in the world."""
+    runs, size = population.lengths.shape
+    flat = Population(
+        population.genes.flatten(0, 1)[:, None], population.lengths.flatten()[:, None]
+    )
+    trials = world.run(encoding.commands(flat), trial=0)
+    longest = encoding.max_commands
+    places = np.zeros((2, longest, len(trials)))
+    for index, trial in enumerate(trials):
+        count = len(trial.commands)
+        seen = trial.command_poses_world[:, :2]
+        places[:, :count, index] = seen[1:].T
+        places[:, count:, index] = seen[-1:].T
+    lengths = flat.lengths[:, 0]
+    cost, goals = task.score(*torch.from_numpy(places), lengths)
+    shape = (runs, size)
+    return cost.float().view(shape), goals.view(shape).numpy()
