@@ -113,3 +113,34 @@ def _row(trial: Trial, fine: np.ndarray, grid: np.ndarray) -> tuple:
     early = times <= 0.05
     speed = np.polyfit(times[early], angle[early], 1)[0] if early.sum() > 2 else 0.0
     return told[:, names.index("goal")], on, np.interp(grid, times, angle), speed
+
+
+CELL = ("mass", "lever", "gain")
+"""what tells one setting of the servo from another"""
+
+
+def cells(runs: Runs) -> list[tuple[float, ...]]:
+    """The setting of each run, rounded so that equal ones compare equal."""
+    columns = [np.round(runs.told[name], 6).tolist() for name in CELL]
+    return list(zip(*columns, strict=True))
+
+
+def merged(runs: Runs) -> Runs:
+    """Repeats as one run: same setting, same trajectory; angles are averaged.
+
+    Goals are those of the first; start and speed are medians, so that one odd start
+    does not matter.
+    """
+    keys = list(zip(cells(runs), runs.labels["trajectory"], strict=True))
+    groups: dict[tuple, list[int]] = {}
+    for index, key in enumerate(keys):
+        groups.setdefault(key, []).append(index)
+    first = runs.take(np.array([group[0] for group in groups.values()]))
+    parts = list(groups.values())
+    drive = replace(
+        first.drive,
+        start=np.array([np.median(runs.drive.start[part]) for part in parts]),
+        speed=np.array([np.median(runs.drive.speed[part]) for part in parts]),
+    )
+    angles = np.stack([runs.angles[part].mean(axis=0) for part in parts])
+    return replace(first, drive=drive, angles=angles)
