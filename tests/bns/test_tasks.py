@@ -1,0 +1,87 @@
+"""Tasks and paths against hand-computed answers."""
+
+import math
+
+import pytest
+import torch
+
+from bns.config import TaskConfig
+from bns.errors import UnknownNameError
+from bns.path import integrate
+from bns.tasks import NavigationTask
+
+GOALS = [(0.3, -0.3), (-0.3, -0.3), (-0.3, 0.3), (0.3, 0.3), (0.3, -0.3)]
+
+
+def score(points, length=None, **settings):
+    task = NavigationTask.of(TaskConfig(**settings))
+    x, y = torch.tensor(points, dtype=torch.float64).T
+    length = torch.tensor(len(points) if length is None else length)
+    cost, reached = task.score(x, y, length)
+    return cost.item(), reached.item()
+
+
+def test_perfect_path_costs_its_commands_alone():
+    cost, reached = score(GOALS)
+    assert reached == 5
+    assert cost == pytest.approx(2.5, abs=1e-4)
+
+
+def test_algorithm_5_by_hand():
+    """One objective reached at 5 cm, then standing 55 cm from the next."""
+    cost, reached = score(
+        [(0.25, -0.3), (0.25, -0.3)], charge_unused=False, command_cost=0.0
+    )
+    assert reached == 1
+    assert cost == pytest.approx(5 + 55 + 4 * 10_000)
+
+
+def test_squared_reading():
+    cost, _ = score([(0.3, -0.2)], charge_unused=False, squared=True, command_cost=0.0)
+    assert cost == pytest.approx(100 + 5 * 10_000)
+
+
+def test_unused_commands_are_charged_so_giving_up_does_not_pay():
+    padded = [(0.0, 0.0)] * 4
+    printed = [score(padded, n, charge_unused=False)[0] for n in (1, 4)]
+    repaired = [score(padded, n)[0] for n in (1, 4)]
+    assert printed[0] < printed[1] - 100
+    assert repaired[1] - repaired[0] == pytest.approx(3 * 0.5)
+
+
+def test_a_place_counts_once_per_command():
+    assert score([(0.3, -0.3)] * 3)[1] == 1
+
+
+def test_reached_only_inside_the_radius():
+    assert score([(0.3, -0.3 + 0.0899)])[1] == 1
+    assert score([(0.3, -0.3 + 0.0901)])[1] == 0
+
+
+def test_infinity_passes_the_centre_twice():
+    task = NavigationTask.of(TaskConfig(name="infinity"))
+    assert task.goals.tolist().count([0.0, 0.0]) == 2
+    assert len(task.goals) == 7
+
+
+def test_unknown_task():
+    with pytest.raises(UnknownNameError, match="Unknown task 'simpel'"):
+        NavigationTask.of(TaskConfig(name="simpel"))
+
+
+def test_integration_of_a_square():
+    quarter = torch.full((4,), math.pi / 2, dtype=torch.float64)
+    ahead = torch.ones(4, dtype=torch.float64)
+    x, y, yaw = integrate(ahead, torch.zeros_like(ahead), quarter, (0.0, 0.0, 0.0))
+    assert x.tolist() == pytest.approx([1, 1, 0, 0])
+    assert y.tolist() == pytest.approx([0, 1, 1, 0])
+    assert yaw[-1].item() == pytest.approx(2 * math.pi)
+
+
+def test_integration_undoes_body_displacements():
+    from bns.worlds.trial import body_displacements
+
+    poses = torch.rand(9, 3, generator=torch.Generator().manual_seed(0)).double()
+    moved = torch.from_numpy(body_displacements(poses.numpy()))
+    x, y, yaw = integrate(*moved.T, tuple(poses[0].tolist()))
+    torch.testing.assert_close(torch.stack([x, y, yaw], 1), poses[1:])
