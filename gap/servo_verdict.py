@@ -82,7 +82,7 @@ def verdict(scores: Scores, null: Null, candidates: Mapping[str, Candidate]) -> 
         return Verdict(
             kind="no gap",
             named=(),
-            sets=((), *((name,) for name in inside)),
+            sets=((),) if p_gap > 1 - COVERAGE else ((), (best,)),
             angle=float("nan"),
             sentence="These runs differ from the nominal law by no more than runs "
             f"without a change do; the nearest explanation would be {best}.",
