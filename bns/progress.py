@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bns.config import RunConfig
+from bns.record import RunRecord
 from bns.step import Step
 
 QUIET_SECONDS = 30.0
@@ -72,6 +73,10 @@ class Progress:
         )
         self.task = self.bar.add_task("", total=self.total, completed=self.first)
         self.bar.start()
+
+    def recall(self, record: RunRecord) -> None:
+        """Take note of what a run that is resumed has solved already."""
+        self.solved |= (record["solved"] > 0).any(axis=1)
 
     def update(self, trial: int, step: Step) -> None:
         """Show that a trial is done."""

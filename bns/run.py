@@ -197,6 +197,8 @@ def _loop(
     """All trials that are left; without a store their steps are kept and returned."""
     memory: list[Step] = []
     done = _restore(batch, store)
+    if store and done:
+        progress.recall(store.record())
     with progress.start(done):
         for trial in range(done, config.trials):
             if stop():

@@ -73,7 +73,7 @@ def summary(record: RunRecord) -> str:
     lines = [
         f"{record.trials} trials of {record.replicates} runs; trials count from 1."
     ]
-    lines.append(_sentence("Solved", solved, "at trial"))
+    lines.append(_sentence("Solved", solved, "at trial {}"))
     onset, damage = int(record.damage_onset.max()), record.config.world.damage
     if onset < 0:
         lines.append("No damage.")
@@ -84,22 +84,21 @@ def summary(record: RunRecord) -> str:
     else:
         lines.append(f"Damage from trial {onset + 1} on: {'; '.join(damage)}.")
         recovered = stats.trials_to_recover(record)
-        lines.append(_sentence("Recovered", recovered, "within trials"))
+        lines.append(_sentence("Recovered", recovered, "within {} trials"))
     return "\n".join(lines)
 
 
-def _sentence(word: str, values: np.ndarray, unit: str) -> str:
+def _sentence(word: str, values: np.ndarray, phrase: str) -> str:
     reached = np.isfinite(values)
     text = f"{word} by {reached.sum()} of {len(values)}"
     if not reached.any():
         return f"{text}."
     middle = stats.median_interval(values)
+    text += f", {phrase.format(number(middle.value))} in the median"
     if middle.low == -np.inf:
-        return f"{text}, {unit} {number(middle.value)} in the median."
-    return (
-        f"{text}, {unit} {number(middle.value)} in the median "
-        f"(95 % interval {number(middle.low)} to {number(middle.high)})."
-    )
+        return f"{text}."
+    low, high = number(middle.low), number(middle.high)
+    return f"{text} (95 % interval {low} to {high})."
 
 
 def number(value: float) -> str:
