@@ -2,6 +2,8 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +11,7 @@ import numpy as np
 
 from bns import files, versions
 from bns.batch import Batch, check_device, check_world, resolve
-from bns.config import RunConfig
+from bns.config import AdaptationConfig, RunConfig, WorldConfig
 from bns.directory import check_free
 from bns.errors import BnsError
 from bns.loading import differences
@@ -262,13 +264,25 @@ def _keep(
 
 def _nets(config: RunConfig, directory: Path | None) -> Any:
     """Nets of the static SNN world, from the run's directory if they are there."""
-    from bns import static_snn
     from bns.worlds.static_nets import StaticNets
 
     path = directory / "static_snn.npz" if directory else None
     if path and path.exists():
         return StaticNets.load(path)
-    nets = static_snn.nets_for(config)
+    nets = _fitted(replace(config, adaptation=AdaptationConfig(), world=_bare(config)))
     if path:
         files.replace(path, nets.save)
     return nets
+
+
+@lru_cache(maxsize=4)
+def _fitted(config: RunConfig) -> Any:
+    """Nets are dear: configurations of one batch share them."""
+    from bns import static_snn
+
+    return static_snn.nets_for(config)
+
+
+def _bare(config: RunConfig) -> WorldConfig:
+    """The world without what differs within a batch."""
+    return WorldConfig(name=config.world.name, robot=config.world.robot)
