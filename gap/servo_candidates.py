@@ -28,7 +28,7 @@ _GRIDS: dict[str, tuple[float, ...]] = {
     "servo_delay": (-0.02, -0.01, 0.01, 0.02, 0.04, 0.08, 0.16, 0.3),
     "servo_lag": (0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.3),
     "servo_duty_limit": (0.05, 0.1, 0.15, 0.2, 0.3, 0.45, 0.7),
-    "servo_current_limit": tuple(1e-3 * np.array([0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.5])),
+    "servo_current_limit": (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.5),
     "servo_backlash": (0.005, 0.01, 0.02, 0.04, 0.08, 0.15),
     "servo_dead_zone": (0.005, 0.01, 0.02, 0.04, 0.08, 0.15),
     "servo_offset": (-0.3, -0.15, -0.08, -0.04, 0.04, 0.08, 0.15, 0.3),
@@ -71,7 +71,7 @@ def _candidate(name: str) -> Candidate:
         low=parameter.low,
         high=parameter.high,
         grid=_GRIDS[name],
-        scale="log" if parameter.nominal == 1.0 else "linear",
+        scale="log" if parameter.nominal >= 1.0 else "linear",
         aliases=_ALIASES.get(name, ()),
         excite=_EXCITE.get(name, SLOW),
     )

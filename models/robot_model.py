@@ -66,14 +66,14 @@ class RobotModel:
 
     Attributes:
         name: of the robot and of its directory.
-        kind: "wheeled" or "legged".
+        kind: "wheeled", "legged" or "servo".
         doc: one line.
         directory: where `<name>.xml`, `scene.xml` and the rest lie.
         commands: what it can be told, in the order of the model's controls.
         ctrl_per_command: control units per unit of command; for wheels 1 / nominal
             radius: 1 m/s becomes so many rad/s.
         base_body: the body that carries everything.
-        base_joint: its free joint.
+        base_joint: its free joint; of a servo on a stand, its shaft.
         tracker_site: what an overhead camera tracks.
         picture: camera of the scene for the portrait.
         sensor_sites: in the order of the robot's readings; they look along their z.

@@ -1,7 +1,9 @@
 """Servo current limit: the drive limits its current."""
 
+import numpy as np
+
 from bns.worlds.effects.base import Parameter, ServoEffect
-from bns.worlds.servo_law import Law, clipped
+from bns.worlds.servo_law import NO_CURRENT_LIMIT, Law
 
 
 class ServoCurrentLimit(ServoEffect):
@@ -13,16 +15,16 @@ class ServoCurrentLimit(ServoEffect):
     source = "current limits of servo firmware; bounds assumed"
     parameters = (
         Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.0001,
-            high=1.0,
-            doc="largest current over nominal (1000 A is none)",
-            example=0.0005,
+            "current",
+            unit="A",
+            nominal=NO_CURRENT_LIMIT,
+            low=0.01,
+            high=NO_CURRENT_LIMIT,
+            doc="largest current; 1000 is none; bounds assumed",
+            example=0.2,
         ),
     )
 
     def change(self, law: Law) -> Law:
-        value = clipped("current_limit", law["current_limit"] * self["factor"])
+        value = np.minimum(law["current_limit"], self["current"])
         return {**law, "current_limit": value}
