@@ -73,7 +73,7 @@ def summary(record: RunRecord) -> str:
     lines = [
         f"{record.trials} trials of {record.replicates} runs; trials count from 1."
     ]
-    lines.append(_sentence("Solved", solved, "at trial {}"))
+    lines.append(sentence("Solved", solved, "at trial {}"))
     onset, damage = int(record.damage_onset.max()), record.config.world.damage
     if onset < 0:
         lines.append("No damage.")
@@ -84,16 +84,19 @@ def summary(record: RunRecord) -> str:
     else:
         lines.append(f"Damage from trial {onset + 1} on: {'; '.join(damage)}.")
         recovered = stats.trials_to_recover(record)
-        lines.append(_sentence("Recovered", recovered, "within {} trials"))
+        lines.append(sentence("Recovered", recovered, "within {} trials"))
     return "\n".join(lines)
 
 
-def _sentence(word: str, values: np.ndarray, phrase: str) -> str:
+def sentence(word: str, values: np.ndarray, phrase: str) -> str:
+    """How many runs got somewhere, and when; `phrase` holds the number's place."""
     reached = np.isfinite(values)
     text = f"{word} by {reached.sum()} of {len(values)}"
     if not reached.any():
         return f"{text}."
     middle = stats.median_interval(values)
+    if middle.value == np.inf:
+        return f"{text}, so not in the median."
     text += f", {phrase.format(number(middle.value))} in the median"
     if middle.low == -np.inf:
         return f"{text}."
@@ -125,6 +128,6 @@ def _try(name: str, make: Callable[[], Path]) -> dict[str, Path]:
 
     try:
         return {name: make()}
-    except BnsError as error:
+    except (BnsError, OSError) as error:
         print(f"bns: no {name}: {error}", file=sys.stderr)
         return {}

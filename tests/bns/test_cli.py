@@ -5,11 +5,13 @@ import os
 import signal
 import sys
 
+import numpy as np
 import pytest
 
 from bns import presets
 from bns.__main__ import INTERRUPTED, WRONG_INPUT, main
 from bns.cli import VERBS
+from bns.cli.outputs import sentence
 from bns.cli.run import STOPPED, until_interrupted
 from bns.doctor import pins
 from bns.store import load
@@ -247,3 +249,19 @@ def test_progress_without_a_terminal_is_a_line_now_and_then(capsys, fakes, monke
     assert len(lines) == 4
     assert lines[0].startswith("fake: trial 1 of 4, about ") and " s left" in lines[0]
     assert lines[3].endswith(", damaged")
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        ([np.inf, np.inf], "Solved by 0 of 2."),
+        ([3, np.inf, np.inf], "Solved by 1 of 3, so not in the median."),
+        ([3, 4], "Solved by 2 of 2, at trial 3.5 in the median."),
+        (
+            [2, 3, 4, 5, 6, np.inf],
+            "Solved by 5 of 6, at trial 4.5 in the median (95 % interval 2 to never).",
+        ),
+    ],
+)
+def test_what_happened_is_told_in_words(values, told):
+    assert sentence("Solved", np.array(values, dtype=float), "at trial {}") == told
