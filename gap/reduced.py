@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from scipy.signal import lfilter
 
 from bns.worlds import compile, observe
 from bns.worlds.effects.base import BodyEffect
@@ -25,6 +26,7 @@ KNEE = 0.002  # [m/s] within which dry friction changes its sign; assumed
 TRAINING, CHECKING = 3, 1  # simulated drives
 DRIVE = 10.0  # [s] each
 SPEED = 0.16  # [m/s] largest speed in them
+PASSES, SETTLED = 12, 1e-7  # until a change of speed below it [m/s, rad/s]
 STEP = 0.1  # [s] over which the error is taken
 GOOD = np.array([5e-5, 5e-5, 5e-4])  # [m, m, rad] error over STEP that passes
 
@@ -54,15 +56,44 @@ class Reduced:
         Returns:
             ``(N, S + 1, 3)``.
         """
-        count, steps, _ = told.shape
-        speed = np.zeros((steps + 1, count, 2))
-        for t in range(steps):
-            change = _terms(speed[t], told[:, t]) @ self.step
-            speed[t + 1] = np.clip(speed[t] + change, -20.0, 20.0)
+        speed = self._speeds(told).transpose(1, 0, 2)
         forward, turn = speed[..., 0].T, speed[..., 1].T
         left = (_side_terms(speed.reshape(-1, 2)) @ self.side).reshape(speed.shape[:2])
         yaw = np.cumsum(turn, axis=1) * self.dt
         return np.stack(_travel(forward, left.T, yaw, self.dt), axis=-1)
+
+    def _speeds(self, told: np.ndarray) -> np.ndarray:
+        """Forward and turning speed, ``(N, S + 1, 2)``.
+
+        The linear part is a filter over time; the rest is put in from the last pass
+        until it no longer changes, which takes a few passes.
+        """
+        count, steps, _ = told.shape
+        linear = np.stack([self.step[0], TRACK * self.step[1]]) + np.eye(2)
+        poles, modes = np.linalg.eig(linear)
+        inputs = told @ self.step[2:4] + self.step[8]
+        speed = np.zeros((count, steps + 1, 2))
+        for _ in range(PASSES):
+            bent = _terms(speed[:, :-1].reshape(-1, 2))
+            drive = inputs + (bent @ self.step[4:8]).reshape(count, steps, 2)
+            drive = drive @ modes
+            for mode in (0, 1):
+                drive[..., mode] = lfilter([1.0], [1.0, -poles[mode]], drive[..., mode])
+            after = np.real(drive @ np.linalg.inv(modes))
+            change = np.abs(after - speed[:, 1:]).max(initial=0.0)
+            speed[:, 1:] = np.clip(after, -20.0, 20.0)
+            if change < SETTLED:
+                return speed
+        return self._stepwise(told)
+
+    def _stepwise(self, told: np.ndarray) -> np.ndarray:
+        count, steps, _ = told.shape
+        speed = np.zeros((steps + 1, count, 2))
+        for t in range(steps):
+            now = speed[t]
+            change = _linear_terms(now, told[:, t]) @ self.step
+            speed[t + 1] = np.clip(now + change, -20.0, 20.0)
+        return speed.transpose(1, 0, 2)
 
 
 def _travel(forward, left, yaw, dt):
@@ -72,12 +103,15 @@ def _travel(forward, left, yaw, dt):
     return x, y, yaw
 
 
-def _terms(speed: np.ndarray, told: np.ndarray) -> np.ndarray:
+def _linear_terms(speed: np.ndarray, told: np.ndarray) -> np.ndarray:
+    v, w = speed.T
+    return np.column_stack([v, TRACK * w, told, _terms(speed), np.ones_like(v)])
+
+
+def _terms(speed: np.ndarray) -> np.ndarray:
     v, w = speed.T
     wheels = np.tanh((v[:, None] + TRACK * w[:, None] * np.array([-1, 1])) / KNEE)
-    return np.column_stack(
-        [v, TRACK * w, told, 0.01 * w * w, 0.1 * v * w, wheels, np.ones_like(v)]
-    )
+    return np.column_stack([0.01 * w * w, 0.1 * v * w, wheels])
 
 
 def _side_terms(speed: np.ndarray) -> np.ndarray:
@@ -101,7 +135,7 @@ def reduced(robot: str, effects: tuple[BodyEffect, ...], per_command: float) -> 
     kept = drives[:TRAINING]
     if not all(np.isfinite(speed).all() for speed, _, _ in drives):
         return Reduced(np.zeros((9, 2)), np.zeros(3), dt, good=False)
-    terms = np.concatenate([_terms(s[:-1, [0, 2]], u) for s, u, _ in kept])
+    terms = np.concatenate([_linear_terms(s[:-1, [0, 2]], u) for s, u, _ in kept])
     change = np.concatenate([np.diff(s[:, [0, 2]], axis=0) for s, _, _ in kept])
     seen = np.concatenate([s for s, _, _ in kept])
     side = np.linalg.lstsq(_side_terms(seen[:, [0, 2]]), seen[:, 1], rcond=None)[0]

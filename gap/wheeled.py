@@ -10,8 +10,9 @@ from bns import models
 from bns.errors import BnsError
 from bns.gap import wheeled_library
 from bns.gap.model import Windows
+from bns.gap.pieces import WHOLE, Piece, moved, pieces_of, stitched, windows
 from bns.gap.records import Candidate
-from bns.gap.reduced import reduced
+from bns.gap.reduced import Reduced, reduced
 from bns.worlds import compile, control, observe
 from bns.worlds.active import Placed
 from bns.worlds.effects.base import Effect, PoseSignal
@@ -47,7 +48,7 @@ class WheeledModel:
         robot: str = "khepera3",
         *,
         threads: int = 2,
-        process: Sequence[float] = (2e-4, 1e-4, 2e-3),
+        process: Sequence[float] = (1e-4, 5e-5, 1e-3),
         resolution: Sequence[float] = (1e-4, 1e-4, 1e-3),
         exact: bool = False,
     ):
@@ -98,37 +99,46 @@ class WheeledModel:
 
     def _key(self, trial: Trial, effects: Sequence[Effect]) -> tuple:
         moving = tuple(str(e) for e in effects if e.stage != "tracking")
-        absolute = any(e.name in ABSOLUTE for e in effects)
-        yaw = float(_start(trial)[2]) if absolute else 0.0
+        seen = trial.observed.tobytes() if _absolute(effects) else b""
         told = trial.commands.values.tobytes() + trial.commands.durations.tobytes()
-        return hashlib.blake2b(told, digest_size=16).digest(), moving, yaw
+        return hashlib.blake2b(told + seen, digest_size=16).digest(), moving
 
     def _run(self, wanted: Mapping[tuple, tuple]) -> dict[tuple, np.ndarray]:
         """Poses from the origin, every `EVERY` steps, ``(S, 3)`` by key."""
         groups: dict[tuple, list] = {}
-        jobs, owners = [], []
+        jobs: list[Job] = []
+        slow: dict[tuple, list] = {}
         for key, (trial, items) in wanted.items():
             told, body = self._told(trial, items), self._body(items)
-            fast = not (self.exact or key[2] or any(e.name in ABSOLUTE for e in body))
-            if fast and reduced(self.name, body, self._robot.ctrl_per_command).good:
+            if not self.exact and not _absolute(items) and self._reduced(body).good:
                 groups.setdefault((body, len(told)), []).append((key, told))
-            else:
-                jobs.append(self._job(told, body, key[2]))
-                owners.append(key)
+                continue
+            pieces = (
+                pieces_of(trial, len(told), self.dt) if _absolute(items) else [WHOLE]
+            )
+            slow[key] = [(len(jobs) + n, piece) for n, piece in enumerate(pieces)]
+            jobs += [self._job(told, body, piece) for piece in pieces]
         made = {}
         for (body, _), members in groups.items():
-            fast = reduced(self.name, body, self._robot.ctrl_per_command)
-            poses = fast.poses(np.stack([told for _, told in members]))
+            poses = self._reduced(body).poses(np.stack([told for _, told in members]))
             for (key, _), pose in zip(members, poses[:, ::EVERY], strict=True):
                 made[key] = pose.copy()
-        for key, motion in zip(owners, self._pool.map(jobs), strict=True):
-            place = compile.free_joint(compile.compiled(self.name).model)
-            free = motion.states[:, 1 + place.start : 1 + place.stop]
-            made[key] = observe.planar(free, key[2])[::EVERY].copy()
+        place = compile.free_joint(compile.compiled(self.name).model)
+        free = slice(1 + place.start, 1 + place.stop)
+        rolled = [motion.states[:, free] for motion in self._pool.map(jobs)]
+        for key, parts in slow.items():
+            poses = [
+                observe.planar(rolled[number], piece.yaw)[piece.lead :]
+                for number, piece in parts
+            ]
+            made[key] = stitched(poses)[::EVERY].copy()
         self._cache.update(made)
         while len(self._cache) > KEPT:
             self._cache.popitem(last=False)
         return made
+
+    def _reduced(self, body: tuple) -> Reduced:
+        return reduced(self.name, body, self._robot.ctrl_per_command)
 
     def _told(self, trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
         counts = control.steps(trial.commands.durations, self.dt)
@@ -145,11 +155,11 @@ class WheeledModel:
     def _body(effects: Sequence[Effect]) -> tuple:
         return tuple(e for e in effects if e.stage == "body" and not e.is_nominal)
 
-    def _job(self, told: np.ndarray, body: tuple, yaw: float) -> Job:
-        values = told * self._robot.ctrl_per_command
+    def _job(self, told: np.ndarray, body: tuple, piece: Piece) -> Job:
+        values = told[piece.first : piece.last] * self._robot.ctrl_per_command
         placed = tuple(Placed(effect, 0.0, FAR, ()) for effect in body)
         segments = compile.segments(self.name, placed, values, self.dt)
-        begin = compile.start_state(segments[0].compiled, (0.0, 0.0, yaw))
+        begin = compile.start_state(segments[0].compiled, (0.0, 0.0, piece.yaw))
         return Job(begin, segments)
 
     def _tracked(
@@ -157,7 +167,7 @@ class WheeledModel:
     ) -> np.ndarray:
         """Poses put at the recorded start, through the tracker, at the samples."""
         times = np.arange(len(poses)) * self.dt * EVERY
-        poses = _moved(poses, _start(trial))
+        poses = moved(poses, _start(trial))
         stamps, seen = times, poses
         for effect in effects:
             if effect.stage == "tracking":
@@ -208,26 +218,8 @@ class WheeledModel:
         }
 
 
-def windows(trial: Trial, length: float) -> Windows:
-    """Windows of at least a length [s] that tile a trial, between seen samples.
-
-    Args:
-        trial: recorded trial.
-        length: infinity = one window, from the first sample to the last.
-    """
-    seen = np.flatnonzero(np.isfinite(trial.observed).all(axis=1))
-    seen = seen[seen >= trial.boundaries[0]]
-    if np.isinf(length):
-        marks = seen[[0, -1]] if len(seen) > 1 else seen[:0]
-    else:
-        kept = list(seen[:1])
-        for sample in seen[1:]:
-            if trial.times[sample] - trial.times[kept[-1]] >= 0.95 * length:
-                kept.append(sample)
-        marks = np.array(kept, dtype=int)
-    first, last = marks[:-1], marks[1:]
-    begin, end = trial.times[first], trial.times[last]
-    return Windows(first, last, (begin + end) / 2, end - begin)
+def _absolute(effects: Sequence[Effect]) -> bool:
+    return any(effect.name in ABSOLUTE for effect in effects)
 
 
 def _start(trial: Trial) -> np.ndarray:
@@ -236,13 +228,3 @@ def _start(trial: Trial) -> np.ndarray:
         return pose
     seen = np.isfinite(trial.poses_world).all(axis=1)
     return trial.poses_world[seen][0]
-
-
-def _moved(poses: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Poses as if they had begun at `start`."""
-    turn = start[2] - poses[0, 2]
-    cos, sin = np.cos(turn), np.sin(turn)
-    x, y = (poses[:, :2] - poses[0, :2]).T
-    return np.column_stack(
-        [start[0] + cos * x - sin * y, start[1] + sin * x + cos * y, poses[:, 2] + turn]
-    )

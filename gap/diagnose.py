@@ -1,0 +1,199 @@
+"""One call from a recording to a verdict."""
+
+import time
+from collections.abc import Sequence
+from contextlib import contextmanager
+
+import numpy as np
+
+from bns.errors import BnsError
+from bns.gap import fit, select, signatures, verdict
+from bns.gap.fit import Point
+from bns.gap.model import GapModel
+from bns.gap.null import Null
+from bns.gap.problem import Problem
+from bns.gap.records import Candidate, Diagnosis, Fit
+from bns.gap.select import Search
+from bns.worlds.trial import Trial
+
+ALPHA_MORE = 0.01  # chance that a further effect is added where there is none
+POWER = 1.2816  # standard normal: 90 % power
+LEVEL = 1.6449  # 90 % interval
+LISTED = 8  # fits of each size that are reported
+LEAST = 2  # trials
+
+
+class _Clock:
+    def __init__(self):
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def __call__(self, stage: str):
+        begin = time.perf_counter()
+        yield
+        self.seconds[stage] = round(time.perf_counter() - begin, 3)
+
+
+def diagnose(
+    trials: Sequence[Trial],
+    model: GapModel,
+    *,
+    seed: int = 0,
+    candidates: Sequence[Candidate] | None = None,
+    calibration: verdict.Calibration | None = None,
+    most: int = 3,
+    full: bool = True,
+) -> Diagnosis:
+    """Where a recording and a nominal model part, why, and how far it can be closed.
+
+    Args:
+        trials: recorded commands and observations.
+        model: nominal model.
+        seed: of what is drawn (null distributions, bootstraps).
+        candidates: explanations to consider; None = all of the model's.
+        calibration: thresholds; None = those of the package.
+        most: largest number of effects at once.
+        full: with localisation and closed fractions; False = the verdict alone.
+
+    Raises:
+        BnsError: too few trials, faults that cannot be repaired, channels that do not
+            fit the model.
+    """
+    from bns.gap import check, quantify, where
+
+    clock = _Clock()
+    with clock("check"):
+        trials, faults = check.check(trials, model)
+    if len(trials) < LEAST:
+        raise BnsError(
+            f"{len(trials)} usable trial: a diagnosis needs {LEAST} at least, to fit "
+            "on some and test on others; record more."
+        )
+    candidates = tuple(model.candidates() if candidates is None else candidates)
+    rules = calibration or verdict.calibration()
+    with clock("signatures"):
+        problem = Problem.of(trials, model, candidates=candidates)
+        curves = signatures.trace(problem, candidates)
+        null = Null.of(problem, curves, seed=seed)
+    worth = null.threshold(ALPHA_MORE)
+    with clock("fits"):
+        search = select.search(problem, curves, null, worth=worth, most=most)
+        choice = verdict.choose(problem, search, null, worth)
+        excite = {item.name: item.excite for item in candidates}
+        answer = verdict.decide(problem, choice, rules, excite)
+        fits = _fits(problem, search)
+    seen = float(np.sqrt(null.threshold(0.05)) + POWER)
+    where_found, closed = {}, {}
+    if full:
+        with clock("where"):
+            where_found = where.where(problem, choice.best, seed=seed)
+        with clock("closed"):
+            closed = quantify.quantify(problem, null, search, choice.best, seed=seed)
+    return Diagnosis(
+        model=model.name,
+        trials=len(trials),
+        faults=faults,
+        verdict=answer,
+        fits=fits,
+        where=where_found,
+        signatures=_signatures(curves, choice, seen),
+        floor=_floor(problem),
+        closed=closed,
+        warnings=_warnings(problem, curves, fits, answer),
+        seed=seed,
+        seconds=clock.seconds,
+        partial={} if full else {"where, closed": "not asked for"},
+    )
+
+
+def _floor(problem: Problem) -> dict:
+    floor = problem.floor
+    return {
+        "source": floor.source,
+        "repeats": floor.repeats,
+        "sigma": floor.sigma.tolist(),
+        "process": floor.process.tolist(),
+        "channels": [channel.name for channel in problem.model.channels],
+    }
+
+
+def _signatures(curves, choice, seen: float) -> dict:
+    """Detectability of every candidate; angle of the chosen to each fitted rival."""
+    best = choice.best
+    ranked = [
+        {"names": list(point.names), "score": score} for point, score in choice.ranked
+    ]
+    return {
+        "seen": seen,
+        "detectability": signatures.detectability(curves, seen),
+        "ranked": ranked,
+        "best": [str(term.effect()) for term in best.terms],
+        "misfit_excess": choice.excess,
+        "explained": choice.explained,
+    }
+
+
+def _fits(problem: Problem, search: Search) -> tuple[Fit, ...]:
+    points = [search.nothing]
+    for found in search.sizes:
+        points += found[:LISTED]
+    base = select.held_out(problem, search.nothing)[1]
+    return tuple(_fit(problem, point, base) for point in points)
+
+
+def _fit(problem: Problem, point: Point, base: np.ndarray) -> Fit:
+    held_out, by_trial = select.held_out(problem, point)
+    spans, condition = _intervals(point)
+    improved = base - by_trial
+    return Fit(
+        names=point.names,
+        effects=tuple(str(term.effect()) for term in point.terms),
+        magnitudes=tuple(term.magnitude for term in point.terms),
+        intervals=spans,
+        units=tuple(term.candidate.unit for term in point.terms),
+        loss=point.loss,
+        held_out=held_out,
+        held_out_se=float(improved.std(ddof=1) * np.sqrt(len(improved))),
+        evidence=select.evidence(point),
+        at_bound=tuple(t.candidate.name for t in point.terms if t.at_bound),
+        condition=condition,
+    )
+
+
+def _intervals(point: Point) -> tuple[tuple[tuple[float, float], ...], float]:
+    """90 % interval of each magnitude from the slopes; condition of the fit."""
+    if not point.terms or not len(point.slopes):
+        return tuple((t.magnitude, t.magnitude) for t in point.terms), 1.0
+    size = np.linalg.norm(point.slopes, axis=1) + 1e-12
+    scaled = point.slopes / size[:, None]
+    normal = scaled @ scaled.T
+    condition = float(np.linalg.cond(normal))
+    spread = np.sqrt(np.abs(np.diag(np.linalg.pinv(normal)))) / size
+    spans, at = [], 0
+    for term in point.terms:
+        item, half = term.candidate, LEVEL * float(spread[at])
+        low = max(term.magnitude - half, item.low)
+        spans.append((low, min(term.magnitude + half, item.high)))
+        at += 1 + len(term.extras)
+    return tuple(spans), condition
+
+
+def _warnings(problem: Problem, curves, fits: Sequence[Fit], answer) -> tuple[str, ...]:
+    made = []
+    if problem.floor.source != "repeats":
+        made.append(
+            "No repeats of the same commands: what the robot scatters by itself is "
+            "assumed; record two or three repeats."
+        )
+    if curves.diverged:
+        made.append(f"Diverged in simulation: {', '.join(curves.diverged)}.")
+    chosen = answer.named[0] if answer.named else ()
+    best = next((fit for fit in fits if chosen and fit.names == chosen), None)
+    if best and best.at_bound:
+        made.append(f"At a bound: {', '.join(best.at_bound)}.")
+    if best and best.condition > 1e4:
+        made.append(f"Magnitudes trade off (condition {best.condition:.0f}).")
+    return tuple(made)
+
+
+__all__ = ["diagnose", "fit"]

@@ -1,0 +1,271 @@
+"""Which effects: single ones, pairs and triples, by signature and then in full."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bns.gap import fit
+from bns.gap.fit import Point, Term
+from bns.gap.null import Null
+from bns.gap.problem import Problem
+from bns.gap.signatures import Curves, integer
+from bns.gap.whiten import loss, weights
+
+SINGLES, NEAR = 10, 5  # single effects fitted in full: at most, and at least
+PAIRS, TRIPLES = 10, 4
+HOPELESS, PATIENCE = 60.0, 3  # a fit so much worse than the best; so many in a row
+STRUCTURE = 0.1  # p-value below which a rest has structure
+CHUNK = 256  # levels whose loss is taken at once
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Fitted supports by size, best first within each.
+
+    Attributes:
+        nothing: the empty support.
+        sizes: points with one effect, with two, with three; later ones may be empty.
+        screened: smallest loss on the signature of each candidate alone, ``(C,)``.
+    """
+
+    nothing: Point
+    sizes: tuple[tuple[Point, ...], ...]
+    screened: np.ndarray
+
+    def best(self, size: int) -> Point | None:
+        """The best support of a size, None if none was fitted."""
+        if size == 0:
+            return self.nothing
+        found = self.sizes[size - 1] if size <= len(self.sizes) else ()
+        return found[0] if found else None
+
+
+def search(
+    problem: Problem, curves: Curves, null: Null, *, worth: float, most: int = 3
+) -> Search:
+    """Fit what may explain a recording.
+
+    Args:
+        problem: the recording.
+        curves: signatures.
+        null: what chance gives.
+        worth: improvement that a further effect has to bring.
+        most: largest number of effects at once.
+    """
+    (nothing,) = fit.evaluate(problem, [()])
+    losses = level_losses(curves, nothing.rest)
+    screened = np.array(
+        [min(losses[curves.levels(c)], default=np.inf) for c in range(_count(curves))]
+    )
+    singles = _singles(problem, curves, losses, screened)
+    sizes = [singles]
+    if most > 1 and _unexplained(problem, curves, null, singles[0], worth):
+        sizes.append(_pairs(problem, curves, nothing, singles))
+        best = sizes[1][0]
+        more = most > 2 and singles[0].loss - best.loss > worth
+        if more and _unexplained(problem, curves, null, best, worth):
+            sizes.append(_triples(problem, curves, sizes[1]))
+    return Search(nothing, tuple(sizes), screened)
+
+
+def _unexplained(
+    problem: Problem, curves: Curves, null: Null, point: Point, worth: float
+) -> bool:
+    """Whether a further effect may help: the rest has structure."""
+    if null.misfit(problem, point.rest)[0] < STRUCTURE:
+        return True
+    return point.loss - level_losses(curves, point.rest).min() > worth
+
+
+def _fitted(problem: Problem, starts: Sequence[Sequence[Term]]) -> list[Point]:
+    """Fits in the order of the starts, until they stop coming near the best."""
+    points: list[Point] = []
+    failures = 0
+    for start in starts:
+        points.append(fit.refine(problem, start))
+        best = min(point.loss for point in points)
+        failures = failures + 1 if points[-1].loss > best + HOPELESS else 0
+        if failures >= PATIENCE:
+            break
+    return points
+
+
+def _count(curves: Curves) -> int:
+    return len(curves.candidates)
+
+
+def level_losses(curves: Curves, rest: np.ndarray) -> np.ndarray:
+    """Loss if each level alone were added to the prediction, ``(L,)``."""
+    rows, rest = curves.signature, rest.astype(np.float32)
+    return np.concatenate(
+        [loss(rest - rows[at : at + CHUNK]) for at in range(0, len(rows), CHUNK)]
+        or [np.zeros(0)]
+    )
+
+
+def _starts(curves: Curves, losses: np.ndarray, candidate: int) -> list[Term]:
+    """The best level, and the best on another branch if it is nearly as good."""
+    mine = curves.levels(candidate)
+    order = mine[np.argsort(losses[mine])]
+    item = curves.candidates[candidate]
+    first = order[0]
+    made = [Term.at(item, int(curves.branch[first]), curves.magnitude[first])]
+    others = order[curves.branch[order] != curves.branch[first]]
+    if len(others) and losses[others[0]] < losses[first] + 0.2 * abs(losses[first]):
+        made.append(
+            Term.at(item, int(curves.branch[others[0]]), curves.magnitude[others[0]])
+        )
+    return made
+
+
+def _singles(
+    problem: Problem, curves: Curves, losses: np.ndarray, screened: np.ndarray
+) -> tuple[Point, ...]:
+    order = np.argsort(screened)
+    order = order[np.isfinite(screened[order])]
+    limit = screened[order[0]] + max(60.0, 0.15 * (screened.max() - screened.min()))
+    chosen = [c for place, c in enumerate(order) if place < NEAR or screened[c] < limit]
+    starts = [
+        [start]
+        for candidate in chosen[:SINGLES]
+        for start in _starts(curves, losses, candidate)
+    ]
+    return _unique(_fitted(problem, starts))
+
+
+def _pairs(
+    problem: Problem,
+    curves: Curves,
+    nothing: Point,
+    singles: Sequence[Point],
+) -> tuple[Point, ...]:
+    """The best pairs by superposed signatures, fitted in full."""
+    table, at = pair_losses(curves, nothing.rest, weights(singles[0].rest))
+    first, second = np.triu_indices(_count(curves), 1)
+    order = np.argsort(table[first, second])
+    added = _additions(curves, singles[0])[:2]
+    starts = [[*singles[0].terms, term] for term in added]
+    for a, b in zip(first[order[:PAIRS]], second[order[:PAIRS]], strict=True):
+        if np.isfinite(table[a, b]):
+            starts.append([_term(curves, level) for level in at[a, b]])
+    return _unique(_fitted(problem, starts))
+
+
+def _term(curves: Curves, level: int) -> Term:
+    item = curves.candidates[curves.owner[level]]
+    return Term.at(item, int(curves.branch[level]), curves.magnitude[level])
+
+
+def _additions(curves: Curves, point: Point) -> list[Term]:
+    """The best further effects, by their signatures alone."""
+    losses = level_losses(curves, point.rest)
+    found = []
+    for candidate, item in enumerate(curves.candidates):
+        mine = curves.levels(candidate)
+        if item.name not in point.names and len(mine):
+            found.append(mine[losses[mine].argmin()])
+    found.sort(key=lambda level: losses[level])
+    return [_term(curves, level) for level in found]
+
+
+def _triples(
+    problem: Problem, curves: Curves, pairs: Sequence[Point]
+) -> tuple[Point, ...]:
+    points = [
+        fit.refine(problem, [*pair.terms, added])
+        for pair in pairs[:2]
+        for added in _additions(curves, pair)[: TRIPLES // 2]
+    ]
+    return _unique(points)
+
+
+def _unique(points: Sequence[Point]) -> tuple[Point, ...]:
+    best: dict[frozenset, Point] = {}
+    for point in sorted(points, key=lambda point: point.loss):
+        if len(set(point.names)) == len(point.names):
+            best.setdefault(frozenset(point.names), point)
+    return tuple(best.values())
+
+
+def pair_losses(
+    curves: Curves, rest: np.ndarray, weight: np.ndarray
+) -> tuple[np.ndarray, dict[tuple[int, int], tuple[int, int]]]:
+    """Smallest weighted square of the rest under any two levels.
+
+    Args:
+        curves: signatures.
+        rest: whitened, ``(N,)``.
+        weight: square roots of weights, ``(N,)``.
+
+    Returns:
+        ``(C, C)`` by pair of candidates, infinite on the diagonal; and their levels.
+    """
+    rows = curves.signature * weight.astype(np.float32)
+    left = (rest * weight).astype(np.float32)
+    own = (rows * rows).sum(axis=1) - 2 * rows @ left
+    table = 2 * rows @ rows.T + own[:, None] + own[None, :]
+    count = _count(curves)
+    spans = [curves.levels(c) for c in range(count)]
+    losses, at = np.full((count, count), np.inf), {}
+    for a in range(count):
+        if not len(spans[a]):
+            continue
+        band = table[spans[a][0] : spans[a][-1] + 1]
+        for b in range(a + 1, count):
+            if len(spans[b]):
+                piece = band[:, spans[b][0] : spans[b][-1] + 1]
+                row, column = np.unravel_index(piece.argmin(), piece.shape)
+                losses[a, b] = float(left @ left) + piece[row, column]
+                at[a, b] = int(spans[a][row]), int(spans[b][column])
+    return losses, at
+
+
+def held_out(
+    problem: Problem, point: Point, *, folds: int = 5
+) -> tuple[float, np.ndarray]:
+    """Loss on trials that the magnitudes were not fitted to.
+
+    The magnitudes are fitted again without each group of trials, along the slopes of
+    the fit on all.
+
+    Returns:
+        summed loss; loss by trial, ``(n_trials,)``.
+    """
+    rows = problem.whiten.rows
+    by_trial = np.zeros(len(rows))
+    groups = [range(k, len(rows), folds) for k in range(min(folds, len(rows)))]
+    for group in groups:
+        change = np.zeros(len(point.slopes))
+        kept = np.ones(len(point.rest), dtype=bool)
+        for number in group:
+            kept[rows[number]] = False
+        if len(point.slopes) and kept.any():
+            weight = weights(point.rest[kept])
+            slopes = point.slopes[:, kept] * weight
+            change = np.linalg.lstsq(slopes.T, point.rest[kept] * weight, rcond=1e-8)[0]
+        rest = point.rest - change @ point.slopes
+        for number in group:
+            by_trial[number] = loss(rest[rows[number]])
+    return float(by_trial.sum()), by_trial
+
+
+def evidence(point: Point) -> float:
+    """Minus twice the log marginal likelihood, by Laplace, up to a constant.
+
+    The prior of each magnitude is even over its range.
+    """
+    if not point.terms:
+        return point.loss
+    value = point.loss
+    at = 0
+    for term in point.terms:
+        item = term.candidate
+        curvature = float((point.slopes[at] ** 2).sum()) if len(point.slopes) else 0.0
+        width = item.high - item.low
+        if not integer(item) and curvature > 0:
+            value += max(np.log(curvature * width**2 / (2 * np.pi)), 0.0)
+        else:
+            value += 2 * np.log(max(width, 2.0))
+        at += 1 + len(term.extras)
+    return float(value)
