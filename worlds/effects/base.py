@@ -14,120 +14,29 @@ One effect, one file in this directory; `registry` finds it by its `name`.
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from bns.errors import BnsError, OutOfBoundsError, UnknownNameError
+from bns.errors import BnsError, UnknownNameError
+from bns.worlds.effects.parameter import Choice, Parameter
+from bns.worlds.effects.signals import ControlSignal, PoseSignal
+
+__all__ = [
+    "ActuatorEffect",
+    "BodyEffect",
+    "Choice",
+    "CommandEffect",
+    "ControlSignal",
+    "Effect",
+    "Parameter",
+    "PoseSignal",
+    "SensorEffect",
+    "ServoEffect",
+    "TrackingEffect",
+]
 
 STAGES = ("command", "actuator", "body", "sensor", "tracking")
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A number that says how strong an effect is.
-
-    Attributes:
-        name: as written in text (`factor`).
-        unit: SI unit, "1" for a ratio.
-        nominal: the value at which the effect changes nothing (given the others).
-        low, high: bounds, inclusive.
-        doc: meaning in one line, with the source of the bounds or "assumed".
-        example: a value that makes the effect clearly felt (used by contract tests
-            and listings).
-        integer: whether only whole numbers make sense.
-        scales: whether severity scales it; False for what is no strength but a place
-            or kind (a position, a direction), which stays as given.
-    """
-
-    name: str
-    unit: str
-    nominal: float
-    low: float
-    high: float
-    doc: str
-    example: float
-    integer: bool = False
-    scales: bool = True
-
-    def check(self, effect: str, value: object) -> float:
-        """The value as a float inside the bounds.
-
-        Raises:
-            OutOfBoundsError: not a number, not finite, or outside the bounds.
-        """
-        try:
-            number = float(value)  # type: ignore[arg-type]
-        except (TypeError, ValueError):
-            number = float("nan")
-        whole = not self.integer or number == np.floor(number)
-        if not (np.isfinite(number) and self.low <= number <= self.high and whole):
-            unit = f"{self.unit}, whole numbers only" if self.integer else self.unit
-            raise OutOfBoundsError(
-                f"{effect}:{self.name}", value, self.low, self.high, unit
-            )
-        return number
-
-
-@dataclass(frozen=True)
-class Choice:
-    """A setting with named alternatives (`wheel` = left, right, both)."""
-
-    name: str
-    options: tuple[str, ...]
-    default: str
-    doc: str
-
-    def check(self, effect: str, value: object) -> str:
-        """The value, one of the options.
-
-        Raises:
-            UnknownNameError: it is none of them.
-        """
-        if value not in self.options:
-            raise UnknownNameError(f"{effect}:{self.name}", str(value), self.options)
-        return str(value)
-
-
-@dataclass(frozen=True, eq=False)
-class ControlSignal:
-    """What reaches a robot's actuators during one trial, on the physics grid.
-
-    Attributes:
-        times: start of each physics step [s], shape ``(S,)``.
-        values: command in force at each step, shape ``(S, C)``, SI units.
-        command: index of that command in the list, shape ``(S,)``; -1 after the last.
-        channels: names of the C columns.
-        dt: physics step [s].
-    """
-
-    times: np.ndarray
-    values: np.ndarray
-    command: np.ndarray
-    channels: tuple[str, ...]
-    dt: float
-
-    def column(self, name: str) -> int:
-        """Column index of a channel."""
-        return self.channels.index(name)
-
-
-@dataclass(frozen=True, eq=False)
-class PoseSignal:
-    """What the tracker sees during one trial: samples on the observation grid.
-
-    Attributes:
-        times: time stamps [s], shape ``(T,)``.
-        poses: planar poses in the world frame, shape ``(T, 3)``; NaN = lost.
-        fine_times: the physics grid [s], shape ``(S + 1,)``, for delays.
-        fine_poses: true poses on it, shape ``(S + 1, 3)``.
-    """
-
-    times: np.ndarray
-    poses: np.ndarray
-    fine_times: np.ndarray
-    fine_poses: np.ndarray
 
 
 class Effect(ABC):
