@@ -117,9 +117,7 @@ def forward(
     if not fused:
         return w2 @ hidden_layer(shape, theta, inputs) + b2
     active = fused_hidden_layer(shape, theta, inputs)
-    heads = [
-        (active * w2[:, :, head, :, None]).sum(2) for head in range(shape.outputs)
-    ]
+    heads = [(active * w2[:, :, head, :, None]).sum(2) for head in range(shape.outputs)]
     return torch.stack(heads, dim=2) + b2
 
 
