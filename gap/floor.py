@@ -47,7 +47,11 @@ def estimate(
         trials: the recording.
         predicted: nominal prediction of each trial.
     """
-    sigma = np.maximum(_measurement(trials, predicted), model.resolution)
+    units = np.array([channel.unit for channel in model.channels])
+    sigma = _measurement(trials, predicted)
+    for unit in set(units):  # channels of one unit come from one instrument
+        sigma[units == unit] = np.sqrt((sigma[units == unit] ** 2).mean())
+    sigma = np.maximum(sigma, model.resolution)
     groups = _repeats(trials)
     if not groups:
         return Floor(sigma, np.asarray(model.process), "state reset", 0)

@@ -1,0 +1,186 @@
+"""Scores of the withheld-effect bench, from the rows that its runner writes."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise, permutations
+from typing import Any
+
+import numpy as np
+
+from bns.gap import baselines, fit, select, signatures
+from bns.gap.cases import Case, record
+from bns.gap.model import GapModel
+from bns.gap.problem import Problem
+from bns.gap.quantify import edit_error
+from bns.gap.records import Diagnosis
+from bns.worlds.effects import registry
+
+LARGE = 3.0  # sizes from which effects have to be named
+
+
+def said(found: Diagnosis, case: Case, model: GapModel) -> dict[str, Any]:
+    """What a diagnosis said of a case, the oracle and the baselines, as plain data."""
+    answer = case.answer
+    candidates = model.candidates()
+    problem = Problem.of(case.trials, model, candidates=candidates)
+    row = {
+        "verdict": found.verdict.kind,
+        "named": found.verdict.named,
+        "sets": found.verdict.sets,
+        "p_gap": found.verdict.p_gap,
+        "p_misfit": found.verdict.p_misfit,
+        "excess": found.signatures["misfit_excess"],
+        "explained": found.signatures["explained"],
+        "ranked": found.signatures["ranked"],
+        "faults": found.faults,
+        "closed": found.closed.get("closed"),
+        "before": found.closed.get("before"),
+        "after": found.closed.get("after"),
+        "best": found.signatures["best"],
+        "loss": {"+".join(fit.names): fit.loss for fit in found.fits},
+        "intervals": [
+            (fit.names, fit.magnitudes, fit.intervals)
+            for fit in found.fits
+            if set(fit.names) == set(answer.names)
+        ],
+        "seconds": found.seconds,
+    }
+    if answer.kind in ("single", "pair"):
+        row["oracle"] = _oracle(problem, case, candidates)
+    if answer.kind == "pair" and found.verdict.named:
+        row["edit"] = _edit(found, case, model)
+    if answer.kind in ("single", "none"):
+        curves = signatures.trace(problem, candidates)
+        row["baselines"] = baselines.name(problem, curves)
+    return row
+
+
+def _oracle(problem: Problem, case: Case, candidates) -> float:
+    by_name = {item.name: item for item in candidates}
+    terms = []
+    for name, text, magnitude in zip(
+        case.answer.names, case.answer.effects, case.answer.magnitudes, strict=True
+    ):
+        item, values = by_name[name], registry.parse(text).values
+        term = fit.Term.at(item, _branch(item, values), magnitude)
+        extras = tuple(float(values[extra]) for extra in item.extras)
+        terms.append(replace(term, extras=extras))
+    held_out = select.held_out(problem, fit.refine(problem, terms))[0]
+    return held_out / len(problem.rest)
+
+
+def _branch(item, values) -> int:
+    for number, branch in enumerate(item.branches):
+        if all(values[k] == v for k, v in branch.items() if isinstance(v, str)):
+            return number
+    return 0
+
+
+def _edit(found: Diagnosis, case: Case, model: GapModel) -> dict[str, float]:
+    """Take the first true effect away; predict a recording with the second alone."""
+    first, second = (registry.parse(text) for text in case.answer.effects)
+    alone = record(case.commands, [*case.reality, second], 7, model.name)
+    effects = [registry.parse(text) for text in found.best.effects]
+    ours = edit_error(alone, model, effects, first.name)["edited"]
+    oracle = edit_error(alone, model, [first, second], first.name)["edited"]
+    return {"ours": ours, "oracle": oracle}
+
+
+def matches(names: Sequence[str], answer: dict[str, Any]) -> bool:
+    """Whether a support is the true one, effects that look alike merged."""
+    classes = answer["aliases"]
+    if len(names) != len(classes):
+        return False
+    return any(
+        all(name in row for name, row in zip(order, classes, strict=True))
+        for order in permutations(names)
+    )
+
+
+def merged(row: dict[str, Any]) -> int:
+    """Size of the 90 % set with the true effect's aliases counted as one."""
+    sets = row["said"]["sets"]
+    right = sum(matches(names, row["answer"]) for names in sets)
+    return len(sets) - max(right - 1, 0)
+
+
+def size(row: dict[str, Any]) -> float:
+    """Size of the smallest hidden effect over what is detected."""
+    return min(row["answer"]["sizes"], default=0.0)
+
+
+def of(rows: Sequence[dict], kind: str, smallest: float = 0.0) -> list[dict]:
+    """Rows of a kind whose effects are at least this large, errors left out."""
+    return [
+        row
+        for row in rows
+        if row["kind"] == kind
+        and size(row) >= smallest
+        and ("verdict" in row["said"] or kind == "fault")
+    ]
+
+
+def share(rows: Sequence[dict], holds) -> float:
+    """Share of rows for which something holds; NaN if there are none."""
+    return float(np.mean([bool(holds(row)) for row in rows])) if rows else float("nan")
+
+
+def right(row: dict[str, Any]) -> bool:
+    """Whether the first support that was named is the true one (aliases merged)."""
+    named = row["said"]["named"]
+    return bool(named) and matches(named[0], row["answer"])
+
+
+def strict(row: dict[str, Any]) -> bool:
+    """Whether the first support named is the true one, aliases not merged."""
+    named = row["said"]["named"]
+    return bool(named) and sorted(named[0]) == sorted(row["answer"]["names"])
+
+
+def covered(row: dict[str, Any]) -> bool:
+    """Whether the true support is in the set."""
+    names = sorted(row["answer"]["names"])
+    return any(sorted(found) == names for found in row["said"]["sets"])
+
+
+def confident_wrong(row: dict[str, Any]) -> bool:
+    """Whether one support was named alone and it is not exactly the true one."""
+    return row["said"]["verdict"] in ("effect", "together") and not strict(row)
+
+
+def aliased(row: dict[str, Any]) -> bool:
+    """Whether the recording cannot tell the true effect from another."""
+    return any(len(names) > 1 for names in row["answer"]["aliases"])
+
+
+def confusion(rows: Sequence[dict]) -> dict[str, int]:
+    """Counts of "true effect -> named effect", effects without their sides."""
+    counts: Counter[str] = Counter()
+    for row in rows:
+        named = row["said"]["named"]
+        first = "+".join(named[0]) if named else row["said"]["verdict"]
+        counts[f"{'+'.join(row['answer']['names']) or row['kind']} -> {first}"] += 1
+    return dict(counts.most_common())
+
+
+def failures(rows: Sequence[dict], holds) -> list[str]:
+    """One line per row for which something does not hold."""
+    return [
+        f"{row['kind']} {row['seed']}: {', '.join(row['answer']['effects'])} "
+        f"(size {size(row):.2f}) -> {row['said']['verdict']} {row['said']['named']}"
+        for row in rows
+        if not holds(row)
+    ]
+
+
+def by_size(rows: Sequence[dict]) -> list[dict[str, float]]:
+    """Accuracy and abstention by size of the effect."""
+    edges = [0.0, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0, np.inf]
+    made = []
+    for low, high in pairwise(edges):
+        part = [row for row in rows if low <= size(row) < high]
+        silent = share(part, lambda row: not row["said"]["named"])
+        named = share(part, right)
+        made.append({"from": low, "n": len(part), "named": named, "silent": silent})
+    return made
