@@ -4,11 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import t as student
 
 from bns.gap.records import Candidate, Verdict
 from bns.gap.servo_score import Scores
 
 LEVEL = 0.03  # chance of a false alarm that is accepted
+LEAST = 1e-6  # below it a statistic is zero
 COVERAGE = 0.90  # of the sets
 EXCESS = (
     3.0  # times what the worst setting without a change leaves: none of the library
@@ -46,8 +48,15 @@ class Null:
         return Null(names, self.statistics[keep], self.left[keep])
 
     def chance(self, statistic: float) -> float:
-        """Probability of so large a statistic where nothing changed."""
-        return float((1 + (self.statistics >= statistic).sum()) / (1 + len(self.cells)))
+        """Probability of so large a statistic where nothing changed.
+
+        Statistics are positive and skewed: their logarithms are taken as normal, of a
+        mean and variance that are known from N settings only (Student's t).
+        """
+        logs = np.log(np.maximum(self.statistics, LEAST))
+        spread = logs.std(ddof=1) * np.sqrt(1 + 1 / len(logs))
+        away = np.log(max(statistic, LEAST)) - logs.mean()
+        return float(student.sf(away / max(spread, LEAST), len(logs) - 1))
 
     @property
     def slack(self) -> float:
@@ -68,7 +77,6 @@ def verdict(scores: Scores, null: Null, candidates: Mapping[str, Candidate]) -> 
     ranked = scores.ranked
     best = ranked[0]
     inside = [name for name in ranked if scores.worse(name) <= null.slack]
-    inside += [a for a in candidates[best].aliases if a in ranked and a not in inside]
     left = scores.costs[best] / scores.size
     p_misfit = float((1 + (null.left >= left).sum()) / (1 + len(null.left)))
     second = next((n for n in ranked if n not in _class(best, candidates)), best)
@@ -78,7 +86,8 @@ def verdict(scores: Scores, null: Null, candidates: Mapping[str, Candidate]) -> 
         "second": (second,),
         "margin": scores.worse(second),
     }
-    if p_gap > max(LEVEL, 1.0 / (1 + len(null.cells))):
+    most = EXCESS * null.left.max()
+    if p_gap > LEVEL and scores.nothing / scores.size <= most:
         return Verdict(
             kind="no gap",
             named=(),
@@ -89,7 +98,7 @@ def verdict(scores: Scores, null: Null, candidates: Mapping[str, Candidate]) -> 
             change=_excite(inside, candidates),
             **common,
         )
-    if left > EXCESS * null.left.max():
+    if left > most:
         return Verdict(
             kind="none of the library",
             named=(),

@@ -15,6 +15,7 @@ from bns.worlds.trial import (
     Trial,
 )
 
+ANGLE = "angle"  # of a joint that is observed where there is no pose
 UNITS = {channel.name: channel.unit for channel in (*POSE_CHANNELS, *WHEEL_CHANNELS)}
 RESERVED = ("replicate", "trial", "time", "first", "last", "duration")
 
@@ -66,7 +67,10 @@ def valid(trial: Trial, where: str) -> None:
         raise FormatError(
             f"{where}: time goes backwards at sample {row}; sort the samples by time."
         )
-    lost = np.isnan(trial.poses_world).all(axis=1)
+    names = [channel.name for channel in trial.channels]
+    lost = np.zeros(len(trial.times), bool)
+    if POSE[0] in names:
+        lost = np.isnan(trial.poses_world).all(axis=1)
     wrong = ~np.isfinite(trial.observed) & ~lost[:, None]
     if wrong.any() or np.isinf(trial.observed).any():
         row, column = np.argwhere(wrong | np.isinf(trial.observed))[0]
@@ -102,14 +106,14 @@ def channel_units(channels: Sequence[Channel], where: str) -> None:
 
 
 def missing_pose(channels: Sequence[Channel], where: str) -> None:
-    """Stop if a channel of the pose is missing.
+    """Stop if a part of the pose is missing; a servo on a stand has no pose at all.
 
     Raises:
-        FormatError: there is none of x, y or yaw.
+        FormatError: some of x, y and yaw are there and some not, and no angle either.
     """
     names = [name for name, _ in channels]
     missing = [name for name in POSE if name not in names]
-    if missing:
+    if missing and not (len(missing) == len(POSE) and ANGLE in names):
         raise FormatError(
             f"{where}: {', '.join(missing)} missing; there are {', '.join(names)}."
         )

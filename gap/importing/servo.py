@@ -28,6 +28,8 @@ def despiked(angle: np.ndarray) -> tuple[np.ndarray, int]:
     good neighbours.
     """
     angle = np.asarray(angle, dtype=np.float64)
+    if not len(angle):
+        return angle, 0
     near = np.lib.stride_tricks.sliding_window_view(np.pad(angle, 3, mode="edge"), 7)
     wrong = np.abs(angle - np.median(near, axis=1)) > SPIKE
     if not wrong.any() or wrong.all():

@@ -73,8 +73,14 @@ def _trial(file: Path) -> Trial:
             key: np.array([float(entry[name]) for entry in content["entries"]])
             for key, name in ENTRIES.items()
         }
+        if len(columns["time"]) < 2:
+            raise FormatError(
+                f"{file} has {len(columns['time'])} samples, 2 are needed."
+            )
         mass, lever = float(about["mass"]), float(about["length"])
         gain, told = float(about["kp"]), float(about["vin"])
+    except FormatError:
+        raise
     except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
         raise FormatError(f"{file} is no run of an XL330 ({error!r}).") from None
     columns["current"] = servo.signed(columns["current"]) * 1e-3

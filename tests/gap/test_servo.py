@@ -1,0 +1,153 @@
+"""Servo diagnosis against planted answers, on runs that the law itself made."""
+
+import numpy as np
+import pytest
+
+from bns.errors import BnsError
+from bns.gap import servo, servo_nominal
+from bns.gap.servo_candidates import candidates, columns
+from bns.gap.servo_nominal import Nominal
+from bns.gap.servo_runs import Runs, cells, merged, runs
+from bns.models import servo_pendulum
+from bns.worlds.effects import registry
+from bns.worlds.servo_law import law
+from bns.worlds.servo_physics import Drive, simulate
+from bns.worlds.trial import Channel, Commands, Trial
+
+NAMES = ("servo_payload", "servo_lever", "servo_gain", "servo_voltage", "servo_delay")
+CELLS = [(m, a, k) for m in (0.4, 0.7) for a in (0.1, 0.15) for k in (6.0, 16.0)]
+SECONDS, DT = 3.0, 0.005
+NOMINAL = Nominal({**servo_pendulum.law(), "stribeck": 0.0}, 0.0)
+REALITY = {"coulomb": 0.13, "viscous": 0.05, "load_friction": 0.12}
+"""the nominal law is wrong where the truth has these, in every run"""
+
+
+def recorded(settings, effect: str = "", seed: int = 0, rate=0.15) -> Runs:
+    """Runs of each setting: a sweep, and a lift with a fall, with noise."""
+    rng = np.random.default_rng(seed)
+    times = np.arange(round(SECONDS / DT)) * DT
+    sweep = 1.2 * np.sin(2 * np.pi * rate * times**1.6)
+    lift = np.minimum(times, 1.4) * 1.1
+    goals = np.tile(np.stack([sweep, lift]), (len(settings), 1))
+    on = np.tile(np.stack([0 * times + 1, times < 1.6]), (len(settings), 1)) > 0.5
+    rows = np.repeat(np.array(settings), 2, axis=0)
+    still = np.zeros(len(rows))
+    told = dict(zip(("mass", "lever", "gain"), rows.T, strict=True))
+    drive = Drive(goals, still, still, on, DT, round(0.01 / DT))
+    numbers = {k: v[:, None] for k, v in told.items()}
+    truth = law({**NOMINAL.values, **REALITY, **numbers})
+    sets = [[registry.parse(effect)] if effect else []]
+    angles = simulate(columns(truth, sets), drive)[:, 0]
+    angles = angles + rng.normal(0, 1e-3, angles.shape)
+    kinds = ("sweep", "lift") * len(settings)
+    return Runs(drive, angles, told, {"trajectory": kinds})
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return servo.learn(recorded(CELLS), NOMINAL, candidates=candidates(NAMES))
+
+
+@pytest.mark.parametrize(
+    "effect, name, magnitude",
+    [
+        ("servo_payload:mass=0.25", "servo_payload", 0.25),
+        ("servo_lever:factor=0.7", "servo_lever", 0.7),
+        ("servo_delay:delay=0.05", "servo_delay", 0.05),
+    ],
+)
+def test_a_planted_effect_is_named_and_measured(reference, effect, name, magnitude):
+    runs = recorded([(0.55, 0.12, 10.0)], effect, seed=1)
+    found, scores = servo.diagnose(runs, reference)
+    assert found.kind in ("effect", "either") and found.named[0] == (name,)
+    assert len(found.named) <= 2  # payload and lever may be tied, nothing else
+    assert scores.magnitudes[name] == pytest.approx(magnitude, rel=0.1)
+    assert name in found.sentence and found.p_gap < 0.03
+
+
+def test_gain_and_voltage_come_out_as_a_set(reference):
+    runs = recorded([(0.55, 0.12, 16.0)], "servo_gain:factor=0.8", seed=2)
+    found, scores = servo.diagnose(runs, reference)
+    assert found.kind == "either"
+    assert {name for (name,) in found.named} == {"servo_gain", "servo_voltage"}
+    assert found.angle < 5 and found.change
+    assert scores.magnitudes["servo_gain"] == pytest.approx(0.8, rel=0.05)
+    assert found.second[0] not in ("servo_gain", "servo_voltage")
+
+
+def test_a_drive_that_saturates_tells_gain_from_voltage(reference):
+    runs = recorded([(0.55, 0.12, 10.0)], "servo_gain:factor=0.6", seed=2, rate=0.35)
+    found, _ = servo.diagnose(runs, reference)
+    assert found.kind == "effect" and found.named == (("servo_gain",),)
+
+
+def test_nothing_is_nothing_though_the_nominal_is_wrong(reference):
+    for seed in range(3):
+        found, _ = servo.diagnose(recorded([(0.55, 0.12, 10.0)], seed=seed), reference)
+        assert found.kind == "no gap" and found.named == ()
+        assert () in found.sets
+
+
+def test_an_effect_outside_the_library_is_none_of_it(reference):
+    runs = recorded([(0.55, 0.12, 10.0)], "servo_offset:angle=0.3", seed=3)
+    found, _ = servo.diagnose(runs, reference)
+    assert found.kind == "none of the library"
+
+
+def test_repeats_are_merged_and_settings_kept_apart():
+    once = recorded(CELLS[:2], seed=4)
+    thrice = once.take(np.repeat(np.arange(4), 3))
+    both = merged(thrice)
+    assert len(both) == 4 and cells(both) == cells(once)
+    np.testing.assert_allclose(both.angles, once.angles)
+    one = once.retold(mass=2.0)
+    assert set(one.told["mass"]) == {2.0} and (one.angles == once.angles).all()
+
+
+def test_a_fit_recovers_the_law():
+    runs = recorded([(0.4, 0.1, 6.0), (0.7, 0.15, 16.0)])
+    free = ("coulomb", "viscous", "load_friction")
+    found = servo_nominal.fit(runs, free=free)
+    for name in free:
+        assert found.values[name] == pytest.approx(REALITY[name], abs=0.02)
+    assert found.error < 2e-3 and not found.at_bound
+    before = Nominal(NOMINAL.values, 0.0).predict(runs)
+    assert found.error < 0.2 * np.abs(before - runs.angles).mean()
+
+
+def test_trials_are_resampled_on_the_grid():
+    times = np.cumsum(np.r_[0.0, np.tile([0.009, 0.011], 60)])
+    goals = np.arange(len(times)) * 0.01
+    told = Commands(
+        np.stack([goals, 0 * goals + 1], axis=1)[:-1],
+        np.diff(times),
+        (Channel("goal", "rad"), Channel("torque_on", "1")),
+    )
+    trial = Trial(
+        told,
+        times,
+        (2 * times)[:, None],
+        np.arange(len(times)),
+        channels=(Channel("angle", "rad"),),
+        conditions={"mass": 0.5, "lever": 0.1, "gain": 8, "trajectory": "ramp"},
+    )
+    made = runs([trial], seconds=1.0)
+    np.testing.assert_allclose(made.angles[0], 2 * np.arange(101) * 0.01, atol=1e-12)
+    assert made.drive.speed[0] == pytest.approx(2.0)
+    assert made.drive.goals[0, 4] == 0.0 and made.drive.goals[0, 5] == 0.01
+    assert made.drive.torque_on is None and made.labels["trajectory"] == ("ramp",)
+    with pytest.raises(BnsError, match=r"lasts 1\.20 s"):
+        runs([trial], seconds=2.0)
+
+
+def test_too_little_is_refused(reference):
+    with pytest.raises(BnsError, match="five settings"):
+        servo.learn(recorded(CELLS[:4]), NOMINAL)
+    with pytest.raises(BnsError, match="told 2 settings"):
+        servo.diagnose(recorded(CELLS[:2]), reference)
+    with pytest.raises(BnsError, match="do not fix"):
+        servo_nominal.fit(recorded(CELLS[:1]).take(np.zeros(0, int)))
+    odd = recorded(CELLS[:1])
+    odd = Runs(odd.drive, odd.angles, odd.told, {"trajectory": ("sweep", "jump")})
+    with pytest.raises(BnsError, match="trajectory 'jump'"):
+        servo.diagnose(odd, reference)
