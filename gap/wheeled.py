@@ -121,8 +121,8 @@ class WheeledModel:
         made = {}
         for (body, _), members in groups.items():
             poses = self._reduced(body).poses(np.stack([told for _, told in members]))
-            for (key, _), pose in zip(members, poses[:, ::EVERY], strict=True):
-                made[key] = pose.copy()
+            for (key, _), pose in zip(members, poses, strict=True):
+                made[key] = _thinned(pose)
         place = compile.free_joint(compile.compiled(self.name).model)
         free = slice(1 + place.start, 1 + place.stop)
         rolled = [motion.states[:, free] for motion in self._pool.map(jobs)]
@@ -131,7 +131,7 @@ class WheeledModel:
                 observe.planar(rolled[number], piece.yaw)[piece.lead :]
                 for number, piece in parts
             ]
-            made[key] = stitched(poses)[::EVERY].copy()
+            made[key] = _thinned(stitched(poses))
         self._cache.update(made)
         while len(self._cache) > KEPT:
             self._cache.popitem(last=False)
@@ -216,6 +216,17 @@ class WheeledModel:
             "y": pose[:, 1],
             "time in the trial": at,
         }
+
+
+def _thinned(poses: np.ndarray) -> np.ndarray:
+    """Every `EVERY`-th pose; the last interval is made whole by going on straight."""
+    missing = -(len(poses) - 1) % EVERY
+    if missing:
+        beyond = poses[-1] + np.arange(1, missing + 1)[:, None] * (
+            poses[-1] - poses[-2]
+        )
+        poses = np.concatenate([poses, beyond])
+    return poses[::EVERY].copy()
 
 
 def _absolute(effects: Sequence[Effect]) -> bool:

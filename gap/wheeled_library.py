@@ -16,19 +16,37 @@ TURNS = "turns in place and arcs"
 
 # effect, parameter, grid, low, high, per wheel?, further settings. Grids span the
 # effect's range, denser near the nominal; bounds narrower than the effect's own are
-# where a fit would stop to make sense for this robot (assumed).
+# where a fit would stop to make sense for this robot (assumed). Slack is how well the
+# nominal model is believed to be known (assumed: half of what published figures differ
+# by, 10 g, 1 ms); "both_slack" belongs to both wheels together.
 _TABLE = (
     ("axle_length", "factor", FACTORS, 0.7, 1.3, False, {"slack": 0.005}),
     ("battery_sag", "per_second", (0.002, 0.01, 0.04, 0.15), 0, 0.2, False, {}),
     ("battery_sag", "per_metre", (0.02, 0.1, 0.4, 2.0), 0, 2, False, {}),
-    ("centre_of_mass", "dx", (-0.02, -0.01, 0.01, 0.02), -0.02, 0.03, False, {}),
+    (
+        "centre_of_mass",
+        "dx",
+        (-0.02, -0.01, 0.01, 0.02),
+        -0.02,
+        0.03,
+        False,
+        {"slack": 5e-4},
+    ),
     ("centre_of_mass", "dy", (-0.025, -0.01, 0.01, 0.025), -0.03, 0.03, False, {}),
     ("clock_drift", "rate", (-0.1, -0.02, 0.02, 0.1), -0.1, 0.1, False, {}),
     ("command_latency", "delay", (0.05, 0.1, 0.2, 0.4, 0.8), 0, 1, False, {}),
     ("dead_band", "speed", (0.01, 0.02, 0.04, 0.06, 0.09, 0.13), 0, 0.2, True, {}),
     ("floor_friction", "factor", (0.01, 0.03, 0.1, 0.3), 0.01, 3, False, {}),
-    ("motor_lag", "time_constant", (0.03, 0.1, 0.3, 0.8), 0, 2, True, {}),
-    ("payload", "mass", (0.2, 0.7, 2.0), 0, 2, False, {}),
+    (
+        "motor_lag",
+        "time_constant",
+        (0.03, 0.1, 0.3, 0.8),
+        0,
+        2,
+        True,
+        {"both_slack": 1e-3},
+    ),
+    ("payload", "mass", (0.2, 0.7, 2.0), 0, 2, False, {"slack": 0.01}),
     ("rolling_drag", "torque", (0.0005, 0.002, 0.005, 0.012), 0, 0.03, True, {}),
     ("rolling_drag", "viscous", (5e-5, 2e-4, 1e-3, 5e-3), 0, 0.01, True, {}),
     (
@@ -100,7 +118,7 @@ def _rows(
     stem = f"{effect}.{parameter}" if several else effect
     for side in SIDES if sided else ("",):
         settings = {"nominal": about.nominal, **more}
-        slack = settings.pop("slack", 0.0)
+        slack, shared = settings.pop("slack", 0.0), settings.pop("both_slack", 0.0)
         yield Candidate(
             name=f"{stem}[{side}]" if side else stem,
             effect=effect,
@@ -110,7 +128,7 @@ def _rows(
             high=high,
             grid=grid,
             fixed={"wheel": side} if side else {},
-            slack=slack if side in ("", "left", "right") else 0.0,
+            slack=shared if side == "both" else slack,
             excite=EXCITE.get(effect, "any drive"),
             **settings,
         )

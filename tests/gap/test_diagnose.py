@@ -1,0 +1,205 @@
+"""Known answers: planted effects are named, nothing is "no gap", aliases are sets."""
+
+import numpy as np
+import pytest
+
+from bns.errors import BnsError, FormatError
+from bns.gap import check, pieces, verdict
+from bns.gap.cases import commands
+from bns.gap.diagnose import diagnose
+from bns.gap.records import Candidate, Diagnosis
+from bns.gap.reduced import reduced
+from bns.gap.wheeled import WheeledModel
+from bns.worlds.effects import registry
+from bns.worlds.effects.base import CommandEffect, Parameter
+from bns.worlds.mujoco_world import MujocoWorld
+from bns.worlds.trial import Channel, body_displacements
+
+NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.01"
+KEPT = (
+    "axle_length",
+    "command_latency",
+    "dead_band[left]",
+    "motor_lag[both]",
+    "tracker_latency",
+    "tracker_scale",
+    "wheel_gain[left]",
+    "wheel_gain[both]",
+)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return WheeledModel(threads=1)
+
+
+@pytest.fixture(scope="module")
+def told():
+    return commands(np.random.default_rng(3), 4)
+
+
+@pytest.fixture(scope="module")
+def find(model, told):
+    few = tuple(item for item in model.candidates() if item.name in KEPT)
+
+    def run(*effects, full=False):
+        world = MujocoWorld(reality=[*effects, NOISE], threads=1)
+        trials = world.run(told, seeds=range(len(told)))
+        return diagnose(trials, model, candidates=few, full=full)
+
+    return run
+
+
+def test_nothing_planted_is_no_gap(find):
+    found = find()
+    assert found.verdict.kind == "no gap"
+    assert found.verdict.named == ()
+    assert found.verdict.p_gap > 0.02
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "value", "tolerance"),
+    [
+        ("wheel_gain:wheel=left,factor=0.85", "wheel_gain[left]", 0.85, 0.01),
+        ("dead_band:wheel=left,speed=0.04", "dead_band[left]", 0.04, 0.02),
+        ("motor_lag:time_constant=0.15", "motor_lag[both]", 0.15, 0.01),
+    ],
+)
+def test_one_effect_is_named_with_its_value(find, text, name, value, tolerance):
+    found = find(text)
+    assert found.verdict.kind == "effect"
+    assert found.verdict.named == ((name,),)
+    assert found.best.magnitudes[0] == pytest.approx(value, abs=tolerance)
+    assert name in found.verdict.sentence
+
+
+def test_an_alias_is_never_a_single_name(find):
+    found = find("command_latency:delay=0.12")
+    assert found.verdict.kind == "either"
+    named = {names for names in found.verdict.named}
+    assert {("command_latency",), ("tracker_latency",)} <= named
+    assert found.verdict.angle < 5
+    assert "steps in speed" in found.verdict.change
+
+
+def test_two_effects_together(find):
+    found = find("wheel_gain:wheel=left,factor=0.85", "motor_lag:time_constant=0.15")
+    assert found.verdict.kind == "together"
+    assert set(found.verdict.named[0]) == {"wheel_gain[left]", "motor_lag[both]"}
+
+
+class Ripple(CommandEffect):
+    name = "test_ripple"
+    doc = "speed swings with the angle of the wheel"
+    parameters = (Parameter("size", "1", 0.0, 0.0, 1.0, "assumed", 0.4),)
+
+    def apply(self, signal, active, rng):
+        values = signal.values.copy()
+        angle = np.cumsum(values[:, 0]) * signal.dt / 0.02
+        values[:, 0] *= 1 + self["size"] * np.sin(angle)
+        return values
+
+
+def test_an_effect_outside_the_library_is_none_of_it(find):
+    found = find(Ripple({"size": 0.5}))
+    assert found.verdict.kind == "none of the library"
+    assert found.verdict.named == ()
+    assert found.verdict.p_misfit < 0.01
+
+
+def test_where_and_how_far(find):
+    found = find("dead_band:wheel=left,speed=0.05", full=True)
+    share = dict(zip(("left", "right"), found.where["wheels"]["share"], strict=True))
+    assert share["left"] > 0.8
+    assert found.closed["closed"] > 0.95
+    assert found.closed["before"] > found.closed["after"]
+    late = find("command_latency:delay=0.12", full=True)
+    assert late.where["phase"]["turn"]["delay"] == pytest.approx(0.12, abs=0.03)
+
+
+def test_a_diagnosis_survives_json(find):
+    found = find("wheel_gain:wheel=left,factor=0.85")
+    read = Diagnosis.from_json(found.to_json())
+    assert read.verdict.named == found.verdict.named
+    assert read.best.magnitudes == found.best.magnitudes
+    with pytest.raises(FormatError):
+        Diagnosis.from_json("{}")
+
+
+def test_the_same_seed_gives_the_same_diagnosis(find):
+    first, second = find(full=True), find(full=True)
+    assert first.verdict == second.verdict
+    assert first.where == second.where
+
+
+@pytest.mark.parametrize("effects", [(), ("axle_length:factor=0.9",)])
+def test_reduced_dynamics_are_the_simulation(told, effects):
+    edits = tuple(registry.parse(text) for text in effects)
+    fast = reduced("khepera3", edits, 1 / 0.0205)
+    assert fast.good
+    trials = MujocoWorld(reality=effects, threads=1).run(told)
+    model = WheeledModel(threads=1)
+    (quick,) = model.simulate(trials, [edits])
+    for made, trial in zip(quick, trials, strict=True):
+        error = body_displacements(made) - body_displacements(trial.poses_world)
+        assert np.abs(error[:, :2]).max() < 2e-4
+        assert np.abs(error[:, 2]).max() < 3e-3
+
+
+def test_dynamics_that_do_not_fit_are_simulated(told):
+    drag = registry.parse("floor_friction:factor=0.03")
+    assert not reduced("khepera3", (drag,), 1 / 0.0205).good
+
+
+def test_stitched_pieces_keep_the_path():
+    path = np.cumsum(np.random.default_rng(0).normal(size=(30, 3)), axis=0)
+    parts = [path[:11], pieces.moved(path[10:], np.array([5.0, -1.0, 2.0]))]
+    assert np.allclose(pieces.stitched(parts), path)
+
+
+def test_every_candidate_makes_its_effect(model):
+    names = [item.name for item in model.candidates()]
+    assert len(set(names)) == len(names)
+    for item in model.candidates():
+        for branch in range(len(item.branches)):
+            for value in item.grid:
+                assert not item.make(value, branch).is_nominal
+    with pytest.raises(BnsError, match="grid"):
+        Candidate("x", "wheel_gain", "factor", "1", 1.0, 0.0, 2.0, grid=(3.0,))
+
+
+def test_faults_are_repaired_and_listed(model, told):
+    trials = MujocoWorld(reality=[NOISE], threads=1).run(told, seeds=range(4))
+    broken = list(trials)
+    wrapped = trials[0].observed.copy()
+    wrapped[:, 2] = np.angle(np.exp(1j * (wrapped[:, 2] + 3.0)))
+    broken[0] = trials[0].replace(observed=wrapped)
+    spiked = trials[1].observed.copy()
+    spiked[20, 0] += 0.5
+    broken[1] = trials[1].replace(observed=spiked)
+    broken.append(trials[2])
+    made, notes = check.check(broken, model)
+    assert len(made) == 4
+    text = " ".join(notes)
+    assert "spikes" in text and "the same samples" in text
+    assert np.abs(np.diff(made[0].observed[:, 2])).max() < 3
+    assert np.isnan(made[1].observed[20]).all()
+
+
+def test_channels_have_to_fit(model, told):
+    (trial,) = MujocoWorld(threads=1).run(told[:1])
+    renamed = (Channel("x", "mm"), *trial.channels[1:])
+    with pytest.raises(FormatError, match="convert it to SI"):
+        check.check([trial.replace(channels=renamed)], model)
+    with pytest.raises(BnsError, match="needs 2"):
+        diagnose([trial], model)
+
+
+def test_conformal_quantile_covers():
+    rng = np.random.default_rng(0)
+    scores = rng.exponential(size=199)
+    threshold = verdict.quantile(scores, 0.9)
+    assert (scores <= threshold).mean() >= 0.9
+    assert (rng.exponential(size=20_000) <= threshold).mean() == pytest.approx(
+        0.9, abs=0.06
+    )
