@@ -1,0 +1,29 @@
+"""Effects that look alike are reported as a set, never one alone."""
+
+from bench.gap_runner import ensure
+from bench.result import Result
+
+DOC = "effects that look alike are reported as a set, never one alone"
+BAR = ">= 0.95"
+
+
+def run(quick: bool) -> Result:
+    """Score the cases; the missing ones are made and diagnosed first."""
+    from bns.gap import scoring
+
+    rows = ensure(quick)
+    rows = [r for r in scoring.of(rows, "single", 1.0) if scoring.aliased(r)]
+    rows = [r for r in rows if r["said"]["verdict"] != "no gap"]
+    figure = scoring.share(
+        rows, lambda r: r["said"]["verdict"] == "either" and scoring.covered(r)
+    )
+    return Result(
+        figure=figure,
+        unit="share",
+        holds=figure >= 0.95,
+        n=len(rows),
+        details={
+            "confident and wrong": scoring.share(rows, scoring.confident_wrong),
+            "failures": scoring.failures(rows, scoring.covered),
+        },
+    )

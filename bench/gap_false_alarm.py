@@ -1,0 +1,36 @@
+"""No-effect recordings in which a gap is claimed; effects found."""
+
+from bench.gap_runner import ensure
+from bench.result import Result
+
+DOC = "no-effect recordings in which a gap is claimed; effects found"
+BAR = "<= 0.03, >= 0.95 found at 3 x"
+
+
+def run(quick: bool) -> Result:
+    """Score the cases; the missing ones are made and diagnosed first."""
+    from bns.gap import scoring
+
+    rows = ensure(quick)
+    nothing = scoring.of(rows, "none")
+    large = scoring.of(rows, "single", scoring.LARGE)
+    figure = scoring.share(nothing, _claims)
+    found = scoring.share(large, _claims)
+    return Result(
+        figure=figure,
+        unit="share",
+        holds=figure <= 0.03 and not found < 0.95,
+        n=len(nothing),
+        details={
+            "found at 3 x": found,
+            "false alarms": [
+                f"{row['seed']}: {row['said']['verdict']} {row['said']['named']}"
+                for row in nothing
+                if _claims(row)
+            ],
+        },
+    )
+
+
+def _claims(row: dict) -> bool:
+    return row["said"]["verdict"] != "no gap"

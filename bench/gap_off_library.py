@@ -1,0 +1,31 @@
+"""Effects outside the library called none of the library."""
+
+from bench.gap_runner import ensure
+from bench.result import Result
+
+DOC = "effects outside the library called none of the library"
+BAR = ">= 0.75"
+
+
+def run(quick: bool) -> Result:
+    """Score the cases; the missing ones are made and diagnosed first."""
+    from bns.gap import scoring
+
+    rows = ensure(quick)
+    strange = scoring.of(rows, "off-library")
+    known = scoring.of(rows, "single", scoring.LARGE)
+    figure = scoring.share(strange, _none)
+    return Result(
+        figure=figure,
+        unit="share",
+        holds=figure >= 0.75,
+        n=len(strange),
+        details={
+            "said of effects in the library": scoring.share(known, _none),
+            "failures": scoring.failures(strange, _none),
+        },
+    )
+
+
+def _none(row: dict) -> bool:
+    return row["said"]["verdict"] == "none of the library"

@@ -1,0 +1,40 @@
+"""Withheld single effects named, aliases merged, at 3 x their detectability."""
+
+from bench.gap_runner import ensure
+from bench.result import Result
+
+DOC = "withheld single effects named, aliases merged, at 3 x their detectability"
+BAR = ">= 0.95"
+
+
+def run(quick: bool) -> Result:
+    """Score the cases; the missing ones are made and diagnosed first."""
+    from bns.gap import scoring
+
+    rows = ensure(quick)
+    every = scoring.of(rows, "single")
+    large = scoring.of(rows, "single", scoring.LARGE)
+    figure = scoring.share(large, scoring.right)
+    named = {
+        key: scoring.share(large, lambda row, key=key: _baseline(row, key))
+        for key in ("iid", "largest", "forward")
+    }
+    return Result(
+        figure=figure,
+        unit="share",
+        holds=figure >= 0.95,
+        n=len(large),
+        details={
+            "strict": scoring.share(large, scoring.strict),
+            "baselines": named,
+            "by size": scoring.by_size(every),
+            "confusion": scoring.confusion(large),
+            "failures": scoring.failures(large, scoring.right),
+        },
+    )
+
+
+def _baseline(row: dict, key: str) -> bool:
+    return any(
+        row["said"]["baselines"][key] in names for names in row["answer"]["aliases"]
+    )
