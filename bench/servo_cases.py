@@ -19,7 +19,6 @@ SECONDS = 5.9  # of each run; all last 6 s
 FITTED = ((0.535, 0.10, 4.0), (0.741, 0.15, 16.0), (0.969, 0.10, 32.0))
 """cells whose first repeats the nominal law is fitted to, beside the next"""
 FITTED_TOO = (1.168, 0.15, 8.0)
-NOT_FITTED = "brutal"  # steps, in which overload protection cuts the duty
 
 
 @dataclass(frozen=True)
@@ -49,10 +48,10 @@ def load() -> Runs:
 
 
 def nominal(every: Runs) -> Nominal:
-    """The law fitted to the first repeats of four cells, 16 runs."""
+    """The law fitted to the first repeats of four cells, 20 runs."""
     wanted = {tuple(np.round(cell, 2)) for cell in (*FITTED, FITTED_TOO)}
     here = np.array([tuple(np.round(cell, 2)) in wanted for cell in cells(every)])
-    first = every.where(lambda r, t: r == 0 and t != NOT_FITTED, "repeat", "trajectory")
+    first = every.where(lambda number: number == 0, "repeat")
     return servo_nominal.fit(every.take(here & first))
 
 

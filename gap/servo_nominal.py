@@ -22,6 +22,7 @@ FREE = (
     "stribeck_speed",
     "delay",
     "offset",
+    "duty_limit",
 )
 """What a fit adjusts: what a data sheet does not say of one servo."""
 
@@ -115,10 +116,10 @@ def _descend(
 
     error = float(np.abs(residuals(point[None])).mean())
     for _ in range(ROUNDS):
-        steps = np.vstack([0 * point, np.diag(1e-3 * scale)])
-        around = residuals(np.minimum(point + steps, high))
+        inward = np.where(point + 1e-3 * scale > high, -1e-3, 1e-3)
+        around = residuals(point + np.vstack([0 * point, np.diag(inward * scale)]))
         now = around[:, 0].ravel()
-        slopes = (around[:, 1:] - around[:, :1]) / 1e-3  # per unit of scale
+        slopes = (around[:, 1:] - around[:, :1]) / inward[:, None]  # per scale
         slopes = slopes.transpose(0, 2, 1).reshape(-1, len(point))
         weighted = slopes / np.maximum(np.abs(now), SOFT)[:, None]
         normal, pull = weighted.T @ slopes, weighted.T @ now
