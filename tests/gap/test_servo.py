@@ -59,8 +59,10 @@ def reference():
 def test_a_planted_effect_is_named_and_measured(reference, effect, name, magnitude):
     runs = recorded([(0.55, 0.12, 10.0)], effect, seed=1)
     found, scores = servo.diagnose(runs, reference)
-    assert found.kind in ("effect", "either") and found.named[0] == (name,)
-    assert len(found.named) <= 2  # payload and lever may be tied, nothing else
+    named = {name for (name,) in found.named}
+    tied = {"servo_payload", "servo_lever"}  # a little apart by their inertia alone
+    assert name in named and (len(named) == 1 or named == tied)
+    assert found.kind == ("effect" if len(named) == 1 else "either")
     assert scores.magnitudes[name] == pytest.approx(magnitude, rel=0.1)
     assert name in found.sentence and found.p_gap < 0.03
 
@@ -107,7 +109,7 @@ def test_repeats_are_merged_and_settings_kept_apart():
 def test_a_fit_recovers_the_law():
     runs = recorded([(0.4, 0.1, 6.0), (0.7, 0.15, 16.0)])
     free = ("coulomb", "viscous", "load_friction")
-    found = servo_nominal.fit(runs, free=free)
+    found = servo_nominal.fit(runs, free=free, start=NOMINAL.values)
     for name in free:
         assert found.values[name] == pytest.approx(REALITY[name], abs=0.02)
     assert found.error < 2e-3 and not found.at_bound

@@ -51,10 +51,10 @@ def by_mujoco(goals: np.ndarray, start: float, **numbers) -> np.ndarray:
     model = spec.compile()
     data = mujoco.MjData(model)
     data.qpos[0] = start
-    stiffness = values["gain"] * values["error_gain"]
+    stiffness, most = values["gain"] * values["error_gain"], values["duty_limit"]
     seen = [start]
     for goal in goals:
-        data.ctrl[0] = np.clip(stiffness * (goal - data.qpos[0]), -1, 1)
+        data.ctrl[0] = np.clip(stiffness * (goal - data.qpos[0]), -most, most)
         mujoco.mj_step(model, data)
         seen.append(data.qpos[0])
     return np.array(seen)
