@@ -1,0 +1,117 @@
+"""Odometry diagnosis against planted wheels, axles and mounts."""
+
+import numpy as np
+import pytest
+
+from bns.errors import BnsError
+from bns.gap import odometry, odometry_diagnosis
+from bns.gap.importing.khepera3_odometry import chained
+from bns.gap.odometry import Motions, Noise, changed, fit
+from bns.worlds.trial import Channel, Commands, Trial
+
+AXLE, INTERVAL = 0.0884, 0.8
+SCATTER = np.array([7e-4, 5e-4, 1.7e-3])
+
+
+def motions(magnitudes, *, speed=0.01, count=1200, bias=0.0, seed=0) -> Motions:
+    """Drives ahead, back and on the spot, with scatter, lost matches and a bias."""
+    rng = np.random.default_rng(seed)
+    kinds = np.array([(1, 1), (-1, -1), (-1, 1), (1, -1)])[rng.integers(0, 4, count)]
+    ways = kinds * speed * INTERVAL * rng.uniform(0.95, 1.0, (count, 2))
+    clean = Motions(ways[:, 0], ways[:, 1], np.zeros((count, 3)), AXLE)
+    seen = clean.predict(changed(magnitudes)) + rng.normal(0, SCATTER, (count, 3))
+    seen[:, 0] += bias * np.sign(ways.sum(axis=1)) * (kinds.sum(axis=1) != 0)
+    seen[rng.integers(0, count, 5)] += 0.1
+    return Motions(ways[:, 0], ways[:, 1], seen, AXLE)
+
+
+class TestKinematics:
+    def test_straight_spin_and_arc(self):
+        quarter = np.pi / 2
+        left = np.array([0.2, -AXLE / 2 * quarter, 0.0])
+        right = np.array([0.2, AXLE / 2 * quarter, AXLE * quarter])
+        still = Motions(left, right, np.zeros((3, 3)), AXLE)
+        straight, spin, arc = still.predict(odometry.NOMINAL)
+        np.testing.assert_allclose(straight, [0.2, 0, 0], atol=1e-15)
+        np.testing.assert_allclose(spin, [0, 0, quarter], atol=1e-15)
+        np.testing.assert_allclose(arc, [AXLE / 2, AXLE / 2, quarter], atol=1e-15)
+
+    def test_a_mount_ahead_swings_and_its_angle_turns_the_frame(self):
+        spin = Motions(*np.array([[-1.0], [1.0]]) * AXLE / 4 * np.pi, None, AXLE)
+        ahead = spin.predict(changed({"mount_x": 0.01}))[0]
+        np.testing.assert_allclose(ahead, [-0.01, 0.01, np.pi / 2], atol=1e-15)
+        drive = Motions(np.ones(1), np.ones(1), None, AXLE)
+        turned = drive.predict(changed({"mount_angle": np.pi / 2}))[0]
+        np.testing.assert_allclose(turned, [0, -1, 0], atol=1e-15)
+
+    def test_from_a_trial(self):
+        moved = np.array([[0.01, 0.0, 0.1], [0.02, 0.001, -0.2]])
+        told = Commands(np.array([[0.1, 0.2], [0.3, 0.4]]), np.array([1.0, 2.0]))
+        trial = Trial(told, np.array([0.0, 1.0, 3.0]), chained(moved), np.arange(3))
+        found = Motions.of(trial, axle=AXLE)
+        np.testing.assert_allclose(found.left, [0.1, 0.6])
+        np.testing.assert_allclose(found.seen, moved, atol=1e-15)
+        goal = Commands(told.values[:, :1], told.durations, (Channel("goal", "rad"),))
+        with pytest.raises(BnsError, match="left_speed and right_speed"):
+            Motions.of(trial.replace(commands=goal), axle=AXLE)
+
+
+def test_numbers_come_back_within_their_deviations():
+    truth = {"axle": -0.01, "left_diameter": 0.02, "mount_x": -0.006, "mount_y": 0.002}
+    data = motions(truth, speed=0.1, count=4000)
+    noise = odometry.noise_of(data, length_bias=0.0)
+    np.testing.assert_allclose(noise.deviation, SCATTER, rtol=0.1)
+    found = fit(data, tuple(truth), noise)
+    for name, value in truth.items():
+        assert abs(found.magnitudes[name] - value) < 4 * found.deviations[name]
+        assert found.deviations[name] < 1e-3
+
+
+def test_whitening_takes_a_common_bias_of_lengths_out():
+    data = motions({}, bias=2e-4)
+    biased = fit(data, ("both_diameters",), Noise(SCATTER, 0.0))
+    taken = fit(data, ("both_diameters",), Noise(SCATTER, 2e-4))
+    strength = [f.magnitudes["both_diameters"] for f in (biased, taken)]
+    off = [
+        f.magnitudes["both_diameters"] / f.deviations["both_diameters"]
+        for f in (biased, taken)
+    ]
+    assert strength[0] != strength[1]
+    assert abs(off[1]) < 3
+
+
+def test_slow_drives_tie_axle_and_diameters_and_ask_for_a_long_one():
+    data = motions({"both_diameters": 0.0126, "mount_x": -0.0058}, count=2400)
+    found = odometry_diagnosis.diagnose(data)
+    assert found.verdict.kind == "either"
+    assert set(found.verdict.named) == {
+        ("both_diameters", "mount_x"),
+        ("axle", "mount_x"),
+    }
+    for support in found.verdict.named:
+        mount = found.fits[support].magnitudes["mount_x"]
+        assert mount == pytest.approx(-0.0058, abs=4e-4)
+    assert found.verdict.angle < 15
+    assert found.plan[0][0].startswith("long straight drive")
+    assert found.plan[0][1] > 3 > found.plan[-1][1]
+    assert "long straight" in found.verdict.change
+
+
+def test_fast_drives_settle_it():
+    data = motions({"both_diameters": 0.02}, speed=0.3, count=2400)
+    found = odometry_diagnosis.diagnose(data)
+    assert found.verdict.kind == "effect"
+    assert found.verdict.named == (("both_diameters",),)
+    assert "both_diameters +2.0" in found.verdict.sentence
+    assert found.plan == ()
+
+
+def test_nothing_is_nothing():
+    for seed in range(3):
+        found = odometry_diagnosis.diagnose(motions({}, seed=seed))
+        assert found.verdict.kind == "no gap" and found.verdict.named == ()
+
+
+def test_too_few_intervals_are_refused():
+    with pytest.raises(BnsError, match="100 intervals are too few"):
+        odometry_diagnosis.diagnose(motions({}, count=100))
