@@ -18,6 +18,7 @@ from bns.worlds.trial import Trial
 
 HORIZON = 1.0  # [s] over which gaps are given in plain units
 DRAWS = 1000
+CLEAN = 0.01  # p-value above which a rest has no structure
 RIDGE = 8.0  # of the flexible model's weights, in whitened units
 
 
@@ -26,8 +27,9 @@ def quantify(
 ) -> dict[str, Any]:
     """The gap on trials that were not fitted, and the share that is closed.
 
-    Energies are whitened losses per residual, held out; the floor is 1 by
-    construction if the noise was estimated well, and what is found if it is lower.
+    Energies are whitened losses per residual, held out. The floor is what the best
+    model reaches if its rest has no structure left, else 1, which is what the noise
+    was estimated to give.
 
     Returns:
         before, after, floor, ceiling: energies; singles: after each effect alone;
@@ -38,9 +40,9 @@ def quantify(
     before = select.held_out(problem, search.nothing)[1]
     after = select.held_out(problem, best)[1]
     ceiling = flexible(problem, null)
-    lowest = min(
-        1.0, float(after.sum() / count.sum()), float(ceiling.sum() / count.sum())
-    )
+    reached = [float(after.sum() / count.sum()), float(ceiling.sum() / count.sum())]
+    clean = null.misfit(problem, best.rest)[0] > CLEAN
+    lowest = min(reached) if clean else min(1.0, *reached)
     floor = lowest * count
     singles = {
         point.names[0]: select.held_out(problem, point)[0] / count.sum()

@@ -6,9 +6,9 @@ signature is taken to be linear. Angles and distances between these curves say, 
 any fit, what the recording can tell apart and how small an effect it can show.
 """
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from bns.gap.records import Candidate
 from bns.worlds.effects import registry
 
 PIECES = 4  # levels in each stretch between simulated magnitudes
+RATIO, SMALLEST = 1.8, 2.0  # of whitened lengths next to the nominal; the least
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,11 +93,23 @@ def _between(candidate: Candidate, points: list) -> list[tuple[float, np.ndarray
     points = [*points, (candidate.nominal, np.zeros_like(points[0][1]))]
     points.sort(key=lambda item: item[0])
     made = []
-    for (low, a), (high, b) in itertools.pairwise(points):
-        for share in np.arange(PIECES) / PIECES:
+    for (low, a), (high, b) in pairwise(points):
+        for share in _shares(a, b):
             made.append((low + share * (high - low), a + share * (b - a)))
     made.append(points[-1])
     return [item for item in made if item[0] != candidate.nominal]
+
+
+def _shares(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Where to put levels between two signatures: even, but geometric from nominal."""
+    even = np.arange(PIECES) / PIECES
+    if a.any() and b.any():
+        return even
+    length = max(float(np.linalg.norm(b - a)), 1e-12)
+    fine = length / RATIO ** np.arange(1, 40)
+    fine = fine[(fine > SMALLEST) & (fine < length / PIECES)] / length
+    from_nominal = np.sort(np.concatenate([fine, even[1:]]))
+    return np.append(0.0, from_nominal if not a.any() else np.sort(1 - from_nominal))
 
 
 def strength(curves: Curves) -> np.ndarray:

@@ -1,0 +1,65 @@
+"""Cases of the withheld-effect bench, and how they are scored."""
+
+import numpy as np
+import pytest
+
+from bns.gap import cases, check, scoring
+from bns.gap.wheeled import WheeledModel
+
+
+@pytest.fixture(scope="module")
+def model():
+    return WheeledModel(threads=1)
+
+
+def row(named, names=("a",), aliases=(("a", "b"),), verdict="effect", sets=None):
+    answer = {"names": list(names), "aliases": [list(x) for x in aliases]}
+    answer |= {"sizes": [4.0], "effects": list(names)}
+    said = {"verdict": verdict, "named": named, "sets": sets or named}
+    return {"kind": "single", "seed": 1, "answer": answer, "said": said}
+
+
+def test_aliases_are_merged_but_counted_strictly_too():
+    assert scoring.right(row([["b"]]))
+    assert not scoring.strict(row([["b"]]))
+    assert scoring.confident_wrong(row([["b"]]))
+    assert not scoring.right(row([["c"]]))
+    assert scoring.merged(row([["a"], ["b"], ["c"]], verdict="either")) == 2
+
+
+def test_pairs_match_in_any_order():
+    answer = {"aliases": [["a", "b"], ["c"]]}
+    assert scoring.matches(["c", "b"], answer)
+    assert not scoring.matches(["a", "b"], answer)
+    assert not scoring.matches(["a"], answer)
+
+
+def test_silence_is_not_counted_as_right():
+    silent = row([], verdict="no gap", sets=[[]])
+    assert not scoring.right(silent)
+    assert scoring.by_size([silent])[5]["silent"] == 1.0
+
+
+def test_a_case_is_the_same_for_the_same_seed(model):
+    first = cases.build(5, "none", model)
+    second = cases.build(5, "none", model)
+    assert first.answer == second.answer
+    for a, b in zip(first.trials, second.trials, strict=True):
+        assert np.array_equal(a.observed, b.observed, equal_nan=True)
+    assert not first.trials[0].conditions, "the recording gives the answer away"
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_faults_are_noticed(model, seed):
+    case = cases.build(seed, "fault", model)
+    _, notes = check.check(case.trials, model)
+    words = {
+        "wrap": "wrapped",
+        "spikes": "spikes",
+        "duplicate": "the same samples",
+        "stuck": "stuck",
+        "lost": "samples",
+        "infinite": "infinite",
+        "clock": "clocks disagree",
+    }
+    assert words[case.answer.fault] in " ".join(notes)
