@@ -45,7 +45,7 @@ class ServoModel:
         self,
         nominal: Nominal | None = None,
         *,
-        process: Sequence[float] = (0.02,),
+        process: Sequence[float] = (0.06,),
         resolution: Sequence[float] = (1.5e-3,),
     ):
         assert models.robot(self.name).kind == "servo"
