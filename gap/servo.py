@@ -57,7 +57,8 @@ def learn(
     if len(set(names)) < 5:
         raise BnsError(
             f"Runs of {len(set(names))} settings do not show how the nominal law errs; "
-            "record five settings or more without a change."
+            "record five settings or more without a change, or diagnose with "
+            "bns.gap.servo_model, which assumes it."
         )
     residuals = servo_curves.residuals(runs, nominal)
     discrepancy = servo_discrepancy.learn(

@@ -47,7 +47,7 @@ class Discrepancy:
             without: cells to leave out (the run's own).
 
         Raises:
-            BnsError: no other cell has this trajectory; use `white`.
+            BnsError: fewer than three other cells have this trajectory.
         """
         rows = self.residuals.get(trajectory)
         if rows is None:
@@ -67,17 +67,6 @@ class Discrepancy:
         return _whitener(weighted.T @ weighted, self.step)
 
 
-def white(size: int, deviation: float, step: float) -> np.ndarray:
-    """The fallback without runs to learn from: equal, smooth errors, ``(size, size)``.
-
-    Args:
-        size: features.
-        deviation: of the errors [rad].
-        step: time between features [s].
-    """
-    return _whitener(np.eye(size) * deviation**2, step)
-
-
 def _whitener(covariance: np.ndarray, step: float) -> np.ndarray:
     size = len(covariance)
     deviation = np.sqrt(np.diag(covariance))
@@ -87,7 +76,13 @@ def _whitener(covariance: np.ndarray, step: float) -> np.ndarray:
     return np.linalg.inv(np.linalg.cholesky(whole))
 
 
-def learn(residuals: np.ndarray, cells: Sequence, trajectories: Sequence[str], *, step):
+def learn(
+    residuals: np.ndarray,
+    cells: Sequence[tuple[float, ...]],
+    trajectories: Sequence[str],
+    *,
+    step: float,
+) -> Discrepancy:
     """Gather residuals of merged runs by cell and trajectory.
 
     Args:
