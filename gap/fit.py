@@ -14,6 +14,7 @@ from bns.worlds.effects.base import Effect
 
 ROUNDS = 5  # of Gauss-Newton
 ENOUGH = 0.05  # improvement of the loss below which a fit stops
+AHEAD = 4.0  # times the last improvement that a fit may still gain
 ZOOM, ZOOMS = 6, 3  # points and rounds where there is no slope
 FLAT = 0.3  # slope over the chord's below which a parameter counts as without slope
 
@@ -85,15 +86,22 @@ def _finite(value: float) -> float:
     return float(value) if np.isfinite(value) else np.inf
 
 
-def refine(problem: Problem, start: Sequence[Term]) -> Point:
+def refine(problem: Problem, start: Sequence[Term], *, target: float = np.inf) -> Point:
     """Fit the magnitudes (and extras) of a support from a start.
 
     Bounded Gauss-Newton on the simulation itself with secant updates of the slopes;
     a parameter without slope (or a whole number) is searched on a shrinking grid.
     The result is never worse than the start.
+
+    Args:
+        problem: the recording.
+        start: terms to start from.
+        target: a fit that is not on its way to this loss is given up.
     """
     (point,) = evaluate(problem, [start])
-    point = _descend(problem, point)
+    point = _descend(problem, point, target)
+    if point.loss > 4 * target + 1e3:
+        return point
     for place, term in enumerate(point.terms):
         if integer(term.candidate) or _is_flat(point, place):
             point = _zoom(problem, point, place)
@@ -138,7 +146,7 @@ def slopes(problem: Problem, point: Point) -> np.ndarray:
     return np.nan_to_num((point.rest - rests) / step[:, None])
 
 
-def _descend(problem: Problem, point: Point) -> Point:
+def _descend(problem: Problem, point: Point, target: float) -> Point:
     if not np.isfinite(point.loss):
         return point
     point = replace(point, slopes=slopes(problem, point))
@@ -164,7 +172,7 @@ def _descend(problem: Problem, point: Point) -> Point:
         update = point.slopes + np.outer(moved, missing) / max(moved @ moved, 1e-300)
         gain = point.loss - best.loss
         point = replace(best, slopes=update)
-        if gain < ENOUGH:
+        if gain < ENOUGH or point.loss - AHEAD * gain > target:
             break
     return point
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from bns.errors import BnsError, FormatError
 from bns.worlds.effects import registry
-from bns.worlds.effects.base import Effect
+from bns.worlds.effects.base import Effect, Parameter
 
 SCHEMA, VERSION = "bns-diagnosis", 1
 KINDS = ("no gap", "effect", "either", "together", "none of the library")
@@ -91,7 +91,16 @@ class Candidate:
         parameters = {p.name: p for p in registry.get(self.effect).parameters}
         if parameters[self.parameter].integer:
             value = round(value)
+        for name in self.extras:
+            values[name] = _inside(float(values[name]), parameters[name])
         return registry.make(self.effect, **{**values, self.parameter: value})
+
+
+def _inside(value: float, parameter: Parameter) -> float:
+    """The value in the parameter's bounds; a heading comes round instead."""
+    if parameter.unit == "rad" and parameter.high - parameter.low > 6:
+        value = math.remainder(value, 2 * math.pi)
+    return min(max(value, parameter.low), parameter.high)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from bns.gap.signatures import Curves, integer
 from bns.gap.whiten import loss, weights
 
 SINGLES, NEAR = 10, 5  # single effects fitted in full: at most, and at least
-PAIRS, TRIPLES = 10, 4
+PAIRS, TRIPLES = 8, 4
 HOPELESS, PATIENCE = 60.0, 3  # a fit so much worse than the best; so many in a row
 STRUCTURE = 0.1  # p-value below which a rest has structure
 CHUNK = 256  # levels whose loss is taken at once
@@ -82,9 +82,10 @@ def _fitted(problem: Problem, starts: Sequence[Sequence[Term]]) -> list[Point]:
     """Fits in the order of the starts, until they stop coming near the best."""
     points: list[Point] = []
     failures = 0
+    best = np.inf
     for start in starts:
-        points.append(fit.refine(problem, start))
-        best = min(point.loss for point in points)
+        points.append(fit.refine(problem, start, target=best + HOPELESS))
+        best = min(best, points[-1].loss)
         failures = failures + 1 if points[-1].loss > best + HOPELESS else 0
         if failures >= PATIENCE:
             break
@@ -172,12 +173,12 @@ def _additions(curves: Curves, point: Point) -> list[Term]:
 def _triples(
     problem: Problem, curves: Curves, pairs: Sequence[Point]
 ) -> tuple[Point, ...]:
-    points = [
-        fit.refine(problem, [*pair.terms, added])
+    starts = [
+        [*pair.terms, added]
         for pair in pairs[:2]
         for added in _additions(curves, pair)[: TRIPLES // 2]
     ]
-    return _unique(points)
+    return _unique(_fitted(problem, starts))
 
 
 def _unique(points: Sequence[Point]) -> tuple[Point, ...]:
