@@ -31,7 +31,7 @@ class TaskConfig:
     """cost per objective not reached (thesis, Algorithm 5)"""
     squared: bool = False
     """sum squared distances [cm2] (the prose) or distances [cm] (Algorithm 5)"""
-    command_cost: float = 0.5
+    command_cost: float = 5.0
     """cost per command used; the prose asks for few commands [cm]"""
     charge_unused: bool = True
     """charge the distance to the open objective for commands not used, too; the
@@ -70,7 +70,7 @@ class EvolutionConfig:
 
     population: int = 100
     """individuals"""
-    generations: int = 80
+    generations: int = 60
     """generations between two trials in the world (silent)"""
     selection: Selection = "tournament"
     """parents"""
@@ -111,6 +111,8 @@ class SnnConfig:
     """dropout rate after the hidden layer (kind = ensemble)"""
     epochs: int = 400
     """Rprop epochs after each trial (silent)"""
+    weight_decay: float = 0.001
+    """weight of the squared weights in the training loss (silent); 0 = none"""
     warm_start: bool = True
     """go on from the previous weights"""
 

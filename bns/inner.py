@@ -63,7 +63,8 @@ class InnerLoops:
         self.draws = draws
         self.compiled = should_compile(config)
         self._breed, self._judge = self._bred, self.evaluator.judge
-        self._epoch = partial(training.epoch, evaluator.shape)
+        decay = config.snn.weight_decay
+        self._epoch = partial(training.epoch, evaluator.shape, decay=decay)
         if self.compiled:
             torch._dynamo.config.cache_size_limit = 64
             judge = partial(self.evaluator.judge, fused=True)

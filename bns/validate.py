@@ -47,6 +47,7 @@ BOUNDS = {
     "snn.members": Bound(1, 100, "networks"),
     "snn.dropout": Bound(0, 0.95),
     "snn.epochs": Bound(0, 1_000_000, "epochs"),
+    "snn.weight_decay": Bound(0, 1),
     "adaptation.window": Bound(0, 10_000_000, "patterns"),
     "adaptation.simulator_reset_every": Bound(0, 1_000_000, "trials"),
     "adaptation.mutation_rate_after": Bound(0, 1),

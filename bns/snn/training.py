@@ -85,7 +85,12 @@ def epoch(
     targets: Tensor,
     weight: Tensor,
     keep: Tensor | None = None,
+    decay: float = 0.0,
 ) -> tuple[Tensor, RpropState]:
-    """One full-batch epoch; arguments as in `gradient`."""
+    """One full-batch epoch; arguments as in `gradient`.
+
+    `decay` adds half of it times the squared weights to the loss: without, weights
+    grow on data that repeat themselves, and the SNN errs by metres off the data.
+    """
     grad = gradient(shape, theta, inputs, targets, weight, keep)
-    return rprop(theta, grad, state)
+    return rprop(theta, grad + decay * theta, state)
