@@ -15,6 +15,7 @@ FREE = (
     "torque_constant",
     "resistance",
     "armature",
+    "gyration",
     "coulomb",
     "viscous",
     "load_friction",

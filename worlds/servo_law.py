@@ -10,7 +10,7 @@ With the angle q from hanging, the speed w and the goal g as it arrives:
     load     = -9.81 * lever * (mass + arm_mass / 2) * sin(q)
     budget   = coulomb + viscous |w| + stribeck exp(-|w| / stribeck_speed)
                + load_friction |motor - load|
-    inertia  = mass lever^2 + arm_mass lever^2 / 3 + armature
+    inertia  = mass (lever^2 + gyration^2) + arm_mass lever^2 / 3 + armature
     inertia dw/dt = motor + load + friction, friction = what stops w, within +-budget
 
 Source: the form of duty, motor and friction budget is that of BAM (Duclusaud et al.,
@@ -44,9 +44,10 @@ class LawNumber(NamedTuple):
 
 
 NUMBERS: Mapping[str, LawNumber] = {
-    "mass": LawNumber("kg", 0.0, 10.0, "at the end of the lever, a point"),
+    "mass": LawNumber("kg", 0.0, 10.0, "at the end of the lever"),
     "arm_mass": LawNumber("kg", 0.0, 2.0, "of the lever itself, a uniform rod"),
     "lever": LawNumber("m", 0.01, 1.0, "from the axis to the mass"),
+    "gyration": LawNumber("m", 0.0, 0.2, "radius of gyration of the mass itself"),
     "gain": LawNumber("1", 0.0, 2000.0, "proportional gain, in the firmware's units"),
     "error_gain": LawNumber("1/rad", 1e-5, 10.0, "duty per error at gain 1"),
     "voltage": LawNumber("V", 0.0, 60.0, "supply"),

@@ -127,7 +127,8 @@ class _State:
         self.stall = law["torque_constant"] * law["voltage"] / law["resistance"]
         self.brake = law["torque_constant"] ** 2 / law["resistance"]
         arm, square = law["arm_mass"], law["lever"] ** 2
-        self.carried = (law["mass"] + arm / 3) * square
+        own = law["mass"] * law["gyration"] ** 2
+        self.carried = (law["mass"] + arm / 3) * square + own
         self.inertia = self.carried + law["armature"]
         self.weight = GRAVITY * law["lever"] * (law["mass"] + arm / 2)
         self.limited = np.any(law["current_limit"] < NO_CURRENT_LIMIT)

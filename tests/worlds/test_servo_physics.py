@@ -72,7 +72,7 @@ def test_the_mjcf_holds_the_numbers_of_the_law():
     inertia = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, inertia)
     arm = numbers["arm_mass"] * numbers["lever"] ** 2 / 3
-    tip = numbers["mass"] * numbers["lever"] ** 2
+    tip = numbers["mass"] * (numbers["lever"] ** 2 + numbers["gyration"] ** 2)
     assert inertia[0, 0] == pytest.approx(arm + tip + numbers["armature"], rel=1e-4)
 
 
