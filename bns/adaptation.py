@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bns.adaptations import registry
 from bns.config import RunConfig
 from bns.units import metres_per_second
 
@@ -34,6 +35,10 @@ class Adaptations:
     def __init__(self, configs: Sequence[RunConfig], onsets: Sequence[int]):
         self.configs = list(configs)
         self.onsets = np.asarray(onsets, dtype=np.int64)
+        self.extras = [
+            [registry.parse(text) for text in config.adaptation.extra]
+            for config in self.configs
+        ]
 
     def _setting(self, name: str) -> np.ndarray:
         return np.array([getattr(c.adaptation, name) for c in self.configs])
@@ -56,11 +61,28 @@ class Adaptations:
         restart = told & self._setting("restart")
         every = self._setting("simulator_reset_every")
         due = (every > 0) & (trial > 0) & (trial % np.maximum(every, 1) == 0)
+        extra = self._extra(trial)
         return Resets(
-            population=restart | (told & self._setting("population_reset")),
-            simulator=restart | (told & self._setting("simulator_reset")) | due,
-            data=restart | (told & self._setting("data_reset")),
+            population=restart
+            | (told & self._setting("population_reset"))
+            | extra["population"],
+            simulator=restart
+            | (told & self._setting("simulator_reset"))
+            | due
+            | extra["simulator"],
+            data=restart | (told & self._setting("data_reset")) | extra["data"],
         )
+
+    def _extra(self, trial: int) -> dict[str, np.ndarray]:
+        """What the adaptations of `extra` reset, each part ``(R,)`` bool."""
+        wanted = [
+            {part for extra in extras for part in extra.resets(trial, int(onset))}
+            for extras, onset in zip(self.extras, self.onsets, strict=True)
+        ]
+        return {
+            part: np.array([part in parts for parts in wanted])
+            for part in registry.PARTS
+        }
 
     def mutation(self, trial: int) -> tuple[np.ndarray, np.ndarray]:
         """Mutation rate ``(R,)`` and magnitude ``(R, 3)`` [m/s, m/s, s] at a trial."""

@@ -19,8 +19,8 @@ RealChoice = Literal[
 class TaskConfig:
     """What the robot has to do, and how it is scored."""
 
-    name: Literal["simple", "infinity"] = "simple"
-    """simple: A,B,C,D,A; infinity: A,B,E,D,C,E,A (thesis 4.2.2)"""
+    name: str = "simple"
+    """simple: A,B,C,D,A; infinity: A,B,E,D,C,E,A; a file in bns/tasks adds one"""
     corner_x: float = 0.30
     """objectives A-D at (+-corner_x, +-corner_y) from the centre E [m] (silent)"""
     corner_y: float = 0.30
@@ -133,6 +133,8 @@ class AdaptationConfig:
     """forget all patterns on damage"""
     restart: bool = False
     """population, SNN and patterns all reset on damage"""
+    extra: tuple[str, ...] = ()
+    """adaptations from bns/adaptations by name: population_reset_every:trials=10"""
     mutation_rate_after: float = 0.0
     """mutation rate after damage; 0 = unchanged"""
     mutation_magnitude_after: float = 0.0

@@ -22,18 +22,17 @@ def compiled(robot: str):
 
 def objectives(config: RunConfig) -> dict[str, tuple[float, float]]:
     """Positions of the objectives that the run's task uses [m]."""
-    from bns.tasks import ORDERS
     from bns.tasks import objectives as places
 
-    used = ORDERS[config.task.name]
+    used = order(config)
     return {name: at for name, at in places(config.task).items() if name in used}
 
 
 def order(config: RunConfig) -> str:
     """Names of the objectives in the order in which they are to be reached."""
-    from bns.tasks import ORDERS
+    from bns import tasks
 
-    return ORDERS[config.task.name]
+    return tasks.order(config.task.name)
 
 
 def finish(config: RunConfig, poses_world: np.ndarray) -> int:

@@ -5,6 +5,7 @@ import math
 import pytest
 import torch
 
+from bns import tasks
 from bns.config import TaskConfig
 from bns.errors import UnknownNameError
 from bns.path import integrate
@@ -24,7 +25,7 @@ def score(points, length=None, **settings):
 def test_perfect_path_costs_its_commands_alone():
     cost, reached = score(GOALS)
     assert reached == 5
-    assert cost == pytest.approx(2.5, abs=1e-4)
+    assert cost == pytest.approx(5 * 5.0, abs=1e-4)
 
 
 def test_algorithm_5_by_hand():
@@ -46,7 +47,7 @@ def test_unused_commands_are_charged_so_giving_up_does_not_pay():
     printed = [score(padded, n, charge_unused=False)[0] for n in (1, 4)]
     repaired = [score(padded, n)[0] for n in (1, 4)]
     assert printed[0] < printed[1] - 100
-    assert repaired[1] - repaired[0] == pytest.approx(3 * 0.5)
+    assert repaired[1] - repaired[0] == pytest.approx(3 * 5.0)
 
 
 def test_a_place_counts_once_per_command():
@@ -85,3 +86,16 @@ def test_integration_undoes_body_displacements():
     moved = torch.from_numpy(body_displacements(poses.numpy()))
     x, y, yaw = integrate(*moved.T, tuple(poses[0].tolist()))
     torch.testing.assert_close(torch.stack([x, y, yaw], 1), poses[1:])
+
+
+@pytest.mark.parametrize("name", tasks.names())
+def test_every_task_can_be_done(name):
+    """Contract of a task's file: described, and a path through all costs no penalty."""
+    config = TaskConfig(name=name)
+    places = tasks.objectives(config)
+    assert len(tasks.describe(name)) > 20
+    assert set(tasks.order(name)) <= set(places)
+    assert all(abs(x) <= 1.35 and abs(y) <= 0.9 for x, y in places.values())
+    cost, reached = score([places[letter] for letter in tasks.order(name)], name=name)
+    assert reached == len(tasks.order(name))
+    assert cost < config.penalty

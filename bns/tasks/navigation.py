@@ -11,19 +11,24 @@ import torch
 from torch import Tensor
 
 from bns.config import TaskConfig
-from bns.errors import UnknownNameError
+from bns.tasks import registry
 
 CENTIMETRES = 100.0  # [cm/m]
 
-ORDERS: dict[str, str] = {"simple": "ABCDA", "infinity": "ABEDCEA"}  # thesis 4.2.2
-
 
 def objectives(config: TaskConfig) -> dict[str, tuple[float, float]]:
-    """Positions of A to E on the board [m], the centre E being the origin.
+    """Positions of a task's objectives on the board [m], the centre E the origin.
 
     The dissertation gives them in a picture only; the corners are an assumption:
-    A bottom right, B bottom left, C top left, D top right.
+    A bottom right, B bottom left, C top left, D top right. A task's file may place
+    its own.
+
+    Raises:
+        UnknownNameError: no such task.
     """
+    own = registry.content(config.name).get("objectives")
+    if own:
+        return {letter: (float(x), float(y)) for letter, (x, y) in own.items()}
     x, y = config.corner_x, config.corner_y
     return {"A": (x, -y), "B": (-x, -y), "C": (-x, y), "D": (x, y), "E": (0.0, 0.0)}
 
@@ -47,10 +52,8 @@ class NavigationTask:
         Raises:
             UnknownNameError: no such task.
         """
-        if config.name not in ORDERS:
-            raise UnknownNameError("task", config.name, ORDERS)
         places = objectives(config)
-        points = [places[letter] for letter in ORDERS[config.name]]
+        points = [places[letter] for letter in registry.order(config.name)]
         return cls(torch.tensor(points, device=device), config)
 
     @property
