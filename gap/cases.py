@@ -17,6 +17,7 @@ import numpy as np
 
 from bns import seeding
 from bns.gap import fit, select, signatures
+from bns.gap.faults import faulty
 from bns.gap.model import GapModel
 from bns.gap.null import Null
 from bns.gap.problem import Problem
@@ -32,6 +33,7 @@ TRIALS, LENGTH = 8, 10.0  # recordings of a case, and how long each is [s]
 FASTEST = 0.14  # [m/s] largest wheel speed told
 SIZES = 0.5, 8.0  # magnitudes over what is detected, drawn evenly in the logarithm
 PAIR_SIZES = 2.0, 8.0  # of each of two
+LEAST = 0.4  # size below which an effect counts as not excited, and is drawn again
 # A pair of signatures d noise units apart is confused with probability Phi(-d / 2);
 # 20 % is reached at d = 1.68.
 ALIKE = 1.68**2
@@ -204,7 +206,8 @@ def _hide(
         term = _draw(
             rng, curves, size * seen, {t.candidate.effect for t in terms}, wanted
         )
-        terms += [term] if term else []
+        if term and _length(problem, term) > LEAST * seen:
+            terms.append(term)
     effects = [term.effect() for term in terms]
     lengths = np.linalg.norm(problem.signatures([[e] for e in effects]), axis=1)
     made = replace(
@@ -217,6 +220,11 @@ def _hide(
         detected=seen,
     )
     return made, effects
+
+
+def _length(problem: Problem, term: fit.Term) -> float:
+    """Whitened length of what an effect does; the curves only estimate it."""
+    return float(np.linalg.norm(problem.signatures([[term.effect()]])[0]))
 
 
 def _draw(
@@ -275,32 +283,3 @@ def alike(
     found = select.search(clean, curves, null, worth=np.inf, most=1)
     near = [point.names[0] for point in found.sizes[0] if point.loss < ALIKE]
     return tuple(sorted({term.candidate.name, *near}))
-
-
-def faulty(
-    rng: np.random.Generator, trials: Sequence[Trial]
-) -> tuple[tuple[Trial, ...], str]:
-    """Break a recording; returns it and what was done."""
-    names = ("wrap", "spikes", "duplicate", "stuck", "lost", "infinite", "clock")
-    name = names[int(rng.integers(len(names)))]
-    made = list(trials)
-    number = int(rng.integers(len(made)))
-    trial = made[number]
-    observed, times = trial.observed.copy(), trial.times.copy()
-    count = len(times)
-    if name == "wrap":
-        observed[:, 2] = np.angle(np.exp(1j * (observed[:, 2] + np.pi - 0.1)))
-    elif name == "spikes":
-        observed[rng.choice(np.arange(5, count - 5, 4), 3, replace=False), :2] += 0.5
-    elif name == "duplicate":
-        return (*made, trial), name
-    elif name == "stuck":
-        observed[:, 1] = observed[0, 1]
-    elif name == "lost":
-        observed[3 : int(0.7 * count)] = np.nan
-    elif name == "infinite":
-        observed[count // 2, 0] = np.inf
-    else:
-        times = times * 1.2
-    made[number] = trial.replace(observed=observed, times=times)
-    return tuple(made), name

@@ -8,8 +8,8 @@ import numpy as np
 from bns.gap.model import Windows
 from bns.worlds.trial import Trial
 
-LENGTH = 1.6  # [s] of a piece; a heading drifts little in it
-LEAD = 0.4  # [s] simulated before each, about three time constants of the drive
+LENGTH = 2.5  # [s] of a piece; a heading drifts little in it
+LEAD = 1.0  # [s] simulated before each, eight time constants of the drive
 
 
 class Piece(NamedTuple):

@@ -58,7 +58,7 @@ _TABLE = (
         True,
         {},
     ),
-    ("torque_limit", "factor", (0.02, 0.05, 0.09, 0.15), 0, 1, True, {}),
+    ("torque_limit", "factor", (0.02, 0.05, 0.09, 0.13, 0.2), 0, 1, True, {}),
     ("tracker_latency", "delay", (0.05, 0.1, 0.2, 0.4, 0.8), 0, 1, False, {}),
     ("tracker_scale", "factor", (0.8, 0.95, 1.05, 1.25), 0.8, 1.25, False, {}),
     ("wheel_diameter", "factor", FACTORS, 0.7, 1.3, True, {"slack": 0.003}),

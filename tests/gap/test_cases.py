@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from bns.gap import cases, check, scoring
+from bns.errors import BnsError
+from bns.gap import casebook, cases, check, scoring
 from bns.gap.wheeled import WheeledModel
 
 
@@ -63,3 +64,24 @@ def test_faults_are_noticed(model, seed):
         "clock": "clocks disagree",
     }
     assert words[case.answer.fault] in " ".join(notes)
+
+
+def test_a_casebook_keeps_its_answers_apart(model, tmp_path):
+    case = cases.build(5, "none", model)
+    with pytest.raises(BnsError, match="see the answers"):
+        casebook.make(tmp_path / "book", tmp_path / "book" / "a.json", [])
+    made = casebook.make(tmp_path / "book", tmp_path / "answers.json", [("c1", case)])
+    assert made == 1
+    assert "wheel_diameter" not in (tmp_path / "book/c1/dataset.json").read_text()
+    said = tmp_path / "said.jsonl"
+    few = FewCandidates(threads=1)
+    assert casebook.run(tmp_path / "book", few, said) == 1
+    assert casebook.run(tmp_path / "book", few, said) == 0
+    (row,) = casebook.score(said, tmp_path / "answers.json")
+    assert row["kind"] == "none"
+    assert row["said"]["verdict"] == "no gap"
+
+
+class FewCandidates(WheeledModel):
+    def candidates(self):
+        return tuple(c for c in super().candidates() if c.slack)
