@@ -7,7 +7,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from bns.errors import BnsError
-from bns.gap import fit, select, signatures, verdict
+from bns.gap import check, quantify, select, signatures, verdict, where
 from bns.gap.fit import Point
 from bns.gap.model import GapModel
 from bns.gap.null import Null
@@ -59,16 +59,9 @@ def diagnose(
         BnsError: too few trials, faults that cannot be repaired, channels that do not
             fit the model.
     """
-    from bns.gap import check, quantify, where
-
     clock = _Clock()
     with clock("check"):
-        trials, faults = check.check(trials, model)
-    if len(trials) < LEAST:
-        raise BnsError(
-            f"{len(trials)} usable trial: a diagnosis needs {LEAST} at least, to fit "
-            "on some and test on others; record more."
-        )
+        trials, faults = _checked(trials, model)
     candidates = tuple(model.candidates() if candidates is None else candidates)
     rules = calibration or verdict.calibration()
     with clock("signatures"):
@@ -104,6 +97,18 @@ def diagnose(
         seconds=clock.seconds,
         partial={} if full else {"where, closed": "not asked for"},
     )
+
+
+def _checked(
+    trials: Sequence[Trial], model: GapModel
+) -> tuple[tuple[Trial, ...], tuple[str, ...]]:
+    trials, faults = check.check(trials, model)
+    if len(trials) < LEAST:
+        raise BnsError(
+            f"{len(trials)} usable trial: a diagnosis needs {LEAST} at least, to fit "
+            "on some and test on others; record more."
+        )
+    return trials, faults
 
 
 def _floor(problem: Problem) -> dict:
@@ -194,6 +199,3 @@ def _warnings(problem: Problem, curves, fits: Sequence[Fit], answer) -> tuple[st
     if best and best.condition > 1e4:
         made.append(f"Magnitudes trade off (condition {best.condition:.0f}).")
     return tuple(made)
-
-
-__all__ = ["diagnose", "fit"]
