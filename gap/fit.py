@@ -15,7 +15,7 @@ from bns.worlds.effects.base import Effect
 ROUNDS = 5  # of Gauss-Newton
 ENOUGH = 0.05  # improvement of the loss below which a fit stops
 AHEAD = 4.0  # times the last improvement that a fit may still gain
-ZOOM, ZOOMS = 6, 3  # points and rounds where there is no slope
+ZOOM, ZOOMS = 8, 3  # points and rounds where there is no slope
 FLAT = 0.3  # slope over the chord's below which a parameter counts as without slope
 
 
@@ -100,10 +100,10 @@ def refine(problem: Problem, start: Sequence[Term], *, target: float = np.inf) -
     """
     (point,) = evaluate(problem, [start])
     point = _descend(problem, point, target)
-    if point.loss > 4 * target + 1e3:
-        return point
+    hopeless = point.loss > 4 * target + 1e3
     for place, term in enumerate(point.terms):
-        if integer(term.candidate) or _is_flat(point, place):
+        stepped = integer(term.candidate) or term.candidate.stepped
+        if stepped or (not hopeless and _is_flat(point, place)):
             point = _zoom(problem, point, place)
     return point
 

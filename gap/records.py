@@ -42,6 +42,8 @@ class Candidate:
         scale: "log" where magnitudes span decades, else "linear".
         aliases: names of candidates known to look alike whatever is commanded.
         excite: which commands make it felt, in words.
+        stepped: whether the motion changes in steps with the magnitude (a dead band
+            between two speeds told), so that only a search on a grid fits it.
     """
 
     name: str
@@ -59,6 +61,7 @@ class Candidate:
     scale: str = "linear"
     aliases: tuple[str, ...] = ()
     excite: str = ""
+    stepped: bool = False
 
     def __post_init__(self):
         inside = all(self.low <= value <= self.high for value in self.grid)

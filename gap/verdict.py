@@ -15,6 +15,7 @@ from bns.gap.records import Verdict
 from bns.gap.select import Search, held_out
 from bns.gap.signatures import angle
 
+MINOR = 0.015  # share of what is explained below which a further effect is not named
 LISTED = 4  # supports named in a sentence at most
 
 
@@ -80,8 +81,9 @@ class Choice:
 def choose(problem: Problem, search: Search, null: Null, worth: float) -> Choice:
     """How many effects, and the supports of that size in order.
 
-    An effect is added only if it improves the loss by more than chance would and the
-    held-out loss as well, by more than one standard error.
+    An effect is added only if it improves the loss by more than chance would and by
+    more than `MINOR` of the whole (a nominal model that is a little wrong always
+    leaves something), and the held-out loss by more than one standard error.
     """
     size = 0
     nothing = search.nothing
@@ -89,7 +91,10 @@ def choose(problem: Problem, search: Search, null: Null, worth: float) -> Choice
     p_gap = min(1.0, 2 * min(null.p_gain(gain), null.misfit(problem, nothing.rest)[0]))
     for more in range(1, len(search.sizes) + 1):
         new, old = search.best(more), search.best(size)
-        if new is None or old.loss - new.loss <= worth:
+        if new is None:
+            continue
+        least = max(worth, MINOR * (nothing.loss - new.loss))
+        if old.loss - new.loss <= least:
             continue
         total, by_new = held_out(problem, new)
         before, by_old = held_out(problem, old)

@@ -12,6 +12,7 @@ SIDES = ("left", "right", "both")
 HEADINGS = tuple({"direction": k * np.pi / 2} for k in (-1, 0, 1, 2))
 WAYS = tuple({"direction": way} for way in ("forward", "backward", "commanded"))
 FACTORS = (0.7, 0.85, 0.95, 1.05, 1.15, 1.3)
+BANDS = (0.003, 0.006, 0.01, 0.015, 0.02, 0.03, 0.04, 0.06, 0.075, 0.09, 0.11, 0.13)
 TURNS = "turns in place and arcs"
 
 # effect, parameter, grid, low, high, per wheel?, further settings. Grids span the
@@ -35,7 +36,7 @@ _TABLE = (
     ("centre_of_mass", "dy", (-0.025, -0.01, 0.01, 0.025), -0.03, 0.03, False, {}),
     ("clock_drift", "rate", (-0.1, -0.02, 0.02, 0.1), -0.1, 0.1, False, {}),
     ("command_latency", "delay", (0.05, 0.1, 0.2, 0.4, 0.8), 0, 1, False, {}),
-    ("dead_band", "speed", (0.01, 0.02, 0.04, 0.06, 0.09, 0.13), 0, 0.2, True, {}),
+    ("dead_band", "speed", BANDS, 0, 0.2, True, {"stepped": True}),
     ("floor_friction", "factor", (0.01, 0.03, 0.1, 0.3), 0.01, 3, False, {}),
     (
         "motor_lag",
