@@ -78,7 +78,10 @@ def _named(config: RunConfig, name: str) -> RunConfig:
 
 def directory(config: RunConfig) -> Path:
     """Where a configuration's run is kept."""
-    text = json.dumps(asdict(config), sort_keys=True)
+    settings = asdict(config)
+    if not settings["adaptation"]["extra"]:  # an empty list is as good as none
+        del settings["adaptation"]["extra"]
+    text = json.dumps(settings, sort_keys=True)
     return RUNS / f"{config.preset}-{sha256(text.encode()).hexdigest()[:8]}"
 
 
