@@ -34,11 +34,11 @@ def ensure(quick: bool = False, file: Path = FILE) -> list[dict]:
     """Run what is missing; the results of the scored cases."""
     wanted = QUICK if quick else COUNTS
     seeds = {(k, seed_of(k, n)) for k, count in wanted.items() for n in range(count)}
-    run([*sorted(seeds)], file)
+    produce([*sorted(seeds)], file)
     return [row for row in rows(file) if (row["kind"], row["seed"]) in seeds]
 
 
-def run(cases: list[tuple[str, int]], file: Path = FILE) -> None:
+def produce(cases: list[tuple[str, int]], file: Path = FILE) -> None:
     """Make and diagnose the cases that the file lacks, appending as they come."""
     from bns.gap.wheeled import WheeledModel
 
@@ -76,7 +76,7 @@ def one(kind: str, seed: int, model) -> dict:
 
 if __name__ == "__main__":
     kind, first, last, *rest = sys.argv[1:]
-    run(
+    produce(
         [(kind, seed) for seed in range(int(first), int(last))],
         Path(rest[0]) if rest else FILE,
     )
