@@ -1,7 +1,7 @@
 """What the settings decide that the dissertation leaves silent: one changed at a time.
 
 Run in the static-SNN world, which costs no physics: the simple problem, left wheel
-50 % slower (the hardest of the four damages) from trial 15, window 150.
+50 % slower (the hardest of the four damages) from trial 12, window 150.
 """
 
 import os
@@ -16,7 +16,7 @@ from bns.config import RunConfig
 
 DOC = "sweep of the dissertation's silent settings: variants that beat the defaults"
 BAR = "none: the table behind docs/choices.md"
-ONSET, TRIALS, RUNS, WORKERS = 15, 50, 10, 2
+ONSET, TRIALS, RUNS, WORKERS = 12, 40, 8, 1
 
 VARIANTS: dict[str, tuple[str, object]] = {
     "defaults": ("preset", "defaults"),
@@ -43,7 +43,7 @@ VARIANTS: dict[str, tuple[str, object]] = {
 
 
 def run(quick: bool) -> Result:
-    """10 runs of 50 trials a variant; quick: 3 variants, 2 runs of 6 trials."""
+    """8 runs of 40 trials a variant; quick: 3 variants, 2 runs of 6 trials."""
     names = list(VARIANTS)[:3] if quick else list(VARIANTS)
     with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
         rows = list(pool.map(_row, names, [quick] * len(names)))
