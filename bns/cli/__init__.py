@@ -15,6 +15,7 @@ VERBS = {
     "worlds": ("lists", "list the worlds"),
     "robots": ("lists", "list the robot models"),
     "effects": ("lists", "list the effects with parameters, units and ranges"),
+    "gap": ("gap", "diagnose the gap between recordings and a model (experimental)"),
     "doctor": ("doctor", "check this machine and say what to install"),
 }
 """verb -> module of this package, and what it does in one line"""
