@@ -56,7 +56,7 @@ def main(verb: str, argv: list[str]) -> int:
     del verb
     if not argv or argv[0] in ("-h", "--help"):
         print(MANUAL)
-        return 0
+        raise SystemExit(0)
     if argv[0] == "check":
         return _check(parse(Check, argv[1:], prog="bns gap check"))
     if argv[0] == "diagnose":
