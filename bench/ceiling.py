@@ -15,8 +15,7 @@ from bns.evolution.generation import Breeder, Rates
 from bns.tasks import NavigationTask
 from bns.units import metres_per_second
 
-RUNS = 2
-GENERATIONS = 60
+RUNS, POPULATION, GENERATIONS = 1, 60, 60
 
 
 def reached(damage: str) -> dict[str, object]:
@@ -44,6 +43,7 @@ def _search(config: RunConfig, damage: str) -> dict[str, object]:
     torch.set_num_threads(1)
     always = tuple(text.split("@")[0] for text in config.world.damage)
     world = make_world(replace(config, world=replace(config.world, damage=always)))
+    config = replace(config, evolution=replace(config.evolution, population=POPULATION))
     encoding = Encoding.of(config.controller)
     task = NavigationTask.of(config.task)
     draws = Draws(seeding.integer(config.seed, "ceiling"))
