@@ -15,6 +15,7 @@ from bns.config import RunConfig
 from bns.draws import Draws
 from bns.evolution.generation import Breeder, Rates
 from bns.tasks import NavigationTask
+from bns.tasks.trials import score_trials
 from bns.units import metres_per_second
 
 RUNS, POPULATION, GENERATIONS = 1, 60, 60
@@ -115,14 +116,6 @@ def _in_world(
         population.genes.flatten(0, 1)[:, None], population.lengths.flatten()[:, None]
     )
     trials = world.run(encoding.commands(flat), trial=0)
-    longest = encoding.max_commands
-    places = np.zeros((2, longest, len(trials)))
-    for index, trial in enumerate(trials):
-        count = len(trial.commands)
-        seen = trial.command_poses_world[:, :2]
-        places[:, :count, index] = seen[1:].T
-        places[:, count:, index] = seen[-1:].T
-    lengths = flat.lengths[:, 0]
-    cost, goals = task.score(*torch.from_numpy(places), lengths)
+    cost, goals = score_trials(task, trials, encoding.max_commands)
     shape = (runs, size)
     return cost.float().view(shape), goals.view(shape).numpy()

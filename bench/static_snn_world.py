@@ -3,7 +3,6 @@
 from bench import experiments, solving
 from bench.result import Result
 from bns import stats
-from bns.record import RunRecord
 
 DOC = "the same experiments in the static-SNN world and in MuJoCo, side by side"
 BAR = "none: printed beside the physics world's"
@@ -43,8 +42,4 @@ def run(quick: bool) -> Result:
 def _both(config, summary, quick: bool) -> dict[str, dict[str, object]]:
     configs = {world: config(world) for world in ("mujoco", "static-snn")}
     records = experiments.records(configs.values(), quick=quick)
-
-    def row(record: RunRecord) -> dict[str, object]:
-        return summary(record)
-
-    return {world: row(records[c.preset]) for world, c in configs.items()}
+    return {world: summary(records[c.preset]) for world, c in configs.items()}

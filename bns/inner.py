@@ -20,7 +20,7 @@ from bns.evolution.generation import Breeder, Coins, Rates
 from bns.snn import training
 from bns.snn.network import forward
 
-WORTH_COMPILING = 40_000  # generations of all trials; compiling takes some 30 s
+WORTH_COMPILING = 120_000  # generations of all trials; compiling takes some 30 s
 
 
 def should_compile(config: RunConfig) -> bool:
@@ -36,7 +36,7 @@ def should_compile(config: RunConfig) -> bool:
         )
     if config.compiled == "auto":
         work = config.trials * config.evolution.generations * config.replicates
-        return compiler is not None and work >= WORTH_COMPILING * 30 // 10
+        return compiler is not None and work >= WORTH_COMPILING
     return config.compiled == "yes"
 
 

@@ -25,6 +25,7 @@ from bns.inner import InnerLoops
 from bns.snn.network import Shape, predict
 from bns.snn.scaling import Scaling
 from bns.tasks import NavigationTask
+from bns.tasks.trials import score_trials
 from bns.worlds.trial import Commands, Trial
 
 
@@ -190,14 +191,7 @@ class Learner:
     def _score(self, trials: Sequence[Trial]) -> tuple[np.ndarray, np.ndarray]:
         longest = self.config.controller.max_commands
         task = NavigationTask.of(self.config.task)
-        places = np.zeros((2, longest, len(trials)))
-        for run, trial in enumerate(trials):
-            seen = _filled(trial.command_poses_world[:, :2])
-            count = len(trial.commands)
-            places[:, :count, run] = seen[1:].T
-            places[:, count:, run] = seen[-1:].T
-        lengths = torch.tensor([len(t.commands) for t in trials])
-        cost, reached = task.score(*torch.from_numpy(places), lengths)
+        cost, reached = score_trials(task, trials, longest)
         return cost.numpy(), reached.double().numpy()
 
     def _learn(self, tried: Sequence[Trial]) -> dict[str, np.ndarray]:
@@ -254,13 +248,6 @@ class Learner:
         self.loss = torch.from_numpy(arrays["loss"])
         self.draws.restore(arrays["draws"])
         self.buffer.restore(arrays)
-
-
-def _filled(places: np.ndarray) -> np.ndarray:
-    """Positions with lost ones replaced by the last seen (the first is the start)."""
-    seen = np.isfinite(places).all(1)
-    last = np.maximum.accumulate(np.where(seen, np.arange(len(places)), 0))
-    return np.nan_to_num(places[last])
 
 
 def _check_alike(configs: Sequence[RunConfig]) -> None:
