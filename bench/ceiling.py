@@ -18,7 +18,7 @@ from bns.tasks import NavigationTask
 from bns.tasks.trials import score_trials
 from bns.units import metres_per_second
 
-RUNS, POPULATION, GENERATIONS = 1, 60, 60
+RUNS, POPULATION, GENERATIONS = 1, 100, 240
 
 
 DOC = "damages of four that direct evolution in the damaged world solves"

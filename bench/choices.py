@@ -16,7 +16,7 @@ from bns.config import RunConfig
 
 DOC = "sweep of the dissertation's silent settings: variants that beat the defaults"
 BAR = "none: the table behind docs/choices.md"
-ONSET, TRIALS, RUNS, WORKERS = 12, 40, 8, 1
+ONSET, TRIALS, RUNS, WORKERS = 12, 40, 8, 2
 
 VARIANTS: dict[str, tuple[str, object]] = {
     "defaults": ("preset", "defaults"),
