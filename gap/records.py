@@ -76,6 +76,12 @@ class Candidate:
                 "at least is needed (an empty mapping)."
             )
 
+    @property
+    def whole(self) -> bool:
+        """Whether only whole magnitudes make sense."""
+        parameters = registry.get(self.effect).parameters
+        return next(p.integer for p in parameters if p.name == self.parameter)
+
     def make(
         self,
         magnitude: float,
@@ -211,6 +217,7 @@ class Diagnosis:
         seed: of all that was drawn.
         seconds: wall time by stage.
         partial: stages that were left out, with the reason.
+        provenance: which model and recordings, versions, and the like.
     """
 
     model: str
@@ -226,6 +233,7 @@ class Diagnosis:
     seed: int = 0
     seconds: Mapping[str, float] = field(default_factory=dict)
     partial: Mapping[str, str] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def best(self) -> Fit:

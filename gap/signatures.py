@@ -14,7 +14,6 @@ import numpy as np
 
 from bns.gap.problem import Problem
 from bns.gap.records import Candidate
-from bns.worlds.effects import registry
 
 PIECES = 4  # levels in each stretch between simulated magnitudes
 RATIO, SMALLEST = 1.8, 2.0  # of whitened lengths next to the nominal; the least
@@ -51,8 +50,7 @@ class Curves:
 
 def integer(candidate: Candidate) -> bool:
     """Whether only whole magnitudes make sense."""
-    parameters = registry.get(candidate.effect).parameters
-    return next(p.integer for p in parameters if p.name == candidate.parameter)
+    return candidate.whole
 
 
 def trace(problem: Problem, candidates: Sequence[Candidate]) -> Curves:
