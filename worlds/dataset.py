@@ -29,8 +29,8 @@ A dataset is a directory with three files.
     (command channels)    float64  one column per channel
 
 All units are SI. Poses are (x, y, yaw) in the world frame, yaw continuous. A sample
-that the tracker lost has NaN in all of x, y and yaw; no other NaN is allowed. Only a
-robot on a stand has no pose: its channel `angle` takes its place. Hidden
+that the tracker lost has NaN in all of x, y and yaw; no other NaN is allowed. A robot
+on a stand has no pose, but other channels: there a lost sample is NaN in all. Hidden
 states (`Trial.truth`) are not kept. The same trials give the same bytes.
 """
 

@@ -15,7 +15,6 @@ from bns.worlds.trial import (
     Trial,
 )
 
-ANGLE = "angle"  # of a joint that is observed where there is no pose
 UNITS = {channel.name: channel.unit for channel in (*POSE_CHANNELS, *WHEEL_CHANNELS)}
 RESERVED = ("replicate", "trial", "time", "first", "last", "duration")
 
@@ -68,9 +67,8 @@ def valid(trial: Trial, where: str) -> None:
             f"{where}: time goes backwards at sample {row}; sort the samples by time."
         )
     names = [channel.name for channel in trial.channels]
-    lost = np.zeros(len(trial.times), bool)
-    if POSE[0] in names:
-        lost = np.isnan(trial.poses_world).all(axis=1)
+    seen = trial.poses_world if POSE[0] in names else trial.observed
+    lost = np.isnan(seen).all(axis=1)
     wrong = ~np.isfinite(trial.observed) & ~lost[:, None]
     if wrong.any() or np.isinf(trial.observed).any():
         row, column = np.argwhere(wrong | np.isinf(trial.observed))[0]
@@ -106,14 +104,14 @@ def channel_units(channels: Sequence[Channel], where: str) -> None:
 
 
 def missing_pose(channels: Sequence[Channel], where: str) -> None:
-    """Stop if a part of the pose is missing; a servo on a stand has no pose at all.
+    """Stop if a part of the pose is missing; a robot on a stand has no pose at all.
 
     Raises:
-        FormatError: some of x, y and yaw are there and some not, and no angle either.
+        FormatError: some of x, y and yaw are there and some not, or no channel at all.
     """
     names = [name for name, _ in channels]
     missing = [name for name in POSE if name not in names]
-    if missing and not (len(missing) == len(POSE) and ANGLE in names):
+    if missing and not (len(missing) == len(POSE) and names):
         raise FormatError(
             f"{where}: {', '.join(missing)} missing; there are {', '.join(names)}."
         )
