@@ -27,6 +27,7 @@ DAMAGES = {
     "left-50": "wheel_gain:wheel=left,factor=0.5",
     "right-50": "wheel_gain:wheel=right,factor=0.5",
 }
+LATER = ("learner",)  # settings added since the first stored runs
 QUICK = {"replicates": 6, "trials": 12}
 
 
@@ -78,8 +79,11 @@ def _named(config: RunConfig, name: str) -> RunConfig:
 
 def directory(config: RunConfig) -> Path:
     """Where a configuration's run is kept."""
-    settings = asdict(config)
-    if not settings["adaptation"]["extra"]:  # an empty list is as good as none
+    settings, plain = asdict(config), RunConfig()
+    for name in LATER:  # unchanged, they are as good as not there
+        if settings[name] == getattr(plain, name):
+            del settings[name]
+    if not settings["adaptation"]["extra"]:
         del settings["adaptation"]["extra"]
     text = json.dumps(settings, sort_keys=True)
     return RUNS / f"{config.preset}-{sha256(text.encode()).hexdigest()[:8]}"

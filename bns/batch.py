@@ -9,9 +9,10 @@ import numpy as np
 from bns import seeding
 from bns.config import RunConfig
 from bns.errors import BnsError
+from bns.learners import registry as learners
 from bns.step import Step
 from bns.worlds.damage import Damage
-from bns.worlds.trial import Commands, Trial
+from bns.worlds.trial import Trial
 from bns.worlds.world import World
 
 
@@ -23,7 +24,7 @@ class Batch:
     Args:
         configs: they may differ in `adaptation` and `world` only.
         worlds: one per configuration.
-        learner: knows all C * R runs; None makes the BNS learner.
+        learner: knows all C * R runs; None makes the one the configuration names.
 
     Raises:
         BnsError: configurations that cannot share a batch.
@@ -39,12 +40,11 @@ class Batch:
         self.configs, self.worlds = list(configs), list(worlds)
         self.replicates = configs[0].replicates
         self.damages = [Damage.parse(config.world.damage) for config in configs]
+        self._kind = learners.get(configs[0].learner)
         self.learner = learner or self._make_learner()
 
     def _make_learner(self) -> Any:
-        from bns.learner import Learner
-
-        return Learner(
+        return self._kind.make(
             [config for config in self.configs for _ in range(self.replicates)],
             replicates=[*range(self.replicates)] * len(self.configs),
             onsets=[
@@ -76,9 +76,7 @@ class Batch:
         observed["damaged"] = np.repeat(on, self.replicates)
         return Step.of(observed, tried[: min(recorded, self.replicates)]), tried
 
-    def _execute(
-        self, commands: Sequence[Commands], trial: int, stream: str
-    ) -> list[Trial]:
+    def _execute(self, tried: Sequence[Any], trial: int, stream: str) -> list[Trial]:
         trials: list[Trial] = []
         for index, (config, world) in enumerate(
             zip(self.configs, self.worlds, strict=True)
@@ -87,8 +85,8 @@ class Batch:
                 seeding.integer(config.seed, stream, replicate, trial)
                 for replicate in range(self.replicates)
             ]
-            part = commands[self.part(index)]
-            trials += world.run(part, trial=trial, seeds=seeds)
+            part = tried[self.part(index)]
+            trials += self._kind.execute(world, part, trial=trial, seeds=seeds)
         return trials
 
 

@@ -164,6 +164,8 @@ class RunConfig:
 
     preset: str = ""
     """name of the preset this came from"""
+    learner: str = "navigation"
+    """what is learned; a file in bns/learners adds one"""
     task: TaskConfig = field(default_factory=TaskConfig)
     controller: ControllerConfig = field(default_factory=ControllerConfig)
     evolution: EvolutionConfig = field(default_factory=EvolutionConfig)

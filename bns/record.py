@@ -37,6 +37,8 @@ class RunRecord:
         predicted: the same as the SNN foresaw it, ``(R, T, K + 1, 3)``.
         damage_onset: first damaged trial per replicate, ``(R,)``; -1 = none.
         directory: where it was read from, empty if it was not.
+        conditions: what was true of the world, by name.
+        extra: what else a learner keeps of each trial, by name, each ``(R, T, ...)``.
     """
 
     config: RunConfig
@@ -48,6 +50,7 @@ class RunRecord:
     damage_onset: np.ndarray
     directory: str = ""
     conditions: Mapping[str, object] = field(default_factory=dict)
+    extra: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def replicates(self) -> int:

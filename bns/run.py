@@ -14,6 +14,7 @@ from bns.batch import Batch, check_device, check_world, resolve
 from bns.config import AdaptationConfig, RunConfig, WorldConfig
 from bns.directory import check_free
 from bns.errors import BnsError
+from bns.learners import registry as learners
 from bns.loading import differences
 from bns.progress import Progress
 from bns.record import RunRecord
@@ -128,7 +129,6 @@ def make_world(config: RunConfig, directory: Path | None = None) -> World:
         config: says which, where the robot starts, and what is wrong with it.
         directory: where a static SNN world keeps its nets; None trains them anew.
     """
-    from bns.tasks import NavigationTask
     from bns.worlds import registry
 
     name = config.world.name
@@ -136,7 +136,7 @@ def make_world(config: RunConfig, directory: Path | None = None) -> World:
         "robot": config.world.robot,
         "damage": config.world.damage,
         "reality": config.world.reality,
-        "start": NavigationTask.of(config.task).start,
+        **learners.get(config.learner).surroundings(config),
     }
     if name == "static-snn":
         return registry.make(name, nets=_nets(config, directory), **settings)

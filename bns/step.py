@@ -22,7 +22,8 @@ class Step:
 
     Attributes:
         columns: the per-trial figures of `RunRecord`, each ``(R,)``.
-        arrays: "sent" ``(R, K, 3)``, "poses" and "predicted" ``(R, K + 1, 3)``.
+        arrays: "sent" ``(R, K, C)``, "poses" and "predicted" ``(R, K + 1, 3)``, and
+            what else a learner gives, the run first.
         trials: the trials of the recorded replicates with all their samples.
     """
 
@@ -35,11 +36,11 @@ class Step:
         cls, observed: Mapping[str, np.ndarray], trials: Sequence[Trial] = ()
     ) -> "Step":
         """The step in what a learner's `observe` gives."""
-        arrays = {name: np.asarray(observed[name]) for name in ARRAYS}
+        arrays = {n: np.asarray(v) for n, v in observed.items() if np.ndim(v) > 1}
         columns = {
             name: np.asarray(value, dtype=np.float64)
             for name, value in observed.items()
-            if name not in ARRAYS
+            if name not in arrays
         }
         return cls(columns, arrays, trials)
 
@@ -93,9 +94,11 @@ def assemble(
         name: np.zeros((runs, 0, longest + (name != "sent"), 3)) for name in ARRAYS
     }
     names = list(steps[0].columns) if steps else []
-    arrays = {
-        name: np.stack([step.arrays[name] for step in steps], axis=1) for name in ARRAYS
-    } if steps else empty  # fmt: skip
+    stacked = {
+        name: np.stack([step.arrays[name] for step in steps], axis=1)
+        for name in (steps[0].arrays if steps else ())
+    }
+    arrays = {name: stacked.pop(name, empty[name]) for name in ARRAYS}
     return RunRecord(
         config=config,
         versions=dict(versions),
@@ -103,6 +106,7 @@ def assemble(
         damage_onset=np.asarray(damage_onset, dtype=np.int64),
         directory=directory,
         conditions=dict(conditions),
+        extra=stacked,
         **arrays,
     )
 

@@ -187,6 +187,7 @@ class RunStore:
         steps = self.steps()
         record = self._assemble(steps)
         arrays = {name: getattr(record, name) for name in ARRAYS}
+        arrays |= {f"extra.{name}": value for name, value in record.extra.items()}
         arrays["damage_onset"] = record.damage_onset
         files.write_npz(self.directory / "arrays.npz", arrays, compressed=True)
         self._write_dataset(steps)
@@ -262,5 +263,10 @@ def _finished_record(store: RunStore) -> RunRecord:
         damage_onset=arrays["damage_onset"],
         directory=str(store.directory),
         conditions=store.conditions,
+        extra={
+            name.removeprefix("extra."): value
+            for name, value in arrays.items()
+            if name.startswith("extra.")
+        },
         **{name: arrays[name] for name in ARRAYS},
     )

@@ -58,7 +58,8 @@ class FakeLearner:
         solved = (self.memory > 0).astype(float)
         fitness = self.memory.copy()
         columns = {"fitness": fitness, "fitness_best": fitness, "solved": solved}
-        return columns | {"sent": sent, "poses": poses, "predicted": poses + 0.01}
+        kept = {"sent": sent, "poses": poses, "predicted": poses + 0.01}
+        return columns | kept | {"felt": np.stack([self.memory, -self.memory], 1)}
 
     def state(self):
         return {"memory": self.memory}

@@ -185,3 +185,9 @@ def test_unwritable_place_is_one_message(fakes, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(BnsError, match="Cannot write"):
         fakes.train(tmp_path / "file" / "run", config=RunConfig(trials=1))
+
+
+def test_what_else_a_learner_keeps_comes_back(fakes, run, begun):
+    finished, going_on = load(run), load(begun)
+    assert finished.extra["felt"].shape == (3, 4, 2)
+    np.testing.assert_array_equal(finished.extra["felt"][:, :2], going_on.extra["felt"])
