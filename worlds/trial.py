@@ -80,12 +80,27 @@ class Commands:
 
 
 class Outcome(NamedTuple):
-    """What happened in a trial, beside what was measured."""
+    """What happened in a trial, beside what was measured.
+
+    Attributes:
+        left_arena: the robot was beyond the board's edge.
+        fell: it tilted too far.
+        diverged: the physics did; what was measured is not to be trusted.
+        stopped: somebody or something stopped it early.
+        collided: parts of the robot touched each other.
+        overloaded: a servo pushed in vain for too long.
+        overheated: a servo became too hot.
+        unrested: a command ended by its time limit, not by the robot's rest.
+    """
 
     left_arena: bool = False
     fell: bool = False
     diverged: bool = False
     stopped: bool = False
+    collided: bool = False
+    overloaded: bool = False
+    overheated: bool = False
+    unrested: bool = False
 
     @property
     def usable(self) -> bool:
