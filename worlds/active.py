@@ -51,12 +51,14 @@ class Stages:
     Attributes:
         control: those of the command stage, then those of the actuator stage.
         body: edits of the model.
+        sensor: what becomes of what the sensors read.
         tracking: what the tracker does to the poses.
         texts: all of them as text, by origin ("reality", "damage"), for the record.
     """
 
     control: tuple[Placed, ...]
     body: tuple[Placed, ...]
+    sensor: tuple[Placed, ...]
     tracking: tuple[Placed, ...]
     texts: dict[str, list[str]]
 
@@ -79,11 +81,12 @@ class Stages:
         both = placed["reality"] + placed["damage"]
         stage = {
             name: tuple(item for item in both if item.effect.stage == name)
-            for name in ("command", "actuator", "body", "tracking")
+            for name in ("command", "actuator", "body", "sensor", "tracking")
         }
         return cls(
             control=stage["command"] + stage["actuator"],
             body=stage["body"],
+            sensor=stage["sensor"],
             tracking=stage["tracking"],
             texts={key: [str(item) for item in items] for key, items in placed.items()},
         )

@@ -11,7 +11,8 @@ A dataset is a directory with three files.
     command_channels  what the robot is told, likewise
     rows              {"trials": samples, "commands": commands}
     trials            one object per trial, in the order of the tables: "replicate",
-                      "trial", "world", "outcome" (flags), "conditions"
+                      "trial", "world", "outcome" (flags and counters), "conditions",
+                      "handled" (indices of commands in which somebody moved it)
     provenance        anything that says where the data come from
 
 `trials.parquet`, one row per sample, grouped by trial, in order of time:
@@ -148,6 +149,7 @@ def _header(
                 "world": trial.world,
                 "outcome": trial.outcome._asdict(),
                 "conditions": dict(trial.conditions),
+                **_handled(trial),
             }
             for trial, replicate, number in zip(
                 trials, replicates, numbers, strict=True
@@ -162,6 +164,11 @@ def _header(
             f"Conditions or provenance cannot be written as JSON ({error}); give "
             "text, finite numbers, lists and dictionaries."
         ) from None
+
+
+def _handled(trial: Trial) -> dict[str, list[int]]:
+    indices = [index for index, hit in enumerate(trial.handled) if hit]
+    return {"handled": indices} if indices else {}
 
 
 def read(directory: str | Path) -> Dataset:
@@ -196,6 +203,7 @@ def read(directory: str | Path) -> Dataset:
             world=str(about.get("world", "")),
             outcome=Outcome(**checks.flags(about, directory)),
             conditions=about.get("conditions", {}),
+            handled=checks.handled(about, len(trial.commands), directory),
         )
         checks.valid(
             trial,

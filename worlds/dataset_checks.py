@@ -172,19 +172,39 @@ def listed_trials(header: dict, where: Path) -> list[dict]:
     return items
 
 
-def flags(about: dict, where: Path) -> dict[str, bool]:
-    """Outcome flags of a trial.
+def flags(about: dict, where: Path) -> dict[str, bool | int]:
+    """Outcome flags and counters of a trial.
 
     Raises:
-        FormatError: an unknown one, or no truth value.
+        FormatError: an unknown one, no truth value, no count.
     """
     given = about.get("outcome", {})
     known = Outcome._fields
+    kinds = {name: type(value) for name, value in Outcome._field_defaults.items()}
     if not isinstance(given, dict) or not all(
-        name in known and isinstance(value, bool) for name, value in given.items()
+        name in known and type(value) is kinds[name] and value >= 0
+        for name, value in given.items()
     ):
         raise FormatError(
             f"{where}: outcome {given!r} is not understood; flags are "
             f"{', '.join(known)}."
         )
     return given
+
+
+def handled(about: dict, commands: int, where: Path) -> list[bool]:
+    """Which commands of a trial the robot was handled in.
+
+    Raises:
+        FormatError: no list of indices of commands.
+    """
+    given = about.get("handled", [])
+    fine = isinstance(given, list) and all(
+        type(index) is int and 0 <= index < commands for index in given
+    )
+    if not fine:
+        raise FormatError(
+            f"{where}: handled {given!r} is not understood; it lists indices of the "
+            f"{commands} commands."
+        )
+    return [index in set(given) for index in range(commands)]

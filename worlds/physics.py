@@ -66,10 +66,13 @@ class Job(NamedTuple):
     Attributes:
         start: full physics state (time, qpos, qvel, ...), shape ``(n,)``.
         segments: in order of time; the states go through.
+        warm: where the solver starts, shape ``(nv,)``, as the `Motion` before left it:
+            with it a motion goes on to the same bytes. None = from scratch.
     """
 
     start: np.ndarray
     segments: tuple[Segment, ...]
+    warm: np.ndarray | None = None
 
 
 class Motion(NamedTuple):
@@ -79,10 +82,12 @@ class Motion(NamedTuple):
         states: full physics states, shape ``(S + 1, n)``, the start included; NaN from
             `diverged` on.
         diverged: index of the first state that is not valid; -1 = all are.
+        warm: where the solver goes on, shape ``(nv,)``.
     """
 
     states: np.ndarray
     diverged: int
+    warm: np.ndarray | None = None
 
 
 def run(job: Job) -> Motion:
@@ -95,7 +100,8 @@ def run(job: Job) -> Motion:
     total = sum(len(segment.control) for segment in job.segments)
     states = np.empty((total + 1, len(job.start)))
     states[0] = job.start
-    warm, at = None, 0
+    warm = None if job.warm is None else job.warm[None]
+    at = 0
     roller = Rollout()
     for compiled, control in job.segments:
         data = compiled.take()
@@ -119,7 +125,7 @@ def run(job: Job) -> Motion:
             states[at + bad :] = np.nan
             return Motion(states, at + bad)
         at += count
-    return Motion(states, -1)
+    return Motion(states, -1, None if warm is None else warm[0])
 
 
 def _first_bad(states: np.ndarray, warned: bool) -> int:

@@ -91,6 +91,8 @@ class Outcome(NamedTuple):
         overloaded: a servo pushed in vain for too long.
         overheated: a servo became too hot.
         unrested: a command ended by its time limit, not by the robot's rest.
+        edge_turns: how often it was turned at the board's edge.
+        lamp_stops: how often it was stopped, or turned, at a lamp's safety boundary.
     """
 
     left_arena: bool = False
@@ -101,6 +103,8 @@ class Outcome(NamedTuple):
     overloaded: bool = False
     overheated: bool = False
     unrested: bool = False
+    edge_turns: int = 0
+    lamp_stops: int = 0
 
     @property
     def usable(self) -> bool:
@@ -126,6 +130,9 @@ class Trial:
             record, never shown to the learner.
         truth: samples of hidden quantities by name, each ``(T, ...)`` (for example
             ``qpos``); for pictures and tests, never shown to the learner.
+        handled: commands during which the robot was not left to itself (stopped, or
+            turned by hand), shape ``(K,)``: their motion is no motion of the robot.
+            Its next command then starts from rest. Empty = none.
     """
 
     commands: Commands
@@ -138,6 +145,7 @@ class Trial:
     world: str = ""
     conditions: Mapping[str, object] = field(default_factory=dict)
     truth: Mapping[str, np.ndarray] = field(default_factory=dict)
+    handled: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
 
     def __post_init__(self):
         times = _frozen(self.times, 1, "Trial.times")
@@ -156,6 +164,15 @@ class Trial:
                 f"({len(self.commands) + 1},)."
             )
         boundaries.setflags(write=False)
+        handled = np.array(self.handled, dtype=bool)
+        handled = handled if len(handled) else np.zeros(len(self.commands), bool)
+        if handled.shape != (len(self.commands),):
+            raise BnsError(
+                f"Trial.handled has shape {handled.shape}, it needs "
+                f"({len(self.commands)},)."
+            )
+        handled.setflags(write=False)
+        object.__setattr__(self, "handled", handled)
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "observed", observed)
         object.__setattr__(self, "boundaries", boundaries)

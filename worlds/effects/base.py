@@ -129,9 +129,18 @@ class Effect(ABC):
 
 
 class CommandEffect(Effect):
-    """Changes what the robot is told: a transform of the command signal."""
+    """Changes what the robot is told: a transform of the command signal.
+
+    What it makes of a step depends on that step and those before it alone: robots that
+    close a loop get their commands one by one.
+
+    Attributes:
+        memoryless: whether it depends on that step alone, and draws nothing: then it
+            is applied to one command at a time.
+    """
 
     stage = "command"
+    memoryless: ClassVar[bool] = False
 
     @abstractmethod
     def apply(

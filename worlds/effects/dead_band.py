@@ -12,6 +12,7 @@ class DeadBand(CommandEffect):
     name = "dead_band"
     doc = "speeds below a magnitude give a stop"
     source = "regulated minimum 2,000 units (13.9 mm/s): Khepera III manual 2.2 p. 14"
+    memoryless = True
     choices = (WHEEL,)
     parameters = (
         Parameter(

@@ -12,6 +12,7 @@ class SpeedSaturation(CommandEffect):
     name = "speed_saturation"
     doc = "a wheel turns no faster than a limit"
     source = "limits of 48,000 and 43,000 units: Khepera III manual 2.2 p. 14"
+    memoryless = True
     choices = (WHEEL,)
     parameters = (
         Parameter(

@@ -41,6 +41,7 @@ class StuckWheel(CommandEffect):
     """A wheel turns at one speed whatever it is told, as long as commands last."""
 
     choices = (WHEEL, DIRECTION)
+    memoryless = True
 
     def apply(
         self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator

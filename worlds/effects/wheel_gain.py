@@ -12,6 +12,7 @@ class WheelGain(CommandEffect):
     name = "wheel_gain"
     doc = "a wheel turns at a share of the speed it is told"
     source = "thesis 4.2.3 and 6.2.1: a wheel slowed to a share of its intended speed"
+    memoryless = True
     choices = (WHEEL,)
     parameters = (
         Parameter(

@@ -12,6 +12,7 @@ class WheelIntermittent(CommandEffect):
     name = "wheel_intermittent"
     doc = "a wheel stops (or slows to a minimum) in every m-th command"
     source = "thesis 6.2.1 (stops spinning) and 6.3.1 (set to the minimum); m is silent"
+    memoryless = True
     choices = (WHEEL,)
     parameters = (
         Parameter(
