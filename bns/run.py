@@ -83,6 +83,7 @@ def train(
 def train_many(
     configs: Sequence[RunConfig],
     *,
+    worlds: Sequence[World] = (),
     progress: bool = False,
     on_trial: OnTrial | None = None,
 ) -> list[RunRecord]:
@@ -90,6 +91,7 @@ def train_many(
 
     Args:
         configs: they may differ in `adaptation` and `world` only.
+        worlds: one per configuration; none makes those the configurations name.
         progress: show it on the standard error stream.
         on_trial: as for `train`; the runs of all configurations, one after another.
 
@@ -100,7 +102,7 @@ def train_many(
         check_device(config.device)
         check_world(check(config))
     settled, mode = _settle(configs)
-    batch = Batch(settled, [make_world(config) for config in settled])
+    batch = Batch(settled, worlds or [make_world(config) for config in settled])
     steps: list[Step] = []
     bar = Progress(configs[0], enabled=progress)
     with bar.start():
