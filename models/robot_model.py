@@ -103,6 +103,11 @@ class RobotModel:
         return tuple(ChannelName(c.name, c.unit) for c in self.commands)
 
     @property
+    def ranges(self) -> np.ndarray:
+        """Smallest and largest value of each command, shape ``(C, 2)``, SI units."""
+        return np.array([(c.low, c.high) for c in self.commands])
+
+    @property
     def limits(self) -> np.ndarray:
         """Largest magnitude of each command, shape ``(C,)``, SI units."""
         return np.array([max(-c.low, c.high) for c in self.commands])

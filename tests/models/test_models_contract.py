@@ -82,8 +82,8 @@ def test_controls_are_the_commands_in_order(name, compiled):
     robot, model = models.robot(name), compiled[name]
     order = [model.actuator(index).name for index in range(model.nu)]
     assert [command.actuator for command in robot.commands] == order
-    reach = model.actuator_ctrlrange[:, 1] / robot.ctrl_per_command
-    np.testing.assert_allclose(reach, robot.limits, rtol=1e-3)
+    reach = model.actuator_ctrlrange / robot.ctrl_per_command
+    np.testing.assert_allclose(reach, robot.ranges, rtol=1e-3)
 
 
 @robots
@@ -149,15 +149,19 @@ def test_home_rests(name, compiled):
 
 
 @robots
-def test_only_the_floor_is_touched(name, compiled):
+def test_only_the_floor_and_what_is_paired_touch(name, compiled):
     model = compiled[name]
     floor = model.geom("floor").id
     if models.robot(name).kind == "servo":
         assert not (model.geom_contype & model.geom_conaffinity[floor]).any()
         return
+    own = {
+        frozenset(pair) for pair in zip(model.pair_geom1, model.pair_geom2, strict=True)
+    }
     _, data = driven(model, smooth(model, 0.5, seed=4))
     assert data.ncon
-    assert all(floor in contact.geom for contact in data.contact)
+    for contact in data.contact:
+        assert floor in contact.geom or frozenset(contact.geom) in own
 
 
 def test_robots_without_a_floor_have_none():

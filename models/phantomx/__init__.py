@@ -1,0 +1,1 @@
+"""PhantomX AX Hexapod Mark II: six legs, eighteen AX-12A servos."""
