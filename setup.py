@@ -12,6 +12,7 @@ TREES = {
     "bns.models": "models",
     "bns.worlds": "worlds",
     "bns.gap": "gap",
+    "bns.hardware": "hardware",
     "bns.viz": "viz",
 }
 

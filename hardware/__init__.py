@@ -1,0 +1,1 @@
+"""Real robots as worlds: serial drivers, overhead tracking, safety, emulators."""

@@ -1,0 +1,1 @@
+"""Virtual robots that speak the real protocols and move in MuJoCo."""

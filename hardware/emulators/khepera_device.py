@@ -1,0 +1,185 @@
+"""The electronics of an emulated Khepera III: K-Team's server with its quirks.
+
+What is copied is the behaviour read in K-Team's server for the KoreBot: it blanks the
+first character of wide arguments, keeps stale ones where some are missing, answers
+unknown letters with `$`, and throws away what arrives before it has answered.
+"""
+
+from collections import deque
+
+import numpy as np
+
+from bns.hardware.emulators.device import Reply
+from bns.hardware.emulators.khepera_body import KheperaBody
+from bns.hardware.khepera import protocol
+from bns.models.khepera3.units import firmware
+
+BYTE = 10 / protocol.BAUD  # s on the wire: start bit, 8 bits, stop bit
+LONGEST = 82  # characters of a line
+KNOWN = "ABCDEFGHIJKLMNOPQRVXZ"
+
+
+class KheperaDevice:
+    """A Khepera III's firmware on a body.
+
+    Args:
+        body: what moves.
+        version: version and revision that `B` answers; units follow from it.
+        latency: of the link, one way [s] (Bluetooth; not measured, assumed).
+        ending: of its lines: CR LF as K-Team's server, or LF.
+        battery: voltage [V].
+        mute: probability that a command gets no answer (an I2C failure).
+        rng: for what is random.
+
+    Attributes:
+        log: accepted set points: (time, left, right) in speed units.
+    """
+
+    def __init__(
+        self,
+        body: KheperaBody,
+        *,
+        version: tuple[int, int] = (2, 5),
+        latency: float = 0.01,
+        ending: bytes = b"\r\n",
+        battery: float = 7.9,
+        mute: float = 0.0,
+        rng: np.random.Generator | None = None,
+    ):
+        self.body, self.version, self.latency = body, version, latency
+        self.ending, self.battery, self.mute = ending, battery, mute
+        self.units = firmware(version[0])
+        self.rng = rng or np.random.default_rng(0)
+        self.log: deque[tuple[float, int, int]] = deque(maxlen=200_000)
+        self._buffer = b""
+        self._stale = ["0"] * 6
+        self._deaf_until = -1.0
+        self._zero = (0.0, 0.0)
+        self._stamp_from = 0.0
+
+    def advance(self, now: float) -> None:
+        """Let the physics go on until `now` [s]."""
+        self.body.advance(now)
+
+    def receive(self, data: bytes, now: float) -> list[Reply]:
+        """Take bytes; what comes while an answer is being made is lost."""
+        if now < self._deaf_until:
+            return []
+        self._buffer += data
+        ends = [at for at in map(self._buffer.find, (b"\n", b"\r")) if at >= 0]
+        while ends:
+            cut = min(ends)
+            line, self._buffer = self._buffer[:cut], self._buffer[cut + 1 :]
+            if line.strip():
+                self._buffer = b""  # it drops unread input before each answer
+                return self._obey(line[:LONGEST].decode("latin-1"), len(data), now)
+            ends = [at for at in map(self._buffer.find, (b"\n", b"\r")) if at >= 0]
+        self._buffer = self._buffer[-LONGEST:]
+        return []
+
+    def _obey(self, line: str, sent: int, now: float) -> list[Reply]:
+        heard = now + self.latency + sent * BYTE
+        self.body.advance(now)
+        answer = self._answer(line, heard)
+        if answer is None or self.rng.random() < self.mute:
+            return []
+        at = heard + self.latency + len(answer) * BYTE
+        self._deaf_until = heard + 1e-4
+        return [Reply(at, answer)]
+
+    def _answer(self, line: str, at: float) -> bytes | None:
+        letter, *given = line.split(",")
+        if letter == "X":
+            return self._frame(at)
+        made = getattr(self, f"_do_{letter.lower()}", None) if letter in KNOWN else None
+        if letter not in KNOWN:
+            return b"$" + self.ending
+        if letter in ("A", "V") and len(given) != 1:
+            return b"$" + self.ending
+        text = made(given, at) if made else letter.lower()
+        return text.encode() + self.ending
+
+    def _wide(self, given: list[str], count: int) -> list[int]:
+        """Arguments as the robot reads them: first character gone, stale if missing."""
+        for place, item in enumerate(given[:count]):
+            self._stale[place] = item[1:10]
+        return [_whole(item) for item in self._stale[:count]]
+
+    def _do_b(self, given: list[str], at: float) -> str:
+        return f"b,{self.version[0]},{self.version[1]}"
+
+    def _do_d(self, given: list[str], at: float) -> str:
+        left, right = self._wide(given, 2)
+        self.log.append((at, left, right))
+        limit = 48_000  # speed units; TBX clamps there
+        speeds = [
+            self.units.speed(float(np.clip(u, -limit, limit))) for u in (left, right)
+        ]
+        self.body.tell(at, speeds[0], speeds[1])
+        return "d"
+
+    def _do_e(self, given: list[str], at: float) -> str:
+        left, right = (self.units.units(v) for v in self.body.wheel_speeds())
+        return f"e,{round(left)},{round(right)}"
+
+    def _do_r(self, given: list[str], at: float) -> str:
+        left, right = self._counts()
+        return f"r,{left},{right}"
+
+    def _do_i(self, given: list[str], at: float) -> str:
+        left, right = self._wide(given, 2)
+        angles = self.body.wheel_angles()
+        per = self.units.counts / (2 * np.pi)
+        self._zero = (angles[0] * per - left, angles[1] * per - right)
+        return "i"
+
+    def _counts(self) -> tuple[int, int]:
+        per = self.units.counts / (2 * np.pi)
+        left, right = self.body.wheel_angles()
+        return round(left * per - self._zero[0]), round(right * per - self._zero[1])
+
+    def _do_n(self, given: list[str], at: float) -> str:
+        return f"n,{_list(self.body.proximity())},{self._stamp(at)}"
+
+    def _do_o(self, given: list[str], at: float) -> str:
+        return f"o,{_list(self.body.ambient())},{self._stamp(at)}"
+
+    def _do_v(self, given: list[str], at: float) -> str:
+        what = _whole(given[0])
+        whole, part = divmod(round(self.battery * 10), 10)
+        answers = {0: f"v,{whole},{part}", 3: "v,1100", 4: "v,25,0", 5: "v,80"}
+        return answers.get(what, "v,0,3")
+
+    def _do_z(self, given: list[str], at: float) -> str:
+        self._stamp_from = at
+        return "z"
+
+    def _do_q(self, given: list[str], at: float) -> str:
+        return "$"
+
+    def _stamp(self, at: float) -> int:
+        return int((at - self._stamp_from) * 1000) % 2**31  # the unit is assumed: ms
+
+    def _frame(self, at: float) -> bytes:
+        speeds = [round(self.units.units(v)) for v in self.body.wheel_speeds()]
+        values = [*self.body.proximity(), *self.body.ambient(), *speeds]
+        return protocol.FRAME.pack(
+            b"x", *values, *self._counts(), self._stamp(at), b"\n\r"
+        )
+
+
+def _whole(text: str) -> int:
+    """A number as C's atoi reads it."""
+    digits, sign = "", 1
+    for index, letter in enumerate(text.strip()):
+        if index == 0 and letter in "+-":
+            sign = -1 if letter == "-" else 1
+        elif letter in "0123456789":
+            digits += letter
+        else:
+            break
+    return max(min(sign * int(digits or 0), 2**31 - 1), -(2**31))
+
+
+def _list(values: tuple[int, ...]) -> str:
+    return ",".join(map(str, values))

@@ -1,0 +1,60 @@
+"""What goes wrong on a line or in a trial, noted one by one."""
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import NamedTuple
+
+from bns.hardware.clock import Clock
+
+KEPT = 100_000  # faults kept in memory
+
+
+class Fault(NamedTuple):
+    """One thing that went wrong.
+
+    Attributes:
+        at: time on the session's clock [s].
+        kind: "no answer", "garbled answer", ...
+        about: command or part that it concerns.
+        seen: what was there instead, as text.
+    """
+
+    at: float
+    kind: str
+    about: str
+    seen: str
+
+
+class FaultLog:
+    """All faults of a session.
+
+    Args:
+        clock: of the session.
+        path: file to append each fault to, a JSON line each; None keeps them here.
+    """
+
+    def __init__(self, clock: Clock, path: Path | str | None = None):
+        self.clock = clock
+        self.path = Path(path) if path else None
+        self.faults: list[Fault] = []
+        self.counts: Counter[str] = Counter()
+
+    def note(self, kind: str, about: bytes | str = "", seen: bytes | str = "") -> None:
+        """Add a fault."""
+        fault = Fault(round(self.clock.now(), 4), kind, _text(about), _text(seen))
+        self.counts[kind] += 1
+        if len(self.faults) < KEPT:
+            self.faults.append(fault)
+        if self.path:
+            with open(self.path, "a", encoding="utf-8") as file:
+                file.write(json.dumps(fault._asdict()) + "\n")
+
+    def __len__(self) -> int:
+        return sum(self.counts.values())
+
+
+def _text(data: bytes | str) -> str:
+    if isinstance(data, bytes):
+        return data[:80].decode("ascii", "backslashreplace").strip()
+    return data

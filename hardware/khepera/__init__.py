@@ -1,0 +1,1 @@
+"""Khepera III: its ASCII protocol and the driver on it."""

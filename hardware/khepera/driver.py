@@ -1,0 +1,294 @@
+"""The driver of a Khepera III: one command, one answer, and nothing moves unwatched."""
+
+from collections.abc import Callable
+from typing import NamedTuple, Protocol
+
+from bns.errors import BnsError
+from bns.hardware.clock import Clock
+from bns.hardware.errors import LinkError
+from bns.hardware.faults import FaultLog
+from bns.hardware.khepera import protocol
+from bns.hardware.line import Line
+from bns.models.khepera3.units import Firmware, firmware
+
+LARGEST = 43_000  # speed units, firmware < 3, regulated (manual 2.2, p. 14)
+NEWEST = 9  # firmware versions beyond it are not known and refused
+TIMEOUT = 0.12  # s for an answer: 7 ms of wire, two Bluetooth latencies; assumed
+RETRIES = 6
+QUIET = 0.02  # s without a byte after which the line counts as silent
+
+
+class Guard(Protocol):
+    """What has to stand behind a moving robot, see `bns.hardware.watchdog`."""
+
+    def feed(self, *, moving: bool) -> None:
+        """Say that the process is alive; raises if the guard has fired."""
+        ...
+
+
+class Drive(NamedTuple):
+    """A set point that the robot has acknowledged.
+
+    Attributes:
+        at: when it held, the middle of the exchange [s].
+        units: left and right [speed units].
+    """
+
+    at: float
+    units: tuple[int, int]
+
+
+class Khepera3:
+    """A Khepera III on a line.
+
+    Args:
+        line: to it.
+        clock: to wait on.
+        faults: where what goes wrong on the line is noted.
+        guard: without one, `drive` refuses to move the robot.
+        limit: largest speed over the floor [m/s]; faster commands are refused.
+        timeout: for an answer [s].
+
+    Attributes:
+        round_trips: duration of each exchange that went well [s], the newest 1000.
+    """
+
+    def __init__(
+        self,
+        line: Line,
+        clock: Clock,
+        *,
+        faults: FaultLog | None = None,
+        guard: Guard | None = None,
+        limit: float = 0.15,
+        timeout: float = TIMEOUT,
+    ):
+        self.line, self.clock, self.guard = line, clock, guard
+        self.faults = faults if faults is not None else FaultLog(clock)
+        self.limit, self.timeout = limit, timeout
+        self.units: Firmware | None = None
+        self.version: tuple[int, int] = (0, 0)
+        self.round_trips: list[float] = []
+
+    def identify(self) -> tuple[int, int]:
+        """Ask for the firmware and take its units.
+
+        Returns:
+            version, revision.
+
+        Raises:
+            BnsError: nothing answers, another device does, or the firmware is not
+                known. Nothing has moved.
+        """
+        heard: list[bytes] = []
+        try:
+            answer = self.ask(b"B\n", "b", heard=heard)
+        except LinkError as error:
+            raise _stranger(b"".join(heard)) from error
+        self.version = (answer[0], answer[1])
+        if not 1 <= self.version[0] <= NEWEST:
+            raise BnsError(
+                f"Firmware {self.version[0]}.{self.version[1]} is not known (1 to "
+                f"{NEWEST} are): its units could be anything, so nothing was moved."
+            )
+        self.units = firmware(self.version[0])
+        return self.version
+
+    def ask(
+        self, command: bytes, letter: str, *, heard: list[bytes] | None = None
+    ) -> tuple[int, ...]:
+        """Send a command and give the numbers of its answer.
+
+        Args:
+            command: the line, with its ending.
+            letter: of the answer.
+            heard: collects every byte that came, for a look at a stranger.
+
+        Raises:
+            LinkError: no proper answer in any of the tries, or the line is dead.
+        """
+        return self._exchange(
+            command, lambda line: protocol.numbers(line, letter), heard
+        )
+
+    def drive(self, left: float, right: float, *, times: int = 1) -> Drive:
+        """Set the wheels' speeds over the floor [m/s].
+
+        Args:
+            left, right: within the limit.
+            times: how often it is sent; twice on a line that loses bytes, because a
+                digit lost on the way is acknowledged like any other number.
+
+        Raises:
+            BnsError: too fast, nobody guards, or the firmware is not known yet.
+            LinkError: not acknowledged.
+        """
+        if self.units is None:
+            raise BnsError("The firmware is not known yet: call identify() first.")
+        if max(abs(left), abs(right)) > self.limit * (1 + 1e-9):
+            raise BnsError(
+                f"Speed {max(abs(left), abs(right)):.3g} m/s is above the limit of "
+                f"{self.limit:.3g} m/s: give slower commands."
+            )
+        moving = bool(left or right)
+        if moving and self.guard is None:
+            raise BnsError("Nobody guards the robot: it moves with a watchdog only.")
+        if self.guard is not None:
+            self.guard.feed(moving=moving)
+        pair = (round(self.units.units(left)), round(self.units.units(right)))
+        command = protocol.speeds(*pair)
+        begin = self.clock.now()
+        self.ask(command, "d")
+        middle = (begin + self.clock.now()) / 2
+        for _ in range(times - 1):
+            self.ask(command, "d")
+        return Drive(middle, pair)
+
+    def stop(self) -> None:
+        """Stop both wheels and see that they stand.
+
+        Raises:
+            LinkError: the robot does not confirm it.
+        """
+        for _ in range(4):
+            self.ask(protocol.STOP, "d")
+            self.ask(protocol.STOP, "d")
+            if self._standing():
+                break
+        if self.guard is not None:
+            self.guard.feed(moving=False)
+
+    def _standing(self) -> bool:
+        """Whether the wheels slow down to a stand within a moment."""
+        for _ in range(12):
+            if max(map(abs, self.speeds())) < 1500:  # below the smallest regulated
+                return True
+            self.clock.sleep(0.03)
+        return False
+
+    def speeds(self) -> tuple[int, int]:
+        """Measured speeds, left and right [speed units]."""
+        left, right = self.ask(b"E\n", "e")
+        return left, right
+
+    def positions(self) -> tuple[int, int]:
+        """Position counters, left and right [counts]."""
+        left, right = self.ask(b"R\n", "r")
+        return left, right
+
+    def proximity(self) -> tuple[int, ...]:
+        """11 proximity values, larger = nearer."""
+        return self.ask(b"N\n", "n")[: protocol.SENSORS]
+
+    def ambient(self) -> tuple[int, ...]:
+        """11 ambient light values, smaller = more light."""
+        return self.ask(b"O\n", "o")[: protocol.SENSORS]
+
+    def battery(self, what: int = 0) -> float:
+        """Battery: 0 voltage [V], 3 remaining [mAh], 4 temperature [C], 5 left [%]."""
+        return self._exchange(f"V,{what}\n".encode(), protocol.decimal)
+
+    def everything(self) -> protocol.Reading:
+        """All sensors, speeds and positions in one binary frame.
+
+        Raises:
+            LinkError: no whole frame in any of the tries.
+        """
+        return self._repeat(self._frame, "X")
+
+    def _exchange(
+        self,
+        command: bytes,
+        understood: Callable,
+        heard: list[bytes] | None = None,
+    ):
+        def once():
+            return self._line(command, understood, heard)
+
+        return self._repeat(once, command.decode().strip())
+
+    def _repeat(self, once: Callable, what: str):
+        for _ in range(RETRIES + 1):
+            begin = self.clock.now()
+            answer = once()
+            if answer is not None:
+                self.round_trips.append(self.clock.now() - begin)
+                del self.round_trips[:-1000]
+                return answer
+            self.resynchronise()
+        raise LinkError(
+            f"No proper answer to {what!r} in {RETRIES + 1} tries: check the link; a "
+            "robot that was moving may still be."
+        )
+
+    def _line(self, command: bytes, understood: Callable, heard: list[bytes] | None):
+        """One try: lines are read until one is the answer or time is up."""
+        self.line.discard()
+        self.line.write(command)
+        until, buffer = self.clock.now() + self.timeout, b""
+        while (left := until - self.clock.now()) > 0:
+            data = self.line.read(left)
+            if heard is not None:
+                heard.append(data)
+            buffer = (buffer + data)[-4096:]
+            while (cut := _ending(buffer)) >= 0:
+                line, buffer = buffer[:cut].strip(b"\r\n"), buffer[cut + 1 :]
+                if not line:
+                    continue
+                answer = understood(line)
+                if answer is not None:
+                    return answer
+                self.faults.note("garbled answer", command, line)
+        kind = "cut answer" if buffer else "no answer"
+        self.faults.note(kind, command, buffer)
+        return None
+
+    def _frame(self) -> protocol.Reading | None:
+        self.line.discard()
+        self.line.write(b"X\n")
+        until, data = self.clock.now() + self.timeout, b""
+        size = protocol.FRAME.size
+        while len(data) < size and (left := until - self.clock.now()) > 0:
+            data += self.line.read(left)
+        reading = protocol.frame(data[:size])
+        if reading is None:
+            self.faults.note("broken frame", b"X", data[:size])
+        return reading
+
+    def resynchronise(self) -> None:
+        """End a half-sent line and wait until nothing comes any more."""
+        self.line.write(b"\n")  # empty lines are ignored
+        until = self.clock.now() + 0.2
+        while self.clock.now() < until and self.line.read(QUIET):
+            pass
+        self.line.discard()
+
+
+def _ending(buffer: bytes) -> int:
+    """Where the first line ends (LF or CR), -1 if none does."""
+    found = [at for at in (buffer.find(b"\n"), buffer.find(b"\r")) if at >= 0]
+    return min(found) if found else -1
+
+
+def _stranger(heard: bytes) -> BnsError:
+    """What it means that `B` got no answer."""
+    if b"\xff\xff" in heard:
+        return BnsError(
+            "What answers on this port speaks the Dynamixel protocol: a hexapod, no "
+            "Khepera III. Give --robot phantomx or another --port."
+        )
+    text = heard.strip()
+    if text and all(32 <= c < 127 or c in b"\r\n" for c in text):
+        return BnsError(
+            f"What answers on this port ({text[:40].decode()!r}) is no Khepera III: "
+            "give another --port."
+        )
+    if text:
+        return BnsError(
+            "What comes from this port cannot be read: the baud rate is wrong; the "
+            f"Khepera III talks at {protocol.BAUD}."
+        )
+    return BnsError(
+        "Nothing answers on this port: switch the Khepera III on, check cable or "
+        f"Bluetooth, and that it talks at {protocol.BAUD} baud."
+    )

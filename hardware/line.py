@@ -1,0 +1,159 @@
+"""The line to a robot: bytes out, bytes in, over a serial port."""
+
+import errno
+import os
+from typing import Any, Protocol
+
+from bns.errors import BnsError, MissingDependencyError
+from bns.hardware.errors import LinkError
+
+INSTALL = 'pip install "bns-testbed[hardware]"'
+
+
+class Line(Protocol):
+    """What a driver talks through."""
+
+    def write(self, data: bytes) -> None:
+        """Send.
+
+        Raises:
+            LinkError: the line is dead.
+        """
+        ...
+
+    def read(self, timeout: float) -> bytes:
+        """What has arrived; waits at most `timeout` [s] for the first byte.
+
+        Raises:
+            LinkError: the line is dead.
+        """
+        ...
+
+    def discard(self) -> None:
+        """Forget what has arrived."""
+        ...
+
+    def close(self) -> None:
+        """Give the port back."""
+        ...
+
+
+class SerialLine:
+    """A serial port, held by this process alone.
+
+    Args:
+        port: device file.
+        baud: bits per second; 8 data bits, no parity, 1 stop bit.
+
+    Raises:
+        MissingDependencyError: pyserial is not installed.
+        BnsError: no such port, no permission, in use, not a serial port.
+    """
+
+    def __init__(self, port: str, baud: int = 115200):
+        self.port, self.baud = port, baud
+        serial = _pyserial()
+        check_port(port)
+        try:
+            self._serial = serial.Serial(
+                port, baud, timeout=0.1, write_timeout=0.3, exclusive=True
+            )
+        except (OSError, ValueError) as error:  # SerialException is an OSError
+            raise _explained(port, error) from error
+
+    def fileno(self) -> int:
+        """The open file's number, for the watchdog."""
+        return self._serial.fileno()
+
+    def write(self, data: bytes) -> None:
+        """Send, see `Line.write`."""
+        try:
+            self._serial.write(data)
+        except OSError as error:
+            raise self._dead(error) from error
+
+    def read(self, timeout: float) -> bytes:
+        """What has arrived, see `Line.read`."""
+        try:
+            self._serial.timeout = max(timeout, 0.0)
+            first = self._serial.read(1)
+            return first + self._serial.read(self._serial.in_waiting) if first else b""
+        except (OSError, TypeError) as error:  # TypeError: closed while reading
+            raise self._dead(error) from error
+
+    def discard(self) -> None:
+        """Forget what has arrived."""
+        try:
+            self._serial.reset_input_buffer()
+        except _errors() as error:
+            raise self._dead(error) from error
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._serial.close()
+
+    def _dead(self, error: BaseException) -> LinkError:
+        return LinkError(
+            f"The line on {self.port} is dead ({error}): check cable, power and "
+            "Bluetooth; a robot that was moving may still be."
+        )
+
+
+def check_port(port: str) -> None:
+    """Refuse a port that cannot be one.
+
+    Raises:
+        BnsError: it does not exist, may not be opened, or is no device.
+    """
+    if not port:
+        raise BnsError(f"No port was given: give --port DEVICE{_ports()}.")
+    if not os.path.exists(port):
+        raise BnsError(f"There is no port {port}{_ports()}.")
+    if not os.access(port, os.R_OK | os.W_OK):
+        raise BnsError(
+            f"No permission for {port}: join its group (usermod -aG dialout USER) "
+            "and log in again."
+        )
+
+
+def _ports() -> str:
+    from glob import glob
+
+    found = sorted(
+        port
+        for kind in ("ttyUSB", "ttyACM", "rfcomm")
+        for port in glob(f"/dev/{kind}*")
+    )
+    return (
+        f"; this machine has {', '.join(found)}"
+        if found
+        else ("; this machine has none now (rehearse with `bns hardware emulate`)")
+    )
+
+
+def _explained(port: str, error: BaseException) -> BnsError:
+    code = getattr(error, "errno", None)
+    busy = code in (errno.EBUSY, errno.EAGAIN) or "lock" in str(error)
+    if busy:
+        return BnsError(
+            f"Port {port} is in use by another program: end that one first."
+        )
+    if code in (errno.ENOTTY, errno.EINVAL) or "configure port" in str(error):
+        return BnsError(f"{port} is no serial port: give the robot's device file.")
+    return BnsError(f"Port {port} cannot be opened: {error}.")
+
+
+def _pyserial() -> Any:
+    try:
+        import serial
+    except ImportError as error:
+        raise MissingDependencyError(
+            "a robot on a port", "pyserial", INSTALL
+        ) from error
+    return serial
+
+
+def _errors() -> tuple[type[BaseException], ...]:
+    import termios
+
+    return (OSError, termios.error)
