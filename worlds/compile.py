@@ -71,6 +71,21 @@ def _posed(free: np.ndarray, start: tuple[float, float, float]) -> np.ndarray:
     return np.concatenate([[x, y, free[2]], turned])
 
 
+def turned(model: mujoco.MjModel, state: np.ndarray, yaw: float) -> np.ndarray:
+    """A full physics state with the robot at rest where it is, looking elsewhere.
+
+    Args:
+        model: the compiled model.
+        state: (time, qpos, qvel, ...).
+        yaw: where it looks then [rad].
+    """
+    place, state = free_joint(model), state.copy()
+    free = state[1 + place.start : 1 + place.stop]
+    free[:] = _posed(free, (free[0], free[1], yaw))
+    state[1 + model.nq : 1 + model.nq + model.nv] = 0.0
+    return state
+
+
 def free_joint(model: mujoco.MjModel) -> slice:
     """Where the base's position and orientation lie in qpos."""
     joint = int(np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)[0])

@@ -11,6 +11,7 @@ from bns.worlds import active, compile, control, observe
 from bns.worlds.active import Stages
 from bns.worlds.checks import bounded, checked_start, shared
 from bns.worlds.damage import Damage
+from bns.worlds.loops import Loops
 from bns.worlds.physics import Job, Motion, Pool
 from bns.worlds.trial import Commands, Trial
 
@@ -27,7 +28,7 @@ class Plan(NamedTuple):
     job: Job
 
 
-class MujocoWorld:
+class MujocoWorld(Loops):
     """Robots that execute commands in MuJoCo, N at a time.
 
     A trial depends on its commands, damage, trial number and seed alone: not on the
@@ -53,6 +54,8 @@ class MujocoWorld:
         BnsError: an effect that this robot or world cannot have.
     """
 
+    stages = STAGES
+
     def __init__(
         self,
         robot: str = "khepera3",
@@ -73,7 +76,7 @@ class MujocoWorld:
         self.reality = active.as_damage(reality)
         given = self.damage if isinstance(self.damage, tuple) else (self.damage,)
         for item in (*given, self.reality):
-            active.refuse(item, stages=STAGES, kind=self.model.kind, world=name)
+            active.refuse(item, stages=self.stages, kind=self.model.kind, world=name)
         self.arena = (float(arena[0]), float(arena[1]))
         self.start = checked_start(start, self.arena)
         self.sample_dt = bounded("sample_dt", sample_dt, self.dt, 60.0, "s")
@@ -142,7 +145,6 @@ class MujocoWorld:
             plan.seed,
             trial,
         )
-        hidden = motion.states[sampled] if self.truth else None
         return Trial(
             commands=plan.commands,
             times=times,
@@ -153,11 +155,11 @@ class MujocoWorld:
             world=self.name,
             conditions=plan.stages.conditions(trial, plan.seed)
             | {"mujoco": mujoco.__version__},
-            truth={} if hidden is None else _hidden(scene, hidden),
+            truth=self.hidden(motion.states[sampled]) if self.truth else {},
         )
 
-
-def _hidden(model: mujoco.MjModel, states: np.ndarray) -> dict[str, np.ndarray]:
-    """Quantities by name from full physics states (time, qpos, qvel, ...)."""
-    end = 1 + model.nq
-    return {"qpos": states[:, 1:end], "qvel": states[:, end : end + model.nv]}
+    def hidden(self, states: np.ndarray) -> dict[str, np.ndarray]:
+        """Quantities by name from full physics states (time, qpos, qvel, ...)."""
+        model = compile.compiled(self.robot).model
+        end = 1 + model.nq
+        return {"qpos": states[:, 1:end], "qvel": states[:, end : end + model.nv]}

@@ -40,10 +40,16 @@ def planar(free: np.ndarray, yaw: float) -> np.ndarray:
     Returns:
         ``(S, 3)`` [m, m, rad]; NaN where `free` is.
     """
+    poses = flat(free)
+    step = np.diff(poses[:, 2], prepend=yaw)
+    poses[:, 2] -= TURN * np.cumsum(np.rint(step / TURN))
+    return poses
+
+
+def flat(free: np.ndarray) -> np.ndarray:
+    """Planar poses, the yaw from -pi to pi, of a free joint; shapes as for `planar`."""
     w, x, y, z = free[:, 3:].T
     angle = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    step = np.diff(angle, prepend=yaw)
-    angle -= TURN * np.cumsum(np.rint(step / TURN))
     return np.column_stack([free[:, :2], angle])
 
 

@@ -29,6 +29,7 @@ __all__ = [
     "CommandEffect",
     "ControlSignal",
     "Effect",
+    "OpticsEffect",
     "Parameter",
     "PoseSignal",
     "SensorEffect",
@@ -193,6 +194,27 @@ class ServoEffect(Effect):
         """The law after the effect: every number by name, arrays of any shape."""
 
 
+class OpticsEffect(Effect):
+    """Changes numbers of the light law (`bns.worlds.light_law`): lamps or sensors.
+
+    What light does before it is a reading can not be written as a transform of the
+    readings: they have saturated. All such effects are numbers of one law.
+    """
+
+    stage = "sensor"
+
+    @abstractmethod
+    def change(
+        self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
+    ) -> dict[str, np.ndarray]:
+        """The law after the effect, without a robot axis.
+
+        Args:
+            law: every number by name; not to be written to.
+            sensors: names of the S sensors.
+        """
+
+
 class SensorEffect(Effect):
     """Changes what a sensor reads: a transform of sensor samples."""
 
@@ -207,7 +229,22 @@ class SensorEffect(Effect):
         active: np.ndarray,
         rng: np.random.Generator,
     ) -> np.ndarray:
-        """The readings after the effect, shape ``(T, n_sensors)`` as given."""
+        """The readings after the effect.
+
+        A reading depends on that reading and those before it alone, and the effect
+        draws what it draws reading by reading: robots that close a loop get their
+        readings one by one.
+
+        Args:
+            times: of the readings [s], shape ``(T,)``.
+            readings: shape ``(T, S)`` [counts]; not to be written to.
+            channels: names of the S sensors.
+            active: where in time the effect is on, shape ``(T,)``.
+            rng: the only source of randomness.
+
+        Returns:
+            New readings, ``(T, S)``; equal to those given where not active.
+        """
 
 
 class TrackingEffect(Effect):

@@ -1,0 +1,134 @@
+"""How light becomes counts: one law, its numbers by name, all robots at once.
+
+A law is a mapping of arrays. Each has the shape given here, or the same with a leading
+robot axis, where robots differ (each with its own damage):
+
+    lamp_position (L, 3) [m], lamp_power (L,) [W], flicker_depth (L,),
+    flicker_frequency (L,) [Hz], ambient () [W/m2],
+    shadow_azimuth () [rad], shadow_width () [rad], shadow_transmission (),
+    position (S, 3) [m], heading (S,) [rad], exponent (), full_light (S,) [W/m2],
+    dark () and bright () [counts], light_noise (), count_noise () [counts], noise (S,)
+
+The irradiance on a sensor falls with the square of the distance and with a power of
+the cosine of the angle to where it looks (the exponent); the reading falls in
+proportion from `dark` to `bright`, which it reaches at `full_light`: smaller is
+brighter. Noise acts on the light and on the reading before it saturates, so that a
+saturated sensor repeats itself.
+"""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+Law = Mapping[str, np.ndarray]
+Sight = Callable[[np.ndarray], np.ndarray]
+"""Which share of a direction's light reaches the sensors: takes unit vectors in the
+robot's frame, shape ``(..., S, L, 3)``, gives ``(..., S, L)``."""
+Screen = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Which share of the lamps' light passes the objects: takes points ``(..., S, 3)`` and
+lamps ``(..., L, 3)`` in the world frame, gives ``(..., S, L)``."""
+
+
+def irradiance(
+    law: Law,
+    poses: np.ndarray,
+    times: np.ndarray | float = 0.0,
+    *,
+    sight: Sight | None = None,
+    screen: Screen | None = None,
+) -> np.ndarray:
+    """Light on each sensor.
+
+    Args:
+        law: see the module's docstring.
+        poses: of the robots in the world frame, shape ``(n, 3)`` [m, m, rad].
+        times: moment of each robot's reading [s], shape ``(n,)`` or one for all.
+        sight: what the robot's own body leaves of a direction.
+        screen: what objects leave of a lamp.
+
+    Returns:
+        Irradiance weighted by the angular response, shape ``(n, S)`` [W/m2].
+    """
+    poses = np.asarray(poses, dtype=np.float64)
+    points = _points(law, poses)
+    way = law["lamp_position"][..., None, :, :] - points[:, :, None, :]  # (n, S, L, 3)
+    square = np.maximum((way**2).sum(-1), 1e-6)  # [m2] no nearer than 1 mm
+    unit = way / np.sqrt(square)[..., None]
+    look = law["heading"] + poses[:, 2, None]
+    cosine = (
+        unit[..., 0] * np.cos(look)[..., None] + unit[..., 1] * np.sin(look)[..., None]
+    )
+    light = _shining(law, times) / (4 * np.pi * square)
+    light = light * np.maximum(cosine, 0.0) ** law["exponent"][..., None, None]
+    if sight is not None:
+        light = light * sight(_in_body(unit, poses[:, 2]))
+    if screen is not None:
+        lamps = np.broadcast_to(law["lamp_position"], (len(poses), *unit.shape[2:]))
+        light = light * screen(points, lamps)
+    light = light * _shadow(law, way)
+    return light.sum(-1) + law["ambient"][..., None]
+
+
+def counts(
+    law: Law, light: np.ndarray, noise: tuple[np.ndarray, np.ndarray] | None = None
+) -> np.ndarray:
+    """Readings from irradiance: smaller is brighter.
+
+    Args:
+        law: see the module's docstring.
+        light: shape ``(n, S)`` [W/m2].
+        noise: two arrays of standard normal numbers, ``(n, S)`` each; None = none.
+
+    Returns:
+        Whole counts, shape ``(n, S)``.
+    """
+    dark, bright = law["dark"][..., None], law["bright"][..., None]
+    if noise is not None:
+        scale = law["noise"]
+        light = light * (1 + scale * law["light_noise"][..., None] * noise[0])
+    reading = dark - (dark - bright) * light / law["full_light"]
+    if noise is not None:
+        reading = reading + scale * law["count_noise"][..., None] * noise[1]
+    return np.rint(np.clip(reading, bright, dark))
+
+
+def _points(law: Law, poses: np.ndarray) -> np.ndarray:
+    """Where the sensors are, in the world frame, ``(n, S, 3)``."""
+    x, y, z = np.moveaxis(law["position"], -1, 0)
+    cos, sin = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
+    return np.stack(
+        np.broadcast_arrays(
+            poses[:, 0, None] + cos * x - sin * y,
+            poses[:, 1, None] + sin * x + cos * y,
+            z,
+        ),
+        axis=-1,
+    )
+
+
+def _in_body(unit: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    """Directions turned into the robot's frame."""
+    cos, sin = np.cos(yaw)[:, None, None], np.sin(yaw)[:, None, None]
+    x, y, z = np.moveaxis(unit, -1, 0)
+    return np.stack([cos * x + sin * y, cos * y - sin * x, z], axis=-1)
+
+
+def _shining(law: Law, times: np.ndarray | float) -> np.ndarray:
+    """Power of each lamp at each robot's moment, broadcasts to ``(n, S, L)``."""
+    moment = np.asarray(times, dtype=np.float64).reshape(-1, 1)
+    wave = 0.5 * (1 - np.cos(2 * np.pi * law["flicker_frequency"] * moment))
+    return (law["lamp_power"] * (1 - law["flicker_depth"] * wave))[:, None, :]
+
+
+def _shadow(law: Law, way: np.ndarray) -> np.ndarray:
+    """What passes where a shadow falls from the lamp, ``(n, S, L)``."""
+    azimuth = np.arctan2(-way[..., 1], -way[..., 0])  # from the lamp to the sensor
+    off = azimuth - law["shadow_azimuth"][..., None, None]
+    off = np.abs((off + np.pi) % (2 * np.pi) - np.pi)
+    inside = off < law["shadow_width"][..., None, None] / 2
+    return np.where(inside, law["shadow_transmission"][..., None, None], 1.0)
+
+
+def stacked(laws: list[Law]) -> dict[str, np.ndarray]:
+    """The laws of several robots as one, with a leading robot axis."""
+    return {name: np.stack([law[name] for law in laws]) for name in laws[0]}

@@ -1,0 +1,93 @@
+"""What one robot of a closed loop does in a cycle: controls and models for physics."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from bns.worlds import compile, control
+from bns.worlds.active import Stages
+from bns.worlds.effects.base import ControlSignal
+from bns.worlds.physics import Compiled, Segment
+
+
+class LoopControl:
+    """From the commands of one robot, as they come, to segments of its motion.
+
+    Args:
+        robot: name of the robot model.
+        stages: what holds in this trial.
+        steps: physics steps of a cycle.
+        cycles: of the trial.
+        dt: physics step [s].
+        channels: what the robot is told.
+        ctrl_per_command: see `RobotModel`.
+        seed, trial: of what is random.
+    """
+
+    def __init__(
+        self,
+        robot: str,
+        stages: Stages,
+        *,
+        steps: int,
+        cycles: int,
+        dt: float,
+        channels: tuple[str, ...],
+        ctrl_per_command: float,
+        seed: int,
+        trial: int,
+    ):
+        self.stages, self.dt = stages, dt
+        self._steps, self._channels, self._scale = steps, channels, ctrl_per_command
+        self._seed, self._trial = seed, trial
+        self._told = np.empty((0, len(channels)))
+        self._memoryless = all(
+            getattr(item.effect, "memoryless", False) for item in stages.control
+        )
+        blank = np.zeros((steps * cycles, 0))
+        pieces = compile.segments(robot, stages.body, blank, dt)
+        ends = np.cumsum([0, *(len(piece.control) for piece in pieces)]).tolist()
+        self._pieces: list[tuple[int, int, Compiled]] = [
+            (begin, end, piece.compiled)
+            for (begin, end), piece in zip(pairwise(ends), pieces, strict=True)
+        ]
+
+    @property
+    def first(self) -> Compiled:
+        """The model that the trial starts with."""
+        return self._pieces[0][2]
+
+    def cycle(self, command: np.ndarray) -> tuple[Segment, ...]:
+        """The next cycle's motion under a command, shape ``(C,)``."""
+        begin = len(self._told) * self._steps
+        self._told = np.vstack([self._told, command])
+        return self._cut(self._values() * self._scale, begin)
+
+    def standing(self, begin: int, end: int) -> tuple[Segment, ...]:
+        """Standing still from a physics step to another: whatever is broken."""
+        return self._cut(np.zeros((end - begin, len(self._channels))), begin)
+
+    def _values(self) -> np.ndarray:
+        """The last command after all effects on the physics grid, ``(steps, C)``."""
+        if not self.stages.control:
+            return np.repeat(self._told[-1:], self._steps, axis=0)
+        count = len(self._told)
+        first = count - 1 if self._memoryless else 0
+        command = np.repeat(np.arange(first, count), self._steps)
+        given = ControlSignal(
+            times=np.arange(first * self._steps, count * self._steps) * self.dt,
+            values=self._told[command],
+            command=command,
+            channels=self._channels,
+            dt=self.dt,
+        )
+        values = control.disturbed(given, self.stages.control, self._seed, self._trial)
+        return values[-self._steps :]
+
+    def _cut(self, values: np.ndarray, begin: int) -> tuple[Segment, ...]:
+        end = begin + len(values)
+        return tuple(
+            Segment(model, values[max(a, begin) - begin : min(b, end) - begin])
+            for a, b, model in self._pieces
+            if a < end and b > begin
+        )
