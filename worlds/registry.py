@@ -7,7 +7,8 @@ A world is registered as a callable that takes settings by keyword and returns a
     my-world = "my_package.module:MyWorld"
 
 and a script with `register("my-world", MyWorld)`. The first line of the callable's
-docstring is its description.
+docstring is its description. Worlds that a user keeps in `worlds.toml` are found as
+well (`bns.worlds.corrected`).
 """
 
 import inspect
@@ -18,6 +19,7 @@ from importlib.metadata import entry_points
 from typing import Any
 
 from bns.errors import BnsError, UnknownNameError
+from bns.worlds import corrected
 from bns.worlds.world import World
 
 GROUP = "bns.worlds"
@@ -47,7 +49,7 @@ def _installed() -> dict[str, Any]:
 
 def names() -> tuple[str, ...]:
     """Names of all worlds, sorted."""
-    return tuple(sorted({*_BUILT_IN, *_installed(), *_registered}))
+    return tuple(sorted({*_BUILT_IN, *_installed(), *_registered, *corrected.known()}))
 
 
 def get(name: str) -> Callable[..., World]:
@@ -63,6 +65,9 @@ def get(name: str) -> Callable[..., World]:
         return getattr(import_module(module), attribute)
     if name in _installed():
         return _installed()[name].load()
+    kept = corrected.known()
+    if name in kept:
+        return corrected.factory(kept[name], make)
     raise UnknownNameError("world", name, names())
 
 

@@ -1,9 +1,10 @@
 """`bns run`: train a preset, a TOML file, or go on with a run directory."""
 
+import re
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -12,6 +13,9 @@ import tyro
 from bns.cli.parse import parse
 from bns.config import RunConfig
 from bns.errors import BnsError, FormatError, UnknownNameError
+
+_WORLD = re.compile(r"^--world(=.*)?$")
+"""short for --world.name"""
 
 STOPPED = 130
 """exit code of a run that Ctrl-C stopped after a whole trial"""
@@ -58,8 +62,21 @@ def main(verb: str, argv: list[str]) -> int:
         )
     config, out = source(argv[0])
     start = Arguments(source=argv[0], config=config, out=out)
-    given = parse(Arguments, argv, prog="bns run", default=start)
-    return execute(given)
+    words = [_WORLD.sub(r"--world.name\1", word) for word in argv]
+    given = parse(Arguments, words, prog="bns run", default=start)
+    return execute(replace(given, config=expanded(given.config)))
+
+
+def expanded(config: RunConfig) -> RunConfig:
+    """With a kept world (`worlds.toml`) written out, so that the record has it all."""
+    from bns.worlds import corrected
+
+    kept = corrected.known().get(config.world.name)
+    if kept is None:
+        return config
+    reality = (*kept.reality, *config.world.reality)
+    world = replace(config.world, name=kept.base, robot=kept.robot, reality=reality)
+    return replace(config, world=world)
 
 
 def source(text: str) -> tuple[RunConfig, str]:

@@ -29,7 +29,11 @@ def test_check_says_how_many_trials_can_be_used(recording, capsys):
         (["gap", "chek", "x"], "Did you mean 'check'"),
         (["gap", "check", "nowhere"], "nowhere"),
         (["gap", "diagnose", "x", "--model", "khepera4"], "khepera"),
-        (["gap", "check", "x", "--model", "servo_pendulum"], "wheeled"),
+        (["gap", "check", "x", "--model", "robot.xml"], "TOML file that maps"),
+        (["gap", "check", "x", "--importer", "xl33"], "Did you mean 'xl330'"),
+        (["gap", "plan", "nowhere"], "bns gap diagnose DATA --out nowhere"),
+        (["gap", "edit", "nowhere", "--remove", "a", "--predict", "b"], "nowhere"),
+        (["gap", "apply", "nowhere", "--world", "kitchen"], "nowhere"),
     ],
 )
 def test_wrong_input_is_one_line_and_exit_code_2(words, said, capsys):

@@ -1,0 +1,160 @@
+"""`bns gap plan`, `edit` and `apply`: what follows from a diagnosis."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tyro
+
+from bns.cli.parse import parse
+from bns.errors import BnsError, UnknownNameError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Planned:
+    """Say which command would best separate the explanations that a diagnosis left
+    tied, and write it to a file. Record it, then diagnose both recordings together.
+    """
+
+    directory: tyro.conf.Positional[str]
+    """a directory that `bns gap diagnose` wrote"""
+    to: str = ""
+    """file for the commands, CSV (default: DIRECTORY/next_command.csv)"""
+    arena: tuple[float, float] = (2.7, 1.8)
+    """size of the board along x and y [m]; drives start at its centre"""
+    seed: int = 0
+    """of the random commands among those considered"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Edit:
+    """Take an effect away from the corrected model and predict a recording in which it
+    was not there: a model with the right physics stays right.
+    """
+
+    directory: tyro.conf.Positional[str]
+    """a directory that `bns gap diagnose` wrote"""
+    remove: str
+    """name of the effect, wheel_gain[left] or wheel_gain; * = all"""
+    predict: tuple[str, ...]
+    """recordings without it: dataset directories, or logs with --columns"""
+    effect: str = ""
+    """fitted effects to edit, joined by +; default: those that the verdict names"""
+    columns: str = ""
+    """TOML file that maps the log's columns to channels"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Apply:
+    """Keep the corrected world under a name; `bns run PRESET --world NAME` trains in
+    it, `bns worlds` lists it. For a model of your own: write the corrected MJCF.
+    """
+
+    directory: tyro.conf.Positional[str]
+    """a directory that `bns gap diagnose` wrote"""
+    world: str = ""
+    """name for the world"""
+    effect: str = ""
+    """fitted effects to apply, joined by +; default: those that the verdict names"""
+    user: bool = False
+    """keep it for all directories (in the user's own file), not ./worlds.toml"""
+    replace: bool = False
+    """replace a kept world of the same name"""
+    xml: str = ""
+    """for a model of your own: file for the corrected MJCF"""
+
+
+def main(verb: str, argv: list[str]) -> int:
+    """Run the verb; gives the exit code."""
+    if verb == "plan":
+        return _plan(parse(Planned, argv, prog="bns gap plan"))
+    if verb == "edit":
+        return _edit(parse(Edit, argv, prog="bns gap edit"))
+    return _apply(parse(Apply, argv, prog="bns gap apply"))
+
+
+def _model(found: Any) -> Any:
+    from bns.gap import inputs
+
+    return inputs.model(str(found.provenance.get("model", found.model)), threads=1)
+
+
+def _plan(given: Planned) -> int:
+    from bns.gap import command_file, odometry_record, plan, store
+
+    found = store.load(given.directory)
+    if found.model == odometry_record.MODEL:
+        made = odometry_record.planned(found)
+    else:
+        made = plan.plan(found, _model(found), arena=given.arena, seed=given.seed)
+    print(made.sentence)
+    if not made.options or not made.repeats:
+        return 0
+    for option in made.options[1:4]:
+        print(f"  next: {option.excitation.name} ({option.distances.min():.2g})")
+    path = Path(given.to or Path(given.directory) / "next_command.csv")
+    command_file.write(made.options[0].excitation.commands, path)
+    print(f"commands:  {path}")
+    print("Record them, then: bns gap diagnose DATA NEW_DATA --out ANOTHER_DIR")
+    return 0
+
+
+def _edit(given: Edit) -> int:
+    from bns.gap import edit, inputs, store
+
+    found = store.load(given.directory)
+    model = _model(found)
+    trials = inputs.trials(given.predict, model, columns=given.columns)
+    inputs.tellable(trials, model)
+    made = edit.edit(found, trials, model, remove=given.remove, effect=given.effect)
+    print(made.sentence)
+    for name, loss in made.losses.items():
+        errors = ", ".join(
+            f"{channel} {value:.3g} {unit}"
+            for (channel, unit), value in zip(
+                made.channels, made.plain[name], strict=True
+            )
+        )
+        print(
+            f"  {name:<9} {loss:8.3f} of the floor; over {made.horizon:g} s: {errors}"
+        )
+    return 0
+
+
+def _apply(given: Apply) -> int:
+    from bns.gap import store
+    from bns.worlds import corrected, registry
+
+    found = store.load(given.directory)
+    fit = store.chosen(found, given.effect)
+    model = _model(found)
+    if found.verdict.kind == "either" and not given.effect:
+        others = " or ".join(" + ".join(names) for names in found.verdict.named)
+        print(f"note: tied are {others}; the first is taken, --effect chooses another.")
+    own = hasattr(model, "parse")
+    if own or given.xml:
+        if not (own and given.xml):
+            raise BnsError(
+                "A model of your own is corrected by --xml FILE (a robot of `bns "
+                "robots` by --world NAME)."
+            )
+        left = model.write_corrected(fit.effects, given.xml)
+        print(f"model:     {given.xml}")
+        for text in left:
+            print(f"note: {text} acts on signals, an MJCF file can not hold it.")
+        return 0
+    if not given.world:
+        raise BnsError("Give the world a name: --world NAME.")
+    if given.world in registry.names() and given.world not in corrected.known():
+        raise BnsError(f"{given.world!r} is a built-in world; take another name.")
+    if found.model == "servo_pendulum":
+        raise UnknownNameError("robot of a world", found.model, ("khepera3",))
+    note = f"diagnosis of {', '.join(found.provenance.get('data', ()))}"
+    world = corrected.Corrected(
+        given.world, "mujoco", found.model, fit.effects, note=note
+    )
+    path = corrected.keep(world, user=given.user, replace=given.replace)
+    print(f"World {given.world!r}: {', '.join(fit.effects)}")
+    print(f"kept in:   {path}")
+    print(f"Train in it: bns run demo --world {given.world}")
+    return 0

@@ -1,0 +1,194 @@
+"""`bns gap check` and `bns gap diagnose`."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import tyro
+
+from bns.cli.parse import parse
+from bns.errors import BnsError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """Check recordings against a model: time stamps, lost and doubled samples, wraps,
+    spikes, stuck and quantised channels. Repairs are listed; a fault that cannot be
+    repaired stops it.
+    """
+
+    data: tyro.conf.Positional[tuple[str, ...]]
+    """dataset directories; or CSV or MCAP logs, with --columns"""
+    model: str = ""
+    """nominal robot (see `bns robots`), or the TOML file of a model of your own
+    (docs/gap_your_robot.md); default: khepera3, or what the importer reads"""
+    columns: str = ""
+    """TOML file that maps the log's columns to channels (docs/formats.md)"""
+    importer: str = ""
+    """reader of a known recording: khepera3_odometry, kscale_sts3215, mrclam6, xl330"""
+    only: tuple[str, ...] = ()
+    """NAME=VALUE: keep trials whose conditions say so (gain=8 mass=0.741)"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diagnose(Check):
+    """Diagnose the sim-to-real gap of recordings: no gap, one effect, several that
+    these data cannot tell apart, two together, or none of the library. Prints the
+    verdict; writes OUT/diagnosis.json, report.html and recording.rrd.
+    """
+
+    out: str = field(default="")
+    """directory for the results; none: print only"""
+    report: bool = True
+    """write report.html"""
+    rerun: bool = True
+    """write recording.rrd"""
+    seed: int = 0
+    """of what is drawn (null distributions, bootstraps)"""
+    most: int = 3
+    """largest number of effects at once"""
+    threads: int = 2
+    """threads of the physics"""
+
+
+def main(verb: str, argv: list[str]) -> int:
+    """Run the verb; gives the exit code."""
+    if verb == "check":
+        return _check(parse(Check, argv, prog="bns gap check"))
+    return _diagnose(parse(Diagnose, argv, prog="bns gap diagnose"))
+
+
+def nominal(given: Check, threads: int = 1) -> Any:
+    """The model that was asked for."""
+    from bns.gap import inputs
+
+    servo = given.importer in ("kscale_sts3215", "xl330")
+    return inputs.model(
+        given.model or (inputs.SERVO if servo else "khepera3"), threads=threads
+    )
+
+
+def recorded(given: Check, model: Any) -> list[Any]:
+    """The trials that were asked for."""
+    from bns.gap import inputs
+
+    return inputs.trials(
+        given.data,
+        model,
+        columns=given.columns,
+        importer=given.importer,
+        only=given.only,
+    )
+
+
+def _check(given: Check) -> int:
+    from bns.gap import check, inputs
+
+    model = nominal(given)
+    trials = recorded(given, model)
+    inputs.tellable(trials, model)
+    usable, notes = check.check(trials, model)
+    for note in notes:
+        print(note)
+    print(f"{len(usable)} of {len(trials)} trials can be used.")
+    return 0
+
+
+def _diagnose(given: Diagnose) -> int:
+    from bns.gap import store
+
+    out = Path(given.out) if given.out else None
+    if out and out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise BnsError(f"{out} exists and is not overwritten; give another --out.")
+    if given.importer == "khepera3_odometry" and not given.model:
+        found, model, trials = _odometry(given), None, []
+    else:
+        model = nominal(given, given.threads)
+        trials = recorded(given, model)
+        found = _general(given, model, trials, out)
+    found = replace(found, provenance=_provenance(given, model))
+    if out:
+        store.save(found, out)
+    _say(found)
+    if out:
+        _draw(given, found, trials, model, out)
+    return 0
+
+
+def _general(given: Diagnose, model: Any, trials: list[Any], out: Path | None) -> Any:
+    from bns.gap import inputs, partial
+    from bns.gap.diagnose import diagnose
+
+    inputs.tellable(trials, model)
+    try:
+        return diagnose(trials, model, seed=given.seed, most=given.most)
+    except BnsError as error:
+        if out:
+            kept = partial.write(trials, model, error, out)
+            raise BnsError(f"{error} What was found until then: {kept}") from error
+        raise
+
+
+def _odometry(given: Diagnose) -> Any:
+    from bns.gap import odometry_record
+    from bns.gap.importing import khepera3_odometry
+
+    trials = [khepera3_odometry.read(path) for path in given.data]
+    return odometry_record.record(trials, axle=khepera3_odometry.AXLE)
+
+
+def _provenance(given: Diagnose, model: Any) -> dict[str, Any]:
+    from bns import versions
+
+    named = given.model or (model.name if model else "odometry")
+    return {
+        "data": list(given.data),
+        "model": str(Path(named).resolve()) if named.endswith(".toml") else named,
+        "importer": given.importer,
+        "columns": given.columns,
+        "only": list(given.only),
+        "versions": dict(versions.collect()),
+    }
+
+
+def _say(found: Any) -> None:
+    """The verdict in words, then the best fits."""
+    print(found.verdict.sentence)
+    if found.verdict.change:
+        print(found.verdict.change)
+    for line in _closed(found):
+        print(line)
+    for fit in found.fits[:5]:
+        print(
+            f"  held-out loss {fit.held_out:.5g}  {' + '.join(fit.names) or 'nothing'}"
+        )
+    for line in (*found.faults, *found.warnings):
+        print(f"note: {line}")
+
+
+def _closed(found: Any) -> Sequence[str]:
+    closed = found.closed
+    if not closed or not found.verdict.named:
+        return ()
+    low, high = closed["closed_interval"]
+    return (
+        f"Gap closed on held-out trials: {100 * closed['closed']:.0f} % "
+        f"[{100 * low:.0f}, {100 * high:.0f}].",
+    )
+
+
+def _draw(given: Diagnose, found: Any, trials: Any, model: Any, out: Path) -> None:
+    made = {"data": out / "diagnosis.json"}
+    if given.report:
+        from bns.viz import gap_report
+
+        made["report"] = gap_report.write(found, trials, model, out / "report.html")
+    if given.rerun and model is not None:
+        from bns.viz import gap_recording
+
+        made["recording"] = gap_recording.write(
+            found, trials, model, out / "recording.rrd"
+        )
+    for name, path in made.items():
+        print(f"{name + ':':<11}{path}")

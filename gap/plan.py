@@ -1,0 +1,277 @@
+"""The next command: what to run so that what is still tied comes apart.
+
+Each excitation of a bounded family is simulated under the tied explanations. How far
+two of them part there is the whitened distance of their predictions, after each
+magnitude has been allowed to move as far as the recording so far leaves it free
+(T-optimal discrimination, Atkinson and Fedorov 1975). Half its square is the expected
+logarithm of the Bayes factor.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from scipy.stats import norm
+
+from bns.gap import excite, inputs, store, verdict
+from bns.gap.excite import Excitation
+from bns.gap.floor import Floor
+from bns.gap.model import GapModel
+from bns.gap.problem import Problem
+from bns.gap.records import Diagnosis, Fit
+from bns.worlds.effects.base import Effect
+from bns.worlds.trial import Commands, Trial
+
+SAMPLE = 0.1  # [s] between the samples that a recording is assumed to have
+MARGIN = 0.12  # [m] that a robot keeps from the edge of its arena
+ARENA = (2.7, 1.8)  # [m] the board (thesis); its centre is where drives start
+MOST, POWER = 10, 1.2816  # repeats that may be asked for; 90 % power
+TIED = 4  # explanations that are compared, at most
+LEVEL = 1.6449  # 90 % interval
+FREE = 0.05  # share by which a magnitude without an interval may move
+
+
+@dataclass(frozen=True, eq=False)
+class Option:
+    """One excitation and what it would tell.
+
+    Attributes:
+        excitation: the commands.
+        distances: whitened, by pair of tied explanations, ``(pairs,)``.
+        wrong: probability to name the wrong one of a pair after it, mean over pairs.
+    """
+
+    excitation: Excitation
+    distances: np.ndarray
+    wrong: float
+
+    @property
+    def bayes(self) -> float:
+        """Expected logarithm of the Bayes factor, of the pair that parts least."""
+        return float(self.distances.min() ** 2 / 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What to run next.
+
+    Attributes:
+        tied: names of the tied explanations; fewer than two: nothing is tied.
+        options: excitations, the best first; empty where nothing is tied.
+        repeats: how often the best has to be run for 9 in 10 to be told apart; 0 =
+            more than `MOST` times, so that it is no use.
+        sentence: in words.
+    """
+
+    tied: tuple[tuple[str, ...], ...]
+    options: tuple[Option, ...]
+    repeats: int
+    sentence: str
+
+
+def plan(
+    found: Diagnosis,
+    model: GapModel,
+    *,
+    family: Sequence[Excitation] = (),
+    arena: tuple[float, float] = ARENA,
+    seed: int = 0,
+) -> Plan:
+    """The command that best separates what a diagnosis left tied.
+
+    Args:
+        found: the diagnosis.
+        model: the nominal model that it was made with.
+        family: excitations to choose from; empty = those of the robot's kind.
+        arena: size of the board [m] that a wheeled robot may not leave.
+        seed: of the random excitations.
+    """
+    fits = tied(found)
+    if len(fits) < 2:
+        return Plan(tuple(f.names for f in fits), (), 0, _nothing(found))
+    effects = [[store.parse(text, model) for text in fit.effects] for fit in fits]
+    family = tuple(family) or _family(model, seed)
+    family = _safe(family, model, effects, arena)
+    made = [_option(item, found, model, fits, effects) for item in family]
+    options = tuple(sorted(made, key=lambda option: option.wrong))
+    names = tuple(fit.names for fit in fits)
+    if not options:
+        return Plan(names, (), 0, "No command of the family is safe in this arena.")
+    count = repeats(float(options[0].distances.min()))
+    return Plan(names, options, count, _sentence(fits, options[0], count))
+
+
+def tied(found: Diagnosis) -> list[Fit]:
+    """The fits between which the verdict could not decide."""
+    if found.verdict.kind != "either":
+        return [found.best] if found.verdict.named else []
+    by_names = {frozenset(fit.names): fit for fit in found.fits}
+    return [
+        by_names[frozenset(names)]
+        for names in found.verdict.named[:TIED]
+        if frozenset(names) in by_names
+    ]
+
+
+def repeats(distance: float, *, tie: float | None = None) -> int:
+    """How often a command has to be run to part two explanations in 9 of 10 cases.
+
+    Args:
+        distance: whitened, of one run.
+        tie: difference of losses up to which two explanations count as tied.
+
+    Returns:
+        from 1 on; 0 if `MOST` runs are not enough.
+    """
+    tie = verdict.calibration().tie if tie is None else tie
+    for count in range(1, MOST + 1):
+        whole = distance * np.sqrt(count)
+        if whole**2 - 2 * POWER * whole >= tie:
+            return count
+    return 0
+
+
+def blank(commands: Commands, model: GapModel, name: str = "") -> Trial:
+    """A trial that nobody has run yet: as the nominal model would do it."""
+    ends = np.concatenate([[0.0], np.cumsum(commands.durations)])
+    grid = np.arange(0.0, ends[-1] + 1e-9, SAMPLE)
+    times = np.unique(np.concatenate([grid, ends]).round(6))
+    trial = Trial(
+        commands=commands,
+        times=times,
+        observed=np.zeros((len(times), len(model.channels))),
+        boundaries=np.searchsorted(times, ends.round(6)),
+        channels=tuple(model.channels),
+        robot=model.name,
+        world=name,
+    )
+    ((seen,),) = model.simulate([trial], [()])
+    return trial.replace(observed=seen)
+
+
+def _family(model: GapModel, seed: int) -> tuple[Excitation, ...]:
+    if hasattr(model, "excitations"):
+        return tuple(model.excitations(seed=seed))
+    limits = inputs.limits(model)
+    if set(limits) == {"left_speed", "right_speed"}:
+        top = min(high for _, high, _ in limits.values())
+        return excite.wheeled(seed=seed, fastest=min(excite.FAST, 0.95 * top))
+    return excite.general(limits, seed=seed)
+
+
+def _safe(
+    family: Sequence[Excitation],
+    model: GapModel,
+    effects: Sequence[Sequence[Effect]],
+    arena: tuple[float, float],
+) -> list[Excitation]:
+    """Those that stay on the board, whichever explanation is true."""
+    if [channel.name for channel in model.channels][:2] != ["x", "y"]:
+        return list(family)
+    half = np.asarray(arena) / 2 - MARGIN
+    trials = [blank(item.commands, model) for item in family]
+    paths = model.simulate(trials, [(), *effects])
+    return [
+        item
+        for number, item in enumerate(family)
+        if all((np.abs(made[number][:, :2]) < half).all() for made in paths)
+    ]
+
+
+def _option(
+    item: Excitation,
+    found: Diagnosis,
+    model: GapModel,
+    fits: Sequence[Fit],
+    effects: Sequence[Sequence[Effect]],
+) -> Option:
+    trial = blank(item.commands, model)
+    problem = Problem.of(
+        [trial], model, candidates=model.candidates(), floor=_floor(found, model)
+    )
+    moved = [_moved(fit, model) for fit in fits]
+    sets = [*effects, *(row for rows, _ in moved for row in rows)]
+    made = problem.signatures(sets)
+    shapes, slopes, at = made[: len(fits)], [], len(fits)
+    for rows, spreads in moved:
+        slopes.append(
+            np.array([made[at + k] - shapes[len(slopes)] for k in range(len(rows))])
+        )
+        at += len(spreads)
+    distances = np.array(
+        [
+            min(_apart(shapes, slopes, i, j), _apart(shapes, slopes, j, i))
+            for i, j in combinations(range(len(fits)), 2)
+        ]
+    )
+    return Option(item, distances, float(norm.sf(distances / 2).mean()))
+
+
+def _apart(shapes, slopes, i: int, j: int) -> float:
+    """Distance of i's prediction to j's, j's magnitudes free within what is known."""
+    gap = np.nan_to_num(shapes[i] - shapes[j])
+    if not len(slopes[j]):
+        return float(np.linalg.norm(gap))
+    rows = np.nan_to_num(slopes[j])
+    # Magnitudes in units of their own deviation: a prior of variance 1.
+    normal = rows @ rows.T + np.eye(len(rows))
+    left = rows @ gap
+    return float(np.sqrt(max(gap @ gap - left @ np.linalg.solve(normal, left), 0.0)))
+
+
+def _moved(fit: Fit, model: GapModel) -> tuple[list[list[Effect]], list[float]]:
+    """The fit with each magnitude one standard deviation further."""
+    effects = [store.parse(text, model) for text in fit.effects]
+    rows, spreads = [], []
+    for at, (name, interval) in enumerate(zip(fit.names, fit.intervals, strict=True)):
+        item = store.candidate(name, model)
+        if item.whole:
+            continue
+        spread = (interval[1] - interval[0]) / 2 / LEVEL
+        magnitude = fit.magnitudes[at]
+        if spread <= 0:
+            spread = FREE * max(abs(magnitude - item.nominal), 1e-9)
+        value = magnitude + spread
+        if value > item.high:
+            value = magnitude - spread
+        values = {**effects[at].values, item.parameter: max(value, item.low)}
+        rows.append([*effects[:at], type(effects[at])(values), *effects[at + 1 :]])
+        spreads.append(spread)
+    return rows, spreads
+
+
+def _floor(found: Diagnosis, model: GapModel) -> Floor:
+    given = found.floor
+    return Floor(
+        np.array(given["sigma"][: len(model.channels)], dtype=float),
+        np.array(given["process"], dtype=float),
+        str(given["source"]),
+        int(given["repeats"]),
+    )
+
+
+def _nothing(found: Diagnosis) -> str:
+    said = {
+        "no gap": "no gap was found",
+        "none of the library": "no effect of the library explains the gap",
+    }
+    reason = said.get(found.verdict.kind, "one explanation stands alone")
+    return f"Nothing is tied: {reason}."
+
+
+def _sentence(fits: Sequence[Fit], best: Option, count: int) -> str:
+    names = " or ".join(" + ".join(fit.names) for fit in fits)
+    if not count:
+        return (
+            f"Tied: {names}. No safe command of the family tells them apart (the best, "
+            f"{best.excitation.name}, by {best.distances.min():.2g} deviations): they "
+            "do the same to whatever is commanded and seen. Observe another quantity."
+        )
+    often = "once" if count == 1 else f"{count} times"
+    return (
+        f"Tied: {names}. Run {often}: {best.excitation.name} "
+        f"({best.excitation.commands.duration:.0f} s); it parts them by "
+        f"{best.distances.min():.2g} deviations (expected log Bayes factor "
+        f"{best.bayes:.3g}, wrong one named {100 * best.wrong:.2g} %)."
+    )

@@ -1,0 +1,78 @@
+"""A diagnosis in a directory, and what of it can be simulated again."""
+
+from pathlib import Path
+
+from bns.errors import BnsError, FormatError, UnknownNameError
+from bns.gap.model import GapModel
+from bns.gap.records import Candidate, Diagnosis, Fit
+from bns.worlds.effects import registry
+from bns.worlds.effects.base import Effect
+
+FILE = "diagnosis.json"
+
+
+def save(found: Diagnosis, directory: str | Path) -> Path:
+    """Write a diagnosis into a directory, which is created; gives the file."""
+    directory = Path(directory)
+    directory.mkdir(parents=True, exist_ok=True)
+    (directory / FILE).write_text(found.to_json(), encoding="utf-8")
+    return directory / FILE
+
+
+def load(directory: str | Path) -> Diagnosis:
+    """The diagnosis of a directory.
+
+    Raises:
+        FormatError: there is none, or it is not to be read.
+    """
+    path = Path(directory) / FILE
+    if not path.is_file():
+        raise FormatError(
+            f"{directory} holds no {FILE}: make one with bns gap diagnose DATA --out "
+            f"{directory}."
+        )
+    return Diagnosis.from_json(path.read_text(encoding="utf-8"))
+
+
+def parse(text: str, model: GapModel) -> Effect:
+    """An effect as a diagnosis with this model writes it."""
+    own = getattr(model, "parse", None)
+    return own(text) if own else registry.parse(text)
+
+
+def candidate(name: str, model: GapModel) -> Candidate:
+    """The model's candidate of that name.
+
+    Raises:
+        UnknownNameError: it has none.
+    """
+    known = {item.name: item for item in model.candidates()}
+    if name not in known:
+        raise UnknownNameError("effect", name, known)
+    return known[name]
+
+
+def chosen(found: Diagnosis, names: str = "") -> Fit:
+    """The fit that stands for the gap.
+
+    Args:
+        found: a diagnosis.
+        names: of the effects, joined by "+"; "" = those that the verdict names first.
+
+    Raises:
+        BnsError: the verdict names nothing.
+        UnknownNameError: no such support was fitted.
+    """
+    if names:
+        wanted = {name.strip() for name in names.split("+")}
+        for fit in found.fits:
+            if set(fit.names) == wanted:
+                return fit
+        known = [" + ".join(fit.names) for fit in found.fits if fit.names]
+        raise UnknownNameError("fitted effect", names, known)
+    if not found.verdict.named:
+        raise BnsError(
+            f"The verdict is {found.verdict.kind!r}: there is nothing to correct or "
+            "take away. Give --effect NAME to take a fit all the same."
+        )
+    return found.best

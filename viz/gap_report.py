@@ -1,0 +1,118 @@
+"""One self-contained HTML page about a diagnosis of the sim-to-real gap."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from bns import files
+from bns.gap.model import GapModel
+from bns.gap.records import Diagnosis
+from bns.viz import gap_figures, gap_view, gap_words
+from bns.viz.report import picture
+from bns.worlds.trial import Trial
+
+CAPTIONS = {
+    "motion": (
+        "The robot and its models",
+        "The trial with the largest gap: what was recorded, and what the nominal and "
+        "the corrected model make of the same commands from the same start.",
+    ),
+    "closing": (
+        "How far the gap closes",
+        "Loss on trials that were not fitted: of the nominal model, with each effect "
+        "alone, with what the verdict names, and of a flexible model that explains "
+        "nothing but shows how much is predictable at all.",
+    ),
+    "horizons": (
+        "Where the gap is",
+        "Root mean square of recorded minus predicted motion, by channel and by how "
+        "far ahead was predicted from an observed state. An error that grows is one of "
+        "motion; one that stays is one of a sensor. Bars are 90 % intervals over "
+        "trials.",
+    ),
+    "over_time": (
+        "Residuals over time",
+        "The same trial, window by window; inside the band there is nothing to "
+        "explain.",
+    ),
+}
+
+
+def write(
+    found: Diagnosis, trials: Sequence[Trial], model: GapModel | None, path: str | Path
+) -> Path:
+    """Write the report.
+
+    Args:
+        found: the diagnosis.
+        trials: the recording it was made of.
+        model: its nominal model; None = none that can be simulated (no figures of
+            motion).
+        path: file to write; no other is needed to read it.
+    """
+    page = _template().render(_context(found, trials, model))
+    files.write_bytes(Path(path), page.encode())
+    return Path(path)
+
+
+def _context(found: Diagnosis, trials: Sequence[Trial], model: GapModel | None) -> dict:
+    about = found.provenance
+    return {
+        "found": found,
+        "title": f"{found.verdict.kind[0].upper()}{found.verdict.kind[1:]}",
+        "answers": gap_words.answers(found),
+        "explanations": gap_words.explanations(found),
+        "detectable": gap_words.detectable(found, model),
+        "steps": gap_words.next_steps(found, model),
+        "figures": _figures(found, trials, model),
+        "data": about.get("data", ()),
+        "command": _command(found),
+        "versions": sorted(dict(about.get("versions", {})).items()),
+    }
+
+
+def _command(found: Diagnosis) -> str:
+    about = found.provenance
+    words = ["bns gap diagnose", *about.get("data", ("DATA",))]
+    words.append(f"--model {about.get('model', found.model)}")
+    for key in ("importer", "columns"):
+        if about.get(key):
+            words.append(f"--{key} {about[key]}")
+    if about.get("only"):
+        words.append("--only " + " ".join(about["only"]))
+    return " ".join([*words, f"--seed {found.seed}", "--out DIR"])
+
+
+def _figures(
+    found: Diagnosis, trials: Sequence[Trial], model: GapModel | None
+) -> list[dict]:
+    if model is None or not found.where:
+        return []
+    seen = gap_view.view(found, trials, model)
+    made = {
+        "motion": gap_figures.motion(seen),
+        "horizons": gap_figures.horizons(found, seen),
+        "closing": gap_figures.closing(found),
+        "over_time": gap_figures.over_time(seen),
+    }
+    return [
+        {
+            "name": name,
+            "title": CAPTIONS[name][0],
+            "caption": CAPTIONS[name][1],
+            "image": picture(figure),
+        }
+        for name, figure in made.items()
+    ]
+
+
+def _template():
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("bns.viz", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("gap_report.html")
