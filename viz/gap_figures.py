@@ -31,17 +31,18 @@ def closing(found: Diagnosis):
         axes.barh(range(len(rows)), values, color=colours, height=0.62, left=0)
         axes.set_yticks(range(len(rows)), names)
         axes.axvline(closed["floor"], color=style.GREEN, ls="--", lw=1.4)
-        axes.annotate(
+        axes.set_ylim(len(rows) - 0.4, -0.6)
+        _log(axes.xaxis, axes.set_xscale)
+        axes.set_xlim(left=0.7 * min(closed["floor"], *values))
+        axes.text(
+            closed["floor"],
+            1.01,
             "floor",
-            (closed["floor"], len(rows) - 0.45),
             color=style.GREEN,
             ha="center",
             va="bottom",
-            annotation_clip=False,
+            transform=axes.get_xaxis_transform(),
         )
-        axes.set_xscale("log")
-        axes.invert_yaxis()
-        axes.set_ylim(len(rows) - 0.4, -0.6)
         axes.grid(axis="y", visible=False)
         axes.set_xlabel("held-out loss per residual (1 = noise alone), log scale")
     return figure
@@ -86,12 +87,25 @@ def horizons(found: Diagnosis, view: View):
                 label="floor",
             )
             axes.set_xticks(place, labels)
-            axes.set_yscale("log")
+            _log(axes.yaxis, axes.set_yscale)
             axes.set_title(f"{feature.name} [{unit}]")
             axes.set_xlabel("predicted over")
         handles, names = panels[0].get_legend_handles_labels()
         figure.legend(handles, names, loc="outside lower center", ncols=3)
     return figure
+
+
+def _log(axis, set_scale) -> None:
+    """A logarithmic axis with plain numbers."""
+    from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
+
+    set_scale("log")
+    low, high = sorted(axis.get_view_interval())
+    subs = (1.0, 2.0, 5.0) if high / max(low, 1e-300) < 300 else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs))
+    axis.set_minor_locator(NullLocator())
+    axis.set_minor_formatter(NullFormatter())
+    axis.set_major_formatter("{x:g}")
 
 
 def _horizon(value: float | None) -> str:

@@ -58,7 +58,7 @@ def _context(found: Diagnosis, trials: Sequence[Trial], model: GapModel | None) 
     about = found.provenance
     return {
         "found": found,
-        "title": f"{found.verdict.kind[0].upper()}{found.verdict.kind[1:]}",
+        "title": gap_words.title(found),
         "answers": gap_words.answers(found),
         "explanations": gap_words.explanations(found),
         "detectable": gap_words.detectable(found, model),

@@ -11,6 +11,18 @@ LISTED = 12  # rows of the table of explanations
 ROUND = {"m": ("mm", 1e3), "rad": ("mrad", 1e3)}
 
 
+def title(found: Diagnosis) -> str:
+    """The verdict in a few words."""
+    verdict = found.verdict
+    named = " + ".join(verdict.named[0]) if verdict.named else ""
+    return {
+        "effect": f"One effect: {named}",
+        "together": f"Together: {named}",
+        "either": f"{len(verdict.named)} explanations are tied",
+        "no gap": "No gap",
+    }.get(verdict.kind, "A gap that no effect of the library explains")
+
+
 def answers(found: Diagnosis) -> list[tuple[str, str]]:
     """The three questions, each with its answer in a sentence or two."""
     return [
@@ -38,7 +50,7 @@ def where(found: Diagnosis) -> str:
     if regime.get("words") and regime.get("explained", 0.0) > 0.02:
         text += f" It is largest when {regime['words']}."
     change = found.where.get("change") or {}
-    if change.get("direction"):
+    if change.get("direction") and change["trial"] > 0:
         text += (
             f" It {change['direction']} in trial {change['trial']} at "
             f"{change['time']:.1f} s."

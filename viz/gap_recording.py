@@ -1,0 +1,203 @@
+"""Rerun recording of a diagnosis: recorded, nominal and corrected robot together."""
+
+from collections.abc import Sequence
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+
+from bns.gap.model import GapModel
+from bns.gap.records import Diagnosis
+from bns.viz import gap_scene, style
+from bns.viz.blueprint import BACKGROUND, LIVE_TIMELINE
+from bns.viz.gap_figures import CORRECTED, NOMINAL
+from bns.viz.gap_view import View, view
+from bns.worlds.trial import Trial
+
+GAP = 1.0
+"""s of pause between two trials"""
+
+FEWEST = 6
+"""trials that are shown at most, those with the largest gap"""
+
+
+def write(
+    found: Diagnosis, trials: Sequence[Trial], model: GapModel, path: str | Path
+) -> Path:
+    """Write the recording.
+
+    Args:
+        found: the diagnosis.
+        trials: the recording it was made of.
+        model: its nominal model.
+        path: file to write, `.rrd`.
+    """
+    import rerun as rr
+
+    seen = view(found, trials, model)
+    losses = [seen.energy(number).mean() for number in range(len(seen.trials))]
+    chosen = sorted(np.argsort(losses)[::-1][:FEWEST].tolist())
+    starts = _starts(seen, chosen)
+    identity = sha256(found.to_json().encode()).hexdigest()[:12]
+    stream = rr.RecordingStream("bns", recording_id=identity, send_properties=False)
+    stream.set_log_time_enabled(False)
+    stream.set_log_tick_enabled(False)
+    planar = gap_scene.planar(seen)
+    length = starts[-1] + _length(seen.trials[chosen[-1]])
+    stream.save(str(path), default_blueprint=_layout(seen, planar, length))
+    stream.send_recording_name(f"gap of {found.model}: {found.verdict.kind}")
+    _styles(stream, seen)
+    if planar:
+        gap_scene.log_static(stream, seen, chosen)
+    for number, start in zip(chosen, starts, strict=True):
+        _residuals(stream, seen, number, start)
+        _observed(stream, seen, number, start)
+        if planar:
+            gap_scene.send(stream, seen, number, start)
+    stream.log("about", _about(found, chosen), static=True)
+    stream.flush()
+    stream.disconnect()
+    return Path(path)
+
+
+def _length(trial: Trial) -> float:
+    return float(trial.times[-1] - trial.times[0])
+
+
+def _starts(seen: View, chosen: Sequence[int]) -> list[float]:
+    lengths = [_length(seen.trials[number]) + GAP for number in chosen]
+    return np.concatenate([[0.0], np.cumsum(lengths)[:-1]]).tolist()
+
+
+def times(seconds: np.ndarray):
+    """A column of times on the timeline of motion."""
+    import rerun as rr
+
+    return [rr.TimeColumn(LIVE_TIMELINE, duration=np.atleast_1d(seconds))]
+
+
+def _styles(stream, seen: View) -> None:
+    import rerun as rr
+
+    colours = {"nominal": NOMINAL, "corrected": CORRECTED, "floor": style.GREEN}
+    for feature in seen.problem.model.features:
+        for name, colour in colours.items():
+            stream.log(
+                f"residuals/{feature.name}/{name}",
+                rr.SeriesLines(names=name, colors=style.rgb(colour), widths=1.5),
+                static=True,
+            )
+    bright = {"recorded": "#ffffff", "nominal": NOMINAL, "corrected": style.SKY}
+    for channel in seen.trials[0].channels:
+        for name, colour in bright.items():
+            stream.log(
+                f"observed/{channel.name}/{name}",
+                rr.SeriesLines(names=name, colors=style.rgb(colour), widths=1.5),
+                static=True,
+            )
+
+
+def _residuals(stream, seen: View, number: int, start: float) -> None:
+    """Recorded minus predicted motion, window by window, in the features' units."""
+    import rerun as rr
+
+    windows = seen.problem.windows[number]
+    index = times(start + windows.times - seen.trials[number].times[0])
+    series = {"nominal": seen.gap(number), "floor": 2 * seen.scatter(number)}
+    if seen.effects:
+        series["corrected"] = seen.left[number]
+    for column, feature in enumerate(seen.problem.model.features):
+        for name, values in series.items():
+            stream.send_columns(
+                f"residuals/{feature.name}/{name}",
+                index,
+                rr.Scalars.columns(scalars=values[:, column]),
+            )
+
+
+def _observed(stream, seen: View, number: int, start: float) -> None:
+    import rerun as rr
+
+    trial = seen.trials[number]
+    series = {"recorded": trial.observed, "nominal": seen.nominal[number]}
+    if seen.effects:
+        series["corrected"] = seen.corrected[number]
+    for name, values in series.items():
+        for column, channel in enumerate(trial.channels):
+            fine = np.isfinite(values[:, column])
+            stream.send_columns(
+                f"observed/{channel.name}/{name}",
+                times(start + trial.times[fine] - trial.times[0]),
+                rr.Scalars.columns(scalars=values[fine, column]),
+            )
+
+
+def _layout(seen: View, planar: bool, length: float):
+    import rerun.blueprint as rrb
+
+    span = rrb.TimeRange(
+        rrb.TimeRangeBoundary.absolute(seconds=0.0),
+        rrb.TimeRangeBoundary.absolute(seconds=length),
+    )
+
+    def plots(root: str, words: str, channels):
+        return rrb.Vertical(
+            *(
+                rrb.TimeSeriesView(
+                    origin=f"{root}/{channel.name}",
+                    name=f"{channel.name} [{channel.unit}]{words}",
+                    axis_x=rrb.TimeAxis(view_range=span),
+                    plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+                )
+                for channel in channels
+            ),
+            name="Residuals" if root == "residuals" else "Observed",
+        )
+
+    residuals = plots(
+        "residuals", ": recorded minus predicted", seen.problem.model.features
+    )
+    observed = plots("observed", "", seen.trials[0].channels)
+    about = rrb.TextDocumentView(origin="/about", name="How to read this")
+    if planar:
+        parts = rrb.Horizontal(
+            gap_scene.view_3d(seen, BACKGROUND),
+            rrb.Tabs(residuals, observed, about, active_tab=0),
+            column_shares=[3, 2],
+        )
+    else:
+        parts = rrb.Horizontal(
+            residuals, rrb.Tabs(observed, about, active_tab=0), column_shares=[1, 1]
+        )
+    return rrb.Blueprint(
+        parts,
+        rrb.TimePanel(state="collapsed", timeline=LIVE_TIMELINE, play_state="paused"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _about(found: Diagnosis, chosen: Sequence[int]):
+    import rerun as rr
+
+    lines = [
+        f"# {found.verdict.kind}",
+        "",
+        found.verdict.sentence,
+        "",
+        "**World.** Side by side, on the same commands from the same start: the "
+        "nominal model (orange), the recorded robot in its own colours, the corrected "
+        "model (blue). Beside the models' paths the recorded one is drawn thin. The "
+        "recorded path is grey where the nominal model is right and red where it "
+        "fails; arrows show by how much its motion is wrong there, five times "
+        "enlarged.",
+        "",
+        "**Residuals.** Recorded minus predicted motion, window by window; the green "
+        "line is two deviations of what the recording scatters by itself.",
+        "",
+        f"Trials shown, one after another: {', '.join(map(str, chosen))} (those with "
+        "the largest gap).",
+    ]
+    return rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN)
