@@ -185,7 +185,7 @@ def view_3d(seen: View, background):
         background=list(background),
         line_grid=False,
         eye_controls=rrb.EyeControls3D(
-            position=(centre[0], centre[1] - 0.65 * away, 1.05 * away),
+            position=(centre[0], centre[1] - 0.85 * away, 1.3 * away),
             look_target=(centre[0], centre[1] - 0.05, 0.0),
             eye_up=(0, 0, 1),
         ),
