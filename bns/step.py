@@ -13,7 +13,7 @@ from bns.record import RunRecord
 from bns.worlds.trial import Channel, Commands, Outcome, Trial
 
 ARRAYS = ("sent", "poses", "predicted")
-_TRIAL = ("times", "observed", "boundaries")
+_TRIAL = ("times", "observed", "boundaries", "handled")
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,12 +124,17 @@ def _plain(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else str(value)
 
 
+def _plain_flag(value: Any) -> bool | int:
+    """A flag or a counter of an outcome as JSON holds it."""
+    return bool(value) if isinstance(value, bool | np.bool_) else int(value)
+
+
 def _trial_meta(trial: Trial) -> dict[str, Any]:
     conditions = json.dumps(dict(trial.conditions), default=_plain)
     return {
         "channels": [list(channel) for channel in trial.channels],
         "command_channels": [list(channel) for channel in trial.commands.channels],
-        "outcome": [bool(flag) for flag in trial.outcome],
+        "outcome": [_plain_flag(flag) for flag in trial.outcome],
         "robot": trial.robot,
         "world": trial.world,
         "conditions": json.loads(conditions),
@@ -151,7 +156,7 @@ def _trial(
     channels = tuple(Channel(*pair) for pair in meta["command_channels"])
     return Trial(
         Commands(stored[f"{prefix}values"], stored[f"{prefix}durations"], channels),
-        *(stored[prefix + name] for name in _TRIAL),
+        **{name: stored[prefix + name] for name in _TRIAL},
         channels=tuple(Channel(*pair) for pair in meta["channels"]),
         outcome=Outcome(*meta["outcome"]),
         robot=meta["robot"],

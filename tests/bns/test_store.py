@@ -155,7 +155,8 @@ def test_step_comes_back_from_arrays_as_it_was():
         np.array([0.0, 0.2, 0.5]),
         np.array([[0, 0, 0], [np.nan] * 3, [1, 2, 3]]),
         np.array([0, 2]),
-        outcome=Outcome(left_arena=True),
+        handled=np.array([True]),
+        outcome=Outcome(left_arena=True, edge_turns=2),
         robot="khepera3",
         world="fake",
         conditions={"damage": ["a"], "mass": np.float64(2.5)},
@@ -170,6 +171,7 @@ def test_step_comes_back_from_arrays_as_it_was():
     np.testing.assert_array_equal(other.observed, trial.observed)
     np.testing.assert_array_equal(other.truth["qpos"], trial.truth["qpos"])
     assert other.outcome == trial.outcome
+    assert other.handled.tolist() == [True]
     assert other.conditions == {"damage": ["a"], "mass": 2.5}
     assert (other.robot, other.world, other.channels) == (
         trial.robot, trial.world, trial.channels,
