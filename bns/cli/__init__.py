@@ -11,6 +11,7 @@ VERBS = {
     "report": ("report", "write one self-contained HTML report on runs"),
     "compare": ("compare", "medians, intervals, p values and effect sizes of runs"),
     "view": ("view", "open a run's recording, or make a picture of it"),
+    "campaign": ("campaign", "many configurations: run them, tables, pictures"),
     "presets": ("lists", "list the presets"),
     "worlds": ("lists", "list the worlds"),
     "robots": ("lists", "list the robot models"),

@@ -1,0 +1,168 @@
+"""The loop around a campaign: what is missing is run and stored as it comes."""
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from bns.batch import check_device, check_world
+from bns.campaign.engines.base import Engine
+from bns.campaign.file import Campaign
+from bns.campaign.identity import changed_default
+from bns.campaign.plan import Job, plan
+from bns.campaign.progress import Progress
+from bns.campaign.store import CampaignStore
+from bns.errors import BnsError
+
+
+@dataclass(frozen=True)
+class Session:
+    """What a call of `run` did.
+
+    Attributes:
+        done: batches it ran.
+        failed: batches that failed, by key, with the reason.
+        waiting: batches that failed before and were not tried again.
+        missing: batches that it was stopped before.
+    """
+
+    done: int
+    failed: dict[str, str]
+    waiting: int
+    missing: int
+
+
+def run(
+    campaign: Campaign,
+    out: Path | str,
+    engine: Engine,
+    *,
+    resume: bool = False,
+    retry: bool = False,
+    mix: bool = False,
+    progress: bool = False,
+    stop: Callable[[], bool] = lambda: False,
+    started: Callable[[], None] = lambda: None,
+) -> Session:
+    """Run what is missing of a campaign.
+
+    Args:
+        campaign: what is wanted.
+        out: directory of its store.
+        engine: where batches run.
+        resume: go on with the store in `out`.
+        retry: try batches again that failed before.
+        mix: allow results of several package versions in one store.
+        progress: show it on the standard error stream.
+        stop: asked after every batch; True ends the session there.
+        started: called once the directory is known to be this session's.
+
+    Raises:
+        BnsError: a setting that is not allowed, a directory that is not free, or a
+            store of another campaign or version.
+    """
+    for member in campaign.members:
+        check_device(member.config.device)
+        check_world(member.config)
+    store = opened(campaign, Path(out), resume=resume)
+    if not mix:
+        store.check_versions()
+    store.lock()
+    try:
+        started()
+        if retry:
+            store.forgive()
+        done = replicates_done(store, campaign)
+        jobs = plan(campaign, done)
+        known = store.failures()
+        todo = [job for job in jobs if job.key not in known]
+        session = _work(campaign, store, engine, todo, done, progress, stop)
+        store.compact()
+    finally:
+        store.close()
+    return Session(**session, waiting=len(jobs) - len(todo))
+
+
+def opened(campaign: Campaign, out: Path, *, resume: bool) -> CampaignStore:
+    """The store to go on with, or a new one.
+
+    Raises:
+        BnsError: the directory is not free, or holds a campaign of another seed.
+    """
+    if not (resume and (out / "campaign.json").exists()):
+        return CampaignStore.create(out, campaign.name, campaign.seed)
+    store = CampaignStore.open(out)
+    if store.seed != campaign.seed:
+        raise BnsError(
+            f"{out} was made with seed = {store.seed}, the file says {campaign.seed}: "
+            "give the file that seed, or another --out."
+        )
+    return store
+
+
+def replicates_done(store: CampaignStore, campaign: Campaign) -> dict[str, int]:
+    """Identity -> replicates stored without a gap.
+
+    Raises:
+        BnsError: a configuration was stored under other defaults.
+    """
+    wanted = {member.identity: member.config for member in campaign.members}
+    found: dict[str, list[tuple[int, int]]] = {}
+    for part in store.read():
+        for block in part.blocks:
+            if block.identity in wanted:
+                changed = changed_default(wanted[block.identity], block.config)
+                if changed:
+                    raise BnsError(
+                        f"{store.directory} was made with another default: {changed}. "
+                        "Set it in the campaign file, or give another --out."
+                    )
+            found.setdefault(block.identity, []).append((block.start, block.count))
+    return {identity: _reach(blocks) for identity, blocks in found.items()}
+
+
+def _reach(blocks: list[tuple[int, int]]) -> int:
+    """Replicates from the first on without a gap."""
+    reached = 0
+    for start, count in sorted(blocks):
+        if start > reached:
+            break
+        reached = max(reached, start + count)
+    return reached
+
+
+def _work(
+    campaign: Campaign,
+    store: CampaignStore,
+    engine: Engine,
+    jobs: list[Job],
+    done: dict[str, int],
+    progress: bool,
+    stop: Callable[[], bool],
+) -> dict[str, object]:
+    trials = {member.identity: member.config.trials for member in campaign.members}
+    behind = sum(trials[i] * count for i, count in done.items() if i in trials)
+    shown = Progress(campaign.name, jobs, behind, enabled=progress)
+    store.note(event="start", engine=engine.name, batches=len(jobs))
+    failed: dict[str, str] = {}
+    finished = 0
+    with shown.start(), closing(engine.run(jobs, beat=shown.beat)) as outcomes:
+        for outcome in outcomes:
+            if outcome.data is None:
+                failed[outcome.key] = outcome.reason
+                attempts, reason = outcome.attempts, outcome.reason
+                store.fail(outcome.key, reason=reason, attempts=attempts)
+            else:
+                store.add(outcome.key, outcome.data)
+                finished += 1
+            store.note(
+                batch=outcome.key,
+                seconds=round(outcome.seconds, 3),
+                attempts=outcome.attempts,
+            )
+            shown.end(outcome.key, failed=outcome.data is None)
+            if stop():
+                break
+    missing = len(jobs) - finished - len(failed)
+    store.note(event="end", done=finished, failed=len(failed), missing=missing)
+    return {"done": finished, "failed": failed, "missing": missing}

@@ -1,0 +1,50 @@
+"""What engines have in common."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from bns.campaign.plan import Job
+
+Beat = Callable[[str, int], None]
+"""called with a job's key and the trials it has done"""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a batch ended.
+
+    Attributes:
+        key: of the job.
+        data: the bytes of its part; None where it failed.
+        reason: why it failed.
+        seconds: from its start to its end, as the driver saw it.
+        attempts: times it was started.
+    """
+
+    key: str
+    data: bytes | None = None
+    reason: str = ""
+    seconds: float = 0.0
+    attempts: int = 1
+
+
+class Engine(Protocol):
+    """Somewhere batches run."""
+
+    name: str
+
+    def run(self, jobs: Sequence[Job], *, beat: Beat) -> Iterator[Outcome]:
+        """Run all jobs; gives each outcome as soon as it is known.
+
+        Raises:
+            BnsError: the engine cannot start.
+        """
+        ...
+
+
+def outcome(key: str, given: bytes | str, seconds: float, attempts: int = 1) -> Outcome:
+    """The outcome in what `work.attempt` gave."""
+    if isinstance(given, str):
+        return Outcome(key, None, given, seconds, attempts)
+    return Outcome(key, given, "", seconds, attempts)

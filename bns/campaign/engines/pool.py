@@ -1,0 +1,178 @@
+"""The local pool: processes with one thread each, each answerable for one batch.
+
+A worker that is killed or says nothing for too long costs the batch it has, and that
+batch alone: it is given to a fresh worker. A pool of the standard library loses every
+batch in flight with one worker.
+"""
+
+import json
+import os
+import selectors
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import deque
+from collections.abc import Iterator, Sequence
+from typing import IO
+
+from bns.campaign.engines import frames
+from bns.campaign.engines.base import Beat, Outcome
+from bns.campaign.plan import Job
+
+ATTEMPTS = 5
+"""times a batch is given to a worker before the worker's death is the batch's fault"""
+
+PATIENCE = 900.0
+"""time without a sign of life after which a worker hangs [s]; compiling takes 60"""
+
+ONE_THREAD = {
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+}
+LAST_WORDS = 2000  # bytes of a dead worker's standard error that are looked at
+
+
+class PoolEngine:
+    """Batches run in processes of this machine.
+
+    Args:
+        workers: processes.
+        attempts: times a batch is given to a worker at most.
+        patience: time without a sign of life after which a worker is killed [s].
+    """
+
+    name = "local"
+
+    def __init__(
+        self, workers: int, *, attempts: int = ATTEMPTS, patience: float = PATIENCE
+    ):
+        self.workers, self.attempts, self.patience = workers, attempts, patience
+        self.crew: list[Worker] = []
+
+    def run(self, jobs: Sequence[Job], *, beat: Beat) -> Iterator[Outcome]:
+        """See `Engine.run`."""
+        waiting = deque((job, 1) for job in jobs)
+        self.crew = [Worker() for _ in range(min(self.workers, len(waiting)))]
+        try:
+            while waiting or any(worker.job for worker in self.crew):
+                for worker in self.crew:
+                    if waiting and worker.job is None:
+                        worker.give(*waiting.popleft())
+                for outcome, again in self._turn(beat):
+                    if outcome:
+                        yield outcome
+                    if again:
+                        waiting.append(again)
+        finally:
+            for worker in self.crew:
+                worker.stop()
+
+    def _turn(
+        self, beat: Beat
+    ) -> Iterator[tuple[Outcome | None, tuple[Job, int] | None]]:
+        """What happens next: outcomes, and jobs to be given out once more."""
+        with selectors.DefaultSelector() as ready:
+            for worker in self.crew:
+                if worker.job:
+                    ready.register(worker.output, selectors.EVENT_READ, worker)
+            events = ready.select(timeout=1.0)
+        heard = [key.data for key, _ in events]
+        for worker in heard:
+            yield from self._hear(worker, beat)
+        for worker in self.crew:
+            if worker.job and worker not in heard:
+                quiet = time.monotonic() - worker.heard
+                if quiet > self.patience:
+                    worker.stop()
+                    yield self._lost(worker, f"no sign of life for {quiet:.0f} s")
+
+    def _hear(
+        self, worker: "Worker", beat: Beat
+    ) -> Iterator[tuple[Outcome | None, tuple[Job, int] | None]]:
+        piece = os.read(worker.output.fileno(), 1 << 20)
+        if not piece:
+            worker.process.wait()
+            yield self._lost(worker, worker.last_words())
+            return
+        worker.heard = time.monotonic()
+        for kind, content in worker.inbox.feed(piece):
+            key = worker.job.key
+            if kind == frames.BEAT:
+                beat(key, int(content))
+            elif kind == frames.DONE:
+                yield worker.end(Outcome(key, content)), None
+            else:
+                yield worker.end(Outcome(key, None, content.decode())), None
+
+    def _lost(
+        self, worker: "Worker", reason: str
+    ) -> tuple[Outcome | None, tuple[Job, int] | None]:
+        """A worker is gone: another one in its place, its batch once more."""
+        job, attempts = worker.job, worker.attempts
+        ended = worker.end(Outcome(job.key, None, f"worker lost: {reason}"))
+        worker.stop()
+        self.crew[self.crew.index(worker)] = Worker()
+        if attempts >= self.attempts:
+            return ended, None
+        return None, (job, attempts + 1)
+
+
+class Worker:
+    """A process and the batch it has."""
+
+    def __init__(self) -> None:
+        self.errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "bns.campaign.engines.worker"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self.errors,
+            bufsize=0,
+            env={**os.environ, **ONE_THREAD},
+            start_new_session=True,  # Ctrl-C is for the driver alone
+        )
+        self.input: IO[bytes] = self.process.stdin
+        self.output: IO[bytes] = self.process.stdout
+        self.inbox = frames.Inbox()
+        self.job: Job | None = None
+        self.attempts = 0
+        self.started = self.heard = time.monotonic()
+
+    def give(self, job: Job, attempts: int) -> None:
+        """Let it run a batch."""
+        self.job, self.attempts = job, attempts
+        self.started = self.heard = time.monotonic()
+        content = json.dumps(job.to_mapping()).encode()
+        message = memoryview(frames.pack(frames.JOB, content))
+        try:
+            while message:
+                message = message[self.input.write(message) :]
+        except BrokenPipeError:
+            return  # dead already: reading its output will say so
+
+    def end(self, ended: Outcome) -> Outcome:
+        """It has no batch any more; gives the outcome with time and attempts."""
+        seconds = time.monotonic() - self.started
+        self.job = None
+        return Outcome(ended.key, ended.data, ended.reason, seconds, self.attempts)
+
+    def last_words(self) -> str:
+        """How the process ended."""
+        code = self.process.returncode
+        if code is not None and code < 0:
+            return f"killed by {signal.Signals(-code).name}"
+        size = self.errors.seek(0, os.SEEK_END)
+        self.errors.seek(max(0, size - LAST_WORDS))
+        lines = self.errors.read().decode(errors="replace").split("\n")
+        said = next((line for line in reversed(lines) if line.strip()), "nothing said")
+        return f"exit code {code}: {said.strip()}"
+
+    def stop(self) -> None:
+        """End the process, whatever it does."""
+        self.process.kill()
+        self.process.wait()
+        for stream in (self.input, self.output, self.errors):
+            stream.close()

@@ -1,0 +1,40 @@
+"""Engines by name."""
+
+import os
+
+from bns.campaign.engines.base import Engine
+from bns.errors import BnsError, UnknownNameError
+
+NAMES = ("inline", "local", "ray")
+
+
+def make(name: str, *, workers: int = 0, ray_address: str = "") -> Engine:
+    """The engine called `name`.
+
+    Args:
+        name: one of `NAMES`.
+        workers: processes or CPUs here; 0 = one for each core.
+        ray_address: of a Ray cluster; empty starts one here.
+
+    Raises:
+        UnknownNameError: no such engine.
+        BnsError: settings that do not fit it.
+    """
+    if name not in NAMES:
+        raise UnknownNameError("engine", name, NAMES)
+    if ray_address and name != "ray":
+        raise BnsError(f"--ray-address goes with --engine ray, not with {name!r}.")
+    if not 0 <= workers <= 1024:
+        raise BnsError(f"--workers {workers} is not allowed: give 1 to 1024.")
+    count = workers or len(os.sched_getaffinity(0))
+    if name == "inline":
+        from bns.campaign.engines.inline import InlineEngine
+
+        return InlineEngine()
+    if name == "local":
+        from bns.campaign.engines.pool import PoolEngine
+
+        return PoolEngine(count)
+    from bns.campaign.engines.ray_engine import RayEngine
+
+    return RayEngine(ray_address, workers=count)

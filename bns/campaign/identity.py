@@ -1,0 +1,72 @@
+"""What a configuration is, whatever it is called and wherever it stands in a file.
+
+The identity of a configuration is a digest of the settings in which it differs from
+the defaults. Replicates, seed, threads, device and the preset's name are no part of
+it. A setting that is added later therefore changes no identity; a default that is
+changed would leave them equal, so a store keeps whole configurations and refuses what
+does not match them.
+"""
+
+import json
+from collections.abc import Iterable
+from dataclasses import replace
+from hashlib import sha256
+from typing import Any
+
+from bns import seeding
+from bns.config import AdaptationConfig, RunConfig, WorldConfig
+from bns.validate import leaves
+
+NO_PART = {"preset", "seed", "replicates", "record_replicates", "threads", "device"}
+
+
+def settings(config: RunConfig) -> dict[str, Any]:
+    """The settings that tell a configuration from the default one."""
+    default = dict(leaves(RunConfig()))
+    return {
+        name: value
+        for name, value in leaves(config)
+        if name not in NO_PART and value != default[name]
+    }
+
+
+def identity(config: RunConfig) -> str:
+    """The configuration's name: 12 hexadecimal digits."""
+    return digest(settings(config))
+
+
+def core(config: RunConfig) -> str:
+    """The identity without what runs of one batch may differ in."""
+    bare = replace(config, adaptation=AdaptationConfig(), world=WorldConfig())
+    return digest(settings(bare) | {"device": config.device})
+
+
+def digest(content: Any, length: int = 12) -> str:
+    """A digest of plain values, the same on every machine."""
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return sha256(text.encode()).hexdigest()[:length]
+
+
+def batch_seed(seed: int, members: Iterable[tuple[str, int]]) -> int:
+    """The seed of a batch, from who is in it.
+
+    Args:
+        seed: of the campaign.
+        members: identity and first replicate of each configuration, sorted.
+    """
+    names = [part for identity, start in members for part in (identity, start)]
+    return seeding.integer(seed, "campaign", *names)
+
+
+def world_seed(seed: int) -> int:
+    """The seed of worlds that are trained: one world for the whole campaign."""
+    return seeding.integer(seed, "campaign-world")
+
+
+def changed_default(wanted: RunConfig, stored: RunConfig) -> str:
+    """A setting in which configurations of one identity differ; empty if none."""
+    theirs = dict(leaves(stored))
+    for name, value in leaves(wanted):
+        if name not in NO_PART and theirs[name] != value:
+            return f"{name} = {theirs[name]!r}, now {value!r}"
+    return ""

@@ -1,0 +1,231 @@
+"""`bns campaign`: run a campaign file, say how far it is and what it says."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import tyro
+
+from bns.cli.parse import parse
+from bns.cli.tables import show
+from bns.errors import BnsError, UnknownNameError
+
+VERBS = ("run", "status", "table", "plot")
+MANUAL = """usage: bns campaign {run,status,table,plot} ... [...]
+
+  run FILE.toml --out DIR  run what is missing; --resume goes on
+  status DIR               what is done, what failed and why
+  table DIR                medians, p (Mann-Whitney, Holm), A12, power
+  plot DIR                 recovery curves and sensitivity, as PNG
+
+A campaign file varies any setting in a grid, a list or a random sample
+(docs/campaigns.md). `bns campaign VERB --help` is the manual of a verb."""
+
+FAILED = 1
+"""exit code of a campaign in which batches failed"""
+
+Measure = Literal["observation", "solve", "recover"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """Run what is missing of a campaign. Ctrl-C stops it after the next batch that is
+    done, twice at once; --resume goes on and loses nothing that was done.
+    """
+
+    file: tyro.conf.Positional[str]
+    """the campaign file (TOML), or a campaign's directory to go on with"""
+    out: str = ""
+    """directory for the results (default: runs/NAME)"""
+    engine: Literal["local", "inline", "ray"] = "local"
+    """local: processes of one thread each; inline: this process; ray: a Ray cluster"""
+    workers: int = 0
+    """processes (local) or CPUs (ray, where it is started here); 0 = one a core"""
+    ray_address: str = ""
+    """HOST:PORT of a Ray cluster; without it one is started here"""
+    resume: bool = False
+    """go on with what is in the directory"""
+    retry: bool = False
+    """try batches again that failed before"""
+    mix: bool = False
+    """allow results of several package versions in one directory"""
+    yes: bool = False
+    """take a very large campaign"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Status:
+    """Say how far a campaign is and which batches failed; it may be running."""
+
+    directory: tyro.conf.Positional[str]
+    """a campaign's directory"""
+    json: bool = False
+    """print JSON instead of a table"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableOf(Status):
+    """Medians with 95 % bootstrap intervals; for pairs that differ in one setting
+    Mann-Whitney p, Holm's p over the whole table, A12 with its 95 % interval, and the
+    power at the observed effect.
+    """
+
+    measure: Measure = "observation"
+    """observation: cost after the damage (eq 3.1); solve, recover: trials until then"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plot:
+    """Draw recovery curves (median, 95 % bootstrap interval) and how the measure
+    depends on each setting that is varied.
+    """
+
+    directory: tyro.conf.Positional[str]
+    """a campaign's directory"""
+    out: str = field(default="")
+    """folder for curves.png and sensitivity.png (default: the directory)"""
+    measure: Measure = "observation"
+    """what sensitivity.png shows"""
+
+
+def main(verb: str, argv: list[str]) -> int:
+    """Run a verb of campaigns; gives the exit code."""
+    del verb
+    if not argv or argv[0] in ("-h", "--help"):
+        print(MANUAL)
+        raise SystemExit(0)
+    does = {
+        "run": (Run, _run),
+        "status": (Status, _status),
+        "table": (TableOf, _table),
+        "plot": (Plot, _plot),
+    }
+    if argv[0] not in does:
+        raise UnknownNameError("verb of `bns campaign`", argv[0], VERBS)
+    kind, do = does[argv[0]]
+    return do(parse(kind, argv[1:], prog=f"bns campaign {argv[0]}"))
+
+
+def _run(given: Run) -> int:
+    from bns import files
+    from bns.campaign import drive, file
+    from bns.campaign.engines import registry
+    from bns.campaign.store import FILE
+    from bns.cli.run import STOPPED, until_interrupted
+
+    path = Path(given.file)
+    if path.is_dir():
+        path, out = path / FILE, path
+    else:
+        out = Path(given.out or f"runs/{path.stem}")
+    if not path.exists():
+        raise BnsError(f"There is no campaign file {path}: see docs/campaigns.md.")
+    campaign = file.read(path, sure=given.yes)
+    engine = registry.make(
+        given.engine, workers=given.workers, ray_address=given.ray_address
+    )
+    data = path.read_bytes()
+    with until_interrupted() as stop:
+        session = drive.run(
+            campaign,
+            out,
+            engine,
+            resume=given.resume,
+            retry=given.retry,
+            mix=given.mix,
+            progress=True,
+            stop=stop,
+            started=lambda: files.write_bytes(out / FILE, data),
+        )
+    return _say(session, out, STOPPED)
+
+
+def _say(session: Any, out: Path, stopped: int) -> int:
+    bad = len(session.failed) + session.waiting
+    print(f"{session.done} batches done, {bad} failed. Results: {out}")
+    for key, reason in list(session.failed.items())[:5]:
+        print(f"  {key}: {reason}")
+    if session.missing:
+        print(f"{session.missing} are left: bns campaign run {out} --resume")
+        return stopped
+    if bad:
+        print(f"Try them again: bns campaign run {out} --resume --retry")
+        return FAILED
+    return 0
+
+
+def _status(given: Status) -> int:
+    import json
+
+    from bns.campaign import results
+
+    found = results.status(results.read(given.directory))
+    if given.json:
+        print(json.dumps(found, indent=2))
+        return 0
+    rows = [
+        [row["member"], row["identity"], f"{row['runs']} of {row['wanted']}"]
+        for row in found["members"]
+    ]
+    show(["member", "identity", "runs"], rows, json=False)
+    print(f"{found['runs']} of {found['wanted']} runs are done.")
+    for entry in found["failed"]:
+        attempts = f"{entry['attempts']} attempts"
+        print(f"failed: {entry['key']} ({attempts}): {entry['reason']}")
+    return 0
+
+
+def _table(given: TableOf) -> int:
+    from bns.campaign import results
+    from bns.campaign.table import table
+    from bns.cli.compare import span, text
+    from bns.compare import MEASURES
+
+    found = table(results.read(given.directory), given.measure)
+    head = ["member", "runs", "reached", "median", "95 % interval"]
+    rows = [
+        [r.label, f"{r.runs}", f"{r.reached}", text(r.median.value), span(r.median)]
+        for r in found.rows
+    ]
+    if not given.json:
+        show(head, rows, json=False)
+        head, rows = [], []
+    pairs = ["a", "b", "p", "p (Holm)", "A12", "95 % interval", "power"]
+    lines = [
+        [
+            v.a,
+            v.b,
+            f"{v.p:.5f}",
+            f"{v.p_holm:.5f}",
+            text(v.a12.value),
+            span(v.a12),
+            f"{v.power:.2f}",
+        ]
+        for v in found.pairs
+    ]
+    if given.json:
+        _json(head, rows, pairs, lines)
+        return 0
+    if lines:
+        show(pairs, lines, json=False)
+    print(f"{given.measure}: {MEASURES[given.measure]}")
+    print("A12: probability that a's value is larger than b's, ties counted half")
+    return 0
+
+
+def _json(head: list, rows: list, pairs: list, lines: list) -> None:
+    import json
+
+    members = [dict(zip(head, row, strict=True)) for row in rows]
+    compared = [dict(zip(pairs, line, strict=True)) for line in lines]
+    print(json.dumps({"members": members, "pairs": compared}, indent=2))
+
+
+def _plot(given: Plot) -> int:
+    from bns.campaign import results
+    from bns.viz import campaign as pictures
+
+    out = Path(given.out or given.directory)
+    for path in pictures.write(results.read(given.directory), out, given.measure):
+        print(path)
+    return 0
