@@ -71,18 +71,18 @@ def summary(record: RunRecord) -> str:
     """What happened, in words."""
     solved = stats.trials_to_solve(record)
     lines = [
-        f"{record.trials} trials of {record.replicates} runs; trials count from 1."
+        f"{record.trials} trials of {record.replicates} runs, numbered from 0."
     ]
-    lines.append(sentence("Solved", solved, "at trial {}"))
+    lines.append(sentence("Solved", solved, "after {} trials"))
     onset, damage = int(record.damage_onset.max()), record.config.world.damage
     if onset < 0:
         lines.append("No damage.")
     elif onset >= record.trials:
         lines.append(
-            f"Damage from trial {onset + 1} on was not met: {'; '.join(damage)}."
+            f"Damage from trial {onset} on was not met: {'; '.join(damage)}."
         )
     else:
-        lines.append(f"Damage from trial {onset + 1} on: {'; '.join(damage)}.")
+        lines.append(f"Damage from trial {onset} on: {'; '.join(damage)}.")
         recovered = stats.trials_to_recover(record)
         lines.append(sentence("Recovered", recovered, "within {} trials"))
     return "\n".join(lines)
