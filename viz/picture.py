@@ -4,10 +4,10 @@ import os
 import socket
 import subprocess
 import sys
-import sysconfig
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryFile
 
@@ -76,9 +76,16 @@ def missing() -> MissingDependencyError | None:
 
 
 def executable() -> str | None:
-    """Path of the `rerun` program that belongs to this Python."""
+    """Path of the viewer that belongs to this Python.
+
+    The program itself, not the script of that name, which starts it as another process
+    that stays when the script is ended.
+    """
+    package = find_spec("rerun_cli")
+    if package is None or package.origin is None:
+        return None
     name = "rerun.exe" if sys.platform == "win32" else "rerun"
-    path = Path(sysconfig.get_path("scripts")) / name
+    path = Path(package.origin).parent / name
     return str(path) if path.is_file() else None
 
 

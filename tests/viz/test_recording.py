@@ -1,5 +1,6 @@
 """Recordings: verified by Rerun's own tool, read back, and drawn."""
 
+import socket
 import subprocess
 
 import numpy as np
@@ -106,8 +107,12 @@ def test_a_picture_without_warnings(rrd, tmp_path, monkeypatch):
         pytest.skip(str(problem))
     from PIL import Image
 
+    port = picture.free_port()
+    monkeypatch.setattr(picture, "free_port", lambda: port)
     png = tmp_path / "run.png"
     assert picture.save(rrd, png) == []
+    with socket.socket() as probe:  # the viewer is gone, it listens no more
+        assert probe.connect_ex(("127.0.0.1", port)) != 0
     with Image.open(png) as image:
         assert image.size == (1920, 1080)
         assert len(image.resize((96, 54)).getcolors(9999)) > 50  # not an empty window
