@@ -44,7 +44,7 @@ def start_state(scene: Compiled, start: tuple[float, float, float]) -> np.ndarra
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
     place = free_joint(model)
-    data.qpos[place] = _posed(data.qpos[place], start)
+    data.qpos[place] = posed(data.qpos[place], start)
     state = np.empty(mujoco.mj_stateSize(model, STATE))
     mujoco.mj_getState(model, data, state, STATE)
     rest = np.zeros((round(SETTLE / model.opt.timestep), model.nu))
@@ -54,13 +54,13 @@ def start_state(scene: Compiled, start: tuple[float, float, float]) -> np.ndarra
         mujoco.mj_setState(model, data, motion.states[-1], STATE)
         data.time = 0.0
         data.qvel[:] = 0.0
-        data.qpos[place] = _posed(data.qpos[place], start)
+        data.qpos[place] = posed(data.qpos[place], start)
         mujoco.mj_getState(model, data, state, STATE)
     state.setflags(write=False)
     return state
 
 
-def _posed(free: np.ndarray, start: tuple[float, float, float]) -> np.ndarray:
+def posed(free: np.ndarray, start: tuple[float, float, float]) -> np.ndarray:
     """A free joint's (7,) values moved to a planar pose, its height and tilt kept."""
     x, y, yaw = start
     w, i, j, k = free[3:]
@@ -68,22 +68,7 @@ def _posed(free: np.ndarray, start: tuple[float, float, float]) -> np.ndarray:
     turn = np.array([np.cos(angle / 2), 0, 0, np.sin(angle / 2)])
     turned = np.empty(4)
     mujoco.mju_mulQuat(turned, turn, free[3:])
-    return np.concatenate([[x, y, free[2]], turned])
-
-
-def turned(model: mujoco.MjModel, state: np.ndarray, yaw: float) -> np.ndarray:
-    """A full physics state with the robot at rest where it is, looking elsewhere.
-
-    Args:
-        model: the compiled model.
-        state: (time, qpos, qvel, ...).
-        yaw: where it looks then [rad].
-    """
-    place, state = free_joint(model), state.copy()
-    free = state[1 + place.start : 1 + place.stop]
-    free[:] = _posed(free, (free[0], free[1], yaw))
-    state[1 + model.nq : 1 + model.nq + model.nv] = 0.0
-    return state
+    return np.array([x, y, free[2], *turned])
 
 
 def free_joint(model: mujoco.MjModel) -> slice:

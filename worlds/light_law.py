@@ -65,7 +65,8 @@ def irradiance(
     if screen is not None:
         lamps = np.broadcast_to(law["lamp_position"], (len(poses), *unit.shape[2:]))
         light = light * screen(points, lamps)
-    light = light * _shadow(law, way)
+    if law["shadow_width"].any():
+        light = light * _shadow(law, way)
     return light.sum(-1) + law["ambient"][..., None]
 
 
@@ -94,16 +95,13 @@ def counts(
 
 def _points(law: Law, poses: np.ndarray) -> np.ndarray:
     """Where the sensors are, in the world frame, ``(n, S, 3)``."""
-    x, y, z = np.moveaxis(law["position"], -1, 0)
+    place = law["position"]
     cos, sin = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
-    return np.stack(
-        np.broadcast_arrays(
-            poses[:, 0, None] + cos * x - sin * y,
-            poses[:, 1, None] + sin * x + cos * y,
-            z,
-        ),
-        axis=-1,
-    )
+    points = np.empty((len(poses), *place.shape[-2:]))
+    points[..., 0] = poses[:, 0, None] + cos * place[..., 0] - sin * place[..., 1]
+    points[..., 1] = poses[:, 1, None] + sin * place[..., 0] + cos * place[..., 1]
+    points[..., 2] = place[..., 2]
+    return points
 
 
 def _in_body(unit: np.ndarray, yaw: np.ndarray) -> np.ndarray:
@@ -115,6 +113,8 @@ def _in_body(unit: np.ndarray, yaw: np.ndarray) -> np.ndarray:
 
 def _shining(law: Law, times: np.ndarray | float) -> np.ndarray:
     """Power of each lamp at each robot's moment, broadcasts to ``(n, S, L)``."""
+    if not law["flicker_depth"].any():
+        return law["lamp_power"].reshape(-1, 1, law["lamp_power"].shape[-1])
     moment = np.asarray(times, dtype=np.float64).reshape(-1, 1)
     wave = 0.5 * (1 - np.cos(2 * np.pi * law["flicker_frequency"] * moment))
     return (law["lamp_power"] * (1 - law["flicker_depth"] * wave))[:, None, :]

@@ -40,7 +40,7 @@ class LoopControl:
         self.stages, self.dt = stages, dt
         self._steps, self._channels, self._scale = steps, channels, ctrl_per_command
         self._seed, self._trial = seed, trial
-        self._told = np.empty((0, len(channels)))
+        self._told, self._count = np.empty((cycles, len(channels))), 0
         self._memoryless = all(
             getattr(item.effect, "memoryless", False) for item in stages.control
         )
@@ -57,21 +57,30 @@ class LoopControl:
         """The model that the trial starts with."""
         return self._pieces[0][2]
 
-    def cycle(self, command: np.ndarray) -> tuple[Segment, ...]:
-        """The next cycle's motion under a command, shape ``(C,)``."""
-        begin = len(self._told) * self._steps
-        self._told = np.vstack([self._told, command])
-        return self._cut(self._values() * self._scale, begin)
+    def cycle(self, held: np.ndarray, controls: np.ndarray) -> tuple[Segment, ...]:
+        """The next cycle's motion.
 
-    def standing(self, begin: int, end: int) -> tuple[Segment, ...]:
-        """Standing still from a physics step to another: whatever is broken."""
-        return self._cut(np.zeros((end - begin, len(self._channels))), begin)
+        Args:
+            held: the command at each physics step of the cycle, ``(steps, C)``.
+            controls: of the actuators if nothing changes it, ``(steps, nu)``.
+        """
+        begin = self._count * self._steps
+        self._count += 1
+        if self.stages.control:
+            self._told[self._count - 1] = held[0]
+            controls = self._values() * self._scale
+        if len(self._pieces) == 1:
+            return (Segment(self._pieces[0][2], controls),)
+        end = begin + self._steps
+        return tuple(
+            Segment(model, controls[max(a, begin) - begin : min(b, end) - begin])
+            for a, b, model in self._pieces
+            if a < end and b > begin
+        )
 
     def _values(self) -> np.ndarray:
         """The last command after all effects on the physics grid, ``(steps, C)``."""
-        if not self.stages.control:
-            return np.repeat(self._told[-1:], self._steps, axis=0)
-        count = len(self._told)
+        count = self._count
         first = count - 1 if self._memoryless else 0
         command = np.repeat(np.arange(first, count), self._steps)
         given = ControlSignal(
@@ -83,11 +92,3 @@ class LoopControl:
         )
         values = control.disturbed(given, self.stages.control, self._seed, self._trial)
         return values[-self._steps :]
-
-    def _cut(self, values: np.ndarray, begin: int) -> tuple[Segment, ...]:
-        end = begin + len(values)
-        return tuple(
-            Segment(model, values[max(a, begin) - begin : min(b, end) - begin])
-            for a, b, model in self._pieces
-            if a < end and b > begin
-        )

@@ -18,6 +18,7 @@ import numpy as np
 from mujoco.rollout import Rollout
 
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS.value
+SHARES = 4  # that a thread gets of a batch: few to hand out, enough to balance
 CONTROL = mujoco.mjtState.mjSTATE_CTRL.value
 
 
@@ -118,7 +119,7 @@ def run(job: Job) -> Motion:
             state=states[None, at + 1 : at + 1 + count],
         )
         warm = data.qacc_warmstart[None].copy()
-        warned = any(warning.number for warning in data.warning)
+        warned = bool(data.warning.number.any())
         compiled.give_back(data)
         bad = _first_bad(states[at : at + 1 + count], warned)
         if bad >= 0:
@@ -159,4 +160,11 @@ class Pool:
             return [run(job) for job in jobs]
         if self._executor is None:
             self._executor = ThreadPoolExecutor(self.threads)
-        return list(self._executor.map(run, jobs))
+        size = max(len(jobs) // (self.threads * SHARES), 1)
+        shares = [jobs[i : i + size] for i in range(0, len(jobs), size)]
+        done = self._executor.map(_run_all, shares)
+        return [motion for motions in done for motion in motions]
+
+
+def _run_all(jobs: Sequence[Job]) -> list[Motion]:
+    return [run(job) for job in jobs]

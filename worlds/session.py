@@ -77,6 +77,7 @@ class Session:
         turns, stops: at the edge and at a lamp, ``(n,)``.
         stopped: for good, ``(n,)``.
         cycle: cycles done.
+        segments: of the motion in the last cycle, of the robots that moved.
         readings: of the sensors now, ``(n, S)`` [counts]; S is 0 without sensors.
     """
 
@@ -113,14 +114,16 @@ class Session:
         self.states = np.empty((n, cycles * steps + 1, size))
         if n:
             self.states[:, 0] = begin
-        self._place = compile.free_joint(self._controls[0].first.model) if n else None
+        self._free, self._speeds = _columns(self._controls)
+        every = max(round(PERIOD / setting.dt), 1)
+        self._looks = np.append(np.arange(0, steps, every), steps)
         self._warm: list[np.ndarray | None] = [None] * n
         self._turning = {}
         self.commands = np.zeros((n, cycles, len(setting.channels)))
         self.handled = np.zeros((n, cycles), bool)
         self.turns, self.stops = np.zeros(n, int), np.zeros(n, int)
         self.stopped, self.diverged = np.zeros(n, bool), np.zeros(n, bool)
-        self.cycle = 0
+        self.cycle, self.segments = 0, {}
         self.readings = self._read(np.ones(n, bool))
 
     def step(self, commands: object) -> np.ndarray:
@@ -146,21 +149,21 @@ class Session:
         told[self.stopped | self.diverged] = 0.0
         self.commands[:, at] = told
         begin = at * self.setting.steps
-        jobs = {
-            robot: Job(
-                self.states[robot, begin],
-                self._controls[robot].standing(begin, begin + setting.steps)
-                if self.stopped[robot]
-                else self._controls[robot].cycle(told[robot]),
-                self._warm[robot],
-            )
-            for robot in range(n)
-            if not self.diverged[robot]
+        live = np.flatnonzero(~(self.stopped | self.diverged)).tolist()
+        held = np.repeat(told[:, None], setting.steps, axis=1)
+        controls = held * setting.ctrl_per_command
+        self.segments = {
+            robot: self._controls[robot].cycle(held[robot], controls[robot])
+            for robot in live
         }
-        motions = setting.pool.map(list(jobs.values()))
-        for robot, motion in zip(jobs, motions, strict=True):
+        jobs = [
+            Job(self.states[robot, begin], self.segments[robot], self._warm[robot])
+            for robot in live
+        ]
+        for robot, motion in zip(live, setting.pool.map(jobs), strict=True):
             self._keep(robot, begin, motion)
-        self.states[self.diverged, begin + 1 : begin + setting.steps + 1] = np.nan
+        for robot in set(range(n)) - set(live):
+            self._still(robot, begin)
         self.cycle = at + 1
         moved = self._supervise(begin)
         self.readings = self._read(moved)
@@ -172,44 +175,50 @@ class Session:
         self._warm[robot] = motion.warm
         self.diverged[robot] |= motion.diverged >= 0
 
+    def _still(self, robot: int, begin: int) -> None:
+        """A cycle of a robot that was stopped, or that the physics has lost."""
+        span = slice(begin + 1, begin + self.setting.steps + 1)
+        self.states[robot, span] = self.states[robot, begin]
+        self.states[robot, span, 0] += (
+            np.arange(1, self.setting.steps + 1) * self.setting.dt
+        )
+
     def _supervise(self, begin: int) -> np.ndarray:
         """Stop and turn who has to be; which of the robots were put somewhere."""
         setting, moved = self.setting, np.zeros(len(self.stages), bool)
         self.handled[:, self.cycle - 1] = self.stopped
         if setting.supervisor is None or not len(self.stages):
             return moved
-        every = max(round(PERIOD / setting.dt), 1)
-        looks = np.append(np.arange(0, setting.steps, every), setting.steps)
-        places = self.states[:, begin + looks, 1:3]
+        places = self.states[:, begin + self._looks, 1:3]
         calls = setting.supervisor.calls(places, setting.lamps, setting.arena)
         for robot, call in calls.items():
             if not self.stopped[robot]:
-                self._handle(robot, begin, int(looks[call.look]), call)
+                self._hold(robot, begin + self._looks[call.look])
+                self._handle(robot, call)
                 moved[robot] = not self.stopped[robot]
         return moved
 
-    def _handle(self, robot: int, begin: int, look: int, call: Call) -> None:
-        """Stop a robot in mid-cycle; at the cycle's end it is turned or left there."""
-        end = begin + self.setting.steps
+    def _hold(self, robot: int, step: int) -> None:
+        """A robot stands from a physics step to the end of the cycle."""
+        states = self.states[robot, step : self.cycle * self.setting.steps + 1]
+        states[:, 1:] = states[0, 1:]
+        states[:, self._speeds] = 0.0
+        self._warm[robot] = None
+
+    def _handle(self, robot: int, call: Call) -> None:
+        """A robot that was stopped is turned, or left where it stands."""
         self.handled[robot, self.cycle - 1] = True
-        if begin + look < end:
-            standing = self._controls[robot].standing(begin + look, end)
-            job = Job(self.states[robot, begin + look], standing)
-            self._keep(robot, begin + look, self.setting.pool.map([job])[0])
-        supervisor = self.setting.supervisor
+        supervisor, lamp = self.setting.supervisor, None
         if call.reason == "lamp":
+            lamp = self.setting.lamps[call.lamp]
             self.stops[robot] += 1
             self.stopped[robot] = supervisor.at_lamp == "stop"
         else:
             self.turns[robot] += 1
-        if self.stopped[robot] or self.diverged[robot]:
-            return
-        lamp = self.setting.lamps[call.lamp] if call.reason == "lamp" else None
-        state = self.states[robot, end]
-        yaw = supervisor.heading(state[1:3], lamp, self._turner(robot))
-        model = self._controls[robot].first.model
-        self.states[robot, end] = compile.turned(model, state, yaw)
-        self._warm[robot] = None
+        if not (self.stopped[robot] or self.diverged[robot]):
+            free = self.free(self.states[robot, self.cycle * self.setting.steps])
+            yaw = supervisor.heading(free[:2], lamp, self._turner(robot))
+            free[:] = compile.posed(free, (free[0], free[1], yaw))
 
     def _turner(self, robot: int) -> np.random.Generator:
         if robot not in self._turning:
@@ -230,5 +239,14 @@ class Session:
 
     def free(self, states: np.ndarray) -> np.ndarray:
         """Position and orientation of the robots' bodies, ``(..., 7)``, from states."""
-        place = self._place or slice(0, 7)
-        return states[..., 1 + place.start : 1 + place.stop]
+        return states[..., self._free]
+
+
+def _columns(controls: Sequence[LoopControl]) -> tuple[slice, slice]:
+    """Where a full physics state has the base's pose, and where all speeds."""
+    if not controls:
+        return slice(0, 7), slice(0, 0)
+    model = controls[0].first.model
+    place = compile.free_joint(model)
+    speeds = slice(1 + model.nq, 1 + model.nq + model.nv)
+    return slice(1 + place.start, 1 + place.stop), speeds

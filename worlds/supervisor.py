@@ -6,6 +6,7 @@ heading towards the centre and goes on. Both are done by hand or by the tracking
 system: the robot stands, is turned where it stands, and the cycle is lost.
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -78,20 +79,22 @@ class Supervisor:
             The first call for each robot that has one. Robots on their way out are
             left alone.
         """
-        half = np.asarray(arena) / 2 - self.edge
-        beyond = (np.abs(places) - half).max(axis=-1, keepdims=True)
+        depth = np.empty((*places.shape[:2], 1 + len(lamps)))  # [m]
+        x, y = np.moveaxis(np.abs(places), -1, 0)
+        half_x, half_y = arena[0] / 2 - self.edge, arena[1] / 2 - self.edge
+        np.maximum(x - half_x, y - half_y, out=depth[..., 0])
         way = places[:, :, None] - lamps
-        near = self.safety - np.hypot(way[..., 0], way[..., 1])
-        depth = np.concatenate([beyond, near], axis=-1)  # (n, looks, 1 + L) [m]
-        deeper = (depth[:, 1:] > 0) & (np.diff(depth, axis=1) > DEEPER)
-        return {
-            int(robot): self._first(deeper[robot])
-            for robot in np.flatnonzero(deeper.any(axis=(1, 2)))
-        }
+        np.hypot(way[..., 0], way[..., 1], out=depth[..., 1:])
+        np.subtract(self.safety, depth[..., 1:], out=depth[..., 1:])
+        if not (depth > 0).any():
+            return {}
+        deeper = (depth[:, 1:] > 0) & (depth[:, 1:] - depth[:, :-1] > DEEPER)
+        robots = deeper.any(axis=(1, 2)).nonzero()[0].tolist()
+        return {robot: self._first(deeper[robot]) for robot in robots}
 
     def _first(self, deeper: np.ndarray) -> Call:
-        look = int(np.flatnonzero(deeper.any(axis=1))[0])
-        which = int(np.flatnonzero(deeper[look])[-1])  # a lamp before the edge
+        look = int(deeper.any(axis=1).argmax())
+        which = int(deeper[look].nonzero()[0][-1])  # a lamp before the edge
         return Call(look + 1, "lamp" if which else "edge", which - 1)
 
     def heading(
@@ -108,4 +111,4 @@ class Supervisor:
             rng: the only source of randomness.
         """
         way = -place if lamp is None else place - lamp
-        return float(np.arctan2(way[1], way[0]) + rng.uniform(-SPREAD, SPREAD))
+        return math.atan2(way[1], way[0]) + rng.uniform(-SPREAD, SPREAD)
