@@ -1,0 +1,23 @@
+"""OpenCV, imported where it is needed and asked for in words where it is missing."""
+
+from typing import Any
+
+from bns.errors import MissingDependencyError
+from bns.hardware.line import INSTALL
+
+
+def cv2() -> Any:
+    """The module `cv2`.
+
+    Raises:
+        MissingDependencyError: it is not installed, or it has no ArUco.
+    """
+    try:
+        import cv2 as module
+    except ImportError as error:
+        raise MissingDependencyError(
+            "tracking", "opencv-python-headless", INSTALL
+        ) from error
+    if not hasattr(module, "aruco"):
+        raise MissingDependencyError("tracking", "ArUco in OpenCV", INSTALL)
+    return module
