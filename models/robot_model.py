@@ -80,6 +80,7 @@ class RobotModel:
         wheels: driven wheels by side, "left" and "right".
         caster_geom: "" where there is none.
         options: what else `models.spec` takes.
+        servo: module of `bns.models` with the numbers of its servos; "" = it has none.
     """
 
     name: str
@@ -96,6 +97,7 @@ class RobotModel:
     wheels: Mapping[str, Wheel] = field(default_factory=dict)
     caster_geom: str = ""
     options: Mapping[str, Option] = field(default_factory=dict)
+    servo: str = ""
 
     @property
     def channels(self) -> tuple[ChannelName, ...]:

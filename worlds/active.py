@@ -9,7 +9,7 @@ from bns import seeding
 from bns.errors import BnsError
 from bns.worlds.damage import ActiveEffect, Damage, Event
 from bns.worlds.effects import registry
-from bns.worlds.effects.base import Effect
+from bns.worlds.effects.base import Effect, ServoEffect
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Stages:
 
     Attributes:
         control: those of the command stage, then those of the actuator stage.
-        body: edits of the model.
+        body: edits of the model, those of servos among them.
         sensor: what becomes of what the sensors read.
         tracking: what the tracker does to the poses.
         texts: all of them as text, by origin ("reality", "damage"), for the record.
@@ -80,7 +80,7 @@ class Stages:
         }
         both = placed["reality"] + placed["damage"]
         stage = {
-            name: tuple(item for item in both if item.effect.stage == name)
+            name: tuple(item for item in both if _stage(item.effect) == name)
             for name in ("command", "actuator", "body", "sensor", "tracking")
         }
         return cls(
@@ -94,6 +94,11 @@ class Stages:
     def conditions(self, trial: int, seed: int) -> dict[str, object]:
         """What is true of the world in a trial, for its record."""
         return {**self.texts, "trial": trial, "seed": seed}
+
+
+def _stage(effect: Effect) -> str:
+    """Where it acts in a world: those on a servo law are edits of the model."""
+    return "body" if isinstance(effect, ServoEffect) else effect.stage
 
 
 def _placed(origin: str, effects: Iterable[ActiveEffect]) -> tuple[Placed, ...]:

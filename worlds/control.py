@@ -9,6 +9,7 @@ from bns.worlds.active import Placed
 from bns.worlds.effects.base import ControlSignal
 from bns.worlds.trial import Channel, Commands
 
+_ROUNDING = 1 + 1e-9  # by which a value may exceed its limit
 LONGEST = 3600.0  # [s] a trial; assumed: longer ones are slips of a unit
 
 
@@ -20,7 +21,8 @@ def check(
     Args:
         commands: one robot's list.
         channels: what the robot is told, with units.
-        limits: largest magnitude per channel, shape ``(C,)``.
+        limits: largest magnitude per channel, shape ``(C,)``; or smallest and largest
+            value, shape ``(C, 2)``.
         robot: its name, for the message.
 
     Raises:
@@ -38,14 +40,17 @@ def check(
         raise BnsError("A list of commands is empty; give one command at least.")
     if commands.duration > LONGEST:
         raise OutOfBoundsError("trial", commands.duration, 0, LONGEST, "s")
-    beyond = np.argwhere(np.abs(commands.values) > limits * (1 + 1e-9))
+    low, high = (
+        np.array(limits.T if limits.ndim == 2 else (-limits, limits)) * _ROUNDING
+    )
+    beyond = np.argwhere((commands.values < low) | (commands.values > high))
     if len(beyond):
         row, column = beyond[0]
+        ends = limits[column] if limits.ndim == 2 else (-limits[column], limits[column])
         raise OutOfBoundsError(
             f"command {row}: {channels[column].name}",
             commands.values[row, column],
-            -limits[column],
-            limits[column],
+            *ends,
             channels[column].unit,
         )
 

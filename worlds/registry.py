@@ -24,6 +24,7 @@ from bns.worlds.world import World
 
 GROUP = "bns.worlds"
 _BUILT_IN = {
+    "hexapod": "bns.worlds.hexapod_world:HexapodWorld",
     "mujoco": "bns.worlds.mujoco_world:MujocoWorld",
     "light": "bns.worlds.light_world:LightWorld",
     "static-snn": "bns.worlds.static_snn_world:StaticSnnWorld",

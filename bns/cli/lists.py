@@ -73,8 +73,7 @@ def effects() -> Rows:
                 ["", "", p.name, p.unit, f"{span}, nominal {p.nominal:g}", p.doc]
             )
         for c in effect.choices:
-            options = ", ".join(c.options)
-            rows.append(["", "", c.name, "", f"{options} (default {c.default})", c.doc])
+            rows.append(["", "", c.name, "", f"{c.shown} (default {c.default})", c.doc])
     return ["effect", "stage", "parameter", "unit", "range", "meaning"], rows
 
 

@@ -1,7 +1,5 @@
 """What every effect must keep to; a new effect is tested by being there."""
 
-from pathlib import Path
-
 import mujoco
 import numpy as np
 import pytest
@@ -10,8 +8,20 @@ from bns.errors import BnsError, OutOfBoundsError, UnknownNameError
 from bns.worlds import servo_law
 from bns.worlds.effects import listing, registry
 from bns.worlds.effects.base import STAGES, ControlSignal, PoseSignal, ServoEffect
+from bns.worlds.effects.legs import JOINTS
+from tests.worlds.subjects import (
+    DT,
+    LEGGED,
+    STEPS,
+    as_bytes,
+    bare,
+    compiled,
+    frozen,
+    signal_of,
+    told,
+    wheel_fields,
+)
 
-ROVER = (Path(__file__).parent / "rover.xml").read_text()
 NAMES = registry.names()
 SERVO = [name for name in NAMES if issubclass(registry.get(name), ServoEffect)]
 ON_SIGNALS = [name for name in NAMES if name not in SERVO]
@@ -22,29 +32,13 @@ OF_WHEELS = [
     if any(choice.name == "wheel" for choice in registry.get(name).choices)
 ]
 LASTING = {"clock_drift"}  # what a clock has gained stays when the drift ends
-STEPS, DT, SAMPLES = 600, 0.005, 31
-
-
-def frozen(array) -> np.ndarray:
-    array = np.array(array)
-    array.setflags(write=False)
-    return array
+SAMPLES = 31
 
 
 @pytest.fixture
-def control() -> ControlSignal:
-    """Twelve random commands of 40 to 49 steps, then rest; read-only."""
-    rng = np.random.default_rng(1)
-    command = np.repeat(np.arange(12), rng.integers(40, 50, 12))
-    command = np.concatenate([command, -np.ones(STEPS - len(command), dtype=int)])
-    speeds = np.concatenate([rng.uniform(-0.12, 0.12, (12, 2)), np.zeros((1, 2))])
-    return ControlSignal(
-        times=frozen(np.arange(STEPS) * DT),
-        values=frozen(speeds[command]),
-        command=frozen(command),
-        channels=("left_speed", "right_speed"),
-        dt=DT,
-    )
+def control() -> dict[bool, ControlSignal]:
+    """By whether the robot has legs."""
+    return {False: told(("left_speed", "right_speed")), True: told(JOINTS)}
 
 
 @pytest.fixture
@@ -67,34 +61,20 @@ def signals(control, track) -> dict:
     return {"command": control, "actuator": control, "tracking": track}
 
 
-def compiled(effect=None) -> mujoco.MjModel:
-    spec = mujoco.MjSpec.from_string(ROVER)
-    if effect is not None:
-        effect.edit(spec)
-    return spec.compile()
-
-
-def as_bytes(model) -> bytes:
-    """Every field of a model."""
-    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
-    mujoco.mj_saveModel(model, None, buffer)
-    return buffer.tobytes()
-
-
 def length(signals, effect) -> int:
-    return len(signals[effect.stage].times)
+    return len(signal_of(signals, effect).times)
 
 
 def after(effect, signals, *, active=None, seed=0) -> tuple[np.ndarray, ...]:
     """The arrays that the effect makes of the signal of its stage."""
-    signal = signals[effect.stage]
+    signal = signal_of(signals, effect)
     active = np.ones(len(signal.times), bool) if active is None else active
     result = effect.apply(signal, active, np.random.default_rng(seed))
     return result if isinstance(result, tuple) else (result,)
 
 
 def before(effect, signals) -> tuple[np.ndarray, ...]:
-    signal = signals[effect.stage]
+    signal = signal_of(signals, effect)
     tracking = effect.stage == "tracking"
     return (signal.times, signal.poses) if tracking else (signal.values,)
 
@@ -118,7 +98,7 @@ def unchanged(effect, signals) -> bool:
         law = servo_numbers()
         return same(effect.change(law).values(), law.values())
     if effect.stage == "body":
-        return as_bytes(compiled(effect)) == as_bytes(compiled())
+        return as_bytes(compiled(effect)) == as_bytes(bare(effect))
     return same(after(effect, signals), before(effect, signals))
 
 
@@ -236,39 +216,15 @@ def test_only_the_named_wheel_is_touched(name, wheel, other, signals):
     example = listing.example(registry.get(name))
     effect = registry.make(name, **{**example.values, "wheel": wheel})
     if effect.stage == "body":
-        old, new = wheel_fields(compiled()), wheel_fields(compiled(effect))
+        old, new = wheel_fields(bare(effect)), wheel_fields(compiled(effect))
         assert old[other] == new[other]
         assert old[wheel] != new[wheel]
         return
-    signal = signals[effect.stage]
+    signal = signal_of(signals, effect)
     ((new,), (old,)) = after(effect, signals), before(effect, signals)
     kept, moved = signal.column(f"{other}_speed"), signal.column(f"{wheel}_speed")
     assert new[:, kept].tobytes() == old[:, kept].tobytes()
     assert new[:, moved].tobytes() != old[:, moved].tobytes()
-
-
-def wheel_fields(model) -> dict[str, dict[str, bytes]]:
-    """Per wheel, every given (not derived) field of its elements."""
-    derived = ("invweight0", "M0", "acc0", "subtreemass")
-    fields = {}
-    for side in ("left", "right"):
-        body = model.body(f"{side}_wheel").id
-        joint = model.joint(f"{side}_wheel_joint")
-        index = {
-            "body": body,
-            "geom": model.body_geomadr[body],
-            "jnt": joint.id,
-            "dof": joint.dofadr[0],
-            "actuator": model.actuator(f"{side}_wheel").id,
-        }
-        fields[side] = {
-            key: getattr(model, key)[index[key.partition("_")[0]]].tobytes()
-            for key in dir(model)
-            if key.partition("_")[0] in index
-            and isinstance(getattr(model, key), np.ndarray)
-            and not key.endswith(derived)
-        }
-    return fields
 
 
 @pytest.mark.parametrize(
@@ -276,9 +232,13 @@ def wheel_fields(model) -> dict[str, dict[str, bytes]]:
 )
 def test_body_effects_keep_the_sizes_and_the_physics_sound(name):
     model = compiled(listing.example(registry.get(name)))
-    assert len(as_bytes(model)) == len(as_bytes(compiled()))
+    kind = registry.get(name)
+    if not kind.resizes:
+        assert len(as_bytes(model)) == len(as_bytes(bare(kind)))
     data = mujoco.MjData(model)
-    data.ctrl[:] = 3.0  # [rad/s]
+    if kind.robots == LEGGED:
+        mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    data.ctrl[:] = 0.2 if kind.robots == LEGGED else 3.0  # [rad], [rad/s]
     mujoco.mj_step(model, data, nstep=200)
     assert np.isfinite(data.qpos).all()
     assert not any(warning.number for warning in data.warning)

@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from bns.errors import BnsError, UnknownNameError
+from bns.worlds.effects.legs import SERVO, chosen
 from bns.worlds.effects.parameter import Choice, Parameter
 from bns.worlds.effects.signals import ControlSignal, PoseSignal
 
@@ -91,11 +92,13 @@ class Effect(ABC):
 
     def __str__(self) -> str:
         """The effect as text: ``name:parameter=value,...`` (parses back)."""
+        silent = {item.name: item.default for item in self.choices if item.quiet}
         items = (
             f"{name}={value!r}".removesuffix(".0")
             if isinstance(value, float)
             else f"{name}={value}"
             for name, value in self.values.items()
+            if silent.get(name) != value
         )
         text = ",".join(items)
         return f"{self.name}:{text}" if text else self.name
@@ -122,6 +125,10 @@ class Effect(ABC):
             value = p.nominal + severity * (values[p.name] - p.nominal)
             values[p.name] = round(value) if p.integer else value
         return type(self)(values)
+
+    def lost(self) -> frozenset[int]:
+        """Numbers of the legs that no longer carry a walking robot."""
+        return frozenset()
 
     def wheels(self) -> tuple[str, ...]:
         """The wheels that the choice `wheel` names: ("left",), ("right",) or both."""
@@ -169,12 +176,14 @@ class BodyEffect(Effect):
     """Changes the robot or floor: an edit of the model before compilation."""
 
     stage = "body"
+    resizes: ClassVar[bool] = False  # whether it changes the sizes of the model
 
     @abstractmethod
     def edit(self, spec: Any) -> None:
         """Write the effect into `spec` (a `mujoco.MjSpec`), elements found by name.
 
-        Must keep the sizes of the model, so that models of one batch stay alike.
+        Keeps the sizes of the model, unless the class says that it `resizes`; one that
+        changes the number of joints can not set in within a trial.
         """
 
 
@@ -184,14 +193,26 @@ class ServoEffect(Effect):
     A servo closes a loop around its own encoder, so its gain, friction, delay or play
     can not be written as a transform of a signal that is known beforehand, nor as an
     edit of a model alone. All of them are numbers of one law, at whatever stage of the
-    signal path they act; `stage` says which. Subclasses set it.
+    signal path they act; `stage` says which. Subclasses set it. On a walking robot the
+    choice `servo` says which of its servos.
     """
 
     robots = ("servo",)
+    choices = (SERVO,)
 
     @abstractmethod
     def change(self, law: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """The law after the effect: every number by name, arrays of any shape."""
+
+    def edit(self, spec: Any) -> None:
+        """Write the effect into the chosen servos of a walking robot's `MjSpec`."""
+        from bns.worlds import servo_joint
+
+        if self.is_nominal:
+            return
+        for actuator in chosen(spec, self["servo"]):
+            law, powered = servo_joint.read(actuator)
+            servo_joint.write(spec, actuator, self.change(law), powered)
 
 
 class OpticsEffect(Effect):

@@ -1,7 +1,8 @@
-"""Where body effects find the parts of a wheeled robot in a `mujoco.MjSpec`.
+"""Where body effects find the parts of a robot in a `mujoco.MjSpec`.
 
-Only the wheels' body names are relied on, ``left_wheel`` and ``right_wheel``; the base,
-joints, geoms and actuators follow from them.
+Only the wheels' body names are relied on, ``left_wheel`` and ``right_wheel``; joints,
+geoms, actuators and the base follow from them. Of a robot without wheels the base is
+the body that floats.
 """
 
 from collections.abc import Iterator
@@ -11,6 +12,8 @@ from typing import Any
 import numpy as np
 
 from bns.errors import BnsError
+
+FREE = 0  # mjJNT_FREE
 
 
 def wheel(spec: Any, side: str) -> Any:
@@ -29,8 +32,29 @@ def wheel(spec: Any, side: str) -> Any:
 
 
 def base(spec: Any) -> Any:
-    """The body that carries the wheels."""
-    return wheel(spec, "left").parent
+    """The body that carries the wheels, or the one that floats and carries the legs.
+
+    Raises:
+        BnsError: the model has neither.
+    """
+    if spec.body("left_wheel") is not None:
+        return wheel(spec, "left").parent
+    for joint in spec.joints:
+        if joint.type == FREE:
+            return joint.parent
+    raise BnsError(
+        f"Model {spec.modelname!r} has no free base: this effect needs a robot that "
+        "moves about; see `bns robots`."
+    )
+
+
+def grounded(spec: Any) -> Iterator[Any]:
+    """The bodies that carry the robot on the floor: wheels, or all parts of legs."""
+    wheels = [spec.body(f"{side}_wheel") for side in ("left", "right")]
+    if all(item is not None for item in wheels):
+        yield from wheels
+        return
+    yield from base(spec).find_all("body")
 
 
 def joint(spec: Any, side: str) -> Any:

@@ -21,6 +21,7 @@ class CentreOfMass(BodyEffect):
     name = "centre_of_mass"
     doc = "the base's centre of mass lies elsewhere than in the model"
     source = "the model's 11 mm ahead of the axle has one source; bounds assumed"
+    robots = ("wheeled", "legged")
     parameters = (
         _shift("dx", "shift forward; beyond -11 mm the Khepera leans back", 0.01),
         _shift("dy", "shift to the left", 0.01),

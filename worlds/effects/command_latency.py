@@ -15,6 +15,7 @@ class CommandLatency(CommandEffect):
     name = "command_latency"
     doc = "commands reach the motors late"
     source = "0.2 s fits the MRCLAM 6 robots best; bounds assumed"
+    robots = ("wheeled", "legged")
     parameters = (
         Parameter(
             "delay",

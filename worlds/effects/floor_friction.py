@@ -7,16 +7,17 @@ from bns.worlds.effects.base import BodyEffect, Parameter
 
 
 class FloorFriction(BodyEffect):
-    """Sliding friction between wheels and floor is scaled.
+    """Sliding friction between wheels or legs and floor is scaled.
 
     A contact takes the friction of the geom with the higher priority or, where they are
-    equal, the larger of the two: so the wheels' and the floor's are both scaled. The
+    equal, the larger of the two: so the robot's and the floor's are both scaled. The
     casters have a priority and a friction of their own and keep them.
     """
 
     name = "floor_friction"
-    doc = "the wheels grip the floor more or less than in the model"
+    doc = "the robot grips the floor more or less than in the model"
     source = "contact rule: MuJoCo documentation, Computation, Contact; bounds assumed"
+    robots = ("wheeled", "legged")
     parameters = (
         Parameter(
             "factor",
@@ -32,7 +33,6 @@ class FloorFriction(BodyEffect):
     def edit(self, spec: Any) -> None:
         if self.is_nominal:
             return
-        wheels = (bodies.wheel(spec, side) for side in ("left", "right"))
-        for body in (*wheels, spec.worldbody):
+        for body in (*bodies.grounded(spec), spec.worldbody):
             for geom in bodies.contact_geoms(body):
                 geom.friction[0] *= self["factor"]

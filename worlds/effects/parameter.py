@@ -55,12 +55,26 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Choice:
-    """A setting with named alternatives (`wheel` = left, right, both)."""
+    """A setting with named alternatives (`wheel` = left, right, both).
+
+    Attributes:
+        name: as written in text.
+        options: the alternatives.
+        default: the one taken where none is given.
+        doc: meaning in one line.
+        quiet: whether the default is left out of the effect's text.
+    """
 
     name: str
     options: tuple[str, ...]
     default: str
     doc: str
+    quiet: bool = False
+
+    @property
+    def shown(self) -> str:
+        """The alternatives for a listing."""
+        return ", ".join(self.options)
 
     def check(self, effect: str, value: object) -> str:
         """The value, one of the options.

@@ -27,6 +27,7 @@ class Payload(BodyEffect):
     name = "payload"
     doc = "the robot carries a mass that the model does not know"
     source = "parallel-axis theorem; a point mass is assumed"
+    robots = ("wheeled", "legged")
     parameters = (
         Parameter(
             "mass",

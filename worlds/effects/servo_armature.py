@@ -11,6 +11,7 @@ class ServoArmature(ServoEffect):
     stage = "body"
     doc = "the rotor's inertia, seen at the output, differs"
     source = "rotor inertia times gear ratio squared; bounds assumed"
+    robots = ("servo", "legged")
     parameters = (
         Parameter(
             "inertia",

@@ -11,6 +11,7 @@ class ServoCoulomb(ServoEffect):
     stage = "body"
     doc = "dry friction differs"
     source = "BAM (Duclusaud et al., ICRA 2025); bounds assumed"
+    robots = ("servo", "legged")
     parameters = (
         Parameter(
             "torque",

@@ -11,6 +11,7 @@ class ServoDelay(ServoEffect):
     stage = "command"
     doc = "goals take effect later than nominal"
     source = "time on the bus and in the firmware; bounds assumed"
+    robots = ("servo", "legged")
     parameters = (
         Parameter(
             "delay",

@@ -11,6 +11,7 @@ class ServoDutyLimit(ServoEffect):
     stage = "actuator"
     doc = "the drive saturates below the full supply"
     source = "overload protection and torque limits of servo firmware act on the duty"
+    robots = ("servo", "legged")
     parameters = (
         Parameter(
             "factor",

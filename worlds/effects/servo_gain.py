@@ -11,6 +11,7 @@ class ServoGain(ServoEffect):
     stage = "actuator"
     doc = "the position gain differs from what is told"
     source = "the gain is a register of the servo that is easily misread"
+    robots = ("servo", "legged")
     parameters = (
         Parameter(
             "factor",

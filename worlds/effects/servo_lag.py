@@ -11,6 +11,7 @@ class ServoLag(ServoEffect):
     stage = "command"
     doc = "goals are followed with a first-order lag"
     source = "first-order model assumed; bounds assumed"
+    robots = ("servo", "legged")
     parameters = (
         Parameter(
             "time_constant",

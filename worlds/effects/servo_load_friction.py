@@ -11,6 +11,7 @@ class ServoLoadFriction(ServoEffect):
     stage = "body"
     doc = "gear friction in proportion to the load"
     source = "BAM (Duclusaud et al., ICRA 2025); bounds assumed"
+    robots = ("servo", "legged")
     parameters = (
         Parameter(
             "coefficient",

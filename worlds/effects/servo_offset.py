@@ -11,6 +11,7 @@ class ServoOffset(ServoEffect):
     stage = "sensor"
     doc = "the encoder reads a constant too much"
     source = "mounting of the horn on its splines; bounds assumed"
+    robots = ("servo", "legged")
     parameters = (
         Parameter(
             "angle",

@@ -11,6 +11,7 @@ class ServoQuantisation(ServoEffect):
     stage = "sensor"
     doc = "the encoder reads in steps"
     source = "12-bit encoders have steps of 1.53 mrad; bounds assumed"
+    robots = ("servo", "legged")
     parameters = (
         Parameter(
             "step",

@@ -11,6 +11,7 @@ class ServoTorqueConstant(ServoEffect):
     stage = "actuator"
     doc = "the torque constant differs; the back-EMF follows it"
     source = "motor equation: torque kt i, back-EMF kt w"
+    robots = ("servo", "legged")
     parameters = (
         Parameter(
             "factor",

@@ -11,6 +11,7 @@ class ServoViscous(ServoEffect):
     stage = "body"
     doc = "viscous friction differs"
     source = "BAM (Duclusaud et al., ICRA 2025); bounds assumed"
+    robots = ("servo", "legged")
     parameters = (
         Parameter(
             "coefficient",

@@ -11,6 +11,7 @@ class ServoVoltage(ServoEffect):
     stage = "actuator"
     doc = "the supply voltage differs from what is told"
     source = "duty times voltage drives the motor"
+    robots = ("servo", "legged")
     parameters = (
         Parameter(
             "factor",

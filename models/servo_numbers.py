@@ -1,0 +1,55 @@
+"""Nominal numbers of a servo law, read from a servo's `law.toml`.
+
+One table per number, with value, unit, basis and source; where a number is uncertain,
+`low` and `high` say between what it may lie.
+"""
+
+import tomllib
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from bns.errors import FormatError
+from bns.models.numbers import BASES
+
+LAW = "law.toml"
+
+
+@cache
+def _tables(directory: Path) -> dict[str, Mapping[str, Any]]:
+    file = directory / LAW
+    try:
+        tables = tomllib.loads(file.read_text(encoding="utf-8"))
+        for name, table in tables.items():
+            if table["basis"] not in BASES or not (table["source"] and table["unit"]):
+                raise FormatError(f"{file}: {name} lacks a basis, source or unit.")
+            float(table["value"])
+    except (tomllib.TOMLDecodeError, KeyError, TypeError) as error:
+        raise FormatError(f"{file} is not a table of numbers: {error}.") from error
+    return tables
+
+
+def law(directory: Path) -> dict[str, float]:
+    """The nominal numbers of the servo law by name, SI units.
+
+    Args:
+        directory: holds `law.toml`.
+
+    Raises:
+        FormatError: the file is not as it should be.
+    """
+    return {name: float(table["value"]) for name, table in _tables(directory).items()}
+
+
+def uncertain(directory: Path) -> dict[str, tuple[float, float]]:
+    """Smallest and largest likely value of each uncertain number, by name.
+
+    Raises:
+        FormatError: the file is not as it should be.
+    """
+    return {
+        name: (float(table["low"]), float(table["high"]))
+        for name, table in _tables(directory).items()
+        if "low" in table
+    }

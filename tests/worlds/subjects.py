@@ -1,0 +1,88 @@
+"""What effects are tried on: signals and models of a robot that can have them."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from bns import models
+from bns.worlds.effects.base import ControlSignal
+
+ROVER = (Path(__file__).parent / "rover.xml").read_text()
+STEPS, DT = 600, 0.005
+LEGGED = ("legged",)  # robots of effects that need legs
+
+
+def frozen(array) -> np.ndarray:
+    array = np.array(array)
+    array.setflags(write=False)
+    return array
+
+
+def told(channels: tuple[str, ...]) -> ControlSignal:
+    """Twelve random commands of 40 to 49 steps, then rest; read-only."""
+    rng = np.random.default_rng(1)
+    command = np.repeat(np.arange(12), rng.integers(40, 50, 12))
+    command = np.concatenate([command, -np.ones(STEPS - len(command), dtype=int)])
+    size = len(channels)
+    speeds = np.concatenate([rng.uniform(-0.12, 0.12, (12, size)), np.zeros((1, size))])
+    return ControlSignal(
+        times=frozen(np.arange(STEPS) * DT),
+        values=frozen(speeds[command]),
+        command=frozen(command),
+        channels=channels,
+        dt=DT,
+    )
+
+
+def signal_of(signals, effect):
+    """The signal of an effect's stage, for a robot that can have the effect."""
+    found = signals[effect.stage]
+    return found[effect.robots == LEGGED] if isinstance(found, dict) else found
+
+
+def bare(kind) -> mujoco.MjModel:
+    """The model that effects of a kind are tried on, unchanged."""
+    return _spec(kind).compile()
+
+
+def _spec(kind):
+    walks = kind.robots == LEGGED
+    return models.spec("phantomx") if walks else mujoco.MjSpec.from_string(ROVER)
+
+
+def compiled(effect) -> mujoco.MjModel:
+    spec = _spec(effect)
+    effect.edit(spec)
+    return spec.compile()
+
+
+def as_bytes(model) -> bytes:
+    """Every field of a model."""
+    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return buffer.tobytes()
+
+
+def wheel_fields(model) -> dict[str, dict[str, bytes]]:
+    """Per wheel, every given (not derived) field of its elements."""
+    derived = ("invweight0", "M0", "acc0", "subtreemass")
+    fields = {}
+    for side in ("left", "right"):
+        body = model.body(f"{side}_wheel").id
+        joint = model.joint(f"{side}_wheel_joint")
+        index = {
+            "body": body,
+            "geom": model.body_geomadr[body],
+            "jnt": joint.id,
+            "dof": joint.dofadr[0],
+            "actuator": model.actuator(f"{side}_wheel").id,
+        }
+        fields[side] = {
+            key: getattr(model, key)[index[key.partition("_")[0]]].tobytes()
+            for key in dir(model)
+            if key.partition("_")[0] in index
+            and isinstance(getattr(model, key), np.ndarray)
+            and not key.endswith(derived)
+        }
+    return fields

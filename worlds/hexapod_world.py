@@ -1,0 +1,191 @@
+"""The physics world of walking robots: servo goals, each until the robot rests."""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from bns import models
+from bns.models.ax12a import SPEED_UNIT
+from bns.worlds import active, control, legged_flags, legged_plan, observe
+from bns.worlds.active import Stages
+from bns.worlds.checks import bounded, checked_start, shared
+from bns.worlds.damage import Damage
+from bns.worlds.legged_goals import in_units
+from bns.worlds.legged_physics import Walk, WalkJob, walk
+from bns.worlds.legged_plan import Servos
+from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Trial
+
+STAGES = ("command", "actuator", "body", "sensor", "tracking")
+SPEED = round(300 * SPEED_UNIT, 4)  # [rad/s] moving speed register 300; assumed
+
+
+class Plan(NamedTuple):
+    """One robot's trial before it is run."""
+
+    commands: Commands
+    stages: Stages
+    seed: int
+    servos: Servos
+    job: WalkJob
+
+
+class HexapodWorld:
+    """Walking robots in MuJoCo: a command is a goal for every servo, until they rest.
+
+    Each command lasts until servos and body are at rest, at most as long as it is told
+    (`Commands.durations`); the actual times are the trial's. Observed are the pose and,
+    after it, the position that each servo reports. A trial depends on its commands,
+    damage, trial number and seed alone.
+
+    Goals are those of the servos from half-way [rad], signs alike for all legs: coxa
+    forward, femur up, tibia outward. One beyond a servo's end stops is refused; what an
+    effect moves beyond them ends there, as on the robot.
+
+    Args:
+        robot: name of the robot model, see `bns robots`.
+        damage: what is wrong with the robots, by trial, as in `MujocoWorld`.
+        reality: effects that always hold (unless they have a schedule).
+        speed: moving speed of the servos [rad/s].
+        sample_dt: time between two samples [s]; the end of each command is sampled as
+            well.
+        threads: of the physics.
+        start: pose at the start of each trial in the world frame [m, m, rad].
+        arena: size of the board along x and y [m], its centre the world's origin.
+        name: name of the world in the trials.
+        truth: whether trials carry hidden states (`qpos`, `qvel` at the samples).
+
+    Raises:
+        UnknownNameError: no such robot or effect.
+        OutOfBoundsError: a number outside its bounds, a start outside the arena.
+        BnsError: an effect that this robot or world cannot have, effects that take all
+            legs away or let the robot start fallen.
+    """
+
+    def __init__(
+        self,
+        robot: str = "phantomx",
+        *,
+        damage: Damage | Sequence = (),
+        reality: Damage | Sequence = (),
+        speed: float = SPEED,
+        sample_dt: float = 0.1,
+        threads: int = 2,
+        start: Sequence[float] = (0.0, 0.0, 0.0),
+        arena: Sequence[float] = (2.7, 1.8),
+        name: str = "hexapod",
+        truth: bool = False,
+    ):
+        self.model = legged_plan.legged(models.robot(robot))
+        self.robot, self.name, self.truth = robot, name, truth
+        self._channels, self._ranges = self.model.channels, self.model.ranges
+        readings = (Channel(f"{c.name}_position", c.unit) for c in self.model.commands)
+        self.channels = (*POSE_CHANNELS, *readings)
+        self.damage = active.per_robot(damage)
+        self.reality = active.as_damage(reality)
+        given = self.damage if isinstance(self.damage, tuple) else (self.damage,)
+        for item in (*given, self.reality):
+            active.refuse(item, stages=STAGES, kind=self.model.kind, world=name)
+            legged_plan.refuse_legless(self.reality + item)
+        self.arena = (float(arena[0]), float(arena[1]))
+        self.start = checked_start(start, self.arena)
+        self.speed = bounded("speed", speed, 0.01, 100.0, "rad/s")
+        self.dt = legged_plan.timestep(robot)
+        self.sample_dt = bounded("sample_dt", sample_dt, self.dt, 60.0, "s")
+        threads = int(bounded("threads", threads, 1, 1024, "1"))
+        self._threads = ThreadPoolExecutor(threads) if threads > 1 else None
+        legged_plan.refuse_fallen(robot, self.reality, self.start, self._channels)
+
+    def run(
+        self, commands: Sequence[Commands], *, trial: int = 0, seeds: Sequence[int] = ()
+    ) -> list[Trial]:
+        """Execute one list of commands on each of N robots, see `World.run`.
+
+        Raises:
+            BnsError: numbers of commands, seeds and damages disagree; commands that
+                the robot cannot be told.
+        """
+        plans = self.plan(commands, trial=trial, seeds=seeds)
+        walks = self.walks(plans)
+        return [
+            self._observe(plan, done, trial)
+            for plan, done in zip(plans, walks, strict=True)
+        ]
+
+    def plan(
+        self, commands: Sequence[Commands], *, trial: int = 0, seeds: Sequence[int] = ()
+    ) -> list[Plan]:
+        """What `run` hands to the physics, for benches and tests; arguments alike."""
+        damages, seeds = shared(self.damage, seeds, len(commands))
+        return [
+            self._plan(item, damage, trial, seed)
+            for item, damage, seed in zip(commands, damages, seeds, strict=True)
+        ]
+
+    def walks(self, plans: Sequence[Plan]) -> list[Walk]:
+        """What the physics makes of plans, for benches and tests."""
+        jobs = [plan.job for plan in plans]
+        if self._threads is None or len(jobs) == 1:
+            return [walk(job) for job in jobs]
+        return list(self._threads.map(walk, jobs))
+
+    def _plan(self, commands: Commands, damage: Damage, trial: int, seed: int) -> Plan:
+        control.check(commands, self._channels, self._ranges, self.robot)
+        stages = Stages.of(self.reality, damage, trial, commands.duration)
+        job, servos = legged_plan.job(
+            self.robot,
+            commands,
+            stages,
+            start=self.start,
+            speed=self.speed,
+            seed=seed,
+            trial=trial,
+        )
+        return Plan(commands, stages, seed, servos, job)
+
+    def _observe(self, plan: Plan, done: Walk, trial: int) -> Trial:
+        servos, states = plan.servos, done.states
+        free = states[:, 1:8]
+        every = max(self.sample_dt / self.dt, 1.0)
+        sampled, boundaries = observe.sample_steps(done.counts, every)
+        poses = observe.planar(free, self.start[2])
+        grid = np.arange(len(poses)) * self.dt
+        times, seen = observe.tracked(
+            poses[sampled],
+            grid[sampled],
+            poses,
+            grid,
+            plan.stages.tracking,
+            plan.seed,
+            trial,
+        )
+        angles = states[:, servos.angles]
+        readings = angles[sampled] + servos.laws["offset"]
+        readings = in_units(readings, servos.laws["quantisation"])
+        outcome = legged_flags.outcome(
+            free,
+            angles,
+            states[:, servos.speeds],
+            done.control,
+            servos.laws,
+            dt=self.dt,
+            arena=self.arena,
+            touched=bool(done.touched.any()),
+            rested=bool(done.rested.all()),
+            diverged=done.diverged >= 0,
+        )
+        return Trial(
+            commands=plan.commands,
+            times=times,
+            observed=np.column_stack([seen, readings]),
+            boundaries=boundaries,
+            channels=self.channels,
+            outcome=outcome,
+            robot=self.robot,
+            world=self.name,
+            conditions=plan.stages.conditions(trial, plan.seed)
+            | {"speed": self.speed, "mujoco": mujoco.__version__},
+            truth=servos.hidden(states[sampled]) if self.truth else {},
+        )

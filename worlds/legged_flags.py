@@ -1,0 +1,74 @@
+"""What happened to a walking robot in a trial, beside where it went."""
+
+import numpy as np
+
+from bns.models.ax12a import HOTTEST
+from bns.worlds import observe
+from bns.worlds.trial import Outcome
+
+SATURATED = 0.98  # share of the torque limit that counts as all of it; assumed
+OVERLOAD_TIME = 1.0  # [s] at the limit until the servo gives up; assumed
+STALLED = 0.1  # [rad/s] slower = it pushes in vain; assumed
+HEAT_CAPACITY = 50.0  # [J/K] 54.6 g of copper, steel and plastic; assumed
+AMBIENT = 40.0  # [deg C] of the servos at the start of a trial; assumed
+
+
+def outcome(
+    free: np.ndarray,
+    angles: np.ndarray,
+    speeds: np.ndarray,
+    goals: np.ndarray,
+    laws: dict[str, np.ndarray],
+    *,
+    dt: float,
+    arena: tuple[float, float],
+    touched: bool,
+    rested: bool,
+    diverged: bool,
+) -> Outcome:
+    """The flags of a trial.
+
+    Args:
+        free: the base's free joint on the physics grid, shape ``(S + 1, 7)``.
+        angles, speeds: of the servos, shape ``(S + 1, C)`` [rad, rad/s].
+        goals: in force in each step, shape ``(S, C)`` [rad].
+        laws: numbers of the servos, each of shape ``(C,)``.
+        dt: physics step [s].
+        arena: size of the board along x and y [m], centred on the origin.
+        touched: whether the robot's own parts touched.
+        rested: whether every command ended at rest.
+        diverged: whether the physics did.
+    """
+    duty = _duty(goals, angles[:-1], laws)
+    pushing = (np.abs(duty) > SATURATED * laws["duty_limit"]) & (
+        np.abs(speeds[:-1]) < STALLED
+    )
+    seen = observe.outcome(free, arena, diverged)
+    return seen._replace(
+        collided=touched,
+        unrested=not rested,
+        overloaded=_for_long(pushing & (laws["powered"] > 0), OVERLOAD_TIME / dt),
+        overheated=bool((_heated(duty, speeds[:-1], laws, dt) > HOTTEST).any()),
+    )
+
+
+def _duty(goals, angles, laws) -> np.ndarray:
+    """Share of the supply on each motor, shape ``(S, C)``."""
+    wanted = laws["gain"] * laws["error_gain"] * (goals - angles)
+    return np.clip(wanted, -laws["duty_limit"], laws["duty_limit"]) * laws["powered"]
+
+
+def _heated(duty, speeds, laws, dt: float) -> np.ndarray:
+    """Servos' temperatures at the end if none is given off, shape ``(C,)`` [deg C]."""
+    driving = duty * laws["voltage"] - laws["torque_constant"] * speeds * (duty != 0)
+    heat = np.nansum(driving**2, axis=0) / laws["resistance"] * dt  # [J]
+    return AMBIENT + heat / HEAT_CAPACITY
+
+
+def _for_long(on: np.ndarray, steps: float) -> bool:
+    """Whether a column is true for so many steps on end."""
+    count = max(round(steps), 1)
+    if len(on) < count:
+        return False
+    total = np.vstack([np.zeros((1, on.shape[1]), int), np.cumsum(on, axis=0)])
+    return bool((total[count:] - total[:-count] == count).any())

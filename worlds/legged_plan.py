@@ -1,0 +1,226 @@
+"""A walking robot's trial before it is run: models, start, goals in force."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from itertools import pairwise
+
+import mujoco
+import numpy as np
+
+from bns.errors import BnsError
+from bns.models import RobotModel
+from bns.worlds import compile, control, legged_goals, observe, servo_joint
+from bns.worlds.active import Stages
+from bns.worlds.damage import Damage
+from bns.worlds.effects.base import ControlSignal
+from bns.worlds.effects.legs import LEGS
+from bns.worlds.legged_physics import Piece, WalkJob
+from bns.worlds.physics import STATE, Compiled, Job, Segment, run
+from bns.worlds.trial import Commands
+
+STAND = 1.0  # [s] at rest before a trial, so that it starts without a bounce; assumed
+
+
+class Servos:
+    """Where a compiled model has its servos, and their laws.
+
+    Args:
+        model: compiled.
+
+    Attributes:
+        laws: numbers of the servo law, each of shape ``(C,)``.
+        angles, speeds: columns of full physics states, shape ``(C,)``.
+    """
+
+    def __init__(self, model: mujoco.MjModel):
+        joints = model.actuator_trnid[:, 0]
+        self.laws = servo_joint.laws(model)
+        self.angles = 1 + model.jnt_qposadr[joints]
+        self.speeds = 1 + model.nq + model.jnt_dofadr[joints]
+        self._nq, self._nv = model.nq, model.nv
+
+    def hidden(self, states: np.ndarray) -> dict[str, np.ndarray]:
+        """Quantities by name from full physics states (time, qpos, qvel, ...)."""
+        end = 1 + self._nq
+        return {"qpos": states[:, 1:end], "qvel": states[:, end : end + self._nv]}
+
+
+def legged(robot: RobotModel) -> RobotModel:
+    """The robot, if it walks.
+
+    Raises:
+        BnsError: it does not.
+    """
+    if robot.kind != "legged":
+        raise BnsError(
+            f"Robot {robot.name!r} is {robot.kind}, this world is for legged ones: "
+            "take 'phantomx', or the world 'mujoco'."
+        )
+    return robot
+
+
+def timestep(robot: str) -> float:
+    """Physics step of a robot [s]."""
+    return float(compile.compiled(robot).model.opt.timestep)
+
+
+def refuse_legless(damage: Damage) -> None:
+    """Stop if at some time no leg is left.
+
+    Raises:
+        BnsError: all legs are raised, limp or missing together.
+    """
+    for onset in {event.onset_trial for event in damage.events}:
+        held = [item.effect for item in damage.at(onset)]
+        lost = frozenset().union(*(effect.lost() for effect in held))
+        if len(lost) == len(LEGS):
+            raise BnsError(
+                f"{' and '.join(map(str, held))} take all {len(LEGS)} legs away in "
+                f"trial {onset}: leave the robot one at least."
+            )
+
+
+def refuse_fallen(
+    robot: str, reality: Damage, start: tuple[float, float, float], channels: Sequence
+) -> None:
+    """Stop if the robot does not stand at the start of trial 0.
+
+    Raises:
+        BnsError: it is tilted too far, or the physics diverges.
+    """
+    if not reality.events:
+        return
+    stages = Stages.of(reality, Damage.none(), 0, 1.0)
+    still = Commands(np.zeros((1, len(channels))), [1.0], tuple(channels))
+    made, _ = job(robot, still, stages, start=start, speed=1.0, seed=0, trial=0)
+    x, y = made.start[5:7]
+    if not 1 - 2 * (x * x + y * y) >= np.cos(observe.FALLEN):
+        raise BnsError(
+            f"With {', '.join(stages.texts['reality'])} the robot starts fallen; leave "
+            "it legs to stand on, or take a gentler effect."
+        )
+
+
+def job(
+    robot: str,
+    commands: Commands,
+    stages: Stages,
+    *,
+    start: tuple[float, float, float],
+    speed: float,
+    seed: int,
+    trial: int,
+) -> tuple[WalkJob, Servos]:
+    """What the physics gets for one robot's trial.
+
+    Args:
+        robot: name of the model.
+        commands: goals [rad], with the limits of their durations.
+        stages: effects that hold in this trial.
+        start: pose in the world frame [m, m, rad].
+        speed: moving speed of the servos [rad/s].
+        seed, trial: identity of what is random.
+
+    Raises:
+        BnsError: an effect that changes the joints sets in within the trial.
+    """
+    dt = timestep(robot)
+    counts = legged_goals.planned(commands, speed, dt)
+    values, home = np.repeat(commands.values, counts, axis=0), commands.values[0] * 0
+    if stages.control:
+        told = control.signal(commands, counts, dt)
+        values = control.disturbed(told, stages.control, seed, trial)
+        home = _home(told, stages, seed, trial)
+    segments = compile.segments(robot, stages.body, values, dt)
+    first = segments[0].compiled
+    _refuse_other_sizes(segments)
+    laws, before, goals = servo_joint.laws(first.model), home, []
+    home = legged_goals.shaped(home[None], laws, home, dt)[0]
+    for compiled, told in segments:
+        laws = servo_joint.laws(compiled.model)
+        goals.append(legged_goals.shaped(told, laws, before, dt))
+        before = told[-1]
+    ramps = legged_goals.ramps(np.concatenate(goals), home, speed * dt)
+    cuts = np.cumsum([len(told) for _, told in segments])
+    pieces = _pieces(segments, cuts, ramps, counts, legged_goals.limits(commands, dt))
+    begin = stand(first, start, home.tobytes())
+    return WalkJob(begin, pieces), Servos(segments[-1].compiled.model)
+
+
+def _home(told: ControlSignal, stages: Stages, seed: int, trial: int) -> np.ndarray:
+    """Goals before the first command, after the effects, shape ``(C,)``."""
+    still = ControlSignal(
+        told.times[:1],
+        np.zeros_like(told.values[:1]),
+        told.command[:1],
+        told.channels,
+        told.dt,
+    )
+    return control.disturbed(still, stages.control, seed, trial)[0]
+
+
+def _refuse_other_sizes(segments: Sequence[Segment]) -> None:
+    if len({segment.compiled.model.nq for segment in segments}) > 1:
+        raise BnsError(
+            "An effect that adds joints (loose_horn) cannot set in or end within a "
+            "trial; give its onset as a trial alone."
+        )
+
+
+def _pieces(segments, cuts, ramps, counts, limits) -> tuple[Piece, ...]:
+    """The trial cut where commands end and where the model changes."""
+    ends = np.cumsum(counts)
+    pieces, begun = [], 0
+    for begin, end in pairwise(np.union1d([0], np.union1d(ends, cuts))):
+        model = segments[int(np.searchsorted(cuts, begin, side="right"))].compiled
+        command = int(np.searchsorted(ends, begin, side="right"))
+        last = end == ends[command]
+        limit = int(limits[command] - (begin - begun)) if last else 0
+        pieces.append(Piece(model, ramps[begin:end], limit))
+        begun = end if last else begun
+    return tuple(pieces)
+
+
+@lru_cache(maxsize=1024)
+def stand(
+    scene: Compiled, start: tuple[float, float, float], goals: bytes
+) -> np.ndarray:
+    """Full physics state of the robot at rest at its start pose, time 0.
+
+    The robot is put down in its `home` pose and left alone for `STAND` seconds; what it
+    drifts is undone.
+
+    Args:
+        scene: the compiled model.
+        start: pose (x, y, yaw) in the world frame [m, m, rad].
+        goals: of the servos [rad], the bytes of an array of shape ``(C,)``.
+    """
+    model = scene.model
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    place = compile.free_joint(model)
+    data.qpos[place] = _at(data.qpos[place], start)
+    hinges = np.flatnonzero(model.jnt_limited)
+    at = model.jnt_qposadr[hinges]
+    data.qpos[at] = np.clip(data.qpos[at], *model.jnt_range[hinges].T)
+    state = np.empty(mujoco.mj_stateSize(model, STATE))
+    mujoco.mj_getState(model, data, state, STATE)
+    rest = np.tile(np.frombuffer(goals), (round(STAND / model.opt.timestep), 1))
+    motion = run(Job(state, (Segment(scene, rest),)))
+    if motion.diverged < 0:
+        mujoco.mj_setState(model, data, motion.states[-1], STATE)
+        data.time = 0.0
+        data.qvel[:] = 0.0
+        data.qpos[place] = _at(data.qpos[place], start)
+        mujoco.mj_getState(model, data, state, STATE)
+    state.setflags(write=False)
+    return state
+
+
+def _at(free: np.ndarray, start: tuple[float, float, float]) -> np.ndarray:
+    """A free joint's (7,) values moved to a planar pose, its height and tilt kept."""
+    x, y, yaw = start
+    turn = (yaw - observe.planar(free[None], 0.0)[0, 2]) / 2
+    turned = np.empty(4)
+    mujoco.mju_mulQuat(turned, np.array([np.cos(turn), 0, 0, np.sin(turn)]), free[3:])
+    return np.concatenate([[x, y, free[2]], turned])
