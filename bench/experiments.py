@@ -27,7 +27,7 @@ DAMAGES = {
     "left-50": "wheel_gain:wheel=left,factor=0.5",
     "right-50": "wheel_gain:wheel=right,factor=0.5",
 }
-LATER = ("learner",)  # settings added since the first stored runs
+LATER = ("learner", "light")  # settings added since the first stored runs
 QUICK = {"replicates": 6, "trials": 12}
 
 
@@ -79,9 +79,9 @@ def _named(config: RunConfig, name: str) -> RunConfig:
 
 def directory(config: RunConfig) -> Path:
     """Where a configuration's run is kept."""
-    settings, plain = asdict(config), RunConfig()
+    settings, plain = asdict(config), asdict(RunConfig())
     for name in LATER:  # unchanged, they are as good as not there
-        if settings[name] == getattr(plain, name):
+        if settings[name] == plain[name]:
             del settings[name]
     if not settings["adaptation"]["extra"]:
         del settings["adaptation"]["extra"]

@@ -54,6 +54,11 @@ class Encoding:
     max_commands: int
     initial: tuple[int, int]
 
+    @property
+    def gene_shape(self) -> tuple[int, int]:
+        """Genes of an individual: places times kinds."""
+        return self.max_commands, 3
+
     @classmethod
     def of(cls, config: ControllerConfig, device: str = "cpu") -> "Encoding":
         """The encoding that a configuration asks for."""

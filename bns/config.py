@@ -7,6 +7,8 @@ speed units, 144.01 to the mm/s, firmware < 3); everything inside is SI.
 from dataclasses import dataclass, field
 from typing import Literal
 
+from bns.config_light import LightConfig
+
 Selection = Literal["tournament", "best", "roulette", "random"]
 Crossover = Literal["single-point", "n-point", "uniform", "sbx"]
 Mutation = Literal["uniform-range", "bounded-uniform", "gaussian"]
@@ -172,6 +174,7 @@ class RunConfig:
     snn: SnnConfig = field(default_factory=SnnConfig)
     adaptation: AdaptationConfig = field(default_factory=AdaptationConfig)
     world: WorldConfig = field(default_factory=WorldConfig)
+    light: LightConfig = field(default_factory=LightConfig)
     choose: RealChoice = "best"
     """which controller is tried in the world"""
     choose_tournament: float = 0.1

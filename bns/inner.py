@@ -17,8 +17,7 @@ from bns.draws import Draws
 from bns.errors import MissingDependencyError
 from bns.evaluation import Evaluator
 from bns.evolution.generation import Breeder, Coins, Rates
-from bns.snn import training
-from bns.snn.network import forward
+from bns.snn import fitting
 
 WORTH_COMPILING = 120_000  # generations of all trials; compiling takes some 30 s
 
@@ -63,8 +62,7 @@ class InnerLoops:
         self.draws = draws
         self.compiled = should_compile(config)
         self._breed, self._judge = self._bred, self.evaluator.judge
-        decay = config.snn.weight_decay
-        self._epoch = partial(training.epoch, evaluator.shape, decay=decay)
+        self._epoch = fitting.epoch_of(evaluator.shape, config.snn)
         if self.compiled:
             torch._dynamo.config.cache_size_limit = 64
             judge = partial(self.evaluator.judge, fused=True)
@@ -108,21 +106,11 @@ class InnerLoops:
         Returns:
             new weights, and the mean squared error after training ``(R,)``.
         """
-        shape = self.evaluator.shape
-        shaped = targets.unsqueeze(2) if shape.outputs == 1 else targets.unsqueeze(1)
-        drop = self.config.snn.kind == "ensemble" and self.config.snn.dropout > 0
-        state = training.RpropState.fresh(theta)
-        for _ in range(self.config.snn.epochs):
-            keep = self._dropout(inputs) if drop else None
-            theta, state = self._epoch(theta, state, inputs, shaped, weight, keep)
-        error = (forward(shape, theta, inputs) - shaped) * weight
-        patterns = weight.sum((1, 2, 3)).clamp(min=1.0)
-        heads = shape.groups * shape.outputs
-        return theta, error.square().sum((1, 2, 3)) / (patterns * heads)
-
-    def _dropout(self, inputs: Tensor) -> Tensor:
-        """Factors of the hidden neurons: 0, or 1 / (1 - rate)."""
-        shape, rate = self.evaluator.shape, self.config.snn.dropout
-        runs, _, patterns = inputs.shape
-        coins = self.draws.uniform(runs, shape.groups, shape.hidden, patterns)
-        return (coins >= rate).float() / (1.0 - rate)
+        return fitting.fit(
+            self.evaluator.shape,
+            self.config.snn,
+            theta,
+            fitting.Patterns(inputs, targets, weight),
+            self.draws,
+            self._epoch,
+        )

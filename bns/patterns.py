@@ -17,15 +17,24 @@ class PatternBuffer:
     Args:
         runs: R.
         windows: newest patterns a run trains on, 0 = all; shape ``(R,)``.
+        sizes: inputs and targets of a pattern.
+        bucket: training tensors grow in steps of so many patterns.
     """
 
-    def __init__(self, runs: int, windows: Sequence[int]):
+    def __init__(
+        self,
+        runs: int,
+        windows: Sequence[int],
+        sizes: tuple[int, int] = (5, 3),
+        bucket: int = BUCKET,
+    ):
         self.windows = np.asarray(windows, dtype=np.int64)
-        self.inputs = [np.zeros((0, 5), np.float32) for _ in range(runs)]
-        self.targets = [np.zeros((0, 3), np.float32) for _ in range(runs)]
+        self.sizes, self.bucket = sizes, bucket
+        self.inputs = [np.zeros((0, sizes[0]), np.float32) for _ in range(runs)]
+        self.targets = [np.zeros((0, sizes[1]), np.float32) for _ in range(runs)]
 
     def append(self, run: int, inputs: np.ndarray, targets: np.ndarray) -> None:
-        """Add a trial's patterns ``(K, 5)`` and ``(K, 3)``; old ones slide out."""
+        """Add a trial's patterns, inputs and targets; old ones slide out."""
         keep = self.windows[run] or None
         for store, new in ((self.inputs, inputs), (self.targets, targets)):
             joined = np.concatenate([store[run], new.astype(np.float32)])
@@ -50,10 +59,10 @@ class PatternBuffer:
         """
         counts = self.counts
         longest = max(1, int(counts.max()))
-        size = -(-longest // BUCKET) * BUCKET
+        size = -(-longest // self.bucket) * self.bucket
         runs = len(counts)
-        inputs = np.zeros((runs, 5, size), np.float32)
-        targets = np.zeros((runs, 3, size), np.float32)
+        inputs = np.zeros((runs, self.sizes[0], size), np.float32)
+        targets = np.zeros((runs, self.sizes[1], size), np.float32)
         weight = np.zeros((runs, 1, 1, size), np.float32)
         for run, count in enumerate(counts):
             inputs[run, :, :count] = self.inputs[run].T

@@ -52,7 +52,7 @@ def n_point(
     empty = filled == 0
     source = torch.where(empty.unsqueeze(-1), place, source)
     lengths = torch.where(empty, first.lengths, filled.clamp(max=longest))
-    genes = parents.gather(2, source.unsqueeze(-1).expand(-1, -1, -1, 3))
+    genes = parents.gather(2, source.unsqueeze(-1).expand(-1, -1, -1, parents.shape[3]))
     child = Population(genes, lengths)
     return child._replace(genes=genes * child.valid.unsqueeze(-1))
 

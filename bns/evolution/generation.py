@@ -21,11 +21,14 @@ class Rates(NamedTuple):
 
     Attributes:
         rate: probability per gene, ``(R,)``.
-        magnitude: of each gene kind, ``(R, 3)`` [m/s, m/s, s].
+        magnitude: of each gene kind, ``(R, 3)`` [m/s, m/s, s] (weights: ``(R, 1)``).
+        chicken: probability of a fresh second parent, ``(R,)``; None = that of the
+            configuration.
     """
 
     rate: Tensor
     magnitude: Tensor
+    chicken: Tensor | None = None
 
 
 class Coins(NamedTuple):
@@ -64,7 +67,7 @@ class Breeder:
         """
         config = self.config
         count = config.population - config.elitism
-        genes = (runs, count, self.encoding.max_commands, 3)
+        genes = (runs, count, *self.encoding.gene_shape)
         pool = 0
         if config.headless_chicken > 0:
             pool = max(1, int(2 * config.headless_chicken * count))
@@ -101,7 +104,7 @@ class Breeder:
         children = crossover.cross(
             config.crossover,
             first,
-            self._headless_chicken(second, coins),
+            self._headless_chicken(second, coins, rates.chicken),
             coins.crossover,
             eta=config.sbx_eta,
             fixed_length=self.fixed_length,
@@ -109,12 +112,15 @@ class Breeder:
         children = self._mutate(children, rates, coins.mutation)
         return self._with_elites(population, cost, children)
 
-    def _headless_chicken(self, second: Population, coins: Coins) -> Population:
+    def _headless_chicken(
+        self, second: Population, coins: Coins, chance: Tensor | None
+    ) -> Population:
         """Replace second parents by fresh random individuals, with a probability."""
         if coins.fresh.shape[1] == 0:
             return second
         pool = self.encoding.individuals(coins.fresh, coins.fresh_lengths)
-        chosen = coins.chicken < self.config.headless_chicken
+        wanted = self.config.headless_chicken if chance is None else chance[:, None]
+        chosen = coins.chicken < wanted
         rank = (chosen.long().cumsum(1) - 1).clamp(min=0) % pool.lengths.shape[1]
         fresh = take(pool, rank)
         return Population(

@@ -1,0 +1,74 @@
+"""Fitting stacked networks to patterns: the epochs between two trials."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+from torch import Tensor
+
+from bns.config import SnnConfig
+from bns.draws import Draws
+from bns.snn import training
+from bns.snn.network import Shape, forward
+
+Epoch = Callable[..., tuple[Tensor, training.RpropState]]
+
+
+class Patterns(NamedTuple):
+    """What R runs train on.
+
+    Attributes:
+        inputs: scaled, ``(R, I, N)``.
+        targets: scaled, ``(R, O, N)``.
+        weight: 1 for a pattern, 0 for padding, ``(R, 1, 1, N)``.
+    """
+
+    inputs: Tensor
+    targets: Tensor
+    weight: Tensor
+
+
+def epoch_of(shape: Shape, config: SnnConfig) -> Epoch:
+    """The epoch of a configuration, ready to be compiled."""
+    return partial(training.epoch, shape, decay=config.weight_decay)
+
+
+def fit(
+    shape: Shape,
+    config: SnnConfig,
+    theta: Tensor,
+    patterns: Patterns,
+    draws: Draws,
+    epoch: Epoch,
+) -> tuple[Tensor, Tensor]:
+    """Train all runs' networks from fresh step sizes.
+
+    Args:
+        shape: of the networks.
+        config: says for how many epochs, and how much dropout an ensemble has.
+        theta: weights ``(R, D)``.
+        patterns: what to train on.
+        draws: of the dropout.
+        epoch: `epoch_of`, compiled or not.
+
+    Returns:
+        new weights, and the mean squared error after training ``(R,)``.
+    """
+    inputs, targets, weight = patterns
+    shaped = targets.unsqueeze(2) if shape.outputs == 1 else targets.unsqueeze(1)
+    drop = config.kind == "ensemble" and config.dropout > 0
+    state = training.RpropState.fresh(theta)
+    for _ in range(config.epochs):
+        keep = _dropout(shape, config.dropout, inputs, draws) if drop else None
+        theta, state = epoch(theta, state, inputs, shaped, weight, keep)
+    error = (forward(shape, theta, inputs) - shaped) * weight
+    count = weight.sum((1, 2, 3)).clamp(min=1.0)
+    heads = shape.groups * shape.outputs
+    return theta, error.square().sum((1, 2, 3)) / (count * heads)
+
+
+def _dropout(shape: Shape, rate: float, inputs: Tensor, draws: Draws) -> Tensor:
+    """Factors of the hidden neurons: 0, or 1 / (1 - rate)."""
+    runs, _, patterns = inputs.shape
+    coins = draws.uniform(runs, shape.groups, shape.hidden, patterns)
+    return (coins >= rate).float() / (1.0 - rate)
