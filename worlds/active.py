@@ -174,10 +174,11 @@ def refuse(damage: Damage, *, stages: Iterable[str], kind: str, world: str) -> N
     for event in damage.events:
         effect = event.effect
         if effect.stage not in allowed:
+            other = "light" if effect.stage == "sensor" else "mujoco"
             raise BnsError(
                 f"World {world!r} cannot represent {effect.name!r}, an effect on the "
                 f"{effect.stage}: it has the stages {', '.join(allowed)}; "
-                "take another effect or the world 'mujoco'."
+                f"take another effect or the world {other!r}."
             )
         if kind not in effect.robots:
             raise BnsError(

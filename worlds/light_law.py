@@ -7,13 +7,15 @@ robot axis, where robots differ (each with its own damage):
     flicker_frequency (L,) [Hz], ambient () [W/m2],
     shadow_azimuth () [rad], shadow_width () [rad], shadow_transmission (),
     position (S, 3) [m], heading (S,) [rad], exponent (), full_light (S,) [W/m2],
-    dark () and bright () [counts], light_noise (), count_noise () [counts], noise (S,)
+    dark () and bright () [counts], light_noise (), count_noise () [counts], noise (S,),
+    sensitivity (S,)
 
 The irradiance on a sensor falls with the square of the distance and with a power of
 the cosine of the angle to where it looks (the exponent); the reading falls in
 proportion from `dark` to `bright`, which it reaches at `full_light`: smaller is
 brighter. Noise acts on the light and on the reading before it saturates, so that a
-saturated sensor repeats itself.
+saturated sensor repeats itself; `noise` scales both noises. `sensitivity` scales the
+light on a sensor.
 """
 
 from collections.abc import Callable, Mapping
@@ -67,7 +69,7 @@ def irradiance(
         light = light * screen(points, lamps)
     if law["shadow_width"].any():
         light = light * _shadow(law, way)
-    return light.sum(-1) + law["ambient"][..., None]
+    return (light.sum(-1) + law["ambient"][..., None]) * law["sensitivity"]
 
 
 def counts(

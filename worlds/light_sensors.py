@@ -68,6 +68,7 @@ class LightSensors:
             "position": np.array(self.position, dtype=np.float64),
             "heading": np.array(self.heading, dtype=np.float64),
             "noise": np.ones(len(self.names)),
+            "sensitivity": np.ones(len(self.names)),
             "full_light": np.full(len(self.names), float(self.full_light)),
             **{name: np.array(float(getattr(self, name))) for name in scalars},
         }

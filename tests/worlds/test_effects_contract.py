@@ -7,7 +7,14 @@ import pytest
 from bns.errors import BnsError, OutOfBoundsError, UnknownNameError
 from bns.worlds import servo_law
 from bns.worlds.effects import listing, registry
-from bns.worlds.effects.base import STAGES, ControlSignal, PoseSignal, ServoEffect
+from bns.worlds.effects.base import (
+    STAGES,
+    ControlSignal,
+    OpticsEffect,
+    PoseSignal,
+    SensorEffect,
+    ServoEffect,
+)
 from bns.worlds.effects.legs import JOINTS
 from tests.worlds.subjects import (
     DT,
@@ -17,6 +24,8 @@ from tests.worlds.subjects import (
     bare,
     compiled,
     frozen,
+    light,
+    read,
     signal_of,
     told,
     wheel_fields,
@@ -24,7 +33,8 @@ from tests.worlds.subjects import (
 
 NAMES = registry.names()
 SERVO = [name for name in NAMES if issubclass(registry.get(name), ServoEffect)]
-ON_SIGNALS = [name for name in NAMES if name not in SERVO]
+OPTICS = [name for name in NAMES if issubclass(registry.get(name), OpticsEffect)]
+ON_SIGNALS = [name for name in NAMES if name not in (*SERVO, *OPTICS)]
 IN_TIME = [name for name in ON_SIGNALS if registry.get(name).stage != "body"]
 OF_WHEELS = [
     name
@@ -58,7 +68,12 @@ def track() -> PoseSignal:
 
 @pytest.fixture
 def signals(control, track) -> dict:
-    return {"command": control, "actuator": control, "tracking": track}
+    return {
+        "command": control,
+        "actuator": control,
+        "sensor": read(),
+        "tracking": track,
+    }
 
 
 def length(signals, effect) -> int:
@@ -69,7 +84,8 @@ def after(effect, signals, *, active=None, seed=0) -> tuple[np.ndarray, ...]:
     """The arrays that the effect makes of the signal of its stage."""
     signal = signal_of(signals, effect)
     active = np.ones(len(signal.times), bool) if active is None else active
-    result = effect.apply(signal, active, np.random.default_rng(seed))
+    given = tuple(signal) if isinstance(effect, SensorEffect) else (signal,)
+    result = effect.apply(*given, active, np.random.default_rng(seed))
     return result if isinstance(result, tuple) else (result,)
 
 
@@ -93,10 +109,18 @@ def servo_numbers() -> dict[str, np.ndarray]:
     )
 
 
-def unchanged(effect, signals) -> bool:
+def lawful(effect) -> tuple[dict, dict] | None:
+    """The law that an effect changes, before and after; None = it changes no law."""
     if isinstance(effect, ServoEffect):
-        law = servo_numbers()
-        return same(effect.change(law).values(), law.values())
+        return servo_numbers(), effect.change(servo_numbers())
+    if isinstance(effect, OpticsEffect):
+        return light(), effect.change(light(), read().channels)
+    return None
+
+
+def unchanged(effect, signals) -> bool:
+    if laws := lawful(effect):
+        return same(laws[0].values(), laws[1].values())
     if effect.stage == "body":
         return as_bytes(compiled(effect)) == as_bytes(bare(effect))
     return same(after(effect, signals), before(effect, signals))
@@ -166,10 +190,9 @@ class TestEveryEffect:
 
     def test_same_seed_same_bytes(self, name, signals):
         effect = listing.example(registry.get(name))
-        if isinstance(effect, ServoEffect):
-            law = servo_numbers()
-            first = effect.change(law).values()
-            assert same(first, effect.change(law).values()) and not effect.random
+        if laws := lawful(effect):
+            assert same(laws[1].values(), lawful(effect)[1].values())
+            assert not effect.random
             return
         if effect.stage == "body":
             assert as_bytes(compiled(effect)) == as_bytes(compiled(effect))
