@@ -170,6 +170,7 @@ class HexapodWorld:
             states[:, servos.speeds],
             done.control,
             servos.laws,
+            servos.carried,
             dt=self.dt,
             arena=self.arena,
             touched=bool(done.touched.any()),

@@ -10,6 +10,7 @@ SATURATED = 0.98  # share of the torque limit that counts as all of it; assumed
 OVERLOAD_TIME = 1.0  # [s] at the limit until the servo gives up; assumed
 STALLED = 0.1  # [rad/s] slower = it pushes in vain; assumed
 HEAT_CAPACITY = 50.0  # [J/K] 54.6 g of copper, steel and plastic; assumed
+LYING = 0.002  # [m] height of the belly or a hip at which the robot lies; assumed
 AMBIENT = 40.0  # [deg C] of the servos at the start of a trial; assumed
 
 
@@ -19,6 +20,7 @@ def outcome(
     speeds: np.ndarray,
     goals: np.ndarray,
     laws: dict[str, np.ndarray],
+    carried: np.ndarray,
     *,
     dt: float,
     arena: tuple[float, float],
@@ -33,6 +35,7 @@ def outcome(
         angles, speeds: of the servos, shape ``(S + 1, C)`` [rad, rad/s].
         goals: in force in each step, shape ``(S, C)`` [rad].
         laws: numbers of the servos, each of shape ``(C,)``.
+        carried: what may not touch the floor, see `lies`.
         dt: physics step [s].
         arena: size of the board along x and y [m], centred on the origin.
         touched: whether the robot's own parts touched.
@@ -45,11 +48,26 @@ def outcome(
     )
     seen = observe.outcome(free, arena, diverged)
     return seen._replace(
+        fell=seen.fell or lies(free, carried),
         collided=touched,
         unrested=not rested,
         overloaded=_for_long(pushing & (laws["powered"] > 0), OVERLOAD_TIME / dt),
         overheated=bool((_heated(duty, speeds[:-1], laws, dt) > HOTTEST).any()),
     )
+
+
+def lies(free: np.ndarray, carried: np.ndarray) -> bool:
+    """Whether the body or a hip is on the floor at some time.
+
+    Args:
+        free: the base's free joint, shape ``(S, 7)``.
+        carried: balls around points of the base that legs should carry: x, y, z and
+            radius, shape ``(P, 4)`` [m].
+    """
+    w, i, j, k = free[:, 3:].T
+    up = 2 * np.array([i * k - w * j, j * k + w * i, 0.5 - i * i - j * j])
+    heights = carried[:, :3] @ up + free[:, 2] - carried[:, 3:]
+    return bool((heights < LYING).any())
 
 
 def _duty(goals, angles, laws) -> np.ndarray:

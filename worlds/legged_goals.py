@@ -12,7 +12,7 @@ import numpy as np
 from bns.models.ax12a import UNIT
 from bns.worlds.trial import Commands
 
-SETTLE = 0.12  # [s] after the ramps, until a first look whether the robot rests; chosen
+SETTLE = 0.2  # [s] after the ramps, until a first look whether the robot rests; chosen
 
 
 def planned(commands: Commands, speed: float, dt: float) -> np.ndarray:

@@ -15,7 +15,7 @@ from bns.worlds.physics import CONTROL, Compiled, _first_bad, _quiet
 
 PIECE = 0.04  # [s] of a command that goes on
 LOOK = 0.02  # [s] before the end of a piece in which the robot has to rest
-STILL = (0.02, 0.1, 0.2)  # base [m/s], base [rad/s], joints [rad/s]; slower = rests
+STILL = (0.01, 0.1, 0.1)  # base [m/s], base [rad/s], joints [rad/s]; slower = rests
 
 
 class Piece(NamedTuple):

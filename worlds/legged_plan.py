@@ -9,7 +9,14 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.models import RobotModel
-from bns.worlds import compile, control, legged_goals, observe, servo_joint
+from bns.worlds import (
+    compile,
+    control,
+    legged_flags,
+    legged_goals,
+    observe,
+    servo_joint,
+)
 from bns.worlds.active import Stages
 from bns.worlds.damage import Damage
 from bns.worlds.effects.base import ControlSignal
@@ -30,6 +37,7 @@ class Servos:
     Attributes:
         laws: numbers of the servo law, each of shape ``(C,)``.
         angles, speeds: columns of full physics states, shape ``(C,)``.
+        carried: points of the base that legs carry, see `legged_flags.lies`.
     """
 
     def __init__(self, model: mujoco.MjModel):
@@ -37,12 +45,28 @@ class Servos:
         self.laws = servo_joint.laws(model)
         self.angles = 1 + model.jnt_qposadr[joints]
         self.speeds = 1 + model.nq + model.jnt_dofadr[joints]
+        self.carried = _carried(model)
         self._nq, self._nv = model.nq, model.nv
 
     def hidden(self, states: np.ndarray) -> dict[str, np.ndarray]:
         """Quantities by name from full physics states (time, qpos, qvel, ...)."""
         end = 1 + self._nq
         return {"qpos": states[:, 1:end], "qvel": states[:, end : end + self._nv]}
+
+
+def _carried(model: mujoco.MjModel) -> np.ndarray:
+    """The corners of the box `belly` and the femurs' hips, with a thigh's radius."""
+    belly = model.geom("belly")
+    signs = np.stack(np.meshgrid(*[(-1, 1)] * 3), axis=-1).reshape(-1, 3)
+    corners = np.column_stack([belly.pos + signs * belly.size, np.zeros(len(signs))])
+    data = mujoco.MjData(model)
+    data.qpos[compile.free_joint(model)] = [0, 0, 0, 1, 0, 0, 0]
+    mujoco.mj_kinematics(model, data)
+    hips = [
+        [*data.body(f"{leg}_femur").xpos, model.geom(f"{leg}_femur").size[0]]
+        for leg in LEGS
+    ]
+    return np.vstack([corners, hips])
 
 
 def legged(robot: RobotModel) -> RobotModel:
@@ -86,15 +110,16 @@ def refuse_fallen(
     """Stop if the robot does not stand at the start of trial 0.
 
     Raises:
-        BnsError: it is tilted too far, or the physics diverges.
+        BnsError: it is tilted too far or lies on its belly, or the physics diverges.
     """
     if not reality.events:
         return
     stages = Stages.of(reality, Damage.none(), 0, 1.0)
     still = Commands(np.zeros((1, len(channels))), [1.0], tuple(channels))
-    made, _ = job(robot, still, stages, start=start, speed=1.0, seed=0, trial=0)
-    x, y = made.start[5:7]
-    if not 1 - 2 * (x * x + y * y) >= np.cos(observe.FALLEN):
+    made, servos = job(robot, still, stages, start=start, speed=1.0, seed=0, trial=0)
+    free = made.start[None, 1:8]
+    upright = 1 - 2 * (free[0, 4] ** 2 + free[0, 5] ** 2)
+    if not upright >= np.cos(observe.FALLEN) or legged_flags.lies(free, servos.carried):
         raise BnsError(
             f"With {', '.join(stages.texts['reality'])} the robot starts fallen; leave "
             "it legs to stand on, or take a gentler effect."
