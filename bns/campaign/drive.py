@@ -5,13 +5,14 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
+from bns import files
 from bns.batch import check_device, check_world
 from bns.campaign.engines.base import Engine
 from bns.campaign.file import Campaign
 from bns.campaign.identity import changed_default
 from bns.campaign.plan import Job, plan
 from bns.campaign.progress import Progress
-from bns.campaign.store import CampaignStore
+from bns.campaign.store import FILE, CampaignStore
 from bns.errors import BnsError
 
 
@@ -42,7 +43,6 @@ def run(
     mix: bool = False,
     progress: bool = False,
     stop: Callable[[], bool] = lambda: False,
-    started: Callable[[], None] = lambda: None,
 ) -> Session:
     """Run what is missing of a campaign.
 
@@ -55,7 +55,6 @@ def run(
         mix: allow results of several package versions in one store.
         progress: show it on the standard error stream.
         stop: asked after every batch; True ends the session there.
-        started: called once the directory is known to be this session's.
 
     Raises:
         BnsError: a setting that is not allowed, a directory that is not free, or a
@@ -69,7 +68,8 @@ def run(
         store.check_versions()
     store.lock()
     try:
-        started()
+        if campaign.text:
+            files.write_bytes(store.directory / FILE, campaign.text.encode())
         if retry:
             store.forgive()
         done = replicates_done(store, campaign)

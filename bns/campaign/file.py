@@ -77,6 +77,7 @@ class Campaign:
         seed: from which, with identities, all seeds follow.
         batch_runs: runs that share a batch, at most.
         sampled: whether the members are a random sample.
+        text: of the file, kept in the store; empty where there was none.
     """
 
     name: str
@@ -85,6 +86,7 @@ class Campaign:
     seed: int = 0
     batch_runs: int = 30
     sampled: bool = False
+    text: str = ""
 
     @property
     def runs(self) -> int:
@@ -103,7 +105,9 @@ def read(path: Path | str, *, sure: bool = False) -> Campaign:
         BnsError: not there, not TOML, an unknown setting, empty, or very large.
     """
     path = Path(path)
-    return from_content(read_toml(path), path.stem, sure=sure)
+    content = read_toml(path)
+    text = path.read_text(encoding="utf-8")
+    return replace(from_content(content, path.stem, sure=sure), text=text)
 
 
 def from_content(

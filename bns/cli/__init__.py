@@ -12,6 +12,7 @@ VERBS = {
     "compare": ("compare", "medians, intervals, p values and effect sizes of runs"),
     "view": ("view", "open a run's recording, or make a picture of it"),
     "campaign": ("campaign", "many configurations: run them, tables, pictures"),
+    "claims": ("claims", "the dissertation's claims: list, run, judge"),
     "presets": ("lists", "list the presets"),
     "worlds": ("lists", "list the worlds"),
     "robots": ("lists", "list the robot models"),

@@ -107,7 +107,6 @@ def main(verb: str, argv: list[str]) -> int:
 
 
 def _run(given: Run) -> int:
-    from bns import files
     from bns.campaign import drive, file
     from bns.campaign.engines import registry
     from bns.campaign.store import FILE
@@ -124,7 +123,6 @@ def _run(given: Run) -> int:
     engine = registry.make(
         given.engine, workers=given.workers, ray_address=given.ray_address
     )
-    data = path.read_bytes()
     with until_interrupted() as stop:
         session = drive.run(
             campaign,
@@ -135,7 +133,6 @@ def _run(given: Run) -> int:
             mix=given.mix,
             progress=True,
             stop=stop,
-            started=lambda: files.write_bytes(out / FILE, data),
         )
     return _say(session, out, STOPPED)
 

@@ -1,0 +1,19 @@
+"""The dissertation's 157 claims as data, what is measured of them, and their verdicts.
+
+`data/a.toml` to `data/d.toml` hold one investigation each:
+
+    preset      what every side starts from
+    settings    what every side of this investigation shares
+    pieces      name -> settings; a side is a list of names: "left-20 window-150"
+    claims      A1, A2, ...: `where` in the dissertation, what it `says`, its `kind`,
+                and `cells`, or why it is `untested`; `reading` says how a statement
+                without a table is measured
+
+Kinds: S a difference with a p value, N no difference, Q read from a figure, R one run
+on the real robot, I an interpretation.
+
+A cell compares two sides: `a`, `b`, `says` (">" a is better or more, "<" the other way
+round, "=" no difference, "?" a difference without a stated direction), `p` as printed,
+and `measure` (of both, or `measure` of a and `measure_b` of b; by default the cost
+after the damage). Or it holds one side against a number: `at_most` or `at_least`.
+"""

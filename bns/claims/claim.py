@@ -1,0 +1,118 @@
+"""Claims and their cells, read from the data files."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from bns.errors import UnknownNameError
+
+INVESTIGATIONS = ("A", "B", "C", "D")
+KINDS = {
+    "S": "a difference with a p value",
+    "N": "no difference",
+    "Q": "read from a figure",
+    "R": "one run on the real robot",
+    "I": "an interpretation",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """One comparison.
+
+    Attributes:
+        a: pieces of one side, as text.
+        b: pieces of the other; empty where a number stands on the other side.
+        says: ">", "<", "=", "?" as in `bns.claims`.
+        p: as the dissertation prints it: a number, a bound, "n.s.", or "-".
+        measure: what is measured of a, see `bns.claims.measures`.
+        measure_b: what is measured of b.
+        at_most: a's value is claimed to be no larger.
+        at_least: a's value is claimed to be no smaller.
+    """
+
+    a: str
+    b: str = ""
+    says: str = ">"
+    p: str = "-"
+    measure: str = "observation"
+    measure_b: str = ""
+    at_most: float | None = None
+    at_least: float | None = None
+
+    @property
+    def sides(self) -> tuple[str, ...]:
+        """The sides that have to be run."""
+        return (self.a, self.b) if self.b else (self.a,)
+
+    @property
+    def text(self) -> str:
+        """The comparison in words."""
+        if self.at_most is not None:
+            return f"{self.a}: {self.measure} <= {self.at_most:g}"
+        if self.at_least is not None:
+            return f"{self.a}: {self.measure} >= {self.at_least:g}"
+        other = self.measure_b and f" ({self.measure_b})"
+        mine = other and f" ({self.measure})"
+        return f"{self.a}{mine} {self.says} {self.b}{other}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Claim:
+    """What the dissertation says in one place.
+
+    Attributes:
+        id: A1 to D35.
+        where: section, table, figure.
+        says: the claim in one sentence.
+        kind: key of `KINDS`.
+        cells: what is compared; empty where it is not tested.
+        reading: how it is measured, where the dissertation has no number.
+        untested: why it is not tested; empty where it is.
+    """
+
+    id: str
+    where: str
+    says: str
+    kind: str
+    cells: tuple[Cell, ...] = ()
+    reading: str = ""
+    untested: str = ""
+
+    @property
+    def investigation(self) -> str:
+        """A, B, C or D."""
+        return self.id[0]
+
+
+@cache
+def content(investigation: str) -> Mapping[str, Any]:
+    """The data file of an investigation."""
+    path = files("bns.claims.data") / f"{investigation.lower()}.toml"
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+@cache
+def claims() -> Mapping[str, Claim]:
+    """All claims by id, in the order of the dissertation."""
+    found = {}
+    for investigation in INVESTIGATIONS:
+        for name, entry in content(investigation)["claims"].items():
+            cells = tuple(Cell(**cell) for cell in entry.get("cells", ()))
+            found[name] = Claim(id=name, **{**entry, "cells": cells})
+    return found
+
+
+def find(name: str) -> Claim:
+    """The claim called `name`, in capitals or not.
+
+    Raises:
+        UnknownNameError: there is none.
+    """
+    known = claims()
+    if name.upper() not in known:
+        raise UnknownNameError("claim", name, known)
+    return known[name.upper()]

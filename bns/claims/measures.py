@@ -1,0 +1,191 @@
+"""What is measured of each run of a record, one number per run.
+
+Trials are counted from 0, "the damage" is its first trial. Costs are those of the best
+of the population (`fitness_best`).
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bns import stats
+from bns.errors import BnsError, UnknownNameError
+from bns.record import RunRecord
+
+Values = Callable[[RunRecord], np.ndarray]
+LAST = 10  # trials
+COST, SNN = "fitness_best", "snn_forward"
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A number per run.
+
+    Attributes:
+        doc: what it is.
+        values: of the runs of a record, ``(R,)``; NaN = none.
+        low: whether less of it is better; of what is neither good nor bad, a claim
+            says "more", and low is False.
+    """
+
+    doc: str
+    values: Values
+    low: bool = True
+
+
+def measure(name: str) -> Measure:
+    """The measure called `name`.
+
+    Raises:
+        UnknownNameError: there is none.
+    """
+    if name not in MEASURES:
+        raise UnknownNameError("measure", name, MEASURES)
+    return MEASURES[name]
+
+
+def of(record: RunRecord, name: str) -> np.ndarray:
+    """A measure of every run that has it.
+
+    Raises:
+        BnsError: the runs lack a column that it needs.
+    """
+    try:
+        values = measure(name).values(record)
+    except KeyError as error:
+        raise BnsError(f"These runs have no {error}, which {name!r} needs.") from error
+    return values[~np.isnan(values)]
+
+
+def _onset(record: RunRecord) -> int:
+    return int(record.damage_onset[0])
+
+
+def _over(column: str, first: Callable[[RunRecord], int], count: int) -> Values:
+    """Mean of a column over `count` trials from `first` on."""
+
+    def values(record: RunRecord) -> np.ndarray:
+        start = first(record)
+        found = record[column][:, max(0, start) : max(0, start + count)]
+        if found.shape[1] == 0 or (start != 0 and _onset(record) < 0):
+            return np.full(record.replicates, np.nan)
+        return found.mean(axis=1)
+
+    return values
+
+
+def _end(column: str) -> Values:
+    """Mean of a column over the last trials."""
+    return lambda record: record[column][:, -LAST:].mean(axis=1)
+
+
+def _before(record: RunRecord) -> np.ndarray:
+    return record[COST][:, : max(0, _onset(record))].sum(axis=1)
+
+
+def _first_20(record: RunRecord) -> np.ndarray:
+    return record[COST][:, :20].sum(axis=1)
+
+
+def _within(limit: int) -> Values:
+    """Trials to recover, infinite beyond a limit that all records share."""
+
+    def values(record: RunRecord) -> np.ndarray:
+        found = stats.trials_to_recover(record)
+        return np.where(found > limit, np.inf, found)
+
+    return values
+
+
+def _dip(every: int) -> Values:
+    """Rise of the cost over resets that come every so many trials."""
+
+    def values(record: RunRecord) -> np.ndarray:
+        resets = np.arange(every, record.trials, every)
+        cost = record[COST]
+        return (cost[:, resets] - cost[:, resets - 1]).mean(axis=1)
+
+    return values
+
+
+def onset_of_improvement(record: RunRecord) -> np.ndarray:
+    """First trial at which the cost has made up a fifth of its rise; inf = never.
+
+    The cost is smoothed over five trials; the rise is from its mean over the ten
+    trials before the damage to its peak after.
+    """
+    start = _onset(record)
+    found = np.full(record.replicates, np.inf)
+    for run, cost in enumerate(record[COST]):
+        before = cost[max(0, start - LAST) : start].mean()
+        smooth = np.convolve(cost[start:], np.ones(5) / 5, mode="valid")
+        peak = int(smooth.argmax())
+        low = smooth[peak:] <= smooth[peak] - 0.2 * (smooth[peak] - before)
+        if smooth[peak] > before and low.any():
+            found[run] = start + peak + int(low.argmax())
+    return found
+
+
+def _diversity(equation: str) -> dict[str, Measure]:
+    """Diversity by one equation, at several times."""
+    column, short = f"diversity_{equation}", f"diversity{equation}"
+    times = {
+        "start": ("first ten trials", _over(column, lambda r: 0, LAST)),
+        "before": (
+            "ten trials before the damage",
+            _over(column, lambda r: _onset(r) - LAST, LAST),
+        ),
+        "next": (
+            "trial after the first damaged one",
+            _over(column, lambda r: _onset(r) + 1, 1),
+        ),
+        "end": ("last ten trials", _end(column)),
+        "mean": ("all trials, per individual", _per_individual(column)),
+    }
+    return {
+        f"{short}-{time}": Measure(f"diversity {equation}, {doc}", values, low=False)
+        for time, (doc, values) in times.items()
+    }
+
+
+def _per_individual(column: str) -> Values:
+    return lambda r: r[column].mean(axis=1) / r.config.evolution.population
+
+
+MEASURES: Mapping[str, Measure] = {
+    "observation": Measure(
+        "cost summed from the damage on (eq 3.1)", stats.observation_after
+    ),
+    "solve": Measure("trials until solved, counted from 1", stats.trials_to_solve),
+    "recover": Measure(
+        "trials from the damage until solved again, counted from 1",
+        stats.trials_to_recover,
+    ),
+    "within-50": Measure("the same, never if more than 50", _within(50)),
+    "before": Measure("cost summed over the trials before the damage", _before),
+    "before-10": Measure(
+        "cost, ten trials before the damage",
+        _over(COST, lambda r: _onset(r) - LAST, LAST),
+    ),
+    "after": Measure("cost, ten trials from the damage on", _over(COST, _onset, LAST)),
+    "next": Measure(
+        "cost, trial after the first damaged one",
+        _over(COST, lambda r: _onset(r) + 1, 1),
+    ),
+    "end": Measure("cost, last ten trials", _end(COST)),
+    "first-20": Measure("cost summed over the first 20 trials", _first_20),
+    "dip-10": Measure("rise of the cost over resets every 10 trials", _dip(10)),
+    "onset-of-improvement": Measure(
+        "first trial at which a fifth of the rise is made up", onset_of_improvement
+    ),
+    "snn-before": Measure(
+        "error of the forward motion, five trials before the damage",
+        _over(SNN, lambda r: _onset(r) - 5, 5),
+    ),
+    "snn-end": Measure("the same, last ten trials", _end(SNN)),
+    "snn-first": Measure("the same, first trial", _over(SNN, lambda r: 0, 1)),
+    **_diversity("41"),
+    **_diversity("51"),
+    **_diversity("73"),
+}

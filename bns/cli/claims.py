@@ -1,0 +1,238 @@
+"""`bns claims`: the dissertation's claims, run and judged."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import tyro
+
+from bns.cli.parse import parse
+from bns.cli.tables import show
+from bns.errors import BnsError, UnknownNameError
+
+VERBS = ("list", "run", "take", "table")
+MANUAL = """usage: bns claims {list,run,take,table} [...]
+
+  list           all 157 claims: where, what is compared, what the dissertation says
+  run ID ...     run what a claim needs and is missing, then say what it says
+  run --all      the same for every claim whose preset exists
+  take DIR ...   use finished `bns run` directories below DIR
+  table          holds / direction only / null / reversed, with effect sizes
+
+The rule is in docs/claims.md. `bns claims VERB --help` is the manual of a verb."""
+
+WORLDS = ("mujoco", "static-snn")
+
+
+@dataclass(frozen=True, kw_only=True)
+class List:
+    """List the claims: id, place, kind, what the dissertation says, comparisons."""
+
+    ids: tyro.conf.Positional[tuple[str, ...]] = ()
+    """claims to show with all their comparisons; none lists all"""
+    json: bool = False
+    """print JSON instead of a table"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """Run what claims need and is missing, then judge them. Runs are kept in
+    runs/claims/WORLD and never done twice; more can be added at any time.
+    """
+
+    ids: tyro.conf.Positional[tuple[str, ...]] = ()
+    """claims, as in `bns claims run A15 C22`"""
+    all: bool = False
+    """every claim"""
+    world: Literal["mujoco", "static-snn"] = "mujoco"
+    """where robots run"""
+    quick: bool = False
+    """six small and short runs a side, kept apart: for a look, not for a verdict"""
+    runs: int = 0
+    """runs a side, instead of the 30 or 100 of the rule"""
+    engine: Literal["local", "inline", "ray"] = "local"
+    """local: processes of one thread each; inline: this process; ray: a Ray cluster"""
+    workers: int = 0
+    """processes or CPUs; 0 = one a core"""
+    ray_address: str = ""
+    """HOST:PORT of a Ray cluster; without it one is started here"""
+    retry: bool = False
+    """try batches again that failed before"""
+    mix: bool = False
+    """allow results of several package versions in one directory"""
+    root: str = "runs/claims"
+    """where runs are kept"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Take:
+    """Use finished runs of `bns run` for the claims: those whose settings are a
+    side's, and of which there are none yet.
+    """
+
+    folders: tyro.conf.Positional[tuple[str, ...]]
+    """folders of run directories"""
+    world: Literal["mujoco", "static-snn"] = "mujoco"
+    """whose runs"""
+    root: str = "runs/claims"
+    """where runs are kept"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """Judge the claims by the runs that are there."""
+
+    ids: tyro.conf.Positional[tuple[str, ...]] = ()
+    """claims; none means all"""
+    world: Literal["mujoco", "static-snn"] = "mujoco"
+    """which runs"""
+    quick: bool = False
+    """judge the quick runs"""
+    json: bool = False
+    """print JSON instead of a table"""
+    write: str = ""
+    """write the whole page, both worlds, to this file"""
+    root: str = "runs/claims"
+    """where runs are kept"""
+
+
+def main(verb: str, argv: list[str]) -> int:
+    """Run a verb of claims; gives the exit code."""
+    del verb
+    if not argv or argv[0] in ("-h", "--help"):
+        print(MANUAL)
+        raise SystemExit(0)
+    does = {
+        "list": (List, _list),
+        "run": (Run, _run),
+        "take": (Take, _take),
+        "table": (Table, _table),
+    }
+    if argv[0] not in does:
+        raise UnknownNameError("verb of `bns claims`", argv[0], VERBS)
+    kind, do = does[argv[0]]
+    return do(parse(kind, argv[1:], prog=f"bns claims {argv[0]}"))
+
+
+def _chosen(ids: tuple[str, ...]) -> list:
+    from bns.claims.claim import claims, find
+
+    return [find(name) for name in ids] or list(claims().values())
+
+
+def _list(given: List) -> int:
+    from bns.claims.report import kind
+
+    chosen = _chosen(given.ids)
+    head = ["id", "where", "kind", "the dissertation says", "comparisons"]
+    rows = []
+    for claim in chosen:
+        compared = "; ".join(f"{c.text} (p {c.p})" for c in claim.cells)
+        short = f"{len(claim.cells)}" if claim.cells else "not tested"
+        full = compared or f"not tested: {claim.untested}"
+        said = full if given.ids or given.json else short
+        rows.append([claim.id, claim.where, kind(claim), claim.says, said])
+    show(head, rows, json=given.json)
+    return 0
+
+
+def _run(given: Run) -> int:
+    from bns.campaign.engines import registry
+    from bns.claims import runner
+    from bns.cli.run import STOPPED, until_interrupted
+
+    if bool(given.ids) == given.all:
+        raise BnsError(
+            "Give claims, as in `bns claims run A15 C22`, or --all for every one."
+        )
+    if not 0 <= given.runs <= 10_000:
+        raise BnsError(f"--runs {given.runs} is not allowed: give 1 to 10000.")
+    chosen = _chosen(given.ids)
+    need = runner.needed(chosen, world=given.world, quick=given.quick, runs=given.runs)
+    for name, why in list(need.impossible.items())[: None if given.ids else 3]:
+        print(f"{name} cannot run yet: {why}.")
+    engine = registry.make(
+        given.engine, workers=given.workers, ray_address=given.ray_address
+    )
+    with until_interrupted() as stop:
+        sessions = runner.run(
+            chosen,
+            engine,
+            world=given.world,
+            quick=given.quick,
+            runs=given.runs,
+            root=Path(given.root),
+            mix=given.mix,
+            retry=given.retry,
+            stop=stop,
+        )
+    for session in sessions:
+        for key, reason in session.failed.items():
+            print(f"failed: {key}: {reason}")
+    shown = Table(ids=given.ids, world=given.world, quick=given.quick, root=given.root)
+    _table(shown)
+    if any(session.missing for session in sessions):
+        return STOPPED
+    return int(any(session.failed or session.waiting for session in sessions))
+
+
+def _take(given: Take) -> int:
+    from bns.claims import runner
+
+    if not given.folders:
+        raise BnsError("Give folders of run directories, as in `bns claims take runs`.")
+    taken = runner.take(
+        _chosen(()),
+        [Path(folder) for folder in given.folders],
+        world=given.world,
+        root=Path(given.root),
+    )
+    for name in taken:
+        print(name)
+    print(f"{len(taken)} runs taken.")
+    return 0
+
+
+def _table(given: Table) -> int:
+    from bns.claims import page, report, runner
+
+    chosen = _chosen(given.ids)
+    root = Path(given.root)
+
+    def judged(world: str) -> list:
+        place = runner.directory(world, quick=given.quick, root=root)
+        return report.judged(chosen, place, world=world, quick=given.quick)
+
+    if given.write:
+        if given.ids or given.quick:
+            raise BnsError("--write writes all claims: leave ids and --quick out.")
+        from bns import files
+
+        text = page.page({world: judged(world) for world in WORLDS})
+        files.write_bytes(Path(given.write), text.encode())
+        print(given.write)
+        return 0
+    rows = judged(given.world)
+    _show(rows, json=given.json, brief=not given.ids)
+    if not given.json:
+        said = ", ".join(f"{n} {name}" for name, n in report.counts(rows).items() if n)
+        print(f"{len(rows)} claims in {given.world}: {said}")
+        print("* fewer runs than the rule asks for. The rule: docs/claims.md")
+    return 0
+
+
+def _show(rows: list, *, json: bool, brief: bool) -> None:
+    from bns.claims import report
+
+    head = ["claim", "claim's verdict", *report.HEAD]
+    lines = []
+    for row in rows:
+        found = report.cells(row)
+        if not found and (json or not brief):
+            found = [(row.note, *[""] * (len(report.HEAD) - 1))]
+        for number, cell in enumerate(found):
+            first = json or number == 0
+            lines.append(
+                [row.claim.id if first else "", row.verdict if first else "", *cell]
+            )
+    show(head, lines, json=json)
