@@ -11,7 +11,7 @@ import numpy as np
 from bns import models
 from bns.errors import BnsError, UnknownNameError
 from bns.models import numbers
-from bns.worlds import light_law
+from bns.worlds import light_law, sight
 from bns.worlds.light_field import LightField
 from bns.worlds.light_law import Screen, Sight
 from bns.worlds.trial import Channel
@@ -149,4 +149,5 @@ def khepera3(table: str = "thesis") -> LightSensors:
         names=names,
         position=np.array([known[name].value for name in names]),
         heading=np.radians([headings[name] for name in names]),
+        sight=sight.kept(robot.name, names),
     )

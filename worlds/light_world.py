@@ -1,19 +1,24 @@
 """The physics world with lamps: robots that see light and steer themselves."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields, replace
 from functools import cached_property
+from math import inf
 
 import numpy as np
 
 from bns import seeding
 from bns.errors import BnsError, UnknownNameError
-from bns.worlds import light_sensors
-from bns.worlds.active import Stages
+from bns.worlds import light_sensors, objects, observe
+from bns.worlds.active import Placed, Stages
 from bns.worlds.damage import Damage
 from bns.worlds.light_field import Lamp, LightField
-from bns.worlds.mujoco_world import MujocoWorld
-from bns.worlds.sensing import Sensing
+from bns.worlds.mujoco_world import MujocoWorld, Plan
+from bns.worlds.objects import Objects, Post, RayScreen
+from bns.worlds.physics import Motion
+from bns.worlds.sensing import LEAD, Sensing
 from bns.worlds.supervisor import Supervisor
+from bns.worlds.trial import Trial
 
 ROBOT_RADIUS = 0.067
 """m; from the axle's middle to the outermost sensor (Webots' Khepera III)"""
@@ -31,6 +36,7 @@ class LightWorld(MujocoWorld):
     Args:
         lights: lamps, as `Lamp` or as tables with its fields.
         ambient: irradiance that is everywhere [W/m2].
+        posts: things in the way, as `Post` or as tables with its fields.
         sensors: which way the sensors look, "thesis" or "public" headings.
         singles: whether trials have each single sensor beside the virtual two.
         supervisor: what happens at the lamp and at the edge.
@@ -49,6 +55,7 @@ class LightWorld(MujocoWorld):
         *,
         lights: Sequence[Lamp | Mapping] = (Lamp(),),
         ambient: float = 0.02,
+        posts: Sequence[Post | Mapping] = (),
         sensors: str = "thesis",
         singles: bool = False,
         supervisor: Supervisor | None = None,
@@ -77,7 +84,10 @@ class LightWorld(MujocoWorld):
                 f"Robot {robot!r} has no light sensors; the world {name!r} takes "
                 "'khepera3'."
             )
-        self.field = LightField(tuple(_lamp(item) for item in lights), ambient)
+        self.field = LightField(_made(Lamp, "lamp", lights), ambient)
+        self.posts = _made(Post, "object", posts)
+        objects.checked(self.posts, self._places, np.zeros((0, 2)), ROBOT_RADIUS)
+        self._screen = RayScreen(self.posts) if self.posts else None
         self.sensors = light_sensors.khepera3(sensors)
         self.singles = singles
         self.supervisor = supervisor or Supervisor()
@@ -102,19 +112,52 @@ class LightWorld(MujocoWorld):
             seeds=seeds,
             trial=trial,
             reads=reads,
+            screen=self._screen,
             singles=self.singles,
+        )
+
+    def _stages(self, damage: Damage, trial: int, duration: float) -> Stages:
+        stages = super()._stages(damage, trial, duration)
+        if not self.posts:
+            return stages
+        placed = Placed(Objects(self.posts), 0.0, inf, ("objects",))
+        return replace(stages, body=(placed, *stages.body))
+
+    def _about(self) -> dict[str, object]:
+        about = {"lights": [asdict(lamp) for lamp in self.field.lamps]}
+        if self.posts:
+            about["objects"] = [asdict(post) for post in self.posts]
+        return super()._about() | about | {"ambient": self.field.ambient}
+
+    def _observe(self, plan: Plan, motion: Motion, trial: int) -> Trial:
+        """The trial of a list of commands, with what was read after each."""
+        made = super()._observe(plan, motion, trial)
+        ends = np.concatenate([[0], np.cumsum(plan.counts)])
+        sensing = self._sensing([plan.stages], [plan.seed], trial, len(ends))
+        for before, end in zip([0, *ends], ends, strict=False):
+            at = max(end - round(LEAD / self.dt), before)
+            free = motion.states[at, 1:8][None]
+            moment = np.array([at * self.dt])
+            sensing.read(end * self.dt, observe.flat(free), moment)
+        held = np.searchsorted(made.boundaries, np.arange(len(made.times)), "right") - 1
+        return made.replace(
+            observed=np.hstack([made.observed, sensing.readings[0][held]]),
+            channels=made.channels + sensing.channels,
         )
 
     def _starts(self, n: int, seeds: Sequence[int], trial: int) -> np.ndarray:
         return np.array([self._start(seed, trial) for seed in seeds]).reshape(n, 3)
 
     def _start(self, seed: int, trial: int) -> tuple[float, float, float]:
-        """Anywhere on the board, but not near a lamp or the edge."""
+        """Anywhere on the board, but not near a lamp, an object or the edge."""
         rng = seeding.generator(seed, "world", trial, "start")
         half = np.asarray(self.arena) / 2 - max(self.supervisor.edge, 0.0)
+        taken = [(*place, NEAREST) for place in self._places]
+        taken += [(p.x, p.y, p.radius + ROBOT_RADIUS) for p in self.posts]
+        x, y, room = np.array(taken).T
         for _ in range(10_000):
             place = rng.uniform(-half, half)
-            if np.hypot(*(self._places - place).T).min() >= NEAREST:
+            if (np.hypot(x - place[0], y - place[1]) > room).all():
                 return (*place.tolist(), float(rng.uniform(-np.pi, np.pi)))
         raise BnsError(
             f"There is no place on the board {NEAREST} m away from every lamp; give "
@@ -123,6 +166,7 @@ class LightWorld(MujocoWorld):
 
     def _checked_starts(self, starts: object, n: int) -> np.ndarray:
         poses = super()._checked_starts(starts, n)
+        objects.checked(self.posts, self._places, poses, ROBOT_RADIUS)
         for pose in poses:
             way = np.hypot(*(self._places - pose[:2]).T)
             lamp = int(way.argmin())
@@ -143,13 +187,25 @@ class LightWorld(MujocoWorld):
         return poses
 
 
-def _lamp(given: Lamp | Mapping) -> Lamp:
-    if isinstance(given, Lamp):
+def _made(kind: type, name: str, given: object) -> tuple:
+    """Lamps or objects from what a user may give: one or several, or tables."""
+    alone = isinstance(given, kind | Mapping) or not isinstance(given, Sequence)
+    return tuple(_one(kind, name, item) for item in ((given,) if alone else given))
+
+
+def _one(kind: type, name: str, given: object):
+    if isinstance(given, kind):
         return given
+    known = [field.name for field in fields(kind)]
     if not isinstance(given, Mapping):
-        raise BnsError(f"{given!r} is no lamp: give a Lamp or a table of its fields.")
-    known = Lamp.__dataclass_fields__
+        raise BnsError(
+            f"{given!r} is no {name}: give a {kind.__name__} or a table with "
+            f"{', '.join(known)}."
+        )
     for key in given:
         if key not in known:
-            raise UnknownNameError("field of a lamp", str(key), known)
-    return Lamp(**given)
+            raise UnknownNameError(f"field of a {name}", str(key), known)
+    try:
+        return kind(**given)
+    except TypeError as error:
+        raise BnsError(f"{dict(given)!r} is no {name}: {error}.") from error

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-import mujoco
 import numpy as np
 
 from bns.errors import BnsError
@@ -89,9 +88,7 @@ class Loops:
             lamps=self._lamps(),
         )
         duration = setting.cycles * setting.steps * setting.dt
-        stages = [
-            Stages.of(self.reality, damage, trial, duration) for damage in damages
-        ]
+        stages = [self._stages(damage, trial, duration) for damage in damages]
         sensing = self._sensing(stages, seeds, trial, setting.cycles + 1)
         return Session(setting, stages, where, seeds, sensing)
 
@@ -188,8 +185,7 @@ class Loops:
             ),
             robot=self.robot,
             world=self.name,
-            conditions=stages.conditions(setting.trial, seed)
-            | {"mujoco": mujoco.__version__},
+            conditions=stages.conditions(setting.trial, seed) | self._about(),
             truth=self.hidden(states[sampled]) if self.truth else {},
             handled=session.handled[robot, : session.cycle],
         )

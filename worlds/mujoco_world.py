@@ -116,7 +116,7 @@ class MujocoWorld(Loops):
     def _plan(self, commands: Commands, damage: Damage, trial: int, seed: int) -> Plan:
         dt = self.dt
         control.check(commands, self._channels, self._limits, self.robot)
-        stages = Stages.of(self.reality, damage, trial, commands.duration)
+        stages = self._stages(damage, trial, commands.duration)
         counts = control.steps(commands.durations, dt)
         if stages.control:
             given = control.signal(commands, counts, dt)
@@ -127,6 +127,14 @@ class MujocoWorld(Loops):
         segments = compile.segments(self.robot, stages.body, values, dt)
         begin = compile.start_state(segments[0].compiled, self.start)
         return Plan(commands, stages, seed, counts, Job(begin, segments))
+
+    def _stages(self, damage: Damage, trial: int, duration: float) -> Stages:
+        """What holds for a robot in a trial."""
+        return Stages.of(self.reality, damage, trial, duration)
+
+    def _about(self) -> dict[str, object]:
+        """What is true of every trial, for its record."""
+        return {"mujoco": mujoco.__version__}
 
     def _observe(self, plan: Plan, motion: Motion, trial: int) -> Trial:
         scene = plan.job.segments[0].compiled.model
@@ -153,8 +161,7 @@ class MujocoWorld(Loops):
             outcome=observe.outcome(free, self.arena, motion.diverged >= 0),
             robot=self.robot,
             world=self.name,
-            conditions=plan.stages.conditions(trial, plan.seed)
-            | {"mujoco": mujoco.__version__},
+            conditions=plan.stages.conditions(trial, plan.seed) | self._about(),
             truth=self.hidden(motion.states[sampled]) if self.truth else {},
         )
 

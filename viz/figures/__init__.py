@@ -7,6 +7,7 @@ laid over one another; figures of one run take its record.
 from bns.viz.figures.displacement import displacement
 from bns.viz.figures.diversity import diversity
 from bns.viz.figures.fitness import fitness
+from bns.viz.figures.light_responses import light_responses
 from bns.viz.figures.path import path
 from bns.viz.figures.snn_error import snn_error
 from bns.viz.figures.solved import solved
@@ -16,6 +17,7 @@ __all__ = [
     "displacement",
     "diversity",
     "fitness",
+    "light_responses",
     "path",
     "snn_error",
     "solved",

@@ -1,0 +1,96 @@
+"""Figures 5.5 and 5.6 of the dissertation, by what it says of their shape."""
+
+import numpy as np
+import pytest
+
+from bns.viz import figures
+from bns.viz.figures.light_responses import moving_mean, roamed
+from bns.worlds.light_field import LightField
+from bns.worlds.light_sensors import khepera3
+
+SENSORS, FIELD = khepera3(), LightField()
+FORWARD = [at for at, name in enumerate(SENSORS.names) if "back" not in name]
+TEN = SENSORS.names.index("ir_front_left")
+
+
+@pytest.fixture(scope="module")
+def many():
+    """18,000 readings from different angles and positions."""
+    return roamed(SENSORS, FIELD)
+
+
+def test_the_six_sensors_are_at_the_dissertations_angles():
+    degrees = np.sort(np.degrees(SENSORS.heading[FORWARD]))
+    assert degrees == pytest.approx([-85, -45, -10, 10, 45, 85])
+
+
+def test_figure_5_5_each_sensor_is_brightest_where_it_looks(many):
+    at = np.deg2rad(np.arange(-180, 180, 2))
+    means = moving_mean(many.angle, many.counts, at)
+    assert many.counts.min() >= 0 and many.counts.max() <= 4200
+    for sensor in FORWARD:
+        off = np.degrees((at - SENSORS.heading[sensor] + np.pi) % (2 * np.pi) - np.pi)
+        curve = means[:, sensor]
+        assert abs(off[curve.argmin()]) <= 8
+        assert curve.min() < 1000
+        assert curve[np.abs(off) > 100].min() > 3800  # dark behind
+        for side in (-1, 1):  # dims steadily to both sides
+            flank = curve[np.argsort(side * off)][np.sort(side * off) >= 8]
+            assert (np.diff(flank) > -60).all()
+
+
+def test_figure_5_5_is_the_same_to_both_sides(many):
+    at = np.deg2rad(np.arange(-178, 180, 2))
+    means = moving_mean(many.angle, many.counts, at)
+    twin = [SENSORS.names.index(_twin(name)) for name in SENSORS.names]
+    assert means[::-1][:, twin] == pytest.approx(means, abs=250)
+
+
+def _twin(name):
+    sides = {"left": "right", "right": "left"}
+    return "_".join(sides.get(part, part) for part in name.split("_"))
+
+
+def repeated(counts: np.ndarray) -> float:
+    """Share of readings that are the commonest one."""
+    return np.unique(counts, return_counts=True)[1].max() / len(counts)
+
+
+def test_figure_5_6a_one_sensor_says_the_same_from_minus_5_to_25_degrees(many):
+    angle, seen = np.degrees(many.angle), many.counts[:, TEN]
+    assert repeated(seen[(angle > -5) & (angle < 25)]) > 0.5
+    assert repeated(seen[(angle > 40) & (angle < 60)]) < 0.35
+    assert repeated(seen[(angle > -40) & (angle < -20)]) < 0.35
+
+
+def test_figure_5_6a_middling_readings_are_rare_because_the_flanks_are_steep(many):
+    seen = many.counts[:, TEN]
+    middle = ((seen > 1000) & (seen < 3000)).mean()
+    assert middle < 0.15
+    assert (seen <= 1000).mean() > 0.1 and (seen >= 3000).mean() > 0.6
+
+
+def test_figure_5_6b_the_virtual_sensors_never_say_the_same(many):
+    angle, virtual = np.degrees(many.angle), SENSORS.virtual(many.counts)
+    for low in range(-60, 150, 10):  # the whole of the left one's range
+        window = (angle >= low) & (angle < low + 10)
+        assert repeated(virtual[window, 0]) < 0.1
+
+
+def test_figure_5_6b_the_virtual_sensors_see_light_from_more_angles(many):
+    at = np.deg2rad(np.arange(-180, 180, 2))
+    single = moving_mean(many.angle, many.counts, at)[:, TEN]
+    virtual = moving_mean(many.angle, SENSORS.virtual(many.counts), at)[:, 0]
+    assert (virtual < 3800).sum() > 1.25 * (single < 3800).sum()
+
+
+def test_noise_hides_single_readings_and_not_the_trend():
+    one = roamed(SENSORS, FIELD, readings=360)
+    rough = np.abs(np.diff(one.counts[:, TEN]))
+    assert np.median(rough[np.abs(np.diff(one.counts[:, TEN])) > 0]) > 20
+    assert rough.max() > 1500
+
+
+def test_the_figure_shows_six_sensors_and_the_virtual_two():
+    figure = figures.light_responses(SENSORS, FIELD)
+    assert [len(axes.lines) for axes in figure.axes] == [6, 1, 2]

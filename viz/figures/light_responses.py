@@ -1,0 +1,129 @@
+"""What light sensors read by where the light is: figures 5.5 and 5.6."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from bns.viz import style
+from bns.worlds.light_field import LightField
+from bns.worlds.light_sensors import LightSensors
+
+READINGS = 18_000
+"""taken from different angles and positions (thesis 5.2.1, figure 5.5)"""
+
+SPAN = np.deg2rad(10.0)
+"""rad; half the width of the moving mean (thesis 5.2.1)"""
+
+ARENA = np.array([2.7, 1.8])  # m; the board (thesis 4.2.6)
+NEAREST = 0.15  # m; readings are taken outside the safety boundary (assumed)
+_SMALL = {"fontsize": 7, "columnspacing": 0.8, "handlelength": 1.0}
+_COLOURS = (
+    style.BLUE,
+    style.GREEN,
+    style.ORANGE,
+    style.VERMILION,
+    style.PURPLE,
+    style.SKY,
+)
+
+
+class Roamed(NamedTuple):
+    """Readings of a robot that was put all over the board.
+
+    Attributes:
+        angle: to the lamp from where the robot looks, + = left, ``(n,)`` [rad].
+        counts: of each sensor, ``(n, S)``.
+    """
+
+    angle: np.ndarray
+    counts: np.ndarray
+
+
+def roamed(
+    sensors: LightSensors,
+    field: LightField,
+    *,
+    readings: int = READINGS,
+    seed: int = 0,
+) -> Roamed:
+    """Readings at random places of the board, headings evenly spread.
+
+    Args:
+        sensors, field: what is read; angles are to the first lamp.
+        readings: how many.
+        seed: of places, order and noise.
+    """
+    rng = np.random.default_rng(seed)
+    lamp = field.positions[0, :2]
+    places = rng.uniform(-ARENA / 2, ARENA / 2, (4 * readings, 2))
+    far = np.hypot(*(places - lamp).T) > NEAREST
+    places = places[far][:readings]
+    angle = np.linspace(-np.pi, np.pi, len(places), endpoint=False)
+    way = lamp - places
+    yaw = np.arctan2(way[:, 1], way[:, 0]) - angle
+    poses = np.column_stack([places, yaw])
+    return Roamed(angle, sensors.counts(field, poses, rng=rng))
+
+
+def moving_mean(angle: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Mean of all values within `SPAN` of each angle.
+
+    Args:
+        angle: of the values [rad], ``(n,)``.
+        values: ``(n, S)``.
+        at: where the mean is wanted [rad], ``(A,)``.
+
+    Returns:
+        Shape ``(A, S)``.
+    """
+    off = np.abs((angle - at[:, None] + np.pi) % (2 * np.pi) - np.pi)
+    near = (off <= SPAN).astype(float)
+    return near @ values / near.sum(axis=1, keepdims=True)
+
+
+def light_responses(sensors: LightSensors, field: LightField, *, seed: int = 0):
+    """Readings over the angle to the lamp: means, one sensor, the virtual two.
+
+    Args:
+        sensors, field: what is read.
+        seed: see `roamed`.
+    """
+    many = roamed(sensors, field, seed=seed)
+    single = roamed(sensors, field, readings=360, seed=seed + 1)
+    with style.plotting() as figure_class:
+        figure = figure_class(figsize=(9.6, 3.4), layout="constrained")
+        left, middle, right = figure.subplots(1, 3, sharey=True)
+        _means(left, sensors, many)
+        front = sensors.names.index("ir_front_left")
+        middle.plot(
+            np.degrees(single.angle), single.counts[:, front], color=style.ORANGE, lw=1
+        )
+        degrees = round(np.degrees(sensors.heading[front]))
+        middle.set_title(f"One reading each, sensor at {degrees}°")
+        virtual = sensors.virtual(single.counts)
+        for column, (side, colour) in enumerate(
+            (("left", style.BLUE), ("right", style.VERMILION))
+        ):
+            right.plot(
+                np.degrees(single.angle), virtual[:, column], color=colour, lw=1,
+                label=side,
+            )  # fmt: skip
+        right.set_title("One reading each, virtual sensors")
+        right.legend(ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.2))
+        left.set_ylabel("reading [count], small is bright")
+        for axes in (left, middle, right):
+            axes.set_xlabel("lamp to the left [deg]")
+            axes.set_xticks(range(-180, 181, 90))
+    return figure
+
+
+def _means(axes, sensors: LightSensors, many: Roamed) -> None:
+    at = np.deg2rad(np.arange(-180, 181, 2))
+    means = moving_mean(many.angle, many.counts, at)
+    forward = np.flatnonzero(np.abs(sensors.heading) < np.pi / 2 + 0.01)
+    forward = forward[np.argsort(sensors.heading[forward])]
+    for column, colour in zip(forward, _COLOURS, strict=False):
+        degrees = round(np.degrees(sensors.heading[column]))
+        axes.plot(np.degrees(at), means[:, column], color=colour, label=f"{degrees}°")
+    axes.set_title("Mean of readings within 10°")
+    axes.legend(ncols=6, loc="upper center", bbox_to_anchor=(0.5, -0.2), **_SMALL)
