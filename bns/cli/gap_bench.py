@@ -1,0 +1,155 @@
+"""`bns gap bench`: blind cases made, diagnosed, and scored against sealed answers."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tyro
+
+from bns.cli.parse import parse
+from bns.errors import BnsError, FormatError, UnknownNameError
+
+VERBS = ("make", "run", "score")
+MANUAL = """usage: bns gap bench {make,run,score} [...]
+
+  make   write recordings with hidden effects, their answers in another place
+  run    diagnose them; sees the recordings only
+  score  compare what was said with the answers
+
+`bns gap bench VERB --help` is the manual of a verb. Cases of your own making: a
+dataset directory each, and an answers file as `make` writes it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Make:
+    """Write blind cases: a dataset directory each, the answers in a file elsewhere."""
+
+    cases: tyro.conf.Positional[str]
+    """directory for the cases"""
+    answers: str
+    """file for the answers, JSON; may not lie in the directory of the cases"""
+    model: str = "khepera3"
+    """nominal robot, or the TOML file of a model of your own"""
+    count: int = 5
+    """cases of each kind"""
+    kinds: tuple[str, ...] = ("single", "none")
+    """single, pair, none, fault; off-library for models of your own"""
+    seed: int = 0
+    """of the first case"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """Diagnose the cases of a directory; those already in the file are left out."""
+
+    cases: tyro.conf.Positional[str]
+    """directory of the cases"""
+    said: str
+    """file for what is said, a JSON line per case; appended to"""
+    model: str = "khepera3"
+    """nominal robot, or the TOML file of a model of your own"""
+    threads: int = 2
+    """threads of the physics"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Score:
+    """Compare what was said with the answers."""
+
+    said: tyro.conf.Positional[str]
+    """file that `run` wrote"""
+    answers: tyro.conf.Positional[str]
+    """file that `make` wrote"""
+
+
+def main(verb: str, argv: list[str]) -> int:
+    """Run the verb; gives the exit code."""
+    del verb
+    if not argv or argv[0] in ("-h", "--help"):
+        print(MANUAL)
+        raise SystemExit(0)
+    kinds: dict[str, Any] = {"make": (Make, _make), "run": (Run, _run)}
+    kinds["score"] = (Score, _score)
+    if argv[0] not in kinds:
+        raise UnknownNameError("verb of `bns gap bench`", argv[0], VERBS)
+    kind, do = kinds[argv[0]]
+    return do(parse(kind, argv[1:], prog=f"bns gap bench {argv[0]}"))
+
+
+def _make(given: Make) -> int:
+    from bns.gap import casebook, inputs
+
+    model = inputs.model(given.model, threads=2)
+    allowed = ("single", "pair", "none", "fault")
+    if hasattr(model, "parse"):
+        allowed = (*allowed, "off-library")
+    for kind in given.kinds:
+        if kind not in allowed:
+            raise UnknownNameError(f"kind of case of {model.name}", kind, allowed)
+    made = casebook.make(Path(given.cases), Path(given.answers), _cases(given, model))
+    print(f"{made} cases in {given.cases}, answers in {given.answers}")
+    return 0
+
+
+def _cases(given: Make, model: Any) -> Iterator[tuple[str, Any]]:
+    from bns.gap import cases, own_bench
+
+    for place, kind in enumerate(given.kinds):
+        for number in range(given.count):
+            seed = given.seed + 1000 * place + number
+            build = own_bench.build if hasattr(model, "parse") else cases.build
+            yield f"case_{seed:06d}", build(seed, kind, model)
+
+
+def _run(given: Run) -> int:
+    from bns.gap import casebook, inputs
+
+    if not Path(given.cases).is_dir():
+        raise FormatError(f"There is no directory {given.cases} of cases.")
+    model = inputs.model(given.model, threads=given.threads)
+    count = casebook.run(Path(given.cases), model, Path(given.said))
+    print(f"{count} cases diagnosed: {given.said}")
+    return 0
+
+
+def _score(given: Score) -> int:
+    from bns.cli.tables import show
+    from bns.gap import casebook, scoring
+
+    rows = casebook.score(Path(given.said), Path(given.answers))
+    if not rows:
+        raise BnsError(f"{given.said} holds no diagnosis; run the cases first.")
+    show(["kind", "cases", "figure", "value"], _figures(rows), json=False)
+    confused = scoring.confusion([row for row in rows if "verdict" in row["said"]])
+    for line, count in confused.items():
+        print(f"  {count:3d}  {line}")
+    for row in rows:
+        if "error" in row["said"]:
+            print(f"  refused {row['seed']}: {row['said']['error']}")
+    return 0
+
+
+def _figures(rows: list[dict]) -> list[list[str]]:
+    from bns.gap import scoring
+
+    made = []
+    for kind, smallest in (("single", 0.0), ("single", scoring.LARGE), ("pair", 0.0)):
+        found = scoring.of(rows, kind, smallest)
+        if not found:
+            continue
+        label = f"{kind} at >= {smallest:g}x" if smallest else kind
+        for name, holds in (
+            ("named, aliases merged", scoring.right),
+            ("named exactly", scoring.strict),
+            ("in the 90 % set", scoring.covered),
+            ("one name, wrong", scoring.confident_wrong),
+        ):
+            share = scoring.share(found, holds)
+            made.append([label, str(len(found)), name, f"{share:.2f}"])
+    for kind, verdict in (("none", "no gap"), ("off-library", "none of the library")):
+        found = scoring.of(rows, kind)
+        if found:
+            share = scoring.share(found, lambda r, v=verdict: r["said"]["verdict"] == v)
+            made.append([kind, str(len(found)), f'said "{verdict}"', f"{share:.2f}"])
+    return made
