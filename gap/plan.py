@@ -46,11 +46,6 @@ class Option:
     distances: np.ndarray
     wrong: float
 
-    @property
-    def bayes(self) -> float:
-        """Expected logarithm of the Bayes factor, of the pair that parts least."""
-        return float(self.distances.min() ** 2 / 2)
-
 
 @dataclass(frozen=True, eq=False)
 class Plan:
@@ -59,15 +54,17 @@ class Plan:
     Attributes:
         tied: names of the tied explanations; fewer than two: nothing is tied.
         options: excitations, the best first; empty where nothing is tied.
-        repeats: how often the best has to be run for 9 in 10 to be told apart; 0 =
-            more than `MOST` times, so that it is no use.
+        repeats: how often the best has to be run to part, in 9 of 10 cases, the pairs
+            that it parts at all; 0 = no command of the family parts any.
         sentence: in words.
+        alike: pairs of `tied`, by number, that no command of the family parts.
     """
 
     tied: tuple[tuple[str, ...], ...]
     options: tuple[Option, ...]
     repeats: int
     sentence: str
+    alike: tuple[tuple[int, int], ...] = ()
 
 
 def plan(
@@ -94,12 +91,28 @@ def plan(
     family = tuple(family) or _family(model, seed)
     family = _safe(family, model, effects, arena)
     made = [_option(item, found, model, fits, effects) for item in family]
-    options = tuple(sorted(made, key=lambda option: option.wrong))
     names = tuple(fit.names for fit in fits)
-    if not options:
+    if not made:
         return Plan(names, (), 0, "No command of the family is safe in this arena.")
-    count = repeats(float(options[0].distances.min()))
-    return Plan(names, options, count, _sentence(fits, options[0], count))
+    return _ranked(names, made)
+
+
+def _ranked(names: tuple[tuple[str, ...], ...], made: Sequence[Option]) -> Plan:
+    """The options in order, and which pairs none of them parts."""
+    pairs = list(combinations(range(len(names)), 2))
+    table = np.array([option.distances for option in made])
+    open_ = np.array([repeats(float(best)) > 0 for best in table.max(axis=0)])
+    counted = open_ if open_.any() else np.ones(len(pairs), bool)
+    wrong = norm.sf(table[:, counted] / 2).mean(axis=1)
+    options = tuple(
+        Option(made[at].excitation, made[at].distances, float(wrong[at]))
+        for at in np.argsort(wrong, kind="stable")
+    )
+    alike = tuple(p for p, parted in zip(pairs, open_, strict=True) if not parted)
+    counts = [repeats(float(d)) for d in options[0].distances[open_]]
+    count = max(counts, default=0)
+    said = _sentence(names, options[0], open_, count, alike)
+    return Plan(names, options, count, said, alike)
 
 
 def tied(found: Diagnosis) -> list[Fit]:
@@ -260,18 +273,23 @@ def _nothing(found: Diagnosis) -> str:
     return f"Nothing is tied: {reason}."
 
 
-def _sentence(fits: Sequence[Fit], best: Option, count: int) -> str:
-    names = " or ".join(" + ".join(fit.names) for fit in fits)
+def _sentence(names, best: Option, open_, count: int, alike) -> str:
+    words = [" + ".join(name) for name in names]
+    tied_ = " or ".join(words)
     if not count:
         return (
-            f"Tied: {names}. No safe command of the family tells them apart (the best, "
-            f"{best.excitation.name}, by {best.distances.min():.2g} deviations): they "
-            "do the same to whatever is commanded and seen. Observe another quantity."
+            f"Tied: {tied_}. No safe command of the family tells them apart (the best, "
+            f"{best.excitation.name}, by {best.distances.max():.2g} deviations): they "
+            "do the same whatever is commanded. Observe another quantity."
         )
     often = "once" if count == 1 else f"{count} times"
-    return (
-        f"Tied: {names}. Run {often}: {best.excitation.name} "
+    parted = best.distances[open_]
+    text = (
+        f"Tied: {tied_}. Run {often}: {best.excitation.name} "
         f"({best.excitation.commands.duration:.0f} s); it parts them by "
-        f"{best.distances.min():.2g} deviations (expected log Bayes factor "
-        f"{best.bayes:.3g}, wrong one named {100 * best.wrong:.2g} %)."
+        f"{parted.min():.2g} deviations (expected log Bayes factor "
+        f"{parted.min() ** 2 / 2:.3g}, wrong one named {100 * best.wrong:.2g} %)."
     )
+    for first, second in alike:
+        text += f" No command parts {words[first]} from {words[second]}."
+    return text

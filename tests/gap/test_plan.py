@@ -1,0 +1,114 @@
+"""The next command: it moves what is tied apart, and says so where nothing can."""
+
+import numpy as np
+import pytest
+
+from bns.errors import FormatError
+from bns.gap import command_file, excite, plan
+from bns.gap.records import Diagnosis, Fit, Verdict
+from bns.gap.wheeled import WheeledModel
+
+FLOOR = {
+    "sigma": [1e-3, 1e-3, 1e-2],
+    "process": [1e-4, 5e-5, 1e-3],
+    "source": "state reset",
+    "repeats": 0,
+}
+
+
+@pytest.fixture(scope="module")
+def model():
+    return WheeledModel(threads=1)
+
+
+def tied(*fits, kind="either"):
+    """A diagnosis that could not decide between fits."""
+    made = tuple(
+        Fit((n,), (t,), (v,), ((v - s, v + s),), ("1",), 10.0, 10.0, 0.0, 10.0)
+        for n, t, v, s in fits
+    )
+    nothing = Fit((), (), (), (), (), 100.0, 100.0, 0.0, 100.0)
+    names = tuple(fit.names for fit in made)
+    verdict = Verdict(kind, names, names, 1.0, 0.0, 0.5, (), 0.0, "")
+    return Diagnosis("khepera3", 3, (), verdict, (nothing, *made), {}, {}, FLOOR, {})
+
+
+AXLE = ("axle_length", "axle_length:factor=0.9", 0.9, 0.01)
+WHEELS = ("wheel_gain[both]", "wheel_gain:wheel=both,factor=1.11", 1.11, 0.01)
+LATE = ("command_latency", "command_latency:delay=0.12", 0.12, 0.001)
+OLD = ("tracker_latency", "tracker_latency:delay=0.12", 0.12, 0.001)
+
+
+def test_axle_or_wheels_asks_for_a_straight_drive(model):
+    made = plan.plan(tied(AXLE, WHEELS), model)
+    turns = [o for o in made.options if "turn in place" in o.excitation.name]
+    best = made.options[0]
+    assert "turn in place" not in best.excitation.name
+    assert best.distances[0] > 10
+    assert min(o.distances[0] for o in turns) < 0.3 * best.distances[0]
+    assert made.repeats == 1
+    assert best.excitation.name in made.sentence
+
+
+def test_what_no_command_parts_is_said(model):
+    made = plan.plan(tied(LATE, OLD), model)
+    assert made.repeats == 0
+    assert made.alike == ((0, 1),)
+    assert "Observe another quantity" in made.sentence
+    three = plan.plan(tied(LATE, OLD, WHEELS), model)
+    assert three.repeats == 1
+    assert "No command parts command_latency from tracker_latency" in three.sentence
+
+
+def test_nothing_is_tied(model):
+    made = plan.plan(tied(AXLE, kind="effect"), model)
+    assert not made.options and "Nothing is tied" in made.sentence
+
+
+def test_magnitudes_that_are_not_known_part_less(model):
+    family = [item for item in excite.wheeled() if "in place" in item.name][:2]
+    known, loose = (
+        plan.plan(
+            tied((*AXLE[:3], spread), ("tracker_scale", OTHER, 1.1, spread)),
+            model,
+            family=family,
+        )
+        for spread in (0.001, 0.2)
+    )
+    assert loose.options[0].distances[0] < 0.7 * known.options[0].distances[0]
+
+
+OTHER = "tracker_scale:factor=1.1"
+
+
+def test_drives_stay_on_the_board(model):
+    small = plan.plan(tied(AXLE, WHEELS), model, arena=(0.5, 0.5))
+    for option in small.options:
+        path = plan.blank(option.excitation.commands, model).observed
+        assert np.abs(path[:, :2]).max() < 0.25
+    assert len(small.options) < len(excite.wheeled())
+
+
+def test_how_often_a_command_has_to_be_run():
+    assert plan.repeats(10.0, tie=6.0) == 1
+    assert plan.repeats(2.0, tie=6.0) == 5  # 20 - 2 * 1.2816 * sqrt(20) = 8.5 >= 6
+    assert plan.repeats(0.1, tie=6.0) == 0
+
+
+def test_general_commands_keep_to_the_limits():
+    limits = {"a": (-1.0, 3.0, "N"), "b": (0.5, 2.0, "rad")}
+    for item in excite.general(limits):
+        low, high = item.commands.values.min(axis=0), item.commands.values.max(axis=0)
+        assert (low >= [-1.0, 0.5]).all() and (high <= [3.0, 2.0]).all(), item.name
+        assert item.commands.duration == pytest.approx(10.0, abs=0.6)
+
+
+def test_commands_survive_their_file(tmp_path):
+    told = excite.wheeled()[5].commands
+    read = command_file.read(command_file.write(told, tmp_path / "next.csv"))
+    np.testing.assert_array_equal(read.values, told.values)
+    np.testing.assert_allclose(read.durations, told.durations)
+    assert read.channels == told.channels
+    (tmp_path / "bad.csv").write_text("left,right\n1,2\n")
+    with pytest.raises(FormatError, match="left_speed"):
+        command_file.read(tmp_path / "bad.csv")
