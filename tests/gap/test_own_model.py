@@ -172,3 +172,18 @@ def test_effects_are_considered_where_none_are_listed(arm):
         "sensor_gain[shoulder]",
         "command_delay[all]",
     } < names
+
+
+def test_the_description_in_the_documentation_is_one(tmp_path):
+    page = (ARM.parents[2] / "docs" / "gap_your_robot.md").read_text()
+    (tmp_path / "arm.toml").write_text(page.split("```")[1])
+    (tmp_path / "arm.xml").write_text(ARM.with_suffix(".xml").read_text())
+    text = (tmp_path / "arm.toml").read_text()
+    assert "[log]" in text and "[bounds]" in text
+    elbow = '[commands.elbow_goal]\nactuator = "elbow_servo"\nunit = "rad"\n'
+    (tmp_path / "arm.toml").write_text(text + elbow + "low = 0\nhigh = 2\n")
+    made = OwnModel.read(tmp_path / "arm.toml", threads=1)
+    bounds = {item.name: item for item in made.candidates()}
+    assert bounds["joint_damping[elbow]"].high == 0.5
+    assert bounds["body_mass[forearm]"].slack == 0.01
+    assert made.config.log["shoulder"] == ("q1", "deg")

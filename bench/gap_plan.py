@@ -1,0 +1,132 @@
+"""Does the next command that the tool asks for resolve what it left tied?
+
+A hidden effect is recorded with one poor kind of drive only. Where the diagnosis ends
+in a tie that holds the truth, the planned command is recorded in the same world and
+both recordings are diagnosed together. Resolved: one explanation is left and it is the
+true one; or what is left besides it is what the plan said no command can part from it.
+"""
+
+from bench.result import Result
+
+DOC = "ties that the planned command resolves"
+BAR = ">= 0.8 of ties"
+SEED = 3_000_000
+TIES, MOST = 12, 40  # ties to judge; cases to look for them in
+SIZES = (3.0, 8.0)  # of the effects over what the poor recording shows
+POOR = ("straight drive", "turn in place", "arcs, left", "wheel alone")
+NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.008"
+
+
+def run(quick: bool) -> Result:
+    """Look for ties, plan, record, diagnose again."""
+    from bns.gap.wheeled import WheeledModel
+
+    model = WheeledModel("khepera3", threads=1)
+    rows: list[dict] = []
+    looked = 0
+    for number in range(4 if quick else MOST):
+        looked += 1
+        row = _case(SEED + number, model)
+        if row:
+            rows.append(row)
+        if len(rows) >= (1 if quick else TIES):
+            break
+    open_ = [row for row in rows if row["offered"]]
+    solved = [row for row in open_ if row["resolved"]]
+    figure = len(solved) / len(open_) if open_ else float("nan")
+    return Result(
+        figure=figure,
+        unit="share",
+        holds=figure >= 0.8 if open_ else None,
+        n=len(open_),
+        details={
+            "cases_looked_at": looked,
+            "ties": len(rows),
+            "ties_that_no_command_parts_said_so": len(rows) - len(open_),
+            "resolved_of_all_ties": len(solved) / len(rows) if rows else None,
+            "to_one_name": sum(row["alone"] for row in open_),
+            "cases": rows,
+        },
+    )
+
+
+def _case(seed: int, model) -> dict | None:
+    """One case; None where the poor recording left no tie that holds the truth."""
+    import numpy as np
+
+    from bns import seeding
+    from bns.gap import excite, plan
+    from bns.gap.diagnose import diagnose
+
+    rng = seeding.generator(seed, "bench", "plan")
+    kinds = [e for e in excite.wheeled(seed=1) if any(p in e.name for p in POOR)]
+    picked = kinds[int(rng.integers(len(kinds)))]
+    told = [picked.commands] * 3
+    name, effect = _hidden(rng, told, model)
+    if effect is None:
+        return None
+    trials = _record(told, effect, seed)
+    found = diagnose(trials, model, seed=seed, full=False, most=1)
+    named = [names[0] for names in found.verdict.named if len(names) == 1]
+    if found.verdict.kind != "either" or name not in named:
+        return None
+    made = plan.plan(found, model)
+    row = {
+        "hidden": str(effect),
+        "first": picked.name,
+        "tied": named,
+        "offered": bool(made.repeats),
+        "plan": made.options[0].excitation.name if made.repeats else made.sentence,
+        "repeats": made.repeats,
+    }
+    if not made.repeats:
+        return {**row, "resolved": False, "alone": False}
+    more = _record(
+        [made.options[0].excitation.commands] * made.repeats, effect, seed + 1
+    )
+    again = diagnose([*trials, *more], model, seed=seed, full=False, most=1)
+    left = [names[0] for names in again.verdict.named if len(names) == 1]
+    allowed = {name, *_alike(name, made)}
+    return {
+        **row,
+        "then": again.verdict.kind,
+        "left": left,
+        "resolved": name in left and set(left) <= allowed,
+        "alone": left == [name],
+        "distance": float(np.max(made.options[0].distances)),
+    }
+
+
+def _alike(name: str, made) -> set[str]:
+    """What the plan said no command parts from an effect."""
+    pairs = [[made.tied[at][0] for at in pair] for pair in made.alike]
+    return {other for pair in pairs if name in pair for other in pair}
+
+
+def _hidden(rng, told, model):
+    """An effect of a size that the poor recording shows, and its candidate's name."""
+    import numpy as np
+
+    from bns.gap import plan, signatures
+    from bns.gap.problem import Problem
+
+    items = [c for c in model.candidates() if not c.whole]
+    item = items[int(rng.integers(len(items)))]
+    blank = [plan.blank(commands, model) for commands in told]
+    problem = Problem.of(blank, model, candidates=model.candidates())
+    curves = signatures.trace(problem, [item])
+    length = signatures.strength(curves)
+    size = 4.5 * float(np.exp(rng.uniform(*np.log(SIZES))))
+    if not len(length) or length.max() < size:
+        return item.name, None
+    level = int(np.abs(np.log(np.maximum(length, 1e-9) / size)).argmin())
+    return item.name, item.make(curves.magnitude[level], int(curves.branch[level]))
+
+
+def _record(told, effect, seed: int):
+    from bns import seeding
+    from bns.worlds.mujoco_world import MujocoWorld
+
+    world = MujocoWorld("khepera3", reality=[effect, NOISE], threads=1)
+    seeds = [seeding.integer(seed, "bench", "plan", n) for n in range(len(told))]
+    return world.run(told, seeds=seeds)
