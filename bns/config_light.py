@@ -22,6 +22,9 @@ class LightConfig:
     """nearer to a lamp than this the robot is stopped [m] (silent)"""
     at_lamp: Literal["stop", "turn"] = "stop"
     """a robot at the safety boundary stays, or is turned away and goes on"""
+    charge_stopped: Literal["start", "stand"] = "start"
+    """a stopped robot's lost cycles cost as if it were back at its start, or as where
+    it stands; the latter (the printed sum) rewards running into the boundary"""
     start_nearest: float = 0.5
     """simulated trials start no nearer to the lamp than this [m]; as in the world"""
     starts: int = 10
@@ -42,6 +45,8 @@ class LightConfig:
     """hidden neurons of a controller (table 5.1)"""
     weights: float = 5.0
     """random weights lie between - and + this (table 5.1)"""
+    weight_limit: float = 20.0
+    """weights stay between - and + this (silent); SBX spreads them without end"""
     mutation_magnitude: float = 0.05
     """standard deviation of a weight's mutation (table 5.1); the rate is
     evolution.mutation_rate"""

@@ -17,6 +17,7 @@ from bns.draws import Draws
 from bns.errors import MissingDependencyError
 from bns.evaluation import Evaluator
 from bns.evolution.generation import Breeder, Coins, Rates
+from bns.learners.registry import dearness
 from bns.snn import fitting
 
 WORTH_COMPILING = 120_000  # generations of all trials; compiling takes some 30 s
@@ -35,6 +36,7 @@ def should_compile(config: RunConfig) -> bool:
         )
     if config.compiled == "auto":
         work = config.trials * config.evolution.generations * config.replicates
+        work *= dearness(config.learner)
         return compiler is not None and work >= WORTH_COMPILING
     return config.compiled == "yes"
 

@@ -64,6 +64,7 @@ BOUNDS = {
     "light.circle_sweep": Bound(0, 360_000, "deg"),
     "light.hidden": Bound(1, 4096, "neurons"),
     "light.weights": Bound(0, 1000),
+    "light.weight_limit": Bound(0, 10_000),
     "light.mutation_magnitude": Bound(0, 1000),
     "light.batch": Bound(0, 10_000_000, "patterns"),
     "light.islands": Bound(1, 10_000, "islands"),
@@ -90,6 +91,7 @@ _ORDERED = (
     ("evolution.elitism", "evolution.population"),
     ("light.safety", "light.goal"),
     ("light.circle_cycles", "light.cycles"),
+    ("light.weights", "light.weight_limit"),
     ("light.islands", "evolution.population"),
     ("light.reset_elitists", "evolution.population"),
 )

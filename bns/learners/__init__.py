@@ -17,4 +17,7 @@ which runs items of a proposal in a world and gives their trials; and
 
 which gives what the world has to be told beside the robot, its damage and its
 reality: keyword arguments of the world.
+
+`DEARNESS` (1 where it is missing) says how much dearer a generation is than one of
+navigation: it decides whether compiling pays.
 """

@@ -30,3 +30,8 @@ def get(name: str) -> ModuleType:
     if name not in names():
         raise UnknownNameError("learner", name, names())
     return import_module(f"bns.learners.{name}")
+
+
+def dearness(name: str) -> float:
+    """Cost of a learner's generation, that of navigation being 1."""
+    return float(getattr(get(name), "DEARNESS", 1.0))

@@ -1,0 +1,87 @@
+"""The learner's inner loops: judging in closed loop, evolution, training.
+
+Where a run is compiled, one cycle of all robots is one compiled region, and so is an
+epoch of training; see `bns.inner`.
+"""
+
+import torch
+from torch import Tensor
+
+from bns.chromosome import Population
+from bns.config import RunConfig
+from bns.draws import Draws, whole_below
+from bns.evolution.generation import Breeder, Rates
+from bns.inner import should_compile
+from bns.light.simulator import Simulator, Thetas
+from bns.light.task import LightTask
+from bns.snn import fitting
+
+
+class LightLoops:
+    """Evolution and training of R runs.
+
+    Args:
+        config: what the runs share.
+        simulator: the SNNs' shapes and what they stand for.
+        breeder: makes the next generation of every island.
+        draws: source of randomness, shared with the learner.
+    """
+
+    def __init__(
+        self, config: RunConfig, simulator: Simulator, breeder: Breeder, draws: Draws
+    ):
+        self.config, self.simulator = config, simulator
+        self.breeder, self.draws = breeder, draws
+        pool = LightTask.of(config.light).start_pool()
+        self._pool = torch.from_numpy(pool).float().to(config.device)
+        self._advance = simulator.advance
+        self._epochs = {
+            shape: fitting.epoch_of(shape, config.snn)
+            for shape in (simulator.motion, simulator.sensors)
+        }
+        if should_compile(config):
+            torch._dynamo.config.cache_size_limit = 64
+            self._advance = torch.compile(simulator.advance, dynamic=False)
+            self._epochs = {
+                shape: torch.compile(epoch, dynamic=False)
+                for shape, epoch in self._epochs.items()
+            }
+
+    def starts(self, runs: int) -> Tensor:
+        """Random starts, shared by all individuals of a run: ``(R, S, 2)`` [m]."""
+        coins = self.draws.uniform(runs, self.config.light.starts)
+        return self._pool[whole_below(coins, len(self._pool))]
+
+    def cost(self, thetas: Thetas, genomes: Tensor) -> Tensor:
+        """Predicted cost ``(R, P)`` of genomes ``(R, P, D)`` from fresh starts."""
+        runs, count, _ = genomes.shape
+        starts = self.starts(runs).unsqueeze(-1).expand(-1, -1, -1, count)
+        ahead, left = starts[:, :, 0].contiguous(), starts[:, :, 1].contiguous()
+        layers = self.simulator.controllers.layers(genomes)
+        state = self.simulator.begin(ahead, left)
+        for _ in range(self.config.light.cycles):
+            state = self._advance(thetas, layers, state)
+        return (state.error / state.begun).mean(1)
+
+    def cost_of(self, thetas: Thetas, population: Population) -> Tensor:
+        """The same of a population whose rows are islands, ``(R I, p)``."""
+        rows, size = population.lengths.shape
+        runs = len(thetas.motion)
+        genomes = population.genes.reshape(runs, -1, population.genes.shape[2])
+        return self.cost(thetas, genomes).reshape(rows, size)
+
+    def evolve(
+        self, thetas: Thetas, population: Population, cost: Tensor, rates: Rates
+    ) -> tuple[Population, Tensor]:
+        """All generations between two trials; gives the population and its costs."""
+        for _ in range(self.config.evolution.generations):
+            coins = self.breeder.draw(len(cost), self.draws)
+            population = self.breeder.breed(population, cost, rates, coins)
+            cost = self.cost_of(thetas, population)
+        return population, cost
+
+    def train(self, shape, theta: Tensor, patterns) -> tuple[Tensor, Tensor]:
+        """Fit stacked networks of a shape to patterns, see `bns.snn.fitting.fit`."""
+        return fitting.fit(
+            shape, self.config.snn, theta, patterns, self.draws, self._epochs[shape]
+        )

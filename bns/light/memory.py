@@ -1,0 +1,100 @@
+"""What R runs know: patterns and networks of the motion SNN or of the sensor SNNs."""
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from bns.draws import Draws, whole_below
+from bns.light.loops import LightLoops
+from bns.light.patterns import Patterns
+from bns.patterns import PatternBuffer
+from bns.snn import fitting
+from bns.snn.network import Shape, predict
+
+BUCKET = 256  # patterns; training tensors grow in these steps, so shapes recur
+
+
+class Learned:
+    """Patterns and networks of R runs.
+
+    Args:
+        shape: of the networks.
+        targets: outputs that a pattern has.
+        windows: newest patterns a run trains on, 0 = all; shape ``(R,)``.
+        batch: patterns trained on at a time, drawn from those; 0 = all.
+        draws: source of randomness.
+    """
+
+    def __init__(
+        self,
+        shape: Shape,
+        targets: int,
+        windows: np.ndarray,
+        batch: int,
+        draws: Draws,
+    ):
+        self.shape, self.batch, self.draws = shape, batch, draws
+        runs = len(windows)
+        self.buffer = PatternBuffer(runs, windows, (shape.inputs, targets), BUCKET)
+        self.theta = self.fresh()
+        self.loss = torch.full((runs,), torch.nan)
+
+    def fresh(self) -> Tensor:
+        """Random weights ``(R, D)``."""
+        return self.shape.random(len(self.buffer.windows), self.draws)
+
+    def miss(self, run: int, patterns: Patterns) -> np.ndarray:
+        """How far the networks are off on patterns, scaled, ``(N, O)``."""
+        seen = torch.from_numpy(patterns.inputs.T.astype(np.float32))
+        seen = seen.to(self.theta.device)[None]
+        said = predict(self.shape, self.theta[run : run + 1], seen)[0]
+        return said.cpu().numpy().T - patterns.targets
+
+    def append(self, run: int, patterns: Patterns) -> None:
+        """Keep a trial's patterns."""
+        self.buffer.append(run, patterns.inputs, patterns.targets)
+
+    def train(self, loops: LightLoops, which: np.ndarray) -> None:
+        """Train the networks of runs marked in `which` ``(R,)`` that have patterns."""
+        known = torch.from_numpy(which & (self.buffer.counts > 0))
+        if not known.any():
+            return
+        trained, loss = loops.train(self.shape, self.theta, self._patterns())
+        here = known.to(self.theta.device)[:, None]
+        self.theta = torch.where(here, trained, self.theta)
+        self.loss = torch.where(known, loss.cpu(), self.loss)
+
+    def _patterns(self) -> fitting.Patterns:
+        """All patterns, or as many as a batch has, drawn anew each time."""
+        patterns = fitting.Patterns(*self.buffer.tensors(self.theta.device))
+        if not 0 < self.batch < patterns.inputs.shape[2]:
+            return patterns
+        counts = torch.from_numpy(self.buffer.counts).to(self.theta.device)
+        coins = self.draws.uniform(len(counts), self.batch)
+        index = whole_below(coins, counts[:, None].clamp(min=1))
+        inputs, targets, weight = patterns
+        return fitting.Patterns(
+            inputs.gather(2, index[:, None].expand(-1, inputs.shape[1], -1)),
+            targets.gather(2, index[:, None].expand(-1, targets.shape[1], -1)),
+            weight.gather(3, index[:, None, None]),
+        )
+
+    def state(self, prefix: str) -> dict[str, np.ndarray]:
+        """Everything as arrays."""
+        arrays = {
+            "theta": self.theta.cpu().numpy(),
+            "loss": self.loss.numpy(),
+            **self.buffer.state(),
+        }
+        return {f"{prefix}.{name}": value for name, value in arrays.items()}
+
+    def restore(self, prefix: str, arrays: dict[str, np.ndarray]) -> None:
+        """Go on from `state`."""
+        own = {
+            name.removeprefix(f"{prefix}."): value
+            for name, value in arrays.items()
+            if name.startswith(f"{prefix}.")
+        }
+        self.theta = torch.from_numpy(own["theta"]).to(self.theta.device)
+        self.loss = torch.from_numpy(own["loss"])
+        self.buffer.restore(own)

@@ -1,0 +1,82 @@
+"""A world with a lamp that needs no physics: a point on two wheels that sees light."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from bns import presets, seeding
+from bns.worlds.light_sensors import VIRTUAL
+from bns.worlds.trial import POSE_CHANNELS, Commands, Trial
+
+AXLE = 0.0884
+
+
+class FakeLightWorld:
+    """Exact wheels, and light that falls with distance and with the angle."""
+
+    name, robot = "fake-light", "khepera3"
+
+    def run(self, commands, *, trial=0, seeds=()):
+        raise NotImplementedError
+
+    def drive(self, policy, *, cycles=100, cycle=0.4, trial=0, seeds=(), starts=None):
+        poses = np.array([self.start(seed, trial) for seed in seeds])
+        memory = policy.memory(len(poses))
+        path, read, told = [poses], [self.look(poses)], []
+        for _ in range(cycles):
+            commands, memory = policy.act(read[-1], memory)
+            poses = self.moved(poses, commands * cycle)
+            told.append(commands)
+            path.append(poses)
+            read.append(self.look(poses))
+        seen = np.concatenate([np.stack(path, 1), np.stack(read, 1)], axis=-1)
+        count = np.arange(cycles + 1)
+        return [
+            Trial(
+                Commands(values, np.full(cycles, cycle)),
+                count * cycle,
+                rows,
+                count,
+                channels=POSE_CHANNELS + VIRTUAL,
+                robot=self.robot,
+                world=self.name,
+            )
+            for values, rows in zip(np.stack(told, 1), seen, strict=True)
+        ]
+
+    @staticmethod
+    def start(seed, trial):
+        rng = seeding.generator(seed, "fake", trial)
+        angle, away = rng.uniform(-np.pi, np.pi), rng.uniform(0.5, 1.0)
+        return away * np.cos(angle), away * np.sin(angle), rng.uniform(-np.pi, np.pi)
+
+    @staticmethod
+    def look(poses):
+        bearing = np.arctan2(-poses[:, 1], -poses[:, 0]) - poses[:, 2]
+        distance = np.hypot(poses[:, 0], poses[:, 1])
+        sides = bearing[:, None] - np.radians([45, -45])
+        light = np.maximum(np.cos(sides), 0) ** 2 / (1 + 4 * distance[:, None] ** 2)
+        return np.rint(4095 * (1 - light))
+
+    @staticmethod
+    def moved(poses, ways):
+        turn = (ways[:, 1] - ways[:, 0]) / AXLE
+        forward, yaw = ways.mean(1), poses[:, 2] + turn / 2
+        step = np.stack([forward * np.cos(yaw), forward * np.sin(yaw), turn], 1)
+        return poses + step
+
+
+def small(**light):
+    """The preset cut down to a second; settings of the section `light`."""
+    config = presets.load("khepera-light")
+    return replace(
+        config,
+        evolution=replace(config.evolution, population=12, generations=2, tournament=3),
+        snn=replace(config.snn, epochs=20, hidden=8),
+        light=replace(config.light, starts=2, cycles=20, circle_cycles=8, **light),
+        trials=3,
+        replicates=2,
+        record_replicates=1,
+        compiled="no",
+        threads=1,
+    )

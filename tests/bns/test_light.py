@@ -1,0 +1,218 @@
+"""Closed-loop light following: known answers of every part, and the loop itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from bns.config_light import LightConfig
+from bns.draws import Draws
+from bns.errors import BnsError
+from bns.light import patterns
+from bns.light.controller import Controllers
+from bns.light.policy import GenomePolicy
+from bns.light.scaling import brightness, counts
+from bns.light.simulator import Simulator, Thetas
+from bns.light.task import LightTask, lost
+from tests.bns.light_fakes import FakeLightWorld, small
+
+TASK = LightTask.of(LightConfig())
+
+
+class TestController:
+    def kind(self, *, recurrent=False, hidden=1):
+        return Controllers(hidden, recurrent, -0.1, 0.1, 0.02)
+
+    def test_genes_are_counted_with_biases(self):
+        assert self.kind(hidden=5).genes == 5 * 3 + 2 * 6
+        assert self.kind(hidden=5, recurrent=True).genes == 5 * 5 + 2 * 6
+
+    def test_two_layers_by_hand(self):
+        genome = torch.tensor([[1.0, -2.0, 0.5, 3.0, -1.0, 0.25, 0.0]])
+        policy = GenomePolicy(self.kind(), genome)
+        speeds, _ = policy.act(counts(np.array([[0.8, 0.3]])), policy.memory(1))
+        neuron = np.tanh(0.8 - 2 * 0.3 + 0.5)
+        told = 0.1 * np.tanh([3 * neuron + 0.25, -neuron])
+        np.testing.assert_allclose(speeds[0], told, rtol=1e-5)
+
+    def test_slow_wheels_stop(self):
+        policy = GenomePolicy(self.kind(), torch.tensor([[0, 0, 0, 0, 0, 0.1, 3.0]]))
+        speeds, _ = policy.act(np.full((1, 2), 4095.0), policy.memory(1))
+        assert speeds[0, 0] == 0.0
+        assert speeds[0, 1] == pytest.approx(0.1 * np.tanh(3.0))
+
+    def test_recurrent_controllers_remember_their_outputs(self):
+        genome = torch.zeros(1, self.kind(recurrent=True).genes)
+        genome[0, 2] = 1.0  # from the left output to the neuron
+        genome[0, 5] = 1.0  # from the neuron to the left output
+        policy = GenomePolicy(self.kind(recurrent=True), genome)
+        memory = np.array([[0.7, -0.2]])
+        _, memory = policy.act(np.full((1, 2), 4095.0), memory)
+        np.testing.assert_allclose(
+            memory, [[np.tanh(np.tanh(0.7)), 0.0]], rtol=1e-5, atol=1e-7
+        )
+
+    @pytest.mark.parametrize("recurrent", [False, True])
+    def test_robots_of_a_batch_do_not_mix(self, recurrent):
+        kind = self.kind(recurrent=recurrent, hidden=3)
+        genomes = Draws(3).uniform(4, kind.genes) * 4 - 2
+        readings = np.linspace(0, 4095, 8).reshape(4, 2)
+        whole = GenomePolicy(kind, genomes)
+        together, _ = whole.act(readings, whole.memory(4))
+        for robot in range(4):
+            alone = GenomePolicy(kind, genomes[robot : robot + 1])
+            one, _ = alone.act(readings[robot : robot + 1], alone.memory(1))
+            np.testing.assert_allclose(one[0], together[robot], rtol=1e-6)
+
+    def test_wrong_length_and_nan_are_refused(self):
+        with pytest.raises(BnsError, match=r"has 6 weights.*has 7"):
+            GenomePolicy(self.kind(), torch.zeros(1, 6))
+        with pytest.raises(BnsError, match="Genome 1 holds NaN"):
+            GenomePolicy(self.kind(), torch.tensor([[0.0] * 7, [0.0] * 6 + [np.nan]]))
+
+
+class TestTask:
+    def test_cost_of_standing_still_is_the_start_distance_share(self):
+        path = np.tile([0.9, 0.0], (11, 1))
+        assert TASK.cost(path) == pytest.approx(10 * (0.9 - 0.3) / 0.9)
+
+    def test_on_the_goal_radius_nothing_is_charged(self):
+        angle = np.linspace(0, 2, 11)
+        path = 0.3 * np.stack([np.cos(angle), np.sin(angle)], 1)
+        assert TASK.cost(path) == pytest.approx(0.0, abs=1e-12)
+
+    def test_stopped_cycles_cost_as_the_start(self):
+        path = np.array([[1.0, 0], [0.5, 0], [0.1, 0], [0.1, 0], [0.1, 0]])
+        charged = TASK.cost(path, np.array([False, False, True, True]))
+        assert charged == pytest.approx(0.2 + 0.2 + 2 * 0.7)
+        stand = LightTask(TASK.lamp, LightConfig(charge_stopped="stand"))
+        assert stand.cost(path) == pytest.approx(0.2 + 0.2 + 2 * 0.2)
+
+    def circle(self, radius=0.3, turns=1.2, cycles=40):
+        angle = np.linspace(0, 2 * np.pi * turns, cycles + 1)
+        return radius * np.stack([np.cos(angle), np.sin(angle)], 1)
+
+    def test_circling_solves(self):
+        none = np.zeros(40, bool)
+        assert TASK.solved(self.circle(), none)
+        assert TASK.solved(self.circle()[::-1], none)
+
+    def test_standing_far_circles_and_being_stopped_do_not(self):
+        none = np.zeros(40, bool)
+        assert not TASK.solved(np.tile([0.3, 0.0], (41, 1)), none)
+        assert not TASK.solved(self.circle(radius=0.46), none)
+        assert not TASK.solved(self.circle(turns=0.4), none)
+        assert not TASK.solved(self.circle(), np.arange(40) == 20)
+
+    def test_starts_keep_away_from_the_lamp_and_on_the_board(self):
+        away = np.hypot(*TASK.start_pool().T)
+        assert away.min() >= 0.5
+        assert away.max() <= np.hypot(1.27, 0.82)
+
+    @pytest.mark.parametrize("text", ["x", "x=left", "x=1,y"])
+    def test_lamps_that_cannot_be_read(self, text):
+        with pytest.raises(BnsError, match="Lamp"):
+            LightTask.of(LightConfig(lamps=(text,)))
+
+    def test_no_lamp(self):
+        with pytest.raises(BnsError, match="lamps is empty"):
+            LightTask.of(LightConfig(lamps=()))
+
+
+class TestSimulator:
+    """The SNN's closed loop against the same loop by hand, one robot."""
+
+    @pytest.mark.parametrize("recurrent", [False, True])
+    def test_a_cycle_by_hand(self, recurrent):
+        config = small(recurrent=recurrent, hidden=3)
+        simulator, draws = Simulator.of(config), Draws(5)
+        kind = simulator.controllers
+        genome = draws.uniform(1, 1, kind.genes) * 4 - 2
+        thetas = Thetas(
+            simulator.motion.random(1, draws), simulator.sensors.random(1, draws)
+        )
+        state = simulator.begin(torch.full((1, 1, 1), 0.6), torch.full((1, 1, 1), -0.4))
+        layers = kind.layers(genome)
+        pose = np.zeros(3)
+        lamp, policy = np.array([0.6, -0.4]), GenomePolicy(kind, genome[0])
+        memory = policy.memory(1)
+        total = 0.0
+        for _ in range(5):
+            bright = simulator.look(thetas, state)[0, :, 0, 0].numpy()
+            speeds, memory = policy.act(counts(bright)[None], memory)
+            state, seen = simulator.step(thetas, layers, state)
+            np.testing.assert_allclose(seen.speeds[0, :, 0, 0], speeds[0], rtol=1e-4)
+            forward, left, turn = seen.moved[0, :, 0, 0].double().numpy()
+            cos, sin = np.cos(pose[2]), np.sin(pose[2])
+            pose += [cos * forward - sin * left, sin * forward + cos * left, turn]
+            total += abs(np.hypot(*(lamp - pose[:2])) - config.light.goal)
+        here = patterns.in_body(pose[None], tuple(lamp))[0]
+        np.testing.assert_allclose(state.ahead.item(), here[0], atol=1e-5)
+        np.testing.assert_allclose(state.left.item(), here[1], atol=1e-5)
+        assert state.error.item() == pytest.approx(total, abs=1e-5)
+
+    def test_inside_the_boundary_robots_stand(self):
+        simulator, draws = Simulator.of(small()), Draws(1)
+        thetas = Thetas(
+            simulator.motion.random(1, draws), simulator.sensors.random(1, draws)
+        )
+        layers = simulator.controllers.layers(
+            draws.uniform(1, 1, simulator.controllers.genes)
+        )
+        state = simulator.begin(torch.full((1, 1, 1), 0.1), torch.zeros(1, 1, 1))
+        state, seen = simulator.step(thetas, layers, state)
+        assert state.ahead.item() == pytest.approx(0.1)
+        assert not seen.moved.any()
+
+
+class TestPatterns:
+    def trial(self):
+        """A fake robot that was handled in cycle 3 and stopped from cycle 7 on."""
+        draws = Draws(2)
+        kind = Controllers(3, False, -0.12, 0.12, 0.0)
+        policy = GenomePolicy(kind, draws.uniform(1, kind.genes) * 6 - 3)
+        trial = FakeLightWorld().drive(policy, cycles=10, seeds=[4])[0]
+        handled = np.isin(np.arange(10), [3, 7, 8, 9])
+        return trial.replace(handled=handled)
+
+    def scales(self):
+        return Simulator.of(small()).scales
+
+    def test_handled_cycles_teach_no_motion(self):
+        trial = self.trial()
+        found = patterns.motion(trial, self.scales())
+        assert len(found.inputs) == 6
+        assert not found.inputs[0, :2].any()
+        assert not found.inputs[3, :2].any()  # cycle 4 begins at rest
+        told = trial.commands.values[5] / self.scales().speed
+        np.testing.assert_allclose(found.inputs[4, 2:], told)
+
+    def test_sensors_teach_until_the_robot_is_stopped(self):
+        found = patterns.sensors(self.trial(), (0.0, 0.0))
+        assert len(found.inputs) == 9  # the start and eight cycles
+        away = np.hypot(*found.inputs.T)
+        real = np.hypot(*self.trial().command_poses_world[:9, :2].T)
+        np.testing.assert_allclose(away, real)
+
+    def test_lost_cycles_begin_after_the_one_in_which_it_was_stopped(self):
+        assert np.flatnonzero(lost([self.trial()])[0]).tolist() == [8, 9]
+
+    def test_a_mirrored_world_gives_mirrored_patterns(self):
+        trial = self.trial()
+        turned = trial.observed * [1, -1, -1, 1, 1]
+        turned[:, 3:] = turned[:, [4, 3]]
+        commands = replace(trial.commands, values=trial.commands.values[:, ::-1])
+        other = trial.replace(observed=turned, commands=commands)
+        for kind, mirror, extra in (
+            (patterns.motion, patterns.mirrored_motion, self.scales()),
+            (patterns.sensors, patterns.mirrored_sensors, (0.0, 0.0)),
+        ):
+            expected, found = kind(other, extra), mirror(kind(trial, extra))
+            np.testing.assert_allclose(found.inputs, expected.inputs, atol=1e-9)
+            np.testing.assert_allclose(found.targets, expected.targets, atol=1e-9)
+
+    def test_brightness_and_counts_are_inverse(self):
+        read = np.array([0.0, 1000.0, 4095.0])
+        np.testing.assert_allclose(counts(brightness(read)), read, atol=1e-9)
+        assert brightness(np.array(0.0)) == 1.0
