@@ -158,6 +158,7 @@ def _work(
             store.note(
                 batch=outcome.key,
                 seconds=round(outcome.seconds, 3),
+                computed=round(outcome.computed, 3),
                 attempts=outcome.attempts,
             )
             shown.end(outcome.key, failed=outcome.data is None)

@@ -1,5 +1,6 @@
 """One batch, from its job to its bytes: what every engine runs."""
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -97,6 +98,15 @@ FAILURES: tuple[type[Exception], ...] = (
     ValueError,
 )
 """what a batch may raise without taking the campaign with it"""
+
+
+def timed(
+    content: dict[str, Any], beat: Beat = lambda trials: None
+) -> tuple[bytes | str, float]:
+    """What `attempt` gives, and the time it took [s]."""
+    started = time.perf_counter()
+    given = attempt(content, beat)
+    return given, time.perf_counter() - started
 
 
 def attempt(content: dict[str, Any], beat: Beat = lambda trials: None) -> bytes | str:

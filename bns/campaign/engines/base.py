@@ -19,6 +19,7 @@ class Outcome:
         data: the bytes of its part; None where it failed.
         reason: why it failed.
         seconds: from its start to its end, as the driver saw it.
+        computed: the part of them in which it was computed.
         attempts: times it was started.
     """
 
@@ -27,6 +28,7 @@ class Outcome:
     reason: str = ""
     seconds: float = 0.0
     attempts: int = 1
+    computed: float = 0.0
 
 
 class Engine(Protocol):
@@ -43,8 +45,9 @@ class Engine(Protocol):
         ...
 
 
-def outcome(key: str, given: bytes | str, seconds: float, attempts: int = 1) -> Outcome:
-    """The outcome in what `work.attempt` gave."""
+def outcome(key: str, timed: tuple[bytes | str, float], seconds: float) -> Outcome:
+    """The outcome in what `work.timed` gave."""
+    given, computed = timed
     if isinstance(given, str):
-        return Outcome(key, None, given, seconds, attempts)
-    return Outcome(key, given, "", seconds, attempts)
+        return Outcome(key, None, given, seconds, computed=computed)
+    return Outcome(key, given, "", seconds, computed=computed)

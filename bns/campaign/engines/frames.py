@@ -5,6 +5,8 @@ from typing import IO
 
 JOB, BEAT, DONE, FAILED = b"J", b"B", b"D", b"F"
 _HEAD = struct.Struct(">cQ")
+SECONDS = struct.Struct(">d")
+"""stands before the content of DONE and FAILED: time it took to compute [s]"""
 
 
 def pack(kind: bytes, content: bytes) -> bytes:

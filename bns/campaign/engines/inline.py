@@ -18,5 +18,5 @@ class InlineEngine:
         """See `Engine.run`."""
         for job in jobs:
             started = time.monotonic()
-            given = work.attempt(job.to_mapping(), partial(beat, job.key))
+            given = work.timed(job.to_mapping(), partial(beat, job.key))
             yield outcome(job.key, given, time.monotonic() - started)

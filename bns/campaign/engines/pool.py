@@ -15,6 +15,7 @@ import tempfile
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import IO
 
 from bns.campaign.engines import frames
@@ -102,10 +103,8 @@ class PoolEngine:
             key = worker.job.key
             if kind == frames.BEAT:
                 beat(key, int(content))
-            elif kind == frames.DONE:
-                yield worker.end(Outcome(key, content)), None
             else:
-                yield worker.end(Outcome(key, None, content.decode())), None
+                yield worker.end(_ended(key, kind, content)), None
 
     def _lost(
         self, worker: "Worker", reason: str
@@ -118,6 +117,15 @@ class PoolEngine:
         if attempts >= self.attempts:
             return ended, None
         return None, (job, attempts + 1)
+
+
+def _ended(key: str, kind: bytes, content: bytes) -> Outcome:
+    """The outcome in a worker's last message on a batch."""
+    size = frames.SECONDS.size
+    (computed,) = frames.SECONDS.unpack(content[:size])
+    if kind == frames.DONE:
+        return Outcome(key, content[size:], computed=computed)
+    return Outcome(key, None, content[size:].decode(), computed=computed)
 
 
 class Worker:
@@ -157,7 +165,7 @@ class Worker:
         """It has no batch any more; gives the outcome with time and attempts."""
         seconds = time.monotonic() - self.started
         self.job = None
-        return Outcome(ended.key, ended.data, ended.reason, seconds, self.attempts)
+        return replace(ended, seconds=seconds, attempts=self.attempts)
 
     def last_words(self) -> str:
         """How the process ended."""

@@ -40,7 +40,7 @@ class RayEngine:
         """See `Engine.run`."""
         ray = self._start()
         try:
-            task = ray.remote(num_cpus=1, max_retries=RETRIES)(work.attempt)
+            task = ray.remote(num_cpus=1, max_retries=RETRIES)(work.timed)
             yield from self._all(ray, task, jobs)
         finally:
             ray.shutdown()
@@ -58,7 +58,7 @@ class RayEngine:
             try:
                 given = ray.get(ready[0])
             except ray.exceptions.RayError as error:
-                given = f"worker lost: {work.describe(error)}"
+                given = f"worker lost: {work.describe(error)}", 0.0
             yield outcome(key, given, time.monotonic() - started)
 
     def _start(self) -> Any:

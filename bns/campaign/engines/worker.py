@@ -50,11 +50,12 @@ def _serve(content: dict, out: IO[bytes]) -> None:
             _send(out, frames.BEAT, str(trials).encode())
 
     _send(out, frames.BEAT, b"0")
-    given = work.attempt(content, beat)
+    given, seconds = work.timed(content, beat)
+    took = frames.SECONDS.pack(seconds)
     if isinstance(given, str):
-        _send(out, frames.FAILED, given.encode())
+        _send(out, frames.FAILED, took + given.encode())
     else:
-        _send(out, frames.DONE, given)
+        _send(out, frames.DONE, took + given)
 
 
 def _send(out: IO[bytes], kind: bytes, content: bytes) -> None:
