@@ -37,6 +37,7 @@ def train(
     progress: bool = False,
     on_trial: OnTrial | None = None,
     stop: Callable[[], bool] | None = None,
+    background: bool = False,
 ) -> RunRecord:
     """Train all replicates of a configuration.
 
@@ -50,6 +51,8 @@ def train(
         on_trial: called after every trial with its number, what was learned, and
             the trial of every replicate.
         stop: asked before every trial; True ends the run there.
+        background: evolution goes on while a trial runs, for a world in real time;
+            generations are then what time allowed, and recorded.
 
     Returns:
         The record: all trials, or those done when `stop` said so.
@@ -67,7 +70,7 @@ def train(
             store.clean()
             return store.record()
         settled, mode = resolve(config, store.mode if store else "")
-        batch = _batch(settled, store, world)
+        batch = _batch(settled, store, world, background=background)
         shown = Progress(config, enabled=progress)
         steps = _loop(config, batch, store, shown, on_trial, stop or _never)
         if store is None:
@@ -223,14 +226,20 @@ def _never() -> bool:
     return False
 
 
-def _batch(config: RunConfig, store: RunStore | None, world: World | None) -> Batch:
+def _batch(
+    config: RunConfig, store: RunStore | None, world: World | None, *, background: bool
+) -> Batch:
     """Learner and world; a new directory is made once both are known to be possible."""
+    from bns.background import behind
+
+    learner = behind(config) if background else None
     if store is None:
-        return Batch([config], [world or make_world(config)])
+        return Batch([config], [world or make_world(config)], learner=learner)
     keeps_nets = world is None and config.world.name == "static-snn"
     if keeps_nets and not store.exists:
         store.create()
-    batch = Batch([config], [world or make_world(config, store.directory)])
+    made = world or make_world(config, store.directory)
+    batch = Batch([config], [made], learner=learner)
     if not store.exists:
         store.create()
     return batch

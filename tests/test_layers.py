@@ -22,6 +22,7 @@ MAY_IMPORT = {
 }
 PROTOCOL = {
     "bns.worlds",
+    "bns.worlds.alarm",
     "bns.worlds.trial",
     "bns.worlds.world",
     "bns.worlds.damage",

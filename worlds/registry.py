@@ -24,6 +24,7 @@ from bns.worlds.world import World
 
 GROUP = "bns.worlds"
 _BUILT_IN = {
+    "hardware": "bns.hardware.world:HardwareWorld",
     "hexapod": "bns.worlds.hexapod_world:HexapodWorld",
     "mujoco": "bns.worlds.mujoco_world:MujocoWorld",
     "light": "bns.worlds.light_world:LightWorld",

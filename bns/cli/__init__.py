@@ -18,6 +18,7 @@ VERBS = {
     "robots": ("lists", "list the robot models"),
     "effects": ("lists", "list the effects with parameters, units and ranges"),
     "gap": ("gap", "diagnose the gap between recordings and a model (experimental)"),
+    "hardware": ("hardware", "real robots: rehearse, check, calibrate, record"),
     "doctor": ("doctor", "check this machine and say what to install"),
 }
 """verb -> module of this package, and what it does in one line"""

@@ -39,6 +39,12 @@ class Arguments:
     """save: write recording.rrd; live: stream to a viewer as well; off: neither"""
     report: bool = True
     """write report.html at the end"""
+    port: str = ""
+    """device of a real or emulated robot, for --world hardware"""
+    camera: str = "emulated"
+    """number of the camera above it, or emulated; for --world hardware"""
+    calibration: str = ""
+    """of that camera, see `bns hardware calibrate`"""
     config: Annotated[RunConfig, tyro.conf.arg(name="")] = field(
         default_factory=RunConfig
     )
@@ -103,6 +109,10 @@ def source(text: str) -> tuple[RunConfig, str]:
 
 def execute(given: Arguments) -> int:
     """Train, draw, and say what happened."""
+    if given.config.world.name == "hardware":
+        from bns.cli import hardware_run
+
+        return hardware_run.execute(given)
     from bns.cli import outputs
     from bns.run import train
 

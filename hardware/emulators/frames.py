@@ -5,13 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from bns.hardware.tracking import marker as tags
-from bns.hardware.tracking.camera import Camera
+from bns.hardware.tracking.camera import Camera, plane_points
 from bns.hardware.tracking.marker import CELLS, Floor, Marker
 from bns.hardware.tracking.opencv import cv2
 
 BOARD, BODY = 205, 70  # grey values (assumed)
 PLATE = 8 / 6  # side of the white plate in sides of the tag: a cell of white around
 FINE = 4  # subpixels a side
+CELL = 20  # px of a cell of the texture
+RADIUS = 0.064  # m; of the robot's body
 SPARE = 64  # px by which the stored noise is larger than a picture
 
 
@@ -41,12 +43,15 @@ class Painter:
         rng = rng or np.random.default_rng(0)
         width, height = camera.size
         self._empty = np.full((height, width), BOARD, np.uint8)
-        self._tag = tags.picture(marker.number, border=(PLATE - 1) / 2 * CELLS)
+        self._tag = tags.picture(
+            marker.number, cell=CELL, border=(PLATE - 1) / 2 * CELLS
+        )
         floor = floor or Floor()
         half = floor.side / 2 * (CELLS + 2) / CELLS  # with a border of a cell
         for number, (x, y, yaw) in floor.places.items():
-            tag = tags.picture(number)
-            self._draw(self._empty, (x, y), yaw, half, 0.0, tag, 0)
+            square = Marker(number, 2 * half, 0.0, x, y, yaw).corners()
+            tag = tags.picture(number, cell=CELL)
+            self._lay(self._empty, np.column_stack([square, np.zeros(4)]), tag)
         self._grains = _grains(rng, noise, (height, width)) if noise else None
         self._rng = rng
 
@@ -54,14 +59,15 @@ class Painter:
         """The picture of a robot at a pose (None: taken away), ``(H, W)`` uint8."""
         image = self._empty.copy()
         if pose is not None:
-            x, y, yaw = pose
-            self._draw(image, (x, y), yaw, 0.064, self.marker.height, None, BODY)
-            cos, sin = np.cos(yaw), np.sin(yaw)
-            own = (self.marker.x, self.marker.y)
-            place = (x + cos * own[0] - sin * own[1], y + sin * own[0] + cos * own[1])
-            half = self.marker.side / 2 * PLATE
-            turned = yaw + self.marker.yaw
-            self._draw(image, place, turned, half, self.marker.height, self._tag, 0)
+            marker = self.marker
+            around = np.linspace(0, 2 * np.pi, 32, endpoint=False)
+            ring = RADIUS * np.column_stack([np.cos(around), np.sin(around)])
+            rim = self.camera.project(plane_points(pose, ring, marker.height))
+            whole = np.rint(rim * 16).astype(np.int32)
+            cv2().fillPoly(image, [whole], BODY, lineType=cv2().LINE_AA, shift=4)
+            middle = marker.corners().mean(0)
+            plate = middle + PLATE * (marker.corners() - middle)
+            self._lay(image, plane_points(pose, plate, marker.height), self._tag)
         return self._grainy(image)
 
     def _grainy(self, image: np.ndarray) -> np.ndarray:
@@ -74,72 +80,39 @@ class Painter:
         )
         return cv2().subtract(cv2().add(image, more), less)
 
-    def _draw(
-        self,
-        image: np.ndarray,
-        centre: Sequence[float],
-        yaw: float,
-        half: float,
-        height: float,
-        texture: np.ndarray | None,
-        grey: int,
-    ) -> None:
-        """A square with a texture, or a disc of a grey value, on a plane."""
-        left, top, right, bottom = self._window(centre, half * 1.5, height)
-        if left >= right or top >= bottom:
+    def _lay(self, image: np.ndarray, corners: np.ndarray, texture: np.ndarray) -> None:
+        """Draw a square with a texture.
+
+        Args:
+            image: changed.
+            corners: of the square in the world, ``(4, 3)`` [m], in OpenCV's order.
+            texture: what is on it.
+        """
+        module, pixels = cv2(), self.camera.project(corners)
+        low = np.maximum(np.floor(pixels.min(0)).astype(int) - 4, 0)
+        high = np.minimum(np.ceil(pixels.max(0)).astype(int) + 5, self.camera.size)
+        width, tall = (int(v) for v in high - low)
+        if min(width, tall) <= 0:
             return
-        u = left + (np.arange((right - left) * FINE) + 0.5) / FINE - 0.5
-        v = top + (np.arange((bottom - top) * FINE) + 0.5) / FINE - 0.5
-        grid = np.stack(np.meshgrid(u, v), axis=-1)
-        places = self.camera.on_plane(grid.reshape(-1, 2), height) - centre
-        cos, sin = np.cos(yaw), np.sin(yaw)
-        own = places @ np.array([[cos, -sin], [sin, cos]])  # x forward, y left
-        part = image[top:bottom, left:right].astype(np.float32)
-        if texture is None:
-            drawn = np.full(len(own), float(grey), np.float32)
-            inside = np.hypot(*own.T) <= half
-        else:
-            size = texture.shape[0]
-            column = ((-own[:, 1] / half + 1) / 2 * size - 0.5).astype(np.float32)
-            row = ((-own[:, 0] / half + 1) / 2 * size - 0.5).astype(np.float32)
-            shape = grid.shape[:2]
-            module = cv2()
-            drawn = module.remap(
-                texture, column.reshape(shape), row.reshape(shape),
-                module.INTER_LINEAR, borderMode=module.BORDER_REPLICATE,
-            ).ravel().astype(np.float32)  # fmt: skip
-            inside = np.abs(own).max(1) <= half
-        self._blend(part, drawn, inside, grid.shape[:2])
-        image[top:bottom, left:right] = np.rint(part).astype(np.uint8)
+        end = len(texture) - 0.5
+        own = np.float32([[-0.5, -0.5], [end, -0.5], [end, end], [-0.5, end]])
+        fine = ((pixels - low + 0.5) * FINE - 0.5).astype(np.float32)
+        turn = module.getPerspectiveTransform(own, fine)
 
-    def _blend(self, part, drawn, inside, shape) -> None:
-        """Average the subpixels into the picture, blurred as by a lens."""
+        def seen(what: np.ndarray) -> np.ndarray:
+            size = (width * FINE, tall * FINE)
+            warped = module.warpPerspective(what.astype(np.float32), turn, size)
+            small = module.resize(
+                warped, (width, tall), interpolation=module.INTER_AREA
+            )
+            if not self.blur:
+                return small
+            return module.GaussianBlur(small, (0, 0), self.blur)
 
-        def mean(values: np.ndarray) -> np.ndarray:
-            fine = values.reshape(shape)
-            blocks = fine.reshape(shape[0] // FINE, FINE, shape[1] // FINE, FINE)
-            return blocks.mean((1, 3))
-
-        share = mean(inside.astype(np.float32))
-        ink = mean(np.where(inside, drawn, 0).astype(np.float32))
-        if self.blur:
-            module = cv2()
-            share = module.GaussianBlur(share, (0, 0), self.blur)
-            ink = module.GaussianBlur(ink, (0, 0), self.blur)
-        part *= 1 - share
-        part += ink
-
-    def _window(
-        self, centre: Sequence[float], half: float, height: float
-    ) -> tuple[int, int, int, int]:
-        around = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half + centre
-        pixels = self.camera.project(np.column_stack([around, np.full(4, height)]))
-        low = np.floor(pixels.min(0)).astype(int) - 3
-        high = np.ceil(pixels.max(0)).astype(int) + 3
-        width, tall = self.camera.size
-        left, right = np.clip([low[0], high[0]], 0, width)
-        top, bottom = np.clip([low[1], high[1]], 0, tall)
-        return int(left), int(top), int(right), int(bottom)
+        part = image[low[1] : high[1], low[0] : high[0]]
+        share = seen(np.ones_like(texture))
+        mixed = part * (1 - share) + seen(texture)
+        part[:] = np.rint(mixed).clip(0, 255).astype(np.uint8)
 
 
 def _grains(

@@ -13,7 +13,7 @@ from bns.models.khepera3.units import Firmware, firmware
 
 LARGEST = 43_000  # speed units, firmware < 3, regulated (manual 2.2, p. 14)
 NEWEST = 9  # firmware versions beyond it are not known and refused
-TIMEOUT = 0.12  # s for an answer: 7 ms of wire, two Bluetooth latencies; assumed
+TIMEOUT = 0.15  # s for an answer: 7 ms of wire, two Bluetooth latencies; assumed
 RETRIES = 6
 QUIET = 0.02  # s without a byte after which the line counts as silent
 
@@ -69,6 +69,16 @@ class Khepera3:
         self.units: Firmware | None = None
         self.version: tuple[int, int] = (0, 0)
         self.round_trips: list[float] = []
+        self._moving = False
+
+    @property
+    def patience(self) -> float:
+        """Time to wait for an answer [s]: three of the slowest of late, if that is less
+        than the timeout; a stop must not wait long behind a lost byte.
+        """
+        if len(self.round_trips) < 10:
+            return self.timeout
+        return min(max(3 * max(self.round_trips[-20:]), 0.05), self.timeout)
 
     def identify(self) -> tuple[int, int]:
         """Ask for the firmware and take its units.
@@ -133,6 +143,7 @@ class Khepera3:
         moving = bool(left or right)
         if moving and self.guard is None:
             raise BnsError("Nobody guards the robot: it moves with a watchdog only.")
+        self._moving = moving
         if self.guard is not None:
             self.guard.feed(moving=moving)
         pair = (round(self.units.units(left)), round(self.units.units(right)))
@@ -155,6 +166,7 @@ class Khepera3:
             self.ask(protocol.STOP, "d")
             if self._standing():
                 break
+        self._moving = False
         if self.guard is not None:
             self.guard.feed(moving=False)
 
@@ -215,6 +227,8 @@ class Khepera3:
                 self.round_trips.append(self.clock.now() - begin)
                 del self.round_trips[:-1000]
                 return answer
+            if self.guard is not None:
+                self.guard.feed(moving=self._moving)
             self.resynchronise()
         raise LinkError(
             f"No proper answer to {what!r} in {RETRIES + 1} tries: check the link; a "
@@ -225,7 +239,7 @@ class Khepera3:
         """One try: lines are read until one is the answer or time is up."""
         self.line.discard()
         self.line.write(command)
-        until, buffer = self.clock.now() + self.timeout, b""
+        until, buffer = self.clock.now() + self.patience, b""
         while (left := until - self.clock.now()) > 0:
             data = self.line.read(left)
             if heard is not None:

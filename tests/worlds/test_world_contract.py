@@ -9,7 +9,8 @@ from bns.worlds.trial import Channel, Commands, Trial
 from bns.worlds.world import World
 from tests.worlds import kinds
 
-NAMES = registry.names()
+REAL = {"hardware"}  # one robot, in real time: tests/hardware
+NAMES = [name for name in registry.names() if name not in REAL]
 NOISE = "tracker_noise:position_sd=0.01"
 
 

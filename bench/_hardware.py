@@ -1,0 +1,46 @@
+"""What the benches of the hardware mode share."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+
+@contextlib.contextmanager
+def folder() -> Iterator[Path]:
+    """A directory for a port, gone afterwards."""
+    with tempfile.TemporaryDirectory(prefix="bns-") as path:
+        yield Path(path)
+
+
+@contextlib.contextmanager
+def emulator(port: Path, *words: str, robot: str = "khepera3") -> Iterator[object]:
+    """`bns hardware emulate` on a port; ends it afterwards."""
+    command = [sys.executable, "-m", "bns", "hardware", "emulate", robot]
+    command += ["--port", str(port), *words]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    until = time.monotonic() + 60
+    while not port.exists() and time.monotonic() < until:
+        time.sleep(0.02)
+    try:
+        yield process
+    finally:
+        process.send_signal(signal.SIGTERM)
+        try:
+            process.wait(5)
+        except subprocess.TimeoutExpired:
+            process.kill()
+
+
+def alive(pid: int) -> bool:
+    """Whether a process is there."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True

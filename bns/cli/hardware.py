@@ -1,0 +1,162 @@
+"""`bns hardware`: rehearse with an emulated robot, check, calibrate, record."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import tyro
+
+from bns.cli.parse import parse
+from bns.errors import BnsError, UnknownNameError
+
+VERBS = ("emulate", "check", "calibrate", "record")
+MANUAL = """usage: bns hardware {emulate,check,calibrate,record} [...]
+
+  emulate    a virtual robot on a serial port, with a camera above it
+  check      battery, firmware, sensors, link, camera, tag: nothing moves without --move
+  calibrate  the camera: its lens, its place, the height of the robot's tag
+  record     drive safe commands and write a dataset for `bns gap`
+
+`bns run PRESET --world hardware --port DEVICE --camera N` learns on the robot.
+`bns hardware VERB --help` is the manual of a verb."""
+
+Robot = Literal["khepera3", "phantomx"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Emulate:
+    """A virtual robot on a serial port, until Ctrl-C. Signals: USR1 pulls and plugs its
+    cable, USR2 covers and uncovers the camera.
+    """
+
+    robot: tyro.conf.Positional[Robot] = "khepera3"
+    """which one"""
+    port: str = "bns-robot"
+    """path of a link to the port; give it as --port elsewhere"""
+    effects: tuple[str, ...] = ()
+    """what is wrong with its body, see `bns effects`"""
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """where it stands: x, y [m], yaw [deg]"""
+    firmware: int = 2
+    """version that it answers"""
+    latency: float = 0.01
+    """of the link, one way [s]"""
+    battery: float = 7.9
+    """voltage [V]"""
+    lost: float = 0.0
+    """probability that a byte is lost"""
+    corrupted: float = 0.0
+    """probability that a packet is corrupted"""
+    rate: float = 15.0
+    """pictures of the camera a second"""
+    seed: int = 0
+    """of what is random"""
+    log: str = ""
+    """file for a line whenever set point or motion change"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Connection:
+    """How to reach the robot and the camera."""
+
+    port: str = ""
+    """the robot's device, e.g. /dev/rfcomm0"""
+    robot: Robot = "khepera3"
+    """which one it is"""
+    camera: str = "emulated"
+    """number of a camera, a video file, or emulated"""
+    calibration: str = ""
+    """file that `bns hardware calibrate` wrote; needed for a real camera"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check(Connection):
+    """Check robot, link, camera and tag. Nothing moves without --move."""
+
+    move: bool = False
+    """turn and drive a little, to see wheels, directions and tracking agree"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Calibrate(Connection):
+    """Find the camera's place from the floor tags and check the height of the robot's
+    tag; with --views the lens first. Nothing moves.
+    """
+
+    views: tuple[str, ...] = ()
+    """pictures of the ChArUco board (8 x 6 squares of 40 mm), for the lens"""
+    out: str = "camera.json"
+    """file to write"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record(Connection):
+    """Drive safe excitation commands, each list twice, and write a dataset."""
+
+    out: str = "recording"
+    """directory to write"""
+    trials: int = 8
+    """trials; every second one repeats the one before"""
+    commands: int = 10
+    """commands of a trial"""
+    damage: tuple[str, ...] = ()
+    """software damage, see `bns effects`"""
+    seed: int = 0
+    """of the commands"""
+    move: bool = False
+    """say that the robot may move"""
+
+
+def main(verb: str, argv: list[str]) -> int:
+    """Run a verb of the hardware mode; gives the exit code."""
+    del verb
+    if not argv or argv[0] in ("-h", "--help"):
+        print(MANUAL)
+        raise SystemExit(0)
+    if argv[0] not in VERBS:
+        raise UnknownNameError("verb of `bns hardware`", argv[0], VERBS)
+    prog = f"bns hardware {argv[0]}"
+    if argv[0] == "emulate":
+        return _emulate(parse(Emulate, argv[1:], prog=prog))
+    from bns.cli import hardware_session as session
+
+    if argv[0] == "check":
+        return session.check(parse(Check, argv[1:], prog=prog))
+    if argv[0] == "calibrate":
+        return session.calibrate(parse(Calibrate, argv[1:], prog=prog))
+    return session.record(parse(Record, argv[1:], prog=prog))
+
+
+def _emulate(given: Emulate) -> int:
+    for name in ("lost", "corrupted"):
+        if not 0 <= getattr(given, name) <= 0.5:
+            raise BnsError(f"--{name} = {getattr(given, name)}: give 0 to 0.5.")
+    print(f"{given.robot} on {given.port}; Ctrl-C ends it.", flush=True)
+    if given.robot == "phantomx":
+        from bns.hardware.emulators.run_bus import phantomx
+
+        phantomx(
+            given.port,
+            lost=given.lost,
+            corrupted=given.corrupted,
+            seed=given.seed,
+            battery=given.battery if given.battery > 9 else 11.1,
+        )
+        return 0
+    from bns.hardware.emulators.run import khepera3
+
+    x, y, yaw = given.start
+    khepera3(
+        given.port,
+        effects=given.effects,
+        start=(x, y, math.radians(yaw)),
+        version=(given.firmware, 0),
+        latency=given.latency,
+        battery=given.battery,
+        lost=given.lost,
+        corrupted=given.corrupted,
+        rate=given.rate,
+        seed=given.seed,
+        log=given.log,
+    )
+    return 0

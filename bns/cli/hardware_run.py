@@ -1,0 +1,57 @@
+"""`bns run PRESET --world hardware`: learning on a robot, in real time."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from bns.errors import BnsError
+
+STOPPED = 130
+"""exit code of a run that was stopped; it can be resumed"""
+
+
+def execute(given: Any) -> int:
+    """Train on the robot, draw, and say what happened.
+
+    Args:
+        given: what `bns run` was told; one replicate is run, whatever the preset says.
+    """
+    from bns.cli import outputs
+    from bns.hardware.errors import LinkError, SafetyStop
+    from bns.hardware.world import HardwareWorld
+    from bns.run import train
+    from bns.tasks import NavigationTask
+
+    config = replace(given.config, replicates=1, record_replicates=1, threads=1)
+    out = Path(given.out)
+    world = HardwareWorld(
+        config.world.robot,
+        damage=config.world.damage,
+        reality=config.world.reality,
+        sample_dt=config.world.sample_dt,
+        start=NavigationTask.of(config.task).start,
+        port=given.port,
+        camera=given.camera,
+        calibration=given.calibration,
+    )
+    world.connected()  # before anything is written
+    try:
+        with outputs.live(given.rerun, config) as on_trial:
+            record = train(
+                config,
+                out,
+                world=world,
+                resume=given.resume,
+                progress=True,
+                on_trial=on_trial,
+                background=True,
+            )
+    except (SafetyStop, LinkError) as error:
+        if not (out / "run.json").exists():
+            raise
+        again = f"bns run {out} --resume --port {given.port}"
+        raise BnsError(f"{error} Go on with: {again}") from error
+    finally:
+        world.close()
+    outputs.write(record, out, recording=given.rerun != "off", report=given.report)
+    return 0

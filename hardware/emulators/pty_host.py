@@ -1,0 +1,122 @@
+"""An emulated device on a pseudo terminal, in real time."""
+
+import contextlib
+import heapq
+import os
+import pty
+import select
+import termios
+import time
+import tty
+from collections.abc import Callable
+from pathlib import Path
+
+from bns.errors import BnsError
+from bns.hardware.emulators.device import Device
+
+IDLE = 0.004  # s; the loop wakes at least that often
+
+RATES = {getattr(termios, name): int(name[1:]) for name in dir(termios)
+         if name[0] == "B" and name[1:].isdigit()}  # fmt: skip
+
+
+class PtyHost:
+    """Serves a device on a pseudo terminal.
+
+    Args:
+        device: what is behind it.
+        link: path of a symbolic link to the terminal's device; it stays the same
+            when the robot is unplugged and plugged in again.
+        baud: of the device; a host at another rate sees garbage. 0 = any.
+
+    Attributes:
+        late: longest time by which the loop woke too late [s].
+    """
+
+    def __init__(self, device: Device, link: Path | str, *, baud: int = 0):
+        self.device, self.link, self.baud = device, Path(link), baud
+        self.late = 0.0
+        self._master = self._slave = -1
+        self._due: list[tuple[float, int, bytes]] = []
+        self._count = 0
+        self.plug()
+
+    def plug(self) -> None:
+        """Open the terminal and point the link to it.
+
+        Raises:
+            BnsError: the link's path is taken by something else.
+        """
+        if self._master >= 0:
+            return
+        self._master, self._slave = pty.openpty()
+        tty.setraw(self._slave)  # and kept open: else reads fail until a host comes
+        os.set_blocking(self._master, False)
+        beside = self.link.with_name(self.link.name + ".part")
+        try:
+            if self.link.exists() and not self.link.is_symlink():
+                raise BnsError(f"{self.link} exists and is no link; take another path.")
+            beside.unlink(missing_ok=True)
+            beside.symlink_to(os.ttyname(self._slave))
+            beside.replace(self.link)
+        except OSError as error:
+            raise BnsError(f"{self.link} cannot be made: {error.strerror}.") from error
+
+    def unplug(self) -> None:
+        """Close the terminal, as when the cable is pulled."""
+        for number in (self._master, self._slave):
+            with contextlib.suppress(OSError):
+                os.close(number)
+        self._master = self._slave = -1
+        self._due.clear()
+        with contextlib.suppress(OSError):
+            self.link.unlink()
+
+    def serve(self, stop: Callable[[], bool], *extra: Callable[[float], None]) -> None:
+        """Run in real time until `stop` says so.
+
+        Args:
+            stop: asked in every round.
+            extra: further things to do in every round, given the time [s].
+        """
+        while not stop():
+            now = time.monotonic()
+            wait = IDLE
+            if self._due:
+                wait = min(max(self._due[0][0] - now, 0.0), IDLE)
+            if self._master >= 0:
+                ready, _, _ = select.select([self._master], [], [], wait)
+            else:
+                ready = []
+                time.sleep(wait)
+            woke = time.monotonic()
+            self.late = max(self.late, woke - now - wait)
+            self.device.advance(woke)
+            if ready:
+                self._take(woke)
+            self._send()
+            for each in extra:
+                each(woke)
+
+    def _take(self, now: float) -> None:
+        try:
+            data = os.read(self._master, 4096)
+        except OSError:
+            return
+        if self._deaf():
+            data = bytes((c * 7 + 0x83) & 0xFF | 0x80 for c in data)  # another rate
+        for reply in self.device.receive(data, now):
+            self._count += 1
+            heapq.heappush(self._due, (reply.at, self._count, reply.data))
+
+    def _deaf(self) -> bool:
+        if not self.baud:
+            return False
+        rate = RATES.get(termios.tcgetattr(self._slave)[4], 0)
+        return rate not in (0, 38400, self.baud)  # 38400: nobody has set it yet
+
+    def _send(self) -> None:
+        while self._due and self._due[0][0] <= time.monotonic():
+            data = heapq.heappop(self._due)[2]
+            with contextlib.suppress(OSError):  # nobody reads: the wire does not wait
+                os.write(self._master, data)

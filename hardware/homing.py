@@ -1,0 +1,121 @@
+"""Taking the robot back to where a trial starts, by sight."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bns.errors import BnsError
+from bns.hardware.motion import TICK, Mover
+from bns.hardware.tracking.tracker import Sighting
+
+CLOSE = 0.008  # m from the start that will do
+TURNED = np.deg2rad(1.0)  # off the start's heading that will do
+SLOW = 0.025  # m/s; below it the robot's speed control does not regulate well
+TIME = 60.0  # s to get there
+PULSE = 0.12  # s of lag of the wheels: what a short turn loses at each end
+AXLE = 0.0874  # m, nominal
+
+
+def go(mover: Mover, target: Sequence[float], *, speed: float = 0.10) -> Sighting:
+    """Drive to a pose and stop there.
+
+    Closed loop: turn to the place, drive to it, then short turns with a look between
+    them until the heading is right. Works with a weak wheel.
+
+    Args:
+        mover: of the robot.
+        target: (x, y, yaw) in the world frame [m, m, rad].
+        speed: largest [m/s].
+
+    Returns:
+        where it stands.
+
+    Raises:
+        SafetyStop: it was stopped.
+        BnsError: it does not get there.
+    """
+    begin = mover.clock.now()
+    try:
+        seen = mover.wait_for_sight()
+        while not _there(seen, target):
+            if mover.clock.now() - begin > TIME:
+                raise BnsError(
+                    "The robot does not get back to the start: see that nothing is in "
+                    "its way, or put it there by hand."
+                )
+            if _away(seen, target) > CLOSE:
+                _approach(mover, target, speed, begin)
+            mover.halt()
+            seen = _settled(mover)
+            off = _wrapped(target[2] - seen.pose[2])
+            if abs(off) > TURNED:
+                _turn(mover, off)
+                seen = _settled(mover)
+    finally:
+        mover.halt()
+    return seen
+
+
+def _approach(mover: Mover, target: Sequence[float], speed: float, begin: float):
+    """Steer to the place until it is near, or was passed by."""
+    best, back = np.inf, None
+    while mover.clock.now() - begin < TIME:
+        mover.look()
+        seen = mover.last
+        if seen is None:
+            return
+        gap = np.asarray(target[:2]) - seen.pose[:2]
+        away = float(np.hypot(*gap))
+        best = min(best, away)
+        if away < 0.7 * CLOSE or (away > best + 0.01 and best < 0.03):
+            return
+        off = _wrapped(np.arctan2(gap[1], gap[0]) - seen.pose[2])
+        if back is None:  # near: rather backwards than turn round
+            back = abs(off) > np.pi / 2 and away < 0.15
+        if back:
+            off = _wrapped(off + np.pi)
+        ahead = float(np.clip(1.2 * away, SLOW, speed)) * max(np.cos(off), 0.0) ** 3
+        turn = float(np.clip(1.8 * off, -1.6, 1.6)) * AXLE / 2
+        ahead = -ahead if back else ahead
+        pair = np.array([ahead - turn, ahead + turn])
+        pair *= min(1.0, speed / max(np.abs(pair).max(), 1e-9))
+        mover.drive(float(pair[0]), float(pair[1]), times=1)
+        mover.clock.sleep(TICK)
+
+
+def _turn(mover: Mover, off: float) -> None:
+    """A turn on the spot by about `off` [rad], then stop."""
+    rate = 2 * SLOW / AXLE if abs(off) < 0.5 else 2 * 0.06 / AXLE
+    wheel = rate * AXLE / 2 * np.sign(off)
+    until = mover.clock.now() + abs(off) / rate
+    mover.drive(-float(wheel), float(wheel), times=1)
+    while (left := until - mover.clock.now()) > 0.002:
+        mover.look()
+        mover.clock.sleep(min(TICK, left))
+    mover.halt()
+
+
+def _settled(mover: Mover) -> Sighting:
+    """Where it stands: the mean of a few sightings at rest."""
+    mover.clock.sleep(0.15)
+    begin, seen = mover.clock.now(), []
+    first = mover.wait_for_sight()
+    seen.append(first)
+    while len(seen) < 3 and mover.clock.now() - begin < 1.0:
+        seen += [s for s in mover.look() if s.time >= begin]
+        mover.clock.sleep(TICK)
+    pose = np.mean([s.pose for s in seen], axis=0)
+    return seen[-1]._replace(pose=pose)
+
+
+def _there(seen: Sighting, target: Sequence[float]) -> bool:
+    turned = abs(_wrapped(target[2] - seen.pose[2]))
+    return _away(seen, target) <= CLOSE and turned <= TURNED
+
+
+def _away(seen: Sighting, target: Sequence[float]) -> float:
+    return float(np.hypot(target[0] - seen.pose[0], target[1] - seen.pose[1]))
+
+
+def _wrapped(angle: float) -> float:
+    return float((angle + np.pi) % (2 * np.pi) - np.pi)

@@ -1,0 +1,260 @@
+"""Carrying out commands on a robot, with an eye on all that can go wrong."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from bns.errors import BnsError
+from bns.hardware.clock import Clock
+from bns.hardware.errors import LinkError, SafetyStop, Void
+from bns.hardware.faults import FaultLog
+from bns.hardware.khepera.driver import Drive, Khepera3
+from bns.hardware.limits import Limits, Operator
+from bns.hardware.tracking.eyes import Eyes
+from bns.hardware.tracking.tracker import Sighting
+
+TICK = 0.03  # s between two looks at everything
+CHECK = 0.12  # s between two looks at the wheels' speeds
+MEMORY = 0.7  # s for which an old set point may still show in the wheels' speeds
+SLACK, SHARE = 2500, 0.12  # speed units, share: what wheels may be off a set point
+WRONG = 0.3  # s of wrong set points (a digit lost on the line) that void a trial
+LATE = 0.25  # s by which a command may be late before the trial is void
+AFTER = 0.25  # s of looking on after the last command
+
+
+class Point(NamedTuple):
+    """A set point of a schedule.
+
+    Attributes:
+        at: when, since the start [s].
+        left, right: speeds over the floor [m/s].
+        command: index of the command that begins here, -1 within one.
+    """
+
+    at: float
+    left: float
+    right: float
+    command: int
+
+
+@dataclass
+class Performed:
+    """What was carried out.
+
+    Attributes:
+        switched: when each command began, the end of the last one added [s].
+        sightings: from before the start until after the end.
+        late: by how much the latest set point was late [s].
+        left: whether the robot came to the rim, which ended it.
+        notes: what else there is to say.
+    """
+
+    switched: list[float] = field(default_factory=list)
+    sightings: list[Sighting] = field(default_factory=list)
+    late: float = 0.0
+    left: bool = False
+    notes: list[str] = field(default_factory=list)
+
+
+class Mover:
+    """Drives a robot under the limits.
+
+    Args:
+        robot: identified, guarded.
+        eyes: that see it.
+        clock: of the session.
+        limits: hold in every tick.
+        operator: may stop it at any time.
+        faults: where faults are noted.
+
+    Attributes:
+        last: newest sighting.
+    """
+
+    def __init__(
+        self,
+        robot: Khepera3,
+        eyes: Eyes,
+        clock: Clock,
+        *,
+        limits: Limits,
+        operator: Operator,
+        faults: FaultLog,
+    ):
+        self.robot, self.eyes, self.clock = robot, eyes, clock
+        self.limits, self.operator, self.faults = limits, operator, faults
+        self.last: Sighting | None = None
+        self._points: list[Drive] = []
+        self._moving = False
+
+    def look(self) -> list[Sighting]:
+        """New sightings; with the safety checks of a tick.
+
+        Raises:
+            SafetyStop: the operator, the camera or the tracker.
+        """
+        self.operator.check()
+        try:
+            seen = self.eyes.poll()
+        except BnsError as error:
+            raise SafetyStop(f"the camera is lost ({error})", "check it") from error
+        if seen:
+            self.last = seen[-1]
+        now = self.clock.now()
+        if self._moving and (
+            self.last is None
+            or now - self.last.time
+            > self.limits.blind + self.eyes.tracker.camera.latency
+        ):
+            raise SafetyStop("the tracker has lost it", "free the view of its tag")
+        if self._moving and self.robot.guard is not None:
+            self.robot.guard.feed(moving=True)
+        return seen
+
+    def wait_for_sight(self, seconds: float = 3.0) -> Sighting:
+        """A fresh sighting of the standing robot.
+
+        Raises:
+            BnsError: the tag is not in view.
+        """
+        begin = self.clock.now()
+        while self.clock.now() - begin < seconds:
+            for sighting in self.look():
+                if sighting.time >= begin:
+                    return sighting
+            self.clock.sleep(TICK)
+        raise BnsError(
+            "The robot's tag is not in view: put the robot on the board, free the "
+            "camera's view, light it evenly."
+        )
+
+    def drive(self, left: float, right: float, *, times: int = 2) -> Drive:
+        """Set the speeds [m/s] and remember them."""
+        self._moving = self._moving or bool(left or right)
+        drive = self.robot.drive(left, right, times=times)
+        self._points = [p for p in self._points if drive.at - p.at < MEMORY][-20:]
+        self._points.append(drive)
+        return drive
+
+    def halt(self) -> None:
+        """Stop the robot, whatever happened; a dead line is left to the watchdog."""
+        try:
+            self.robot.stop()
+        except LinkError:
+            self.faults.note("the stop was not confirmed", "D,l0,l0")
+            raise
+        finally:
+            self._moving = False
+            self._points.clear()
+
+    def perform(self, schedule: Sequence[Point], total: float) -> Performed:
+        """Carry out a schedule and stop.
+
+        Args:
+            schedule: set points in order of time, the first at 0.
+            total: when the last one ends [s].
+
+        Raises:
+            SafetyStop: it was stopped.
+            Void: it was not carried out as told.
+            LinkError: the line died.
+        """
+        stand = self.wait_for_sight()
+        done = Performed(sightings=[stand])
+        self._wheels = _Wheels(self)
+        try:
+            begin = None
+            for point in schedule:
+                if begin is not None and not self._until(begin + point.at, done):
+                    break
+                drive = self.drive(point.left, point.right)
+                self._wheels.switched(drive)
+                if begin is None:  # it still stands where it stood
+                    begin = drive.at
+                    done.sightings.append(stand._replace(time=begin))
+                done.late = max(done.late, drive.at - begin - point.at)
+                if point.command >= 0:
+                    done.switched.append(drive.at)
+            else:
+                self._until(begin + total, done)
+            done.switched.append(self.drive(0.0, 0.0).at)
+        finally:
+            self.halt()
+        self._look_on(done)
+        self._judge(done)
+        return done
+
+    def _until(self, moment: float, done: Performed) -> bool:
+        """Tick until a moment; whether the robot is still inside the rim."""
+        while (left := moment - self.clock.now()) > 0.004:
+            for sighting in self.look():
+                done.sightings.append(sighting)
+                if self.limits.outside(sighting, self.limits.rim):
+                    done.left = True
+                    return False
+            self._wheels.look(left)
+            left = moment - self.clock.now()
+            self.clock.sleep(min(TICK, max(left, 0.0)))
+        return True
+
+    def _look_on(self, done: Performed) -> None:
+        until = self.clock.now() + AFTER
+        while self.clock.now() < until:
+            done.sightings += self.look()
+            self.clock.sleep(TICK)
+
+    def _judge(self, done: Performed) -> None:
+        if done.late > LATE:
+            raise Void(f"a command was {done.late:.2f} s late")
+        if self._wheels.wrong > WRONG:
+            raise Void(f"wrong set points for {self._wheels.wrong:.2f} s")
+        if self._wheels.stubborn:
+            done.notes.append("a wheel does not follow its set point")
+
+
+class _Wheels:
+    """Whether the wheels do as they were told; a wrong set point is sent again."""
+
+    def __init__(self, mover: Mover):
+        self.mover, self.wrong, self.stubborn = mover, 0.0, False
+        self._good = self._next = mover.clock.now()
+        self._doubt = self._ignore = False
+
+    def switched(self, drive: Drive) -> None:
+        """A new set point holds."""
+        self._good, self._ignore, self._doubt = drive.at, False, False
+        self._next = drive.at + CHECK
+
+    def look(self, left: float) -> None:
+        """Read the speeds where it is time and nothing else is due within 0.06 s."""
+        now = self.mover.clock.now()
+        if now < self._next or left < 0.06 or self._ignore:
+            return
+        self._next = now + CHECK
+        if self._fit() or self._fit():
+            if self._doubt:  # sending it again has helped: it had been wrong
+                self.wrong += self._cured - self._good
+            self._doubt, self._good = False, self.mover.clock.now()
+            return
+        if self._doubt:  # sending it again has not helped: the robot is like that
+            self._ignore = self.stubborn = True
+            return
+        mover, last = self.mover, self.mover._points[-1]
+        mover.faults.note("wheels not as told", str(last.units), str(self._seen))
+        speed = mover.robot.units.speed
+        again = mover.robot.drive(*(speed(u) for u in last.units), times=2)
+        self._doubt, self._cured = True, again.at
+        self._next = again.at + 3 * CHECK
+
+    def _fit(self) -> bool:
+        self._seen = self.mover.robot.speeds()
+        now = self.mover.clock.now()
+        points = [p.units for p in self.mover._points if now - p.at < MEMORY]
+        points = points or [self.mover._points[-1].units]
+        older = [p.units for p in self.mover._points[:-1]][-1:] or [(0, 0)]
+        for side in (0, 1):
+            told = [p[side] for p in (*points, *older)]
+            slack = SLACK + SHARE * max(map(abs, told))
+            if not min(told) - slack <= self._seen[side] <= max(told) + slack:
+                return False
+        return True

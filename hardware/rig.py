@@ -1,0 +1,154 @@
+"""A robot, a camera and a watchdog, connected and checked; nothing moves for that."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from bns.errors import BnsError
+from bns.hardware.clock import Clock, RealClock
+from bns.hardware.faults import FaultLog
+from bns.hardware.khepera import protocol
+from bns.hardware.khepera.driver import Khepera3
+from bns.hardware.leash import Leash
+from bns.hardware.limits import Limits, Operator
+from bns.hardware.line import Line, SerialLine, check_port
+from bns.hardware.motion import Mover
+from bns.hardware.tracking.eyes import Eyes
+
+EMULATED = "emulated"
+SIZE = (1280, 720)  # px of the emulated camera
+
+
+@dataclass
+class Rig:
+    """What a session with a Khepera III consists of.
+
+    Attributes:
+        robot: its driver.
+        eyes: its tracker.
+        clock: time of the session.
+        limits: bounds that hold.
+        operator: who may stop it.
+        faults: what went wrong so far.
+        line: to the robot.
+        leash: to the watchdog; None in virtual time.
+    """
+
+    robot: Khepera3
+    eyes: Eyes
+    clock: Clock
+    limits: Limits
+    operator: Operator
+    faults: FaultLog
+    line: Line
+    leash: Leash | None = None
+
+    def mover(self) -> Mover:
+        """What drives the robot under the limits."""
+        return Mover(
+            self.robot,
+            self.eyes,
+            self.clock,
+            limits=self.limits,
+            operator=self.operator,
+            faults=self.faults,
+        )
+
+    def close(self) -> None:
+        """Give port and camera back; the robot stands."""
+        self.eyes.close()
+        if self.leash is not None:
+            self.leash.release()
+        self.line.close()
+
+
+def connect(
+    port: str,
+    camera: str = EMULATED,
+    *,
+    calibration: str = "",
+    limits: Limits | None = None,
+    log: Path | str | None = None,
+) -> Rig:
+    """Open port and camera, ask the robot who it is, start the watchdog.
+
+    Args:
+        port: the robot's device.
+        camera: number of a camera, a video file, or "emulated".
+        calibration: file of the camera's calibration; needed for a real one.
+        limits: bounds of the session.
+        log: file for what goes wrong.
+
+    Raises:
+        BnsError: something is missing or wrong. Nothing has moved.
+    """
+    clock, limits = RealClock(), limits or Limits()
+    check_port(port)
+    faults = FaultLog(clock, log)
+    line = SerialLine(port, protocol.BAUD)
+    try:
+        robot = Khepera3(line, clock, faults=faults, limit=limits.speed)
+        robot.identify()
+        battery(robot, limits)
+        eyes = look(port, camera, calibration)
+        try:
+            leash = Leash(line.fileno(), port, protocol.BAUD, "khepera3")
+        except BnsError:
+            eyes.close()
+            raise
+    except BnsError:
+        line.close()
+        raise
+    robot.guard = leash
+    return Rig(robot, eyes, clock, limits, Operator(), faults, line, leash)
+
+
+def battery(robot: Khepera3, limits: Limits) -> float:
+    """The battery's voltage [V].
+
+    Raises:
+        BnsError: too low to start.
+    """
+    volts = robot.battery()
+    if volts < limits.battery:
+        raise BnsError(
+            f"The battery has {volts:.1f} V, less than {limits.battery:g} V: charge it."
+        )
+    return volts
+
+
+def look(port: str, camera: str, calibration: str) -> Eyes:
+    """Tracker and camera.
+
+    Raises:
+        BnsError: no such camera, or it is not calibrated.
+    """
+    from bns.hardware.tracking.camera import Camera
+    from bns.hardware.tracking.eyes import ThreadedEyes
+    from bns.hardware.tracking.marker import Marker
+    from bns.hardware.tracking.sources import DeviceCamera, Source, VideoFile
+    from bns.hardware.tracking.tracker import Tracker
+
+    if not camera:
+        raise BnsError("No camera was given: give --camera NUMBER, FILE or emulated.")
+    marker = Marker()
+    if camera == EMULATED:
+        from bns.hardware.emulators.camera import EmulatedCamera
+        from bns.hardware.emulators.frames import Painter
+
+        known = Camera.read(calibration) if calibration else Camera.overhead(SIZE)
+        ideal = replace(Camera.overhead(known.size), latency=0.0)
+        source: Source = EmulatedCamera(port, Painter(ideal, marker))
+        return ThreadedEyes(source, Tracker(known, marker))
+    if not calibration:
+        raise BnsError(
+            "The camera is not calibrated: make a calibration with `bns hardware "
+            "calibrate` and give it as --calibration FILE."
+        )
+    known = Camera.read(calibration)
+    if camera.isdecimal():
+        source = DeviceCamera(int(camera), known.size)
+    elif Path(camera).exists():
+        source = VideoFile(camera)
+    else:
+        raise BnsError(f"No camera {camera!r}: give its number, a file or 'emulated'.")
+    return ThreadedEyes(source, Tracker(known, marker))

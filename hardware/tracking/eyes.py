@@ -1,0 +1,144 @@
+"""The tracker at work: pictures turned into sightings, beside whatever else goes on."""
+
+import threading
+from collections import deque
+from typing import Protocol
+
+from bns.errors import BnsError
+from bns.hardware.clock import VirtualClock
+from bns.hardware.tracking.sources import Source
+from bns.hardware.tracking.tracker import Frame, Sighting, Tracker
+
+WAIT = 0.2  # s for a picture before the loop looks whether it should end
+KEPT = 100_000  # sightings, an hour
+
+
+class Eyes(Protocol):
+    """Who sees the robot."""
+
+    tracker: Tracker
+
+    def poll(self) -> list[Sighting]:
+        """Sightings since the last call, in order of time.
+
+        Raises:
+            BnsError: the camera is lost.
+        """
+        ...
+
+    def frame(self) -> Frame | None:
+        """The newest picture."""
+        ...
+
+    def close(self) -> None:
+        """Look no more."""
+        ...
+
+
+class ThreadedEyes:
+    """A camera and a tracker in a thread of their own.
+
+    Args:
+        source: of pictures; closed with this.
+        tracker: with the calibration of that camera.
+    """
+
+    def __init__(self, source: Source, tracker: Tracker):
+        self.source, self.tracker = source, tracker
+        self._seen: deque[Sighting] = deque(maxlen=KEPT)
+        self._frame: Frame | None = None
+        self._error: BnsError | None = None
+        self._done = threading.Event()
+        self._thread = threading.Thread(target=self._look, name="eyes", daemon=True)
+        self._thread.start()
+
+    def _look(self) -> None:
+        try:
+            while not self._done.is_set():
+                frame = self.source.read(WAIT)
+                if frame is None:
+                    continue
+                late = self.tracker.camera.latency
+                frame = frame._replace(time=frame.time - late)
+                self._frame = frame
+                sighting = self.tracker.see(frame)
+                if sighting is not None:
+                    self._seen.append(sighting)
+        except BnsError as error:
+            self._error = error
+
+    def poll(self) -> list[Sighting]:
+        """Sightings since the last call, see `Eyes.poll`."""
+        if self._error:
+            raise BnsError(str(self._error))
+        if not self._thread.is_alive() and not self._done.is_set():
+            raise BnsError("The tracker has failed; look at its message above.")
+        new = []
+        while self._seen:
+            new.append(self._seen.popleft())
+        return new
+
+    def frame(self) -> Frame | None:
+        """The newest picture."""
+        return self._frame
+
+    def close(self) -> None:
+        """Look no more."""
+        self._done.set()
+        self._thread.join(2.0)
+        self.source.close()
+
+
+class VirtualEyes:
+    """Pictures in virtual time: as many as have become due are looked at when asked.
+
+    Args:
+        source: gives the picture taken at a time.
+        tracker: looks at it.
+        clock: virtual.
+        rate: pictures a second.
+        latency: from a picture being taken to its being there [s].
+    """
+
+    def __init__(
+        self,
+        source: "Painted",
+        tracker: Tracker,
+        clock: VirtualClock,
+        *,
+        rate: float = 15.0,
+        latency: float = 0.04,
+    ):
+        self.source, self.tracker, self.clock = source, tracker, clock
+        self.rate, self.latency = rate, latency
+        self._count, self._frame = 0, None
+        self.blind = False
+
+    def poll(self) -> list[Sighting]:
+        """Sightings since the last call, see `Eyes.poll`."""
+        seen = []
+        while (at := self._count / self.rate) + self.latency <= self.clock.now():
+            self._count += 1
+            if self.blind:
+                self.tracker.missed()
+                continue
+            self._frame = Frame(at, self.source.paint_at(at), self._count)
+            sighting = self.tracker.see(self._frame)
+            if sighting is not None:
+                seen.append(sighting)
+        return seen
+
+    def frame(self) -> Frame | None:
+        """The newest picture."""
+        return self._frame
+
+    def close(self) -> None:
+        """Nothing to give back."""
+
+
+class Painted(Protocol):
+    """Paints the robot as it was at a time."""
+
+    def paint_at(self, at: float):
+        """The picture ``(H, W)`` uint8."""
+        ...
