@@ -5,6 +5,7 @@ until the robot rests or its time is up. So most commands cost one call, and the
 are known beforehand all the same: the last one of a command is held.
 """
 
+from functools import cache
 from typing import NamedTuple
 
 import mujoco
@@ -13,7 +14,7 @@ from mujoco.rollout import Rollout
 
 from bns.worlds.physics import CONTROL, Compiled, _first_bad, _quiet
 
-PIECE = 0.04  # [s] of a command that goes on
+PIECE = 0.06  # [s] of a command that goes on
 LOOK = 0.02  # [s] before the end of a piece in which the robot has to rest
 STILL = (0.01, 0.1, 0.1)  # base [m/s], base [rad/s], joints [rad/s]; slower = rests
 
@@ -56,6 +57,7 @@ class Walk(NamedTuple):
         counts: steps of each command, shape ``(K,)``.
         rested: whether each command ended with the robot at rest, shape ``(K,)``.
         diverged: index of the first state that is not valid; -1 = all are.
+        calls: of the physics that it took.
     """
 
     states: np.ndarray
@@ -64,85 +66,97 @@ class Walk(NamedTuple):
     counts: np.ndarray
     rested: np.ndarray
     diverged: int
+    calls: int
 
 
 class _Course:
-    """States, goals and contacts as they come."""
+    """States, goals and contacts as they come, in memory for the longest course."""
 
-    def __init__(self, start: np.ndarray):
-        self.states, self.control, self.touched = [start[None]], [], []
-        self.steps, self.diverged = 0, -1
-        self._roller, self._warm = Rollout(), None
+    def __init__(self, job: WalkJob):
+        first = job.pieces[0].compiled.model
+        longest = sum(max(len(piece.control), piece.limit) for piece in job.pieces)
+        self.states = np.empty((longest + 1, len(job.start)))
+        self.states[0] = job.start
+        self.control = np.empty((longest, first.nu))
+        self.touched = np.zeros((longest, first.nsensordata))
+        self.steps, self.diverged, self.calls = 0, -1, 0
+        self._roller = Rollout()
+        self._warm: np.ndarray | None = None
 
-    def go(self, compiled: Compiled, control: np.ndarray) -> None:
+    def go(self, model: mujoco.MjModel, data: mujoco.MjData, control, count) -> None:
         """Roll out a stretch; nothing but NaN once the physics has diverged."""
-        count, model = len(control), compiled.model
-        states = np.full((count, self.states[0].shape[1]), np.nan)
-        sensors = np.zeros((count, model.nsensordata))
-        if self.diverged < 0:
-            self._roll(compiled, control, states, sensors)
-        self.states.append(states)
-        self.control.append(control)
-        self.touched.append(sensors.any(axis=1))
-        self.steps += count
-
-    def _roll(self, compiled, control, states, sensors) -> None:
-        data = compiled.take()
+        at, end = self.steps, self.steps + count
+        self.control[at:end] = control
+        self.steps = end
+        states = self.states[None, at + 1 : end + 1]
+        if self.diverged >= 0:
+            states[:] = np.nan
+            return
         self._roller.rollout(
-            [compiled.model],
+            [model],
             [data],
-            self.states[-1][-1:],
-            control[None],
+            self.states[at : at + 1],
+            self.control[None, at:end],
             control_spec=CONTROL,
             skip_checks=True,
-            nstep=len(control),
+            nstep=count,
             initial_warmstart=self._warm,
-            state=states[None],
-            sensordata=sensors[None],
+            state=states,
+            sensordata=self.touched[None, at:end],
         )
         self._warm = data.qacc_warmstart[None].copy()
-        warned = any(warning.number for warning in data.warning)
-        compiled.give_back(data)
-        bad = _first_bad(states, warned)
+        self.calls += 1
+        bad = _first_bad(states[0], bool(data.warning.number.any()))
         if bad >= 0:
-            states[bad:] = np.nan
-            self.diverged = self.steps + 1 + bad
+            states[0, bad:] = np.nan
+            self.diverged = at + 1 + bad
 
-    def rests(self, model: mujoco.MjModel) -> bool:
-        """Whether the robot has been still in the last moments."""
-        look = max(round(LOOK / model.opt.timestep), 1)
-        first = 1 + model.nq
-        speed = np.abs(self.states[-1][-look:, first : first + model.nv]).max(axis=0)
-        base, turn, joints = STILL
-        return bool(
-            speed[:3].max() < base
-            and speed[3:6].max() < turn
-            and speed[6:].max() < joints
-        )
+    def rests(self, speeds: slice, still: np.ndarray, look: int) -> bool:
+        """Whether the robot has been still in the last steps."""
+        seen = self.states[self.steps + 1 - look : self.steps + 1, speeds]
+        return bool((np.abs(seen) < still).all())
+
+
+@cache
+def _stillness(nv: int) -> np.ndarray:
+    """Speeds below which a robot with a free base rests, shape ``(nv,)``."""
+    base, turn, joints = STILL
+    return np.array([base] * 3 + [turn] * 3 + [joints] * (nv - 6))
 
 
 def walk(job: WalkJob) -> Walk:
     """Roll out one robot's commands."""
     _quiet()
-    course, counts, rested, begun = _Course(job.start), [], [], 0
+    course, counts, rested, begun = _Course(job), [], [], 0
     for compiled, control, limit in job.pieces:
-        course.go(compiled, control)
-        if not limit:
-            continue
-        more = max(round(PIECE / compiled.model.opt.timestep), 1)
-        end, still = course.steps - len(control) + limit, course.rests(compiled.model)
-        while not still and course.steps < end and course.diverged < 0:
-            held = min(more, end - course.steps)
-            course.go(compiled, np.repeat(control[-1:], held, axis=0))
-            still = course.rests(compiled.model)
-        counts.append(course.steps - begun)
-        rested.append(still)
-        begun = course.steps
+        data, model = compiled.take(), compiled.model
+        course.go(model, data, control, len(control))
+        if limit:
+            end = course.steps - len(control) + limit
+            rested.append(_waited(course, model, data, end))
+            counts.append(course.steps - begun)
+            begun = course.steps
+        compiled.give_back(data)
+    steps = course.steps
     return Walk(
-        states=np.concatenate(course.states),
-        control=np.concatenate(course.control),
-        touched=np.concatenate(course.touched),
+        states=course.states[: steps + 1],
+        control=course.control[:steps],
+        touched=course.touched[:steps].any(axis=1),
         counts=np.array(counts, np.int64),
         rested=np.array(rested, bool),
         diverged=course.diverged,
+        calls=course.calls,
     )
+
+
+def _waited(course: _Course, model, data, end: int) -> bool:
+    """Go on with the last goals until the robot rests, or a step; whether it rests."""
+    dt, first = model.opt.timestep, 1 + model.nq
+    look, more = max(round(LOOK / dt), 1), max(round(PIECE / dt), 1)
+    speeds, still = slice(first, first + model.nv), _stillness(model.nv)
+    while not (done := course.rests(speeds, still, look)) and course.steps < end:
+        if course.diverged >= 0:
+            return False
+        held = course.control[course.steps - 1]
+        course.go(model, data, held, min(more, end - course.steps))
+    return done
