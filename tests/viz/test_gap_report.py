@@ -1,0 +1,94 @@
+"""Report and recording of a diagnosis: they say what was found, in one file each."""
+
+import re
+
+import numpy as np
+import pytest
+
+from bns.__main__ import main
+from bns.gap import store, wheeled_library
+from bns.gap.cases import commands
+from bns.worlds import corrected, dataset
+from bns.worlds.mujoco_world import MujocoWorld
+
+NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.01"
+GAIN = "wheel_gain:wheel=left,factor=0.85"
+
+KEPT = ("axle_length", "motor_lag[both]", "wheel_gain[left]", "wheel_gain[both]")
+
+
+def recorded(path, *effects):
+    world = MujocoWorld(reality=[*effects, NOISE], threads=1)
+    told = commands(np.random.default_rng(3), 4)
+    return dataset.write(path, world.run(told, seeds=range(4)))
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory):
+    """A diagnosis made on the command line, with everything it writes."""
+    here = tmp_path_factory.mktemp("gap")
+    recorded(here / "data", GAIN)
+    words = ["gap", "diagnose", str(here / "data"), "--out", str(here / "out")]
+    few = tuple(i for i in wheeled_library.candidates() if i.name in KEPT)
+    with pytest.MonkeyPatch.context() as patch:  # few candidates take less time
+        patch.setattr(wheeled_library, "candidates", lambda: few)
+        assert main([*words, "--threads", "1"]) == 0
+    return here
+
+
+def test_the_diagnosis_names_the_effect_and_where_it_comes_from(home):
+    found = store.load(home / "out")
+    assert found.verdict.named == (("wheel_gain[left]",),)
+    assert found.provenance["data"] == [str(home / "data")]
+    assert found.provenance["model"] == "khepera3"
+
+
+def test_the_report_answers_the_questions_in_one_file(home):
+    page = (home / "out" / "report.html").read_text()
+    for said in (
+        "One effect: wheel_gain[left]",
+        "Where is it?",
+        "of it in left wheel",
+        "How far does it close?",
+        "What to do next",
+        "bns gap diagnose",
+    ):
+        assert said in page, said
+    assert page.count("data:image/svg+xml;base64,") == 4
+    assert not re.findall(r'(?:src|href)="(?!data:)', page)
+
+
+def test_the_recording_shows_three_robots(home):
+    from rerun.chunk import RrdReader
+
+    chunks = RrdReader(str(home / "out" / "recording.rrd")).stream()
+    paths = {str(chunk.entity_path) for chunk in chunks}
+    assert {
+        "/world/recorded/khepera3",
+        "/world/nominal/khepera3",
+        "/world/corrected/khepera3",
+        "/world/paths/arrows",
+        "/residuals/turn/corrected",
+    } <= paths
+
+
+def test_without_the_effect_the_edited_model_is_right(home, capsys):
+    recorded(home / "plain")
+    words = ["gap", "edit", str(home / "out"), "--predict", str(home / "plain")]
+    assert main([*words, "--remove", "wheel_gain"]) == 0
+    said = capsys.readouterr().out
+    assert "stays right" in said and "edited" in said
+    assert main([*words, "--remove", "payload"]) == 2
+    assert "wheel_gain[left]" in capsys.readouterr().err
+
+
+def test_the_corrected_world_is_kept_and_nothing_is_left_to_plan(
+    home, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setenv(corrected.VARIABLE, str(tmp_path / "worlds.toml"))
+    assert main(["gap", "apply", str(home / "out"), "--world", "kitchen"]) == 0
+    (text,) = corrected.known()["kitchen"].reality
+    assert text.startswith("wheel_gain:wheel=left,factor=0.84") or "0.85" in text
+    assert main(["gap", "apply", str(home / "out"), "--world", "mujoco"]) == 2
+    assert main(["gap", "plan", str(home / "out")]) == 0
+    assert "Nothing is tied" in capsys.readouterr().out
