@@ -11,7 +11,7 @@ from bench.result import Result
 DOC = "ties that the planned command resolves"
 BAR = ">= 0.8 of ties"
 SEED = 3_000_000
-TIES, MOST = 12, 40  # ties to judge; cases to look for them in
+TIES, MOST = 10, 30  # ties to judge; cases to look for them in
 SIZES = (3.0, 8.0)  # of the effects over what the poor recording shows
 POOR = ("straight drive", "turn in place", "arcs, left", "wheel alone")
 NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.008"
