@@ -57,7 +57,8 @@ def curves(found: Results):
         onsets = {int(r.damage_onset[0]) for _, r in shown if r.damage_onset[0] >= 0}
         for onset in onsets:
             axes.axvline(onset - 0.5, color=style.DAMAGE, ls="--", linewidth=1.2)
-        axes.set_yscale("log")
+        if all((record["fitness_best"] > 0).all() for _, record in shown):
+            axes.set_yscale("log")
         axes.xaxis.get_major_locator().set_params(integer=True)
         axes.set_xlabel("trial in the world")
         axes.set_ylabel("cost of the best (lower is better)")

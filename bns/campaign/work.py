@@ -72,12 +72,15 @@ def _mode(configs: list[RunConfig]) -> str:
 
 
 def _for_world(config: RunConfig, seed: int) -> RunConfig:
-    """What a world depends on; nets of a static SNN are the same for a campaign."""
+    """What a world depends on, so that all of a campaign meet the same nets."""
+    plain = RunConfig()
     return replace(
-        RunConfig(),
-        task=config.task,
-        controller=config.controller,
-        world=config.world,
+        config,
+        evolution=plain.evolution,
+        snn=plain.snn,
+        adaptation=plain.adaptation,
+        trials=plain.trials,
+        replicates=1,
         seed=seed,
         threads=1,
     )

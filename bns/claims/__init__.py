@@ -3,6 +3,8 @@
 `data/a.toml` to `data/d.toml` hold one investigation each:
 
     preset      what every side starts from
+    worlds      which world plays the physics ("mujoco") and the dissertation's own
+                fixed networks ("static-snn"), where there is one
     settings    what every side of this investigation shares
     pieces      name -> settings; a side is a list of names: "left-20 window-150"
     claims      A1, A2, ...: `where` in the dissertation, what it `says`, its `kind`,

@@ -19,7 +19,7 @@ def member(investigation: str, side: str, *, world: str, quick: bool = False) ->
     Args:
         investigation: "A" to "D".
         side: names of pieces.
-        world: name of the world.
+        world: key of the investigation's `worlds`: "mujoco" or "static-snn".
         quick: a small and short version, for a look that takes seconds.
 
     Raises:
@@ -28,6 +28,8 @@ def member(investigation: str, side: str, *, world: str, quick: bool = False) ->
     from bns.batch import check_world
 
     data = content(investigation)
+    if world not in data["worlds"]:
+        raise BnsError(f"no world like {world!r} for this task")
     if data["preset"] not in presets.names():
         raise BnsError(f"no preset {data['preset']!r}")
     settings = flatten(data["settings"], f"claims of {investigation}")
@@ -35,7 +37,7 @@ def member(investigation: str, side: str, *, world: str, quick: bool = False) ->
         if name not in data["pieces"]:
             raise UnknownNameError(f"piece of {investigation}", name, data["pieces"])
         settings |= flatten(data["pieces"][name], name)
-    settings["world.name"] = world
+    settings["world.name"] = data["worlds"][world]
     base = replace(
         presets.load(data["preset"]),
         seed=0,

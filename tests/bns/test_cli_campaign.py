@@ -103,6 +103,18 @@ def test_wrong_words_are_one_line(capsys, tiny, argv, words):
     assert words in message and message.count("\n") == 1
 
 
+def test_ray_that_cannot_be_used_leaves_nothing_behind(capsys, tiny, monkeypatch):
+    import sys
+
+    go = ("campaign", "run", tiny, "--out", "out", "--engine", "ray")
+    nobody = said(capsys, *go, "--ray-address", "127.0.0.1:9", code=WRONG_INPUT)
+    assert "Nobody answers at 127.0.0.1:9" in nobody
+    monkeypatch.setitem(sys.modules, "ray", None)
+    missing = said(capsys, *go, code=WRONG_INPUT)
+    assert "pip install 'bns-testbed[ray]'" in missing
+    assert not (tiny.parent / "out").exists()
+
+
 def test_what_failed_is_said_and_tried_again(capsys, tiny, monkeypatch):
     from bns.campaign import work
 

@@ -61,19 +61,25 @@ class RayEngine:
                 given = f"worker lost: {work.describe(error)}", 0.0
             yield outcome(key, given, time.monotonic() - started)
 
+    def check(self) -> "RayEngine":
+        """This engine, if Ray is there and the cluster answers.
+
+        Raises:
+            MissingDependencyError: Ray is not installed.
+            BnsError: no address, or nobody answers there.
+        """
+        if self.address:
+            answers(self.address)
+        _ray()
+        return self
+
     def _start(self) -> Any:
-        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-        try:
-            import ray
-        except ImportError:
-            raise MissingDependencyError(
-                "--engine ray", "Ray", "pip install 'bns-testbed[ray]'"
-            ) from None
+        ray = _ray()
         options: dict[str, Any] = {"log_to_driver": False, "logging_level": "error"}
         if not self.address:
             ray.init(num_cpus=self.workers, include_dashboard=False, **options)
             return ray
-        answers(self.address)
+        self.check()
         try:
             ray.init(address=self.address, **options)
         except (ConnectionError, RuntimeError, ValueError) as error:
@@ -82,6 +88,17 @@ class RayEngine:
                 f"{work.describe(error)}"
             ) from error
         return ray
+
+
+def _ray() -> Any:
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    try:
+        import ray
+    except ImportError:
+        raise MissingDependencyError(
+            "--engine ray", "Ray", "pip install 'bns-testbed[ray]'"
+        ) from None
+    return ray
 
 
 def answers(address: str) -> None:

@@ -18,7 +18,7 @@ def make(name: str, *, workers: int = 0, ray_address: str = "") -> Engine:
 
     Raises:
         UnknownNameError: no such engine.
-        BnsError: settings that do not fit it.
+        BnsError: settings that do not fit it, Ray is missing, or nobody answers.
     """
     if name not in NAMES:
         raise UnknownNameError("engine", name, NAMES)
@@ -37,4 +37,4 @@ def make(name: str, *, workers: int = 0, ray_address: str = "") -> Engine:
         return PoolEngine(count)
     from bns.campaign.engines.ray_engine import RayEngine
 
-    return RayEngine(ray_address, workers=count)
+    return RayEngine(ray_address, workers=count).check()
