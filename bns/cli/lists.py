@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from bns.cli.parse import parse
 from bns.cli.tables import show
 
+FEW = 4  # commands of a robot that a list shows
 Rows = tuple[list[str], list[list[str]]]
 
 
@@ -55,6 +56,8 @@ def robots() -> Rows:
         told = [
             f"{c.name} {c.low:.4g} to {c.high:.4g} {c.unit}" for c in robot.commands
         ]
+        if len(told) > FEW:
+            told = [*told[: FEW - 1], f"and {len(told) - FEW + 1} more"]
         rows.append([name, robot.kind, ", ".join(told), robot.doc])
     return ["robot", "kind", "commands", "what it is"], rows
 
