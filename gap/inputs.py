@@ -9,7 +9,7 @@ import numpy as np
 from bns import models
 from bns.errors import BnsError, FormatError, OutOfBoundsError, UnknownNameError
 from bns.gap.model import GapModel
-from bns.worlds.trial import Trial
+from bns.worlds.trial import Commands, Trial
 
 IMPORTERS: Mapping[str, str] = {
     "khepera3_odometry": "wheel speeds of a Khepera III beside its laser's motion",
@@ -20,7 +20,15 @@ IMPORTERS: Mapping[str, str] = {
 """readers of known recordings, and what they read"""
 
 ODOMETRY = "khepera3_odometry"
-SERVO = "servo_pendulum"
+SERVO, UNICYCLE = "servo_pendulum", "irobot_create"
+MODELS = {"kscale_sts3215": SERVO, "xl330": SERVO, "mrclam6": UNICYCLE}
+"""what importers read is of these models"""
+
+SAMPLES = 300
+"""samples of a trial that are used at most; more of them tell no more of its motion,
+and what has to be kept of their noise grows with their square"""
+
+PART = 20.0  # [s] length of the trials that long recordings are cut into
 
 
 def model(name: str, *, threads: int = 2) -> GapModel:
@@ -37,6 +45,10 @@ def model(name: str, *, threads: int = 2) -> GapModel:
         from bns.gap.own_model import OwnModel
 
         return OwnModel.read(name, threads=threads)
+    if name == UNICYCLE:
+        from bns.gap.unicycle import UnicycleModel
+
+        return UnicycleModel()
     if name.endswith(".xml"):
         raise BnsError(
             f"{name} alone does not say what is told and seen: give a TOML file that "
@@ -90,7 +102,8 @@ def trials(
     if not found:
         raise BnsError("No trial is left: nothing was recorded, or --only drops all.")
     _of_robot(found, model)
-    return [_fitting(trial, model) for trial in found]
+    step = getattr(model, "dt", 0.0)
+    return [on_grid(thinned(_fitting(trial, model)), step) for trial in found]
 
 
 def _read(path: str, model: GapModel, columns: str, importer: str) -> list[Trial]:
@@ -118,7 +131,8 @@ def _imported(name: str, path: str) -> list[Trial]:
         raise UnknownNameError("importer", name, IMPORTERS)
     reader: Any = import_module(f"bns.gap.importing.{name}")
     if name == "mrclam6":
-        return [t for n in reader.robots(path) for t in reader.read(path, n)]
+        parts = [reader.read(path, n, seconds=PART) for n in reader.robots(path)]
+        return [trial for part in parts for trial in part]
     found = reader.read(path)
     return [found] if isinstance(found, Trial) else list(found)
 
@@ -152,6 +166,53 @@ def _fitting(trial: Trial, model: GapModel) -> Trial:
     names = [channel.name for channel in model.channels]
     observed = np.stack([trial.channel(name) for name in names], axis=1)
     return trial.replace(observed=observed, channels=tuple(model.channels))
+
+
+def thinned(trial: Trial, most: int = SAMPLES) -> Trial:
+    """A trial with every k-th sample, and those at the ends of commands."""
+    every = -(-len(trial.times) // most)
+    if every == 1:
+        return trial
+    kept = np.union1d(np.arange(0, len(trial.times), every), trial.boundaries)
+    if len(kept) > 2 * most:  # more commands than samples wanted
+        kept = np.arange(0, len(trial.times), every)
+        kept = np.union1d(kept, trial.boundaries[[0, -1]])
+    return trial.replace(
+        times=trial.times[kept],
+        observed=trial.observed[kept],
+        boundaries=np.searchsorted(kept, trial.boundaries),
+        truth={},
+    )
+
+
+def on_grid(trial: Trial, step: float) -> Trial:
+    """A trial whose commands end on the grid of a simulation.
+
+    Each end is rounded by itself, so that rounding does not add up over many commands;
+    commands shorter than a step fall away.
+
+    Args:
+        trial: recorded.
+        step: of the simulation [s]; 0 = none.
+    """
+    told = trial.commands
+    if not step or not len(told):
+        return trial
+    ends = np.concatenate([[0.0], np.cumsum(told.durations)])
+    steps = np.rint(ends / step)
+    if np.abs(np.diff(steps) * step - told.durations).max() < 1e-9:
+        return trial
+    kept = np.flatnonzero(np.diff(steps) > 0)
+    if not len(kept):
+        return trial
+    last = np.append(kept[1:], len(told)) - 1  # what falls away belongs to the former
+    held = (steps[last + 1] - steps[kept]) * step
+    bounds = np.append(trial.boundaries[kept], trial.boundaries[-1])
+    return trial.replace(
+        commands=Commands(told.values[kept], held, told.channels),
+        boundaries=bounds,
+        handled=trial.handled[kept],
+    )
 
 
 def tellable(found: Sequence[Trial], model: GapModel) -> None:

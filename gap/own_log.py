@@ -20,6 +20,8 @@ def read(path: str, config: OwnConfig) -> list[Trial]:
     Raises:
         FormatError: no such file, a column missing, or time going backwards.
     """
+    if not Path(path).is_file():
+        raise FormatError(f"{path} is neither a dataset directory nor a log.")
     table = _table(path)
     needed = [item.channel.name for item in (*config.told, *config.seen)]
     columns = {}

@@ -63,10 +63,8 @@ def nominal(given: Check, threads: int = 1) -> Any:
     """The model that was asked for."""
     from bns.gap import inputs
 
-    servo = given.importer in ("kscale_sts3215", "xl330")
-    return inputs.model(
-        given.model or (inputs.SERVO if servo else "khepera3"), threads=threads
-    )
+    usual = inputs.MODELS.get(given.importer, "khepera3")
+    return inputs.model(given.model or usual, threads=threads)
 
 
 def recorded(given: Check, model: Any) -> list[Any]:
@@ -117,12 +115,16 @@ def _diagnose(given: Diagnose) -> int:
 
 
 def _general(given: Diagnose, model: Any, trials: list[Any], out: Path | None) -> Any:
-    from bns.gap import inputs, partial
+    from bns.gap import advice, check, inputs, partial
     from bns.gap.diagnose import diagnose
 
     inputs.tellable(trials, model)
     try:
-        return diagnose(trials, model, seed=given.seed, most=given.most)
+        usable, _ = check.check(trials, model)
+        advice.reproducible(usable, model)
+        found = diagnose(trials, model, seed=given.seed, most=given.most)
+        more = advice.warnings(found, model)
+        return replace(found, warnings=(*found.warnings, *more))
     except BnsError as error:
         if out:
             kept = partial.write(trials, model, error, out)
