@@ -1,0 +1,110 @@
+"""Worlds as Gymnasium environments, and a public algorithm that learns on one."""
+
+import numpy as np
+import pytest
+
+from bns.errors import BnsError
+
+gymnasium = pytest.importorskip("gymnasium")
+checker = pytest.importorskip("gymnasium.utils.env_checker")
+
+MODULE = "bns.worlds.stepwise.gym_env"
+GAIN = "wheel_gain:wheel=left,factor=0.6"
+
+
+def make(name="Light", **settings):
+    """A registered environment."""
+    return gymnasium.make(f"{MODULE}:bns/{name}-v0", **settings)
+
+
+@pytest.mark.parametrize("name", ["Light", "Navigation", "Hexapod"])
+@pytest.mark.filterwarnings("error")
+def test_gymnasium_finds_nothing_wrong(name):
+    env = make(name, render_mode="rgb_array", cycles=3)
+    checker.check_env(env.unwrapped, skip_render_check=name != "Light")
+
+
+def test_any_other_world_can_be_shown():
+    from bns.worlds.stepwise.gym_env import RobotEnv
+
+    checker.check_env(RobotEnv("static-snn"), skip_render_check=True)
+
+
+def test_an_episode_is_truncated_when_its_commands_are_used_up():
+    env = make(cycles=3, render_mode="rgb_array")
+    env.reset(seed=1)
+    ends = [env.step(np.zeros(2, np.float32))[2:4] for _ in range(3)]
+    assert ends == [(False, False), (False, False), (False, True)]
+    picture = env.render()
+    assert picture.shape == (320, 480, 3) and picture.std() > 10
+
+
+def test_damage_start_and_trial_are_options():
+    start = (0.8, 0.1, 0.3)
+    plain, hurt = make(cycles=4), make(cycles=4, damage=[GAIN + "@3"])
+    ahead = np.ones(2, np.float32)
+
+    def end(env, **options):
+        env.reset(seed=1, options={"start": start, **options})
+        for _ in range(4):
+            *_, info = env.step(ahead)
+        return info["pose_world"]
+
+    assert np.array_equal(end(hurt), end(plain))
+    assert end(hurt, trial=3)[2] > end(plain)[2] + 0.2  # the left wheel lags
+    with pytest.raises(BnsError, match="no option colour"):
+        plain.reset(options={"colour": 1})
+    from bns.worlds.stepwise.gym_env import RobotEnv
+
+    with pytest.raises(BnsError, match="'human'"):
+        RobotEnv(render_mode="human")
+
+
+def test_observations_are_the_sensors_in_counts():
+    env = make()
+    assert env.unwrapped.episode.names == ("light_left", "light_right")
+    assert env.observation_space.high.tolist() == [4095, 4095]
+    seen, _ = env.reset(seed=1, options={"start": (0.5, 0.0, np.pi)})
+    assert seen.max() < 3000  # the lamp is ahead
+    away, _ = env.reset(seed=1, options={"start": (0.5, 0.0, 0.0)})
+    assert away.min() > 3900
+
+
+def test_environments_run_side_by_side():
+    both = gymnasium.make_vec(
+        f"{MODULE}:bns/Light-v0", num_envs=2, vectorization_mode="sync", cycles=3
+    )
+    seen, _ = both.reset(seed=[1, 2])
+    assert seen.shape == (2, 2) and not np.array_equal(*seen)
+    assert both.step(np.zeros((2, 2), np.float32))[1].shape == (2,)
+
+
+def test_cma_es_learns_to_come_near_the_lamp():
+    """A linear controller of six weights, by a public algorithm, in a few steps."""
+    cma = pytest.importorskip("cma")
+    env = make(cycles=15)
+    starts = [(0.8, 0.2, 1.5), (-0.7, -0.4, -2.0)]
+
+    def cost(weights):
+        total = 0.0
+        for start in starts:
+            seen, _ = env.reset(seed=1, options={"start": start})
+            over = False
+            while not over:
+                bright = np.append(1 - seen / 4095, 1.0)
+                action = np.tanh(np.reshape(weights, (2, 3)) @ bright)
+                seen, reward, done, late, _ = env.step(action.astype(np.float32))
+                total, over = total - reward, done or late
+        return total
+
+    search = cma.CMAEvolutionStrategy(
+        np.zeros(6), 1.0, {"seed": 2, "popsize": 5, "verbose": -9}
+    )
+    means = []
+    for _ in range(4):
+        weights = search.ask()
+        costs = [cost(item) for item in weights]
+        search.tell(weights, costs)
+        means.append(np.mean(costs))
+    assert search.result.fbest < 0.8 * cost(np.zeros(6))
+    assert np.mean(means[2:]) < np.mean(means[:2])

@@ -1,0 +1,193 @@
+"""One robot in any world, one command at a time: `Stepwise`."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from bns import models
+from bns.errors import BnsError
+from bns.worlds import registry
+from bns.worlds.checks import bounded
+from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Trial
+
+CYCLES = {"light": 100, "hexapod": 11}
+"""commands of an episode (thesis 5.2.2 and 7.2); elsewhere `NAVIGATION`"""
+
+NAVIGATION = 20
+"""commands of an episode of navigation; assumed"""
+
+CYCLE = {"light": 0.4, "hexapod": 1.0}
+"""s; duration of a command (thesis 5.2.2; walking commands end when the robot rests)"""
+
+COMMAND = 0.8
+"""s; duration of a command in navigation (the lab's preferred one)"""
+
+
+class Stepwise:
+    """One robot of a world that gets its commands one by one.
+
+    A world with sessions goes on from the robot's own state. Any other is asked to run
+    all commands so far, which gives the same, as worlds have no memory between calls.
+
+    Args:
+        world: registered name, or a world.
+        damage: what is wrong with the robot, as `MujocoWorld` takes it; for a name.
+        trial: number of the trial that each episode is, for damage with an onset.
+        cycles: commands of an episode; None = as the world's experiments have.
+        cycle: duration of each [s]; None = likewise.
+        settings: further settings of the world; for a name.
+
+    Raises:
+        BnsError: settings that the world refuses.
+    """
+
+    def __init__(
+        self,
+        world: Any = "light",
+        *,
+        damage: Any = (),
+        trial: int = 0,
+        cycles: int | None = None,
+        cycle: float | None = None,
+        **settings: Any,
+    ):
+        if isinstance(world, str):
+            settings = {"threads": 1, **settings}
+            if "threads" not in registry.settings(world):
+                settings.pop("threads")
+            world = registry.make(world, damage=damage, **settings)
+        elif damage or settings:
+            raise BnsError("A world that is made already takes no damage or settings.")
+        self.world, self.trial_number = world, int(bounded("trial", trial, 0, 1e9, "1"))
+        cycles = CYCLES.get(world.name, NAVIGATION) if cycles is None else cycles
+        cycle = CYCLE.get(world.name, COMMAND) if cycle is None else cycle
+        self.cycles = int(bounded("cycles", cycles, 1, 1e6, "1"))
+        self.cycle = bounded("cycle", cycle, 1e-3, 60.0, "s")
+        self.model = models.robot(world.robot)
+        self.seed = 0
+        self._told: list[np.ndarray] = []
+        self._session: Any = None
+        self._pose = np.zeros(len(POSE_CHANNELS))
+
+    @property
+    def command_channels(self) -> tuple[Channel, ...]:
+        """What the robot is told, with units."""
+        return tuple(Channel(*channel) for channel in self.model.channels)
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Smallest and largest of each command, ``(C,)`` each, SI units."""
+        commands = self.model.commands
+        return np.array([c.low for c in commands]), np.array([c.high for c in commands])
+
+    @property
+    def count(self) -> int:
+        """Commands done."""
+        return len(self._told)
+
+    def reset(self, seed: int = 0, start: Sequence[float] | None = None) -> Trial:
+        """Begin an episode.
+
+        Args:
+            seed: of everything random, the start pose included where it is.
+            start: pose [m, m, rad]; None = the world's.
+
+        Returns:
+            The trial so far: no command, one sample.
+        """
+        self.seed, self._told = int(bounded("seed", seed, 0, 2**63, "1")), []
+        starts = None if start is None else np.array([start], dtype=np.float64)
+        if self._loops:
+            self._session = self.world.session(
+                cycles=self.cycles,
+                cycle=self.cycle,
+                trial=self.trial_number,
+                seeds=[self.seed],
+                starts=starts,
+            )
+            return self._kept(self.world.trials(self._session)[0])
+        if start is not None:
+            raise BnsError(
+                f"World {self.world.name!r} takes no start for an episode; make it "
+                "with the setting `start`."
+            )
+        return self._kept(self._first(self._run([np.zeros(len(self.bounds[0]))])))
+
+    def step(self, command: np.ndarray) -> Trial:
+        """Do one command.
+
+        Args:
+            command: shape ``(C,)``, SI units.
+
+        Returns:
+            The trial so far.
+
+        Raises:
+            BnsError: a command that the robot cannot be told, or no episode.
+        """
+        command = np.asarray(command, dtype=np.float64)
+        if self._loops:
+            if self._session is None:
+                raise BnsError("There is no episode to go on with; call reset first.")
+            self._session.step(command[None])
+            self._told.append(command)
+            return self._kept(self.world.trials(self._session)[0])
+        if self.count >= self.cycles:
+            raise BnsError(
+                f"The {self.cycles} cycles of this trial are over; begin another."
+            )
+        made = self._run([*self._told, command])
+        self._told.append(command)
+        return self._kept(made)
+
+    @property
+    def _loops(self) -> bool:
+        return hasattr(self.world, "session")
+
+    def _kept(self, trial: Trial) -> Trial:
+        seen = trial.observed[-1, : len(POSE_CHANNELS)]
+        self._pose = np.where(np.isfinite(seen), seen, self._pose)
+        return trial
+
+    def _run(self, told: Sequence[np.ndarray]) -> Trial:
+        commands = Commands(
+            np.stack(told), np.full(len(told), self.cycle), self.command_channels
+        )
+        return self.world.run([commands], trial=self.trial_number, seeds=[self.seed])[0]
+
+    def _first(self, trial: Trial) -> Trial:
+        """A trial cut before its first command."""
+        return trial.replace(
+            commands=Commands(
+                np.empty((0, len(self.command_channels))),
+                np.empty(0),
+                self.command_channels,
+            ),
+            times=trial.times[:1],
+            observed=trial.observed[:1],
+            boundaries=[0],
+            outcome=type(trial.outcome)(),
+            handled=np.zeros(0, bool),
+        )
+
+    def channels(self) -> tuple[Channel, ...]:
+        """What is observed: the pose, then what else the world's trials have."""
+        return self.reset(self.seed).channels
+
+    def state(self) -> np.ndarray | None:
+        """Full physics state of the robot now; None where the world has no session."""
+        if self._session is None:
+            return None
+        now = self._session.cycle * self._session.setting.steps
+        return self._session.states[0, now]
+
+    def pose(self) -> np.ndarray:
+        """Where the robot was seen last, ``(3,)`` [m, m, rad]; before all: zeros."""
+        return self._pose
+
+    def picture(self, size: tuple[int, int] = (480, 320)) -> np.ndarray:
+        """The arena as it is, from the camera `perspective`, ``(height, width, 3)``."""
+        from bns.worlds.stepwise.look import picture
+
+        return picture(self, size)
