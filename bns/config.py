@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from bns.config_light import LightConfig
+from bns.config_walk import WalkConfig
 
 Selection = Literal["tournament", "best", "roulette", "random"]
 Crossover = Literal["single-point", "n-point", "uniform", "sbx"]
@@ -175,6 +176,7 @@ class RunConfig:
     adaptation: AdaptationConfig = field(default_factory=AdaptationConfig)
     world: WorldConfig = field(default_factory=WorldConfig)
     light: LightConfig = field(default_factory=LightConfig)
+    walk: WalkConfig = field(default_factory=WalkConfig)
     choose: RealChoice = "best"
     """which controller is tried in the world"""
     choose_tournament: float = 0.1

@@ -65,7 +65,7 @@ class Learner:
         onsets: Sequence[int],
     ):
         config = configs[0]
-        _check_alike(configs)
+        check_alike(configs)
         torch.set_num_threads(config.threads)
         self.config = config
         self.runs = len(configs)
@@ -97,14 +97,8 @@ class Learner:
         self._reset(trial)
         self.cost = self.inner.cost(self.theta, self.population)
         if trial >= self.config.evolve_from:
-            rate, magnitude = self.adaptations.mutation(trial)
-            device = self.config.device
-            rates = Rates(
-                torch.from_numpy(rate).to(device),
-                torch.from_numpy(magnitude).to(device),
-            )
             self.population, self.cost = self.inner.evolve(
-                self.theta, self.population, self.cost, rates
+                self.theta, self.population, self.cost, self._rates(trial)
             )
         index = choice.choose(
             self.config, trial, self.cost, self.population, self.theta,
@@ -116,6 +110,13 @@ class Learner:
         if torch.equal(best, index):
             return Proposal(tried, None)
         return Proposal(tried, self.encoding.commands(self.population.pick(best)))
+
+    def _rates(self, trial: int) -> Rates:
+        rate, magnitude = self.adaptations.mutation(trial)
+        device = self.config.device
+        return Rates(
+            torch.from_numpy(rate).to(device), torch.from_numpy(magnitude).to(device)
+        )
 
     def _reset(self, trial: int) -> None:
         resets = self.adaptations.resets(trial)
@@ -199,12 +200,9 @@ class Learner:
         errors = np.full((self.runs, 3), np.nan)
         output = self.scaling.output.cpu().numpy()
         for run, trial in enumerate(tried):
-            commands, moved = patterns.of_trial(trial)
-            if len(commands) == 0:
+            scaled, moved = self._patterns(trial)
+            if len(scaled) == 0:
                 continue
-            scaled = (commands - self.scaling.centre.cpu().numpy()) / (
-                self.scaling.half.cpu().numpy()
-            )
             seen = torch.from_numpy(scaled.T.astype(np.float32)).to(self.config.device)
             said = predict(self.shape, self.theta[run : run + 1], seen[None])[0]
             miss = said.cpu().numpy().T * output - moved
@@ -215,6 +213,12 @@ class Learner:
         self._train(torch.from_numpy(self.buffer.counts > 0))
         names = ("snn_forward", "snn_left", "snn_turn")
         return dict(zip(names, errors.T.copy(), strict=True))
+
+    def _patterns(self, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
+        """Scaled inputs ``(K, I)`` and displacements ``(K, 3)`` [m, m, rad]."""
+        commands, moved = patterns.of_trial(trial)
+        centre, half = self.scaling.centre.cpu(), self.scaling.half.cpu()
+        return (commands - centre.numpy()) / half.numpy(), moved
 
     def _train(self, which: Tensor) -> None:
         """Train the SNNs of the runs marked in `which` ``(R,)`` bool."""
@@ -250,7 +254,13 @@ class Learner:
         self.buffer.restore(arrays)
 
 
-def _check_alike(configs: Sequence[RunConfig]) -> None:
+def check_alike(configs: Sequence[RunConfig]) -> None:
+    """Refuse configurations that cannot share a batch.
+
+    Raises:
+        BnsError: they differ in more than `adaptation` and `world`.
+    """
+
     def core(config: RunConfig) -> RunConfig:
         first = configs[0]
         return replace(

@@ -30,7 +30,14 @@ PROTOCOL = {
 }
 """all that the learner may know of worlds"""
 
-EXPERIMENT = {"bns.run", "bns.batch", "bns.loading", "bns.static_snn", "bns.doctor"}
+EXPERIMENT = {
+    "bns.run",
+    "bns.batch",
+    "bns.loading",
+    "bns.robots",
+    "bns.static_snn",
+    "bns.doctor",
+}
 """modules around the learner that set experiments up: they make worlds by name"""
 
 

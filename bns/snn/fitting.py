@@ -59,15 +59,22 @@ def fit(
     drop = config.kind == "ensemble" and config.dropout > 0
     state = training.RpropState.fresh(theta)
     for _ in range(config.epochs):
-        keep = _dropout(shape, config.dropout, inputs, draws) if drop else None
+        keep = dropout(shape, config.dropout, inputs, draws) if drop else None
         theta, state = epoch(theta, state, inputs, shaped, weight, keep)
+    return theta, mean_error(shape, theta, patterns)
+
+
+def mean_error(shape: Shape, theta: Tensor, patterns: Patterns) -> Tensor:
+    """Mean squared error of scaled outputs on all patterns, ``(R,)``."""
+    inputs, targets, weight = patterns
+    shaped = targets.unsqueeze(2) if shape.outputs == 1 else targets.unsqueeze(1)
     error = (forward(shape, theta, inputs) - shaped) * weight
     count = weight.sum((1, 2, 3)).clamp(min=1.0)
     heads = shape.groups * shape.outputs
-    return theta, error.square().sum((1, 2, 3)) / (count * heads)
+    return error.square().sum((1, 2, 3)) / (count * heads)
 
 
-def _dropout(shape: Shape, rate: float, inputs: Tensor, draws: Draws) -> Tensor:
+def dropout(shape: Shape, rate: float, inputs: Tensor, draws: Draws) -> Tensor:
     """Factors of the hidden neurons: 0, or 1 / (1 - rate)."""
     runs, _, patterns = inputs.shape
     coins = draws.uniform(runs, shape.groups, shape.hidden, patterns)

@@ -7,6 +7,7 @@ outputs and dropout (thesis 7.2.4).
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import torch
 from torch import Tensor
@@ -15,15 +16,21 @@ from bns.config import SnnConfig
 from bns.draws import Draws
 from bns.snn.scaling import INPUTS, OUTPUTS
 
+Activation = Literal["sigmoid", "relu"]
+
 
 @dataclass(frozen=True)
 class Shape:
-    """Sizes of a stack: `groups` networks of `hidden` neurons, `outputs` each."""
+    """Sizes of a stack: `groups` networks of `hidden` neurons, `outputs` each.
+
+    `activation` is that of the hidden neurons.
+    """
 
     groups: int
     hidden: int
     outputs: int
     inputs: int = INPUTS
+    activation: Activation = "sigmoid"
 
     @classmethod
     def of(cls, config: SnnConfig) -> "Shape":
@@ -82,8 +89,16 @@ def hidden_layer(shape: Shape, theta: Tensor, inputs: Tensor) -> Tensor:
         ``(R, G, H, N)``.
     """
     w1, b1, _, _ = shape.split(theta)
-    active = torch.baddbmm(b1, w1, inputs).sigmoid_()
+    total = torch.baddbmm(b1, w1, inputs)
+    active = total.sigmoid_() if shape.activation == "sigmoid" else total.relu_()
     return active.view(theta.shape[0], shape.groups, shape.hidden, -1)
+
+
+def slope(shape: Shape, active: Tensor) -> Tensor:
+    """Derivative of the activation, from what `hidden_layer` gives."""
+    if shape.activation == "sigmoid":
+        return active * (1 - active)
+    return (active > 0).to(active.dtype)
 
 
 def fused_hidden_layer(shape: Shape, theta: Tensor, inputs: Tensor) -> Tensor:
@@ -96,7 +111,8 @@ def fused_hidden_layer(shape: Shape, theta: Tensor, inputs: Tensor) -> Tensor:
     total = b1 + w1[:, :, :1] * inputs[:, :1]
     for i in range(1, shape.inputs):
         total = total + w1[:, :, i : i + 1] * inputs[:, i : i + 1]
-    return total.sigmoid().view(theta.shape[0], shape.groups, shape.hidden, -1)
+    active = total.sigmoid() if shape.activation == "sigmoid" else total.relu()
+    return active.view(theta.shape[0], shape.groups, shape.hidden, -1)
 
 
 def forward(

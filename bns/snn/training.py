@@ -10,7 +10,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from bns.snn.network import Shape, hidden_layer
+from bns.snn.network import Shape, hidden_layer, slope
 
 FIRST_STEP = 0.01  # torch.optim.Rprop's defaults
 SHRINK, GROW = 0.5, 1.2
@@ -55,13 +55,13 @@ def gradient(
     active = hidden_layer(shape, theta, inputs)
     shown = active if keep is None else active * keep
     error = (w2 @ shown + b2 - targets) * weight
-    slope = (w2.transpose(2, 3) @ error) * (active * (1 - active))
+    back = (w2.transpose(2, 3) @ error) * slope(shape, active)
     if keep is not None:
-        slope = slope * keep
-    slope = slope.view(runs, shape.units, -1)
+        back = back * keep
+    back = back.view(runs, shape.units, -1)
     parts = [
-        slope @ inputs.transpose(1, 2),
-        slope.sum(2),
+        back @ inputs.transpose(1, 2),
+        back.sum(2),
         error @ shown.transpose(2, 3),
         error.sum(3),
     ]

@@ -1,0 +1,34 @@
+"""Walking: eleven commands of servo goals that carry the robot far."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from bns.config import RunConfig
+from bns.worlds.trial import Commands, Trial
+from bns.worlds.world import World
+
+DOC = "lists of servo goals that carry a legged robot as far as can be (D)"
+DEARNESS = 20.0
+"""cost of a generation, that of navigation being 1 (population 400, five networks)"""
+
+
+def make(
+    configs: Sequence[RunConfig], *, replicates: Sequence[int], onsets: Sequence[int]
+) -> Any:
+    """The learner of a batch, see `bns.walk.learner.WalkLearner`."""
+    from bns.walk.learner import WalkLearner
+
+    return WalkLearner(configs, replicates=replicates, onsets=onsets)
+
+
+def execute(
+    world: World, tried: Sequence[Commands], *, trial: int, seeds: Sequence[int]
+) -> list[Trial]:
+    """Each list of commands on a robot of its own, from the start pose."""
+    return world.run(tried, trial=trial, seeds=seeds)
+
+
+def surroundings(config: RunConfig) -> dict[str, Any]:
+    """Nothing: the robot starts in the middle of the board, at rest."""
+    del config
+    return {}

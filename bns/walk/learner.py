@@ -1,0 +1,121 @@
+"""BNS with walking robots: evolve servo goals inside an ensemble, walk, train, repeat.
+
+The loop, its resets and its state are those of `bns.learner.Learner`; what differs is
+what genes mean, what the networks foresee and what a trial is worth.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from bns import seeding
+from bns.adaptation import Adaptations
+from bns.config import RunConfig
+from bns.draws import Draws
+from bns.errors import BnsError
+from bns.evolution.generation import Rates
+from bns.learner import Learner, check_alike
+from bns.patterns import PatternBuffer
+from bns.snn.network import Shape
+from bns.snn.scaling import OUTPUTS
+from bns.walk import observing, scaling
+from bns.walk.evaluation import WalkEvaluator
+from bns.walk.goals import TICK, GoalBreeder, Goals
+from bns.walk.loops import WalkLoops
+from bns.worlds.trial import Trial
+
+BUCKET = 256  # patterns; training tensors grow in these steps
+
+
+class WalkLearner(Learner):
+    """R runs of BNS with walking robots as one tensor program.
+
+    Args:
+        configs: one per run; they may differ in `adaptation`, `seed` and world, all
+            else must agree.
+        replicates: number of each run, part of its identity.
+        onsets: first damaged trial of each run, -1 = none.
+
+    Raises:
+        BnsError: configurations that cannot share a batch, an SNN that is no ensemble,
+            a robot that cannot walk.
+    """
+
+    def __init__(
+        self,
+        configs: Sequence[RunConfig],
+        *,
+        replicates: Sequence[int],
+        onsets: Sequence[int],
+    ):
+        config = configs[0]
+        check_alike(configs)
+        if config.snn.kind != "ensemble":
+            raise BnsError(
+                "learner = 'walk' weighs how far networks disagree; set "
+                "snn.kind = 'ensemble' (the preset hexapod-walk does)."
+            )
+        torch.set_num_threads(config.threads)
+        self.config, self.configs, self.runs = config, list(configs), len(configs)
+        self.draws = Draws(
+            seeding.integer(config.seed, "walk-learner", *replicates), config.device
+        )
+        self.encoding = Goals.of(config)
+        servos = len(self.encoding.channels)
+        self.shape = Shape(
+            groups=config.snn.members,
+            hidden=config.snn.hidden,
+            outputs=OUTPUTS,
+            inputs=2 * servos,
+            activation=config.walk.activation,
+        )
+        self.scaling = scaling.Scaling()
+        self.evaluator = WalkEvaluator(self.shape, config.walk)
+        breeder = GoalBreeder(config.evolution, self.encoding, True)
+        self.inner = WalkLoops(config, self.evaluator, breeder, self.draws)
+        self.adaptations = Adaptations(configs, onsets)
+        self.buffer = PatternBuffer(
+            self.runs, self.adaptations.windows, (2 * servos, OUTPUTS), BUCKET
+        )
+        self.population = self._random_population()
+        self.theta = self.shape.random(self.runs, self.draws)
+        self.loss = torch.full((self.runs,), torch.nan)
+        self.cost: Tensor | None = None
+        self._chosen = self.population.pick(torch.zeros(self.runs, dtype=torch.long))
+
+    def _rates(self, trial: int) -> Rates:
+        rate, _ = self.adaptations.mutation(trial)
+        known = self.adaptations.damage_known(trial)
+        size = [
+            config.adaptation.mutation_magnitude_after
+            if damaged and config.adaptation.mutation_magnitude_after > 0
+            else config.walk.mutation_magnitude
+            for config, damaged in zip(self.configs, known, strict=True)
+        ]
+        each = torch.tensor(size, dtype=torch.float32)[:, None] * TICK
+        device, servos = self.config.device, len(self.encoding.channels)
+        return Rates(
+            torch.from_numpy(rate).to(device), each.expand(-1, servos).to(device)
+        )
+
+    def _measured(
+        self, tried: Sequence[Trial], best: Sequence[Trial] | None
+    ) -> dict[str, np.ndarray]:
+        row = observing.measured(tried, best, self.config.walk.adequate)
+        poses = self.evaluator.poses(self.theta, self._chosen)[:, 0]
+        row["predicted"] = poses.double().cpu().numpy()
+        row["distance_predicted"] = observing.distance(row["predicted"])
+        doubt = self.evaluator.disagreement(self.theta, self._chosen)[:, 0]
+        row["disagreement"] = doubt.double().cpu().numpy()
+        cost = self.evaluator.cost(self.theta, self._chosen)[:, 0]
+        row["worth_predicted"] = cost.double().cpu().numpy()
+        return row
+
+    def _predicted_cost(self) -> np.ndarray:
+        poses = self.evaluator.poses(self.theta, self._chosen)[:, 0]
+        return -(observing.distance(poses.double().cpu().numpy()) ** 2)
+
+    def _patterns(self, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
+        return scaling.of_trial(trial)

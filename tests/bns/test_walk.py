@@ -1,0 +1,284 @@
+"""Walking: fitness, path, patterns, bounds, training, the loop in a quick world."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from bns import models
+from bns.chromosome import Population
+from bns.draws import Draws
+from bns.errors import BnsError
+from bns.evolution.generation import Rates
+from bns.run import train
+from bns.snn.fitting import Patterns
+from bns.snn.network import Shape, forward
+from bns.walk import fitness, observing, scaling, training
+from bns.walk.evaluation import WalkEvaluator, path, variance
+from bns.walk.goals import TICK, GoalBreeder, Goals
+from bns.walk.learner import WalkLearner
+from bns.worlds.trial import Commands, Outcome, Trial
+from tests.bns.walkers import STRIDE, Slider, small
+
+SHAPE = Shape(groups=3, hidden=8, outputs=3, inputs=36, activation="relu")
+
+
+def moved(*steps):
+    """Scaled outputs ``(1, 1, 3, K)`` of one member and one individual."""
+    scaled = np.array(steps) / np.array(scaling.MOVED)
+    return torch.tensor(scaled.T, dtype=torch.float32)[None, None]
+
+
+class TestFitness:
+    def test_printed_is_variance_over_distance(self):
+        cost = fitness.printed(torch.tensor([[0.5, 2.0]]), torch.tensor([[1.0, 1.0]]))
+        assert cost.tolist() == [[2.0, 0.5]]
+
+    def test_printed_cannot_tell_far_from_near_where_all_agree(self):
+        cost = fitness.printed(torch.tensor([[0.01, 1.0]]), torch.zeros(1, 2))
+        assert cost.tolist() == [[0.0, 0.0]]
+
+    def test_repaired_is_distance_less_the_spread_of_end_points(self):
+        x = torch.tensor([[[3.0], [5.0]]])  # two members: mean 4, spread 1
+        y = torch.tensor([[[3.0], [3.0]]])
+        assert fitness.repaired(x, y, 2.0).item() == pytest.approx(2 - 5)
+
+    def test_standing_still_is_no_optimum_of_the_repaired_form(self):
+        still = fitness.repaired(torch.zeros(1, 4, 1), torch.zeros(1, 4, 1), 1.0)
+        x = torch.tensor([[[0.02], [0.03], [0.02], [0.03]]])
+        walking = fitness.repaired(x, torch.zeros(1, 4, 1), 1.0)
+        assert walking.item() < still.item() == 0.0
+        agreed = fitness.printed(torch.tensor([[1e-3]]), torch.tensor([[1e-9]]))
+        assert agreed.item() < fitness.printed(
+            torch.tensor([[0.025]]), torch.tensor([[1e-3]])
+        ), "the printed form prefers not to move"
+
+
+class TestEvaluator:
+    def test_a_square_ends_where_it_began(self):
+        outputs = moved(*[(0.05, 0.0, math.pi / 2)] * 4)
+        x, y, yaw = path(outputs, 1)
+        np.testing.assert_allclose(x[0, 0, :, 0], [0.05, 0.05, 0, 0], atol=1e-7)
+        np.testing.assert_allclose(y[0, 0, :, 0], [0, 0.05, 0.05, 0], atol=1e-7)
+        assert yaw[0, 0, -1, 0].item() == pytest.approx(2 * math.pi)
+
+    def test_variance_sums_outputs_and_commands_of_each_individual(self):
+        one, two = torch.zeros(1, 1, 3, 4), torch.zeros(1, 1, 3, 4)
+        two[..., 0], two[..., 2] = 2.0, 4.0  # commands 0 and 1 of individual 0
+        found = variance(torch.cat([one, two], 1), 2)
+        assert found.tolist() == [[3 * 1.0 + 3 * 4.0, 0.0]]
+
+    def test_pieces_give_what_the_whole_gives(self, monkeypatch):
+        monkeypatch.setattr("bns.walk.evaluation.CHUNK", 7)
+        draws = Draws(1)
+        theta, seen = SHAPE.random(2, draws), draws.uniform(2, 36, 30)
+        evaluator = WalkEvaluator(SHAPE, small().walk)
+        whole = forward(SHAPE, theta, seen)
+        torch.testing.assert_close(evaluator.members(theta, seen), whole)
+
+    def test_inputs_are_the_goals_before_and_the_goals(self):
+        goals = torch.arange(6.0).view(1, 1, 2, 3)
+        wanted = torch.tensor([[0.0, 0, 0, 0, 1, 2], [0, 1, 2, 3, 4, 5]])
+        torch.testing.assert_close(scaling.inputs(goals)[0, 0], wanted / scaling.GOAL)
+
+    def test_each_individual_gets_its_own_path(self):
+        config = small()
+        goals, draws = Goals.of(config), Draws(3)
+        theta = SHAPE.random(1, draws)
+        evaluator = WalkEvaluator(SHAPE, config.walk)
+        both = goals.random(1, 2, draws)
+        alone = Population(both.genes[:, 1:], both.lengths[:, 1:])
+        torch.testing.assert_close(
+            evaluator.cost(theta, both)[:, 1:], evaluator.cost(theta, alone)
+        )
+        torch.testing.assert_close(
+            evaluator.poses(theta, both)[:, 1:], evaluator.poses(theta, alone)
+        )
+
+
+class TestGoals:
+    def test_a_tick_is_what_the_maker_says(self):
+        assert math.degrees(TICK) == pytest.approx(0.2933, abs=1e-4)
+
+    def test_random_goals_lie_around_half_way_and_within_the_stops(self):
+        config = small(walk=replace(small().walk, initial=1.5))
+        genes = Goals.of(config).random(2, 50, Draws(0)).genes
+        low, high = models.robot("phantomx").ranges.T
+        assert genes.shape == (2, 50, 11, 18)
+        assert (genes >= torch.tensor(np.maximum(low, -1.5) - 1e-6)).all()
+        assert (genes <= torch.tensor(np.minimum(high, 1.5) + 1e-6)).all()
+        assert genes.amax() > 1.45 and genes.amin() < -1.45
+
+    def test_commands_never_pass_the_stops_by_a_rounding(self):
+        goals = Goals.of(small())
+        genes = goals.low.expand(1, 1, 11, 18).clone()
+        told = goals.commands(Population(genes, torch.full((1, 1), 11)))[0]
+        assert (told.values >= models.robot("phantomx").ranges[:, 0]).all()
+
+    def test_children_stay_within_bounds_whatever_the_crossover(self):
+        config = small(walk=replace(small().walk, reach=0.5))
+        goals, draws = Goals.of(config), Draws(0)
+        breeder = GoalBreeder(config.evolution, goals, True)
+        population = goals.random(1, 40, draws)
+        edge = torch.where(population.genes > 0, goals.high, goals.low)
+        population = population._replace(genes=edge)
+        rates = Rates(torch.tensor([0.5]), torch.full((1, 18), 0.3))
+        coins = breeder.draw(1, draws)
+        bred = breeder.breed(population, draws.uniform(1, 40), rates, coins)
+        assert bred.genes.abs().max() <= 0.5
+        assert (bred.genes.abs() < 0.49).any()
+
+
+class TestTraining:
+    def test_a_step_is_that_of_torch(self):
+        draws = Draws(0)
+        theta = draws.uniform(2, 5)
+        weight = torch.nn.Parameter(theta.clone())
+        optimiser = torch.optim.Adam([weight], lr=0.01)
+        state = training.AdamState.fresh(theta)
+        for step in range(1, 4):
+            grad = draws.uniform(2, 5) - 0.5
+            weight.grad = grad.clone()
+            optimiser.step()
+            theta, state = training.adam(
+                theta, grad, state, torch.tensor(0.01), torch.tensor(float(step))
+            )
+        torch.testing.assert_close(theta, weight.data)
+
+    def test_it_learns_and_runs_do_not_mix(self):
+        config, draws = small(), Draws(0)
+        inputs = draws.uniform(2, 36, 64) - 0.5
+        targets = torch.stack([inputs[:, 0], -inputs[:, 1], inputs[:, :9].sum(1)], 1)
+        weight = torch.ones(2, 1, 1, 64)
+        weight[1, ..., 40:] = 0.0
+        inputs[1, :, 40:], targets[1, :, 40:] = 99.0, -99.0  # padding
+        theta = SHAPE.random(2, draws)
+        patterns = Patterns(inputs, targets, weight)
+        config = replace(config, snn=replace(config.snn, epochs=400, dropout=0.0))
+        _, loss = training.fit(SHAPE, config, theta, patterns, draws)
+        assert (loss < 0.1 * targets[0].square().mean()).all()
+
+    def test_slope_of_relu_is_that_of_autograd(self):
+        from bns.snn.training import gradient
+
+        draws = Draws(2)
+        theta = SHAPE.random(1, draws).requires_grad_()
+        inputs, targets = draws.uniform(1, 36, 9) - 0.5, draws.uniform(1, 1, 3, 9)
+        weight = torch.ones(1, 1, 1, 9)
+        w1, b1, w2, b2 = SHAPE.split(theta)
+        hidden = (w1 @ inputs + b1).relu().view(1, 3, 8, 9)
+        error = w2 @ hidden + b2 - targets
+        (error.square().sum() / 2).backward()
+        found = gradient(SHAPE, theta.detach(), inputs, targets, weight)
+        torch.testing.assert_close(found, theta.grad)
+
+
+def told(count=3):
+    channels = Goals.of(small()).channels
+    return Commands(np.zeros((count, 18)), np.ones(count), channels)
+
+
+def trial(poses, **flags):
+    count = len(poses)
+    return Trial(
+        told(count - 1),
+        np.arange(count),
+        np.array(poses, float),
+        np.arange(count),
+        outcome=Outcome(**flags),
+    )
+
+
+class TestObserving:
+    STRAIGHT = ((0, 0, 0), (0.1, 0, 0), (0.2, 0, 0), (0.3, 0.4, 0))
+
+    def test_distance_is_from_start_to_end(self):
+        assert observing.of_trials([trial(self.STRAIGHT)]) == pytest.approx([0.5])
+
+    def test_a_lost_end_is_where_it_was_seen_last(self):
+        lost = trial((*self.STRAIGHT[:3], (np.nan,) * 3))
+        assert observing.of_trials([lost]) == pytest.approx([0.2])
+
+    def test_fitness_is_equation_7_4_turned_round(self):
+        row = observing.measured([trial(self.STRAIGHT)], None, adequate=0.5)
+        assert row["fitness"] == pytest.approx([-0.25])
+        assert row["fitness_best"] == pytest.approx([-0.25])
+        assert row["solved"] == [1.0]
+
+    @pytest.mark.parametrize(
+        "flags,solved,way",
+        [({"fell": True}, 0.0, 0.5), ({"diverged": True}, 0.0, 0.0)],
+    )
+    def test_who_fell_or_diverged_has_not_solved(self, flags, solved, way):
+        row = observing.measured([trial(self.STRAIGHT, **flags)], None, adequate=0.4)
+        assert row["solved"] == [solved]
+        assert row["distance"] == pytest.approx([way])
+
+    def test_patterns_are_in_the_body_frame_and_leave_the_lost_out(self):
+        turned = trial(((0, 0, math.pi / 2), (0, 0.1, math.pi / 2), (np.nan,) * 3))
+        seen, was = scaling.of_trial(turned)
+        assert seen.shape == (1, 36)
+        np.testing.assert_allclose(was, [[0.1, 0, 0]], atol=1e-12)
+
+
+class TestLearner:
+    def test_it_walks_farther_than_it_began(self):
+        record = train(small(trials=14), world=Slider())
+        before, after = record["distance"][:, :5], record["distance"][:, -4:]
+        assert (after.mean(1) > 2 * before.mean(1)).all()
+        assert (record["distance"] <= STRIDE * 3 * 11).all()
+        error = np.abs(record["distance_predicted"] - record["distance"])
+        assert error[:, -1].max() < 0.1
+
+    def test_first_trials_are_random_controllers(self):
+        record = train(small(trials=6), world=Slider())
+        within = np.abs(record.sent).max((2, 3)) <= 0.4 + 1e-6
+        assert within[:, :5].all() and not within[:, 5].any()
+
+    def test_resumed_state_gives_the_same_bytes(self):
+        def learner():
+            return WalkLearner([small()] * 2, replicates=[0, 1], onsets=[-1, -1])
+
+        def advance(one, number):
+            seen = Slider().run(one.propose(number).tried)
+            return one.observe(number, seen, None)
+
+        first, second = learner(), learner()
+        for number in range(6):
+            advance(first, number)
+        second.restore(first.state())
+        wanted, found = advance(first, 6), advance(second, 6)
+        assert set(wanted) == set(found)
+        for name in wanted:
+            np.testing.assert_array_equal(found[name], wanted[name])
+
+    def test_mutation_after_damage_is_in_ticks(self):
+        config = small()
+        config = replace(
+            config, adaptation=replace(config.adaptation, mutation_magnitude_after=40.0)
+        )
+        one = WalkLearner([config], replicates=[0], onsets=[3])
+        before, after = one._rates(3).magnitude, one._rates(4).magnitude
+        assert before[0].tolist() == pytest.approx([20 * TICK] * 18)
+        assert after[0].tolist() == pytest.approx([40 * TICK] * 18)
+
+    def test_a_robot_without_legs_is_refused(self):
+        config = small()
+        wheels = replace(config, world=replace(config.world, robot="khepera3"))
+        with pytest.raises(BnsError, match="is wheeled and cannot walk"):
+            WalkLearner([wheels], replicates=[0], onsets=[-1])
+
+    def test_networks_that_cannot_disagree_are_refused(self):
+        config = small()
+        three = replace(config, snn=replace(config.snn, kind="three"))
+        with pytest.raises(BnsError, match=r"set snn\.kind = 'ensemble'"):
+            WalkLearner([three], replicates=[0], onsets=[-1])
+
+    @pytest.mark.parametrize("form", ["printed", "repaired"])
+    def test_both_forms_of_fitness_run(self, form):
+        config = small(trials=7)
+        config = replace(config, walk=replace(config.walk, fitness=form))
+        record = train(config, world=Slider())
+        assert np.isfinite(record["worth_predicted"]).all()
