@@ -224,7 +224,7 @@ def stand(
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
     place = compile.free_joint(model)
-    data.qpos[place] = _at(data.qpos[place], start)
+    data.qpos[place] = compile.posed(data.qpos[place], start)
     hinges = np.flatnonzero(model.jnt_limited)
     at = model.jnt_qposadr[hinges]
     data.qpos[at] = np.clip(data.qpos[at], *model.jnt_range[hinges].T)
@@ -236,16 +236,7 @@ def stand(
         mujoco.mj_setState(model, data, motion.states[-1], STATE)
         data.time = 0.0
         data.qvel[:] = 0.0
-        data.qpos[place] = _at(data.qpos[place], start)
+        data.qpos[place] = compile.posed(data.qpos[place], start)
         mujoco.mj_getState(model, data, state, STATE)
     state.setflags(write=False)
     return state
-
-
-def _at(free: np.ndarray, start: tuple[float, float, float]) -> np.ndarray:
-    """A free joint's (7,) values moved to a planar pose, its height and tilt kept."""
-    x, y, yaw = start
-    turn = (yaw - observe.planar(free[None], 0.0)[0, 2]) / 2
-    turned = np.empty(4)
-    mujoco.mju_mulQuat(turned, np.array([np.cos(turn), 0, 0, np.sin(turn)]), free[3:])
-    return np.concatenate([[x, y, free[2]], turned])
