@@ -161,7 +161,9 @@ def _say(found: Any) -> None:
         print(found.verdict.change)
     for line in _closed(found):
         print(line)
-    for fit in found.fits[:5]:
+    nothing = [fit for fit in found.fits if not fit.names]
+    ranked = sorted(found.fits, key=lambda fit: fit.held_out)
+    for fit in [*[fit for fit in ranked if fit.names][:5], *nothing]:
         print(
             f"  held-out loss {fit.held_out:.5g}  {' + '.join(fit.names) or 'nothing'}"
         )
