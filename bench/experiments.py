@@ -37,7 +37,7 @@ def undamaged(problem: str, world: str = "mujoco") -> RunConfig:
 
     config = presets.load(f"khepera-{problem}")
     trials = 30 if problem == "simple" else 60
-    return _named(
+    return named(
         replace(config, trials=trials, world=WorldConfig(name=world)),
         f"{problem}-{world}",
     )
@@ -60,10 +60,10 @@ def damaged(damage: str, *, world: str = "mujoco", **adaptation: object) -> RunC
         world=WorldConfig(name=world, damage=(f"{DAMAGES[damage]}@{ONSET}",)),
     )
     words = [f"{key}={value}" for key, value in sorted(adaptation.items())]
-    return _named(config, "-".join([damage, world, *words]))
+    return named(config, "-".join([damage, world, *words]))
 
 
-def _named(config: RunConfig, name: str) -> RunConfig:
+def named(config: RunConfig, name: str) -> RunConfig:
     """The configuration with a seed of its own, from its name."""
     seed = int.from_bytes(sha256(name.encode()).digest()[:4], "little")
     return replace(
@@ -114,15 +114,14 @@ def records(
 
 def _quick(config: RunConfig) -> RunConfig:
     onset = QUICK["trials"] // 2
-    damage = tuple(
-        text.replace(f"@{ONSET}", f"@{onset}") for text in config.world.damage
-    )
-    evolution = replace(config.evolution, population=50, generations=30)
+    damage = tuple(f"{text.rpartition('@')[0]}@{onset}" for text in config.world.damage)
+    generations = min(config.evolution.generations, 30)
+    evolution = replace(config.evolution, population=50, generations=generations)
     return replace(
         config,
         **QUICK,
         evolution=evolution,
-        snn=replace(config.snn, epochs=100),
+        snn=replace(config.snn, epochs=min(config.snn.epochs, 100)),
         world=replace(config.world, damage=damage),
         compiled="no",
     )

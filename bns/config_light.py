@@ -16,7 +16,7 @@ class LightConfig:
     """lamps by the fields of `bns.worlds.light_field.Lamp`; the first is the goal"""
     ambient: float = 0.02
     """light that is everywhere [W/m2]"""
-    goal: float = 0.30
+    goal: float = 0.40
     """radius at which the robot is to stay, r_g of equation 5.2 [m] (silent)"""
     safety: float = 0.15
     """nearer to a lamp than this the robot is stopped [m] (silent)"""
@@ -33,7 +33,7 @@ class LightConfig:
     """command cycles of a trial (5.2.2)"""
     cycle: float = 0.4
     """duration of each [s] (5.2.2)"""
-    circle_cycles: int = 40
+    circle_cycles: int = 50
     """last cycles in which a robot has to circle the lamp to have solved the task"""
     circle_within: float = 0.15
     """mean distance from the goal radius allowed in these cycles [m]"""
@@ -54,6 +54,9 @@ class LightConfig:
     """every pattern is learned mirrored, too (data augmentation, B4)"""
     bearing: Literal["sine", "angle"] = "sine"
     """the sensor SNN takes sine and cosine of the light's bearing, or the angle"""
+    noise: float = 0.0
+    """noise inside the SNNs, as a share of what they err by on their patterns; 0 =
+    none, 1 = a noise-aware simulator (silent)"""
     batch: int = 0
     """patterns trained on after a trial, drawn from all there are; 0 = all"""
     islands: int = 1

@@ -66,6 +66,7 @@ BOUNDS = {
     "light.weights": Bound(0, 1000),
     "light.weight_limit": Bound(0, 10_000),
     "light.mutation_magnitude": Bound(0, 1000),
+    "light.noise": Bound(0, 100),
     "light.batch": Bound(0, 10_000_000, "patterns"),
     "light.islands": Bound(1, 10_000, "islands"),
     "light.migration_every": Bound(1, 1_000_000, "trials"),

@@ -18,11 +18,19 @@ CURVES = (
 )
 """The same as curves on the timeline `trial`."""
 
+READINGS = "readings"
+"""What the light sensors read, and what was foreseen."""
+
 BACKGROUND = (27, 30, 36)
 
 
 def blueprint(
-    half_width: float, half_depth: float, *, seconds: float = 0.0, follow: bool = False
+    half_width: float,
+    half_depth: float,
+    *,
+    seconds: float = 0.0,
+    follow: bool = False,
+    readings: bool = False,
 ):
     """The layout: the world on the left, learning on the right.
 
@@ -33,10 +41,12 @@ def blueprint(
         half_depth: the same along y [m].
         seconds: length of what is shown on `sim_time` [s]; 0 = not known.
         follow: open on the timeline `trial` and follow its end (live streams).
+        readings: show what light sensors read.
     """
     import rerun.blueprint as rrb
 
     world = _world(rrb, half_width, half_depth)
+    seen = [_readings(rrb, seconds)] if readings else []
     left = rrb.Vertical(
         world,
         rrb.StateTimelineView(
@@ -48,7 +58,8 @@ def blueprint(
             axis_x=_axis(rrb, seconds),
             plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
         ),
-        row_shares=[6, 1.1, 1.9],
+        *seen,
+        row_shares=[6, 1.1, 1.9, *[1.9 for _ in seen]],
     )
     curves = rrb.Vertical(
         *(_curve(rrb, path, name) for path, name in CURVES),
@@ -81,6 +92,15 @@ def blueprint(
 def _bars(rrb, path: str, name: str):
     hidden = rrb.PlotLegend(visible=False)
     return rrb.BarChartView(origin=path, name=name, plot_legend=hidden)
+
+
+def _readings(rrb, seconds: float):
+    return rrb.TimeSeriesView(
+        origin=f"/{READINGS}",
+        name="Light sensors [counts]; smaller is brighter; thin: as the SNNs foresaw",
+        axis_x=_axis(rrb, seconds),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+    )
 
 
 def _axis(rrb, seconds: float):

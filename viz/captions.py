@@ -47,7 +47,46 @@ CAPTIONS = {
     ),
 }
 
+LIGHT = {
+    "path": (
+        "One run, chosen as the typical one. Solid: where the robot went. Dashed: "
+        "where its simulator networks (SNN) had said it would go. The disc has the "
+        "radius at which the robot is to circle the lamp. Jumps of the heading are "
+        "where the robot was turned at the board's edge."
+    ),
+    "fitness": (
+        "Cost of the controller tried in each trial (equation 5.2 with its sign "
+        "turned), lower is better, on a logarithmic axis: the distance from the goal "
+        "radius, summed over the cycles, over the distance of the start. The dotted "
+        "line is the mean. " + BAND
+    ),
+    "solved": (
+        "Left: whether the robot came to the goal radius. Right: share of runs whose "
+        "trial ended with the robot circling the lamp. " + BAND
+    ),
+    "snn_error": (
+        "How wrong the motion SNN was about each trial before it was trained on it, "
+        "per cycle and output. " + BAND
+    ),
+    "sensor_error": (
+        "How wrong the two sensor SNNs were about each trial before they were trained "
+        "on it, per reading. A part of it is the sensors' own noise. " + BAND
+    ),
+    "readings": (
+        "What the two virtual light sensors read in the trials shown (smaller is "
+        "brighter), and what the SNNs had said they would read."
+    ),
+    "starts": (
+        "The last trials of the same run, each from its own random start (dots); "
+        "crosses: stopped at the lamp's safety boundary."
+    ),
+}
+"""Where light following reads otherwise than navigation."""
+
 TITLES = {
+    "sensor_error": "Error of the sensor networks",
+    "readings": "What the light sensors read",
+    "starts": "Paths by start",
     "path": "Where the robot went",
     "fitness": "Fitness",
     "solved": "Objectives reached",

@@ -8,6 +8,7 @@ import numpy as np
 from bns import stats
 from bns.record import RunRecord
 from bns.stats import Interval
+from bns.viz import scene
 from bns.viz.charts import DEGREES, MILLIMETRES
 from bns.worlds.damage import Event
 
@@ -88,7 +89,7 @@ def sentences(record: RunRecord, facts: Facts) -> list[str]:
     config = record.config
     runs = "One run" if facts.runs == 1 else f"{facts.runs} runs"
     found = [
-        f"{runs} of the {config.task.name} task by a {config.world.robot} in the "
+        f"{runs} of the {scene.task(config)} task by a {config.world.robot} in the "
         f"{config.world.name} world, {facts.trials} trials each.",
         _solving(facts),
     ]
@@ -137,11 +138,13 @@ def _recovering(facts: Facts) -> str:
 
 def rows(record: RunRecord, facts: Facts) -> list[tuple[str, str, str]]:
     """The table of key figures: name, value, explanation."""
+    light = scene.follows_light(record.config)
+    meaning = "the lamp circled" if light else "all objectives reached"
     found = [
         (
             "Solved" + ("" if facts.onset is None else " before damage"),
             f"{facts.solved} of {facts.runs} runs",
-            "all objectives reached in one trial",
+            f"{meaning} in one trial",
         ),
         ("Trials to solve", interval(facts.to_solve), "median over all runs"),
     ]
@@ -150,7 +153,7 @@ def rows(record: RunRecord, facts: Facts) -> list[tuple[str, str, str]]:
             (
                 "Recovered",
                 f"{facts.recovered} of {facts.runs} runs",
-                "all objectives reached again, while damaged",
+                f"{meaning} again, while damaged",
             ),
             (
                 "Trials to recover",

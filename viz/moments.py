@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bns.record import RunRecord
-from bns.viz import geometry, scene, style
+from bns.viz import geometry, light_view, scene, style
 from bns.viz.blueprint import LIVE_TIMELINE, TRIAL_TIMELINE
 from bns.viz.choices import Choice
 from bns.viz.paths import arcs, dashes, listed
@@ -55,6 +55,7 @@ def send(
         foreseen = foreseen[: scene.finish(record.config, foreseen) + 1]
         _trails(stream, choice, poses, done, foreseen)
         _wheels(stream, record.sent[at], start)
+        light_view.send_readings(stream, record, at, start)
         states.append((start, f"trial {choice.trial}: {choice.label}"))
         colours.append(choice.colour)
         start += float(times[-1]) + GAP

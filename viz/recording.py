@@ -54,10 +54,14 @@ def write(
     model = scene.compiled(record.config.world.robot) if model is None else model
     stream = open_stream(record.config, replicate)
     seconds = moments.duration(record, replicate, chosen)
-    layout = blueprint(*scene.extent(record.config), seconds=seconds)
+    layout = blueprint(
+        *scene.extent(record.config),
+        seconds=seconds,
+        readings="readings" in record.extra,
+    )
     stream.save(str(path), default_blueprint=layout)
     stream.send_recording_name(
-        f"{record.config.preset or record.config.task.name} / replicate {replicate}"
+        f"{record.config.preset or scene.task(record.config)} / replicate {replicate}"
     )
     stream.send_property("run", rr.AnyValues(**_properties(record, replicate)))
     scene.log_static(stream, record.config, model)
@@ -99,7 +103,7 @@ def _by_number(trials) -> Mapping[int, Trial]:
 def _properties(record: RunRecord, replicate: int) -> dict:
     config = record.config
     return {
-        "task": config.task.name,
+        "task": scene.task(config),
         "robot": config.world.robot,
         "world": config.world.name,
         "damage": " + ".join(config.world.damage) or "none",
@@ -114,13 +118,11 @@ def _about(record: RunRecord, replicate: int, chosen: Sequence[Choice]):
     import rerun as rr
 
     lines = [
-        f"# {record.config.preset or record.config.task.name}, replicate {replicate}",
+        f"# {record.config.preset or scene.task(record.config)}, replicate {replicate}",
         "",
         "**World.** Solid trails are where the robot went, dashed trails where its "
-        "simulator network (SNN) said it would go. Discs are the objectives; their "
-        "size is the distance within which one counts as reached; a solid trail gets "
-        "thin once all are. Press play: the "
-        "robot drives through the trials below, one after another.",
+        "simulator network (SNN) said it would go. " + _discs(record.config) + " Press "
+        "play: the robot drives through the trials below, one after another.",
         "",
         *(f"- trial {choice.trial}: {choice.label}" for choice in chosen),
         "",
@@ -132,6 +134,18 @@ def _about(record: RunRecord, replicate: int, chosen: Sequence[Choice]):
         "`trial` at the bottom left: the paths then are those of each trial.",
     ]
     return rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN)
+
+
+def _discs(config: RunConfig) -> str:
+    if scene.follows_light(config):
+        return (
+            "The disc has the radius at which the robot is to circle the lamp; at the "
+            "orange ring it is stopped."
+        )
+    return (
+        "Discs are the objectives; their size is the distance within which one counts "
+        "as reached; a solid trail gets thin once all are."
+    )
 
 
 def _onset(record: RunRecord, replicate: int) -> str:

@@ -9,7 +9,7 @@ from bns import files, loading
 from bns.errors import BnsError
 from bns.record import RunRecord
 from bns.viz import comparison, facts, figures, scene, style
-from bns.viz.captions import CAPTIONS, TITLES
+from bns.viz.captions import CAPTIONS, LIGHT, TITLES
 
 ALL_RUNS = ("fitness", "solved", "waits", "snn_error", "diversity")
 """Figures that lay several batches over one another."""
@@ -72,7 +72,7 @@ def _load(directory: str | Path) -> RunRecord:
 def _labels(records: Sequence[RunRecord]) -> list[str]:
     """Directory names, else presets; numbered where they are the same."""
     names = [
-        Path(record.directory).name or record.config.preset or record.config.task.name
+        Path(record.directory).name or record.config.preset or scene.task(record.config)
         for record in records
     ]
     return [
@@ -111,7 +111,7 @@ def _batch(label: str, record: RunRecord) -> dict:
     found = facts.Facts.of(record, label)
     return {
         "label": label,
-        "name": record.config.preset or f"{record.config.task.name} task",
+        "name": record.config.preset or f"{scene.task(record.config)} task",
         "sentences": facts.sentences(record, found),
         "rows": facts.rows(record, found),
         "toml": loading.to_toml(record.config),
@@ -126,15 +126,29 @@ def _batch(label: str, record: RunRecord) -> dict:
 
 def _own_figures(runs: Mapping[str, RunRecord]) -> list[dict]:
     record = next(iter(runs.values()))
-    alone = {"path": figures.path, "displacement": figures.displacement}
+    alone = {
+        "path": figures.path,
+        "displacement": figures.displacement,
+        "readings": figures.readings,
+        "starts": figures.starts,
+    }
     return [
         _entry(
             name,
             record,
             alone[name](record) if name in alone else getattr(figures, name)(runs),
         )
-        for name in ONE_RUN
+        for name in _names(record)
     ]
+
+
+def _names(record: RunRecord) -> tuple[str, ...]:
+    """Figures of one batch, in order."""
+    if not scene.follows_light(record.config):
+        return ONE_RUN
+    at = ONE_RUN.index("snn_error")
+    own = ("path", "starts", "readings", *ONE_RUN[1 : at + 1], "sensor_error")
+    return (*own, *ONE_RUN[at + 1 :])
 
 
 def _shared_figures(runs: Mapping[str, RunRecord]) -> list[dict]:
@@ -153,7 +167,9 @@ def _entry(name: str, record: RunRecord, figure) -> dict:
 
 def _caption(name: str, record: RunRecord) -> str:
     goals = scene.order(record.config)
-    return CAPTIONS[name].format(
+    light = scene.follows_light(record.config)
+    text = LIGHT.get(name) if light else None
+    return (text or CAPTIONS[name]).format(
         order=", ".join(goals), goals=len(goals), penalty=record.config.task.penalty
     )
 

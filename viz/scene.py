@@ -3,11 +3,16 @@
 import numpy as np
 
 from bns.config import RunConfig
-from bns.viz import geometry, style
+from bns.viz import geometry, light_view, style
 from bns.viz.paths import reached
 
 MARGIN = 0.25
 """m of board shown around the outermost objectives"""
+
+BOARD = (1.35, 0.9)
+"""m; half the arena's board (thesis 4.2.1)"""
+
+LIGHT = "light following"
 
 _DISC = 0.001
 """m; height of an objective's disc"""
@@ -20,23 +25,48 @@ def compiled(robot: str):
     return models.scene_spec(robot).compile()
 
 
+def task(config: RunConfig) -> str:
+    """What the robot has to do, in a word or two."""
+    return LIGHT if follows_light(config) else config.task.name
+
+
+def follows_light(config: RunConfig) -> bool:
+    """Whether the run is one of closed-loop light following."""
+    return config.learner == "light"
+
+
+def radius(config: RunConfig) -> float:
+    """Radius of an objective's disc, or at which to circle the lamp [m]."""
+    return config.light.goal if follows_light(config) else config.task.radius
+
+
 def objectives(config: RunConfig) -> dict[str, tuple[float, float]]:
     """Positions of the objectives that the run's task uses [m]."""
     from bns.tasks import objectives as places
+
+    if follows_light(config):
+        from bns.light.task import LightTask
+
+        return {"lamp": LightTask.of(config.light).lamp}
 
     used = order(config)
     return {name: at for name, at in places(config.task).items() if name in used}
 
 
-def order(config: RunConfig) -> str:
+def order(config: RunConfig) -> tuple[str, ...]:
     """Names of the objectives in the order in which they are to be reached."""
     from bns import tasks
 
-    return tasks.order(config.task.name)
+    return ("lamp",) if follows_light(config) else tuple(tasks.order(config.task.name))
 
 
 def finish(config: RunConfig, poses_world: np.ndarray) -> int:
-    """Row of `poses_world` at which the task was done; the last one if it was not."""
+    """Row of `poses_world` at which the task was done; the last one if it was not.
+
+    A robot that has found the lamp stays there, so its task ends with the trial.
+    """
+    if follows_light(config):
+        return len(poses_world) - 1
     places = objectives(config)
     goals = np.array([places[name] for name in order(config)])
     rows = reached(poses_world, goals, config.task.radius)
@@ -45,6 +75,8 @@ def finish(config: RunConfig, poses_world: np.ndarray) -> int:
 
 def extent(config: RunConfig) -> tuple[float, float]:
     """Half width and half depth of what matters [m]."""
+    if follows_light(config):
+        return BOARD
     places = np.abs(list(objectives(config).values()))
     return tuple(float(edge) for edge in places.max(axis=0) + MARGIN)
 
@@ -61,7 +93,9 @@ def log_static(stream, config: RunConfig, model) -> None:
 
     stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     geometry.log_static(stream, model)
-    places, radius = objectives(config), config.task.radius
+    if follows_light(config):
+        light_view.log_lamps(stream, config)
+    places = objectives(config)
     names = list(places)
     centres = np.array([(*places[name], _DISC / 2) for name in names])
     count = len(names)
@@ -69,7 +103,7 @@ def log_static(stream, config: RunConfig, model) -> None:
         "world/objectives",
         rr.Cylinders3D(
             centers=centres,
-            radii=[radius] * count,
+            radii=[radius(config)] * count,
             lengths=[_DISC] * count,
             colors=[(*style.rgb(style.YELLOW), 255)] * count,
             fill_mode=rr.components.FillMode.Solid,

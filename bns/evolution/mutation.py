@@ -31,9 +31,13 @@ def uniform_range(share: Tensor, genes: Tensor, low: Tensor, high: Tensor) -> Te
 
 def gaussian(share: Tensor, genes: Tensor, magnitude: Tensor) -> Tensor:
     """Eq 2.20: add a normal number of standard deviation `magnitude`."""
+    return genes + normal(share) * magnitude
+
+
+def normal(share: Tensor) -> Tensor:
+    """Standard normal numbers from uniform ones."""
     inside = share.clamp(1e-6, 1 - 1e-6)
-    normal = torch.erfinv(2 * inside - 1) * 2**0.5
-    return genes + normal * magnitude
+    return torch.erfinv(2 * inside - 1) * 2**0.5
 
 
 def mutate(

@@ -19,7 +19,7 @@ from bns.draws import Draws
 from bns.evolution.generation import Breeder, Rates
 from bns.light import alike, islands, observing, patterns
 from bns.light.controller import Weights
-from bns.light.loops import LightLoops
+from bns.light.loops import LightLoops, Snns
 from bns.light.memory import Learned
 from bns.light.policy import Attempt
 from bns.light.scaling import MOTION_OUTPUTS, SENSORS
@@ -97,23 +97,26 @@ class LightLearner:
         return self.weights.random(rows, self._size, self.draws)
 
     @property
-    def thetas(self) -> Thetas:
-        """Weights of all SNNs."""
-        return Thetas(self.motion.theta, self.sensors.theta)
+    def snns(self) -> Snns:
+        """All SNNs."""
+        return Snns(
+            Thetas(self.motion.theta, self.sensors.theta),
+            Thetas(self.motion.spread, self.sensors.spread),
+        )
 
     def propose(self, trial: int) -> Proposal:
         """Adapt, evolve inside the SNNs, and choose what to try in trial `trial`."""
         self._reset(trial)
-        cost = self.loops.cost_of(self.thetas, self.population)
+        cost = self.loops.cost_of(self.snns, self.population)
         if trial >= self.config.evolve_from:
             every = self.config.light.migration_every
             if trial > 0 and trial % every == 0:
                 self.population = islands.migrate(
                     self.population, cost, self.config.light, self.draws
                 )
-                cost = self.loops.cost_of(self.thetas, self.population)
+                cost = self.loops.cost_of(self.snns, self.population)
             self.population, cost = self.loops.evolve(
-                self.thetas, self.population, cost, self._rates(trial)
+                self.snns, self.population, cost, self._rates(trial)
             )
         return self._proposal(trial, cost.reshape(self.runs, -1))
 
@@ -121,7 +124,7 @@ class LightLearner:
         genomes = self.population.genes.reshape(*cost.shape, -1)
         whole = Population(genomes.unsqueeze(-1), torch.zeros_like(cost).long())
         index = choice.choose(
-            self.config, trial, cost, whole, self.thetas, None, self.draws
+            self.config, trial, cost, whole, self.snns.thetas, None, self.draws
         )
         rows = torch.arange(self.runs, device=index.device)
         best = cost.argmin(1)
@@ -180,7 +183,7 @@ class LightLearner:
         self.population = self.population._replace(genes=torch.where(rows, fresh, old))
 
     def _with_elitists(self, fresh: Tensor, most: int) -> Tensor:
-        cost = self.loops.cost_of(self.thetas, self.population).reshape(self.runs, -1)
+        cost = self.loops.cost_of(self.snns, self.population).reshape(self.runs, -1)
         shape = (self.runs, -1, *fresh.shape[2:])
         fresh, old = fresh.reshape(shape), self.population.genes.reshape(shape)
         order = cost.topk(most, dim=1, largest=False).indices
@@ -209,7 +212,7 @@ class LightLearner:
         row = observing.measured(self.task, tried, best)
         row.update(
             observing.foreseen(
-                self.simulator, self.thetas, self._chosen, self.task, tried
+                self.simulator, self.snns.thetas, self._chosen, self.task, tried
             )
         )
         row.update(self._learn(tried))

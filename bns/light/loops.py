@@ -4,6 +4,8 @@ Where a run is compiled, one cycle of all robots is one compiled region, and so 
 epoch of training; see `bns.inner`.
 """
 
+from typing import NamedTuple
+
 import torch
 from torch import Tensor
 
@@ -11,10 +13,23 @@ from bns.chromosome import Population
 from bns.config import RunConfig
 from bns.draws import Draws, whole_below
 from bns.evolution.generation import Breeder, Rates
+from bns.evolution.mutation import normal
 from bns.inner import should_compile
-from bns.light.simulator import Simulator, Thetas
+from bns.light.simulator import Noise, Simulator, Thetas
 from bns.light.task import LightTask
 from bns.snn import fitting
+
+
+class Snns(NamedTuple):
+    """The SNNs of R runs: their weights, and what they err by.
+
+    Attributes:
+        thetas: weights.
+        spread: RMS error of each scaled output on the patterns, ``(R, 3)``, ``(R, 2)``.
+    """
+
+    thetas: Thetas
+    spread: Thetas
 
 
 class LightLoops:
@@ -52,32 +67,49 @@ class LightLoops:
         coins = self.draws.uniform(runs, self.config.light.starts)
         return self._pool[whole_below(coins, len(self._pool))]
 
-    def cost(self, thetas: Thetas, genomes: Tensor) -> Tensor:
+    def noise(self, spread: Thetas) -> list[Noise] | list[None]:
+        """Normal noise of every cycle, shared by all individuals of a run.
+
+        Args:
+            spread: what the SNNs err by on their patterns, ``(R, 3)`` and ``(R, 2)``.
+        """
+        light = self.config.light
+        if light.noise == 0:
+            return [None] * light.cycles
+        drawn = []
+        for part in spread:
+            runs, outputs = part.shape
+            coins = self.draws.uniform(light.cycles, runs, outputs, light.starts, 1)
+            scale = light.noise * part[:, :, None, None]
+            drawn.append(normal(coins) * scale)
+        return [Noise(*pair) for pair in zip(*drawn, strict=True)]
+
+    def cost(self, snns: Snns, genomes: Tensor) -> Tensor:
         """Predicted cost ``(R, P)`` of genomes ``(R, P, D)`` from fresh starts."""
         runs, count, _ = genomes.shape
         starts = self.starts(runs).unsqueeze(-1).expand(-1, -1, -1, count)
         ahead, left = starts[:, :, 0].contiguous(), starts[:, :, 1].contiguous()
         layers = self.simulator.controllers.layers(genomes)
         state = self.simulator.begin(ahead, left)
-        for _ in range(self.config.light.cycles):
-            state = self._advance(thetas, layers, state)
+        for noise in self.noise(snns.spread):
+            state = self._advance(snns.thetas, layers, state, noise)
         return (state.error / state.begun).mean(1)
 
-    def cost_of(self, thetas: Thetas, population: Population) -> Tensor:
+    def cost_of(self, snns: Snns, population: Population) -> Tensor:
         """The same of a population whose rows are islands, ``(R I, p)``."""
         rows, size = population.lengths.shape
-        runs = len(thetas.motion)
+        runs = len(snns.thetas.motion)
         genomes = population.genes.reshape(runs, -1, population.genes.shape[2])
-        return self.cost(thetas, genomes).reshape(rows, size)
+        return self.cost(snns, genomes).reshape(rows, size)
 
     def evolve(
-        self, thetas: Thetas, population: Population, cost: Tensor, rates: Rates
+        self, snns: Snns, population: Population, cost: Tensor, rates: Rates
     ) -> tuple[Population, Tensor]:
         """All generations between two trials; gives the population and its costs."""
         for _ in range(self.config.evolution.generations):
             coins = self.breeder.draw(len(cost), self.draws)
             population = self.breeder.breed(population, cost, rates, coins)
-            cost = self.cost_of(thetas, population)
+            cost = self.cost_of(snns, population)
         return population, cost
 
     def train(self, shape, theta: Tensor, patterns) -> tuple[Tensor, Tensor]:

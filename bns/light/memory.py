@@ -38,6 +38,7 @@ class Learned:
         self.buffer = PatternBuffer(runs, windows, (shape.inputs, targets), BUCKET)
         self.theta = self.fresh()
         self.loss = torch.full((runs,), torch.nan)
+        self.spread = torch.zeros(runs, targets, device=self.theta.device)
 
     def fresh(self) -> Tensor:
         """Random weights ``(R, D)``."""
@@ -59,10 +60,19 @@ class Learned:
         known = torch.from_numpy(which & (self.buffer.counts > 0))
         if not known.any():
             return
-        trained, loss = loops.train(self.shape, self.theta, self._patterns())
+        patterns = self._patterns()
+        trained, loss = loops.train(self.shape, self.theta, patterns)
         here = known.to(self.theta.device)[:, None]
         self.theta = torch.where(here, trained, self.theta)
+        self.spread = torch.where(here, self._spread(patterns), self.spread)
         self.loss = torch.where(known, loss.cpu(), self.loss)
+
+    def _spread(self, patterns: fitting.Patterns) -> Tensor:
+        """RMS error of each scaled output on patterns, ``(R, O)``."""
+        weight = patterns.weight[:, 0]
+        miss = predict(self.shape, self.theta, patterns.inputs) - patterns.targets
+        total = (miss * weight).square().sum(2)
+        return (total / weight.sum(2).clamp(min=1)).sqrt()
 
     def _patterns(self) -> fitting.Patterns:
         """All patterns, or as many as a batch has, drawn anew each time."""
@@ -84,6 +94,7 @@ class Learned:
         arrays = {
             "theta": self.theta.cpu().numpy(),
             "loss": self.loss.numpy(),
+            "spread": self.spread.cpu().numpy(),
             **self.buffer.state(),
         }
         return {f"{prefix}.{name}": value for name, value in arrays.items()}
@@ -97,4 +108,5 @@ class Learned:
         }
         self.theta = torch.from_numpy(own["theta"]).to(self.theta.device)
         self.loss = torch.from_numpy(own["loss"])
+        self.spread = torch.from_numpy(own["spread"]).to(self.theta.device)
         self.buffer.restore(own)

@@ -2,7 +2,8 @@
 
 Figures, each ``(R,)``: fitness (equation 5.2 with its sign turned: 0 is best; the
 dissertation maximises), fitness_best, fitness_predicted (inside the SNNs, from the
-trial's own start), solved (`LightTask.solved`), edge_turns, lamp_stops, commands
+trial's own start), reached (1 where it came to the goal radius), solved
+(`LightTask.solved`), edge_turns, lamp_stops, commands
 (cycles until the robot was stopped), the errors of `ERRORS`, snn_loss, sensor_loss,
 patterns, sensor_patterns, diversity_41, diversity_51, diversity_73.
 
@@ -54,6 +55,7 @@ def measured(
         "fitness_best": fitness
         if best is None
         else task.cost(places(best), lost(best)),
+        "reached": task.reached(went).astype(np.float64),
         "solved": np.array(solved, np.float64),
         "commands": np.array([_moving(trial) for trial in tried], np.float64),
         **counted,

@@ -24,6 +24,18 @@ class Thetas(NamedTuple):
     sensors: Tensor
 
 
+class Noise(NamedTuple):
+    """What is added to the SNNs' outputs in a cycle, alike for all individuals.
+
+    Attributes:
+        motion: scaled, ``(R, 3, S, 1)``.
+        sensors: scaled, ``(R, 2, S, 1)``.
+    """
+
+    motion: Tensor
+    sensors: Tensor
+
+
 class State(NamedTuple):
     """Simulated robots at the start of a cycle.
 
@@ -114,7 +126,11 @@ class Simulator:
         return State(ahead, left, still, still, begun, torch.zeros_like(ahead))
 
     def step(
-        self, thetas: Thetas, layers: tuple[Tensor, ...], state: State
+        self,
+        thetas: Thetas,
+        layers: tuple[Tensor, ...],
+        state: State,
+        noise: Noise | None = None,
     ) -> tuple[State, Seen]:
         """One cycle of all robots.
 
@@ -122,9 +138,10 @@ class Simulator:
             thetas: weights of the SNNs.
             layers: weights of the controllers, see `Controllers.layers`.
             state: before.
+            noise: of this cycle; None = what the SNNs say holds.
         """
         runs, starts, count = state.ahead.shape
-        bright = self.look(thetas, state)
+        bright = self.look(thetas, state, noise)
         inputs = [bright[:, 0], bright[:, 1]]
         if self.controllers.recurrent:
             inputs += [state.memory[:, 0], state.memory[:, 1]]
@@ -134,6 +151,8 @@ class Simulator:
         pair = torch.cat([state.before, told], dim=1).flatten(2)
         said = predict(self.motion, thetas.motion, pair, fused=True)
         moved = said.view(runs, MOTION_OUTPUTS, starts, count)
+        if noise is not None:
+            moved = moved + noise.motion
         near = (state.ahead.square() + state.left.square()).sqrt() < self.safety
         forward, left, turn = (
             torch.where(near, 0.0, moved[:, axis] * self.scales.moved[axis])
@@ -150,18 +169,25 @@ class Simulator:
         after = State(ahead, left_of, told, memory, state.begun, error)
         return after, Seen(torch.stack([forward, left, turn], dim=1), bright, speeds)
 
-    def look(self, thetas: Thetas, state: State) -> Tensor:
+    def look(self, thetas: Thetas, state: State, noise: Noise | None = None) -> Tensor:
         """Brightness that the robots see now, ``(R, 2, S, P)``."""
         runs, starts, count = state.ahead.shape
         views = self.views(state.ahead.flatten(1), state.left.flatten(1))
         said = predict(self.sensors, thetas.sensors, views, fused=True)
-        return said.clamp(0.0, 1.0).view(runs, SENSORS, starts, count)
+        bright = said.view(runs, SENSORS, starts, count)
+        if noise is not None:
+            bright = bright + noise.sensors
+        return bright.clamp(0.0, 1.0)
 
     def advance(
-        self, thetas: Thetas, layers: tuple[Tensor, ...], state: State
+        self,
+        thetas: Thetas,
+        layers: tuple[Tensor, ...],
+        state: State,
+        noise: Noise | None = None,
     ) -> State:
         """`step` without what was seen: the form to compile."""
-        return self.step(thetas, layers, state)[0]
+        return self.step(thetas, layers, state, noise)[0]
 
 
 def _shape(config: SnnConfig, inputs: int, outputs: int) -> Shape:

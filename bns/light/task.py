@@ -62,6 +62,10 @@ class LightTask:
         """Distance from the lamp [m], ``(..., K + 1)``."""
         return np.hypot(*np.moveaxis(places - np.asarray(self.lamp), -1, 0))
 
+    def reached(self, places: np.ndarray) -> np.ndarray:
+        """Whether robots came to the goal radius, ``(...)`` bool; places as `cost`."""
+        return self.distances(places).min(-1) <= self.config.goal
+
     def solved(self, places: np.ndarray, handled: np.ndarray) -> bool:
         """Whether a robot circles the lamp.
 

@@ -17,7 +17,7 @@ from bns.light.simulator import Simulator, Thetas
 from bns.light.task import LightTask, lost
 from tests.bns.light_fakes import FakeLightWorld, small
 
-TASK = LightTask.of(LightConfig())
+TASK = LightTask.of(LightConfig(goal=0.3, circle_cycles=40))
 
 
 class TestController:
@@ -86,7 +86,7 @@ class TestTask:
         path = np.array([[1.0, 0], [0.5, 0], [0.1, 0], [0.1, 0], [0.1, 0]])
         charged = TASK.cost(path, np.array([False, False, True, True]))
         assert charged == pytest.approx(0.2 + 0.2 + 2 * 0.7)
-        stand = LightTask(TASK.lamp, LightConfig(charge_stopped="stand"))
+        stand = LightTask(TASK.lamp, replace(TASK.config, charge_stopped="stand"))
         assert stand.cost(path) == pytest.approx(0.2 + 0.2 + 2 * 0.2)
 
     def circle(self, radius=0.3, turns=1.2, cycles=40):

@@ -9,8 +9,11 @@ from bns.viz.figures.diversity import diversity
 from bns.viz.figures.fitness import fitness
 from bns.viz.figures.light_responses import light_responses
 from bns.viz.figures.path import path
+from bns.viz.figures.readings import readings
+from bns.viz.figures.sensor_error import sensor_error
 from bns.viz.figures.snn_error import snn_error
 from bns.viz.figures.solved import solved
+from bns.viz.figures.starts import starts
 from bns.viz.figures.waits import waits
 
 __all__ = [
@@ -19,7 +22,10 @@ __all__ = [
     "fitness",
     "light_responses",
     "path",
+    "readings",
+    "sensor_error",
     "snn_error",
     "solved",
+    "starts",
     "waits",
 ]

@@ -30,8 +30,10 @@ def fitness(runs: Mapping[str, RunRecord]):
 
 def _steps(axes, record: RunRecord) -> None:
     """Lines at the cost of one and of all objectives missed."""
-    from bns.viz.scene import order
+    from bns.viz.scene import follows_light, order
 
+    if follows_light(record.config):
+        return
     penalty, count = record.config.task.penalty, len(order(record.config))
     if penalty <= 0:
         return

@@ -9,8 +9,8 @@ from bns.viz import scene, style
 from bns.viz.choices import Choice, choose, typical
 from bns.viz.paths import arcs, listed
 
-BOARD = np.array([1.35, 0.9])
-"""m; half the arena's board (thesis 4.2.1), beyond which paths are cut"""
+BOARD = np.array(scene.BOARD)
+"""m; beyond the board paths are cut"""
 
 _FORESEEN = {"color": style.BLACK, "linewidth": 1.3, "ls": (0, (3, 2))}
 
@@ -52,7 +52,7 @@ def path(
 def _objectives(axes, record: RunRecord) -> None:
     from matplotlib.patches import Circle
 
-    radius = record.config.task.radius
+    radius = scene.radius(record.config)
     for name, (x, y) in scene.objectives(record.config).items():
         axes.add_patch(Circle((x, y), radius, color=style.YELLOW, alpha=0.55, lw=0))
         axes.annotate(name, (x, y), ha="center", va="center", fontweight="bold")

@@ -1,0 +1,47 @@
+"""Recovery in light following: a slow wheel and three sensor damages (table 6.7)."""
+
+from bench import experiments, light_runs, solving
+from bench.result import Result
+from bns import stats
+
+DOC = "most trials to recover (median, over four damages) in light following, T6.7"
+BAR = "slow wheel / noisy / minimum / maximum sensor: median <= 12 / 10 / 12 / 10"
+MEDIANS = {"slow-wheel": 12, "noisy": 10, "minimum": 12, "maximum": 10}
+THESIS = {"slow-wheel": 10, "noisy": 4, "minimum": "8 and 9", "maximum": 7}
+
+
+def run(quick: bool) -> Result:
+    """30 runs of each damage, from trial 20 of 40."""
+    configs = {damage: light_runs.damaged(damage) for damage in light_runs.DAMAGES}
+    records = experiments.records(configs.values(), quick=quick)
+    found: dict[str, dict[str, object]] = {}
+    holds, worst = True, 0.0
+    for damage, config in configs.items():
+        record = records[config.preset]
+        onset = int(record.damage_onset[0])
+        waits = solving.waits(stats.trials_to_recover(record))
+        median = waits["median"]
+        holds = holds and median is not None and median <= MEDIANS[damage]
+        worst = max(worst, record.trials + 1.0 if median is None else median)
+        solved = record["solved"]
+        found[damage] = {
+            "bar": MEDIANS[damage],
+            "one run on the robot (6.5)": THESIS[damage],
+            "solved trials, five before the damage": _share(
+                solved[:, onset - 5 : onset]
+            ),
+            "solved in the onset trial": _share(solved[:, onset]),
+            "solved trials, last five": _share(solved[:, -5:]),
+            **waits,
+        }
+    return Result(
+        figure=worst,
+        unit="trials",
+        holds=None if quick else holds,
+        n=record.replicates,
+        details=found,
+    )
+
+
+def _share(solved) -> float:
+    return round(float(solved.mean()), 3)

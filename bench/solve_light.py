@@ -1,0 +1,37 @@
+"""Trials until the undamaged Khepera III circles the lamp (table 5.19).
+
+What counts as circling is `bns.light.task.LightTask.solved`; the trial is one, from a
+random start, as the dissertation judged its robot runs.
+"""
+
+from bench import experiments, light_runs, solving
+from bench.result import Result
+from bns import stats
+
+DOC = "median trials until the robot circles the lamp, undamaged, settings T5.19"
+BAR = "median <= 6 trials, >= 27 of 30 runs within 15"
+MEDIAN, FEWEST, LIMIT = 6, 27, 15
+
+
+def run(quick: bool) -> Result:
+    """30 runs of the preset `khepera-light`, 15 trials each."""
+    config = light_runs.undamaged()
+    record = experiments.records([config], quick=quick)[config.preset]
+    waits = solving.waits(stats.trials_to_solve(record))
+    median, within = waits["median"], solving.solved_within(record, LIMIT)
+    good = median is not None and median <= MEDIAN and within >= FEWEST
+    last = record["solved"][:, -5:].mean()
+    return Result(
+        figure=median if median is not None else float(record.trials + 1),
+        unit="trials",
+        holds=None if quick else good,
+        n=record.replicates,
+        details={
+            "solved within 15": within,
+            "solved trials among the last five": round(float(last), 3),
+            "stopped at the lamp among the last five": round(
+                float((record["lamp_stops"][:, -5:] > 0).mean()), 3
+            ),
+            **waits,
+        },
+    )
