@@ -1,20 +1,21 @@
 """What a configuration is, whatever it is called and wherever it stands in a file.
 
 The identity of a configuration is a digest of the settings in which it differs from
-the defaults. Replicates, seed, threads, device and the preset's name are no part of
-it. A setting that is added later therefore changes no identity; a default that is
-changed would leave them equal, so a store keeps whole configurations and refuses what
-does not match them.
+the defaults. Replicates, seed, threads, device, the preset's name and the settings of
+other learners are no part of it. A setting that is added later therefore changes no
+identity; a default that is changed would leave them equal, so a store keeps whole
+configurations and refuses what does not match them.
 """
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from hashlib import sha256
 from typing import Any
 
 from bns import seeding
 from bns.config import AdaptationConfig, RunConfig, WorldConfig
+from bns.learners import registry
 from bns.validate import leaves
 
 NO_PART = {"preset", "seed", "replicates", "record_replicates", "threads", "device"}
@@ -25,9 +26,21 @@ def settings(config: RunConfig) -> dict[str, Any]:
     default = dict(leaves(RunConfig()))
     return {
         name: value
-        for name, value in leaves(config)
+        for name, value in _own(config)
         if name not in NO_PART and value != default[name]
     }
+
+
+def foreign(config: RunConfig) -> list[str]:
+    """Sections of the configuration that belong to other learners."""
+    return [name for name in registry.names() if name != config.learner]
+
+
+def _own(config: RunConfig) -> Iterator[tuple[str, Any]]:
+    others = foreign(config)
+    for name, value in leaves(config):
+        if name.partition(".")[0] not in others:
+            yield name, value
 
 
 def identity(config: RunConfig) -> str:
@@ -66,7 +79,7 @@ def world_seed(seed: int) -> int:
 def changed_default(wanted: RunConfig, stored: RunConfig) -> str:
     """A setting in which configurations of one identity differ; empty if none."""
     theirs = dict(leaves(stored))
-    for name, value in leaves(wanted):
+    for name, value in _own(wanted):
         if name not in NO_PART and theirs[name] != value:
             return f"{name} = {theirs[name]!r}, now {value!r}"
     return ""

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from bns.campaign.identity import foreign
 from bns.config import RunConfig
 from bns.errors import BnsError, FormatError
 from bns.loading import from_mapping, to_mapping
@@ -85,7 +86,7 @@ class Part:
                     "identity": block.identity,
                     "start": block.start,
                     "onset": block.onset,
-                    "config": to_mapping(block.config),
+                    "config": _mapping(block.config),
                 }
                 for block in self.blocks
             ],
@@ -111,6 +112,14 @@ class Part:
                 columns[name] = block.columns.get(name, none).ravel().astype(float)
             tables.append(pa.table(columns))
         return pa.concat_tables(tables)
+
+
+def _mapping(config: RunConfig) -> dict[str, Any]:
+    """A configuration without what belongs to other learners."""
+    others = foreign(config)
+    return {
+        key: value for key, value in to_mapping(config).items() if key not in others
+    }
 
 
 def encode(part: Part) -> bytes:

@@ -55,9 +55,11 @@ class Cell:
             return f"{self.a}: {self.measure} <= {self.at_most:g}"
         if self.at_least is not None:
             return f"{self.a}: {self.measure} >= {self.at_least:g}"
-        other = self.measure_b and f" ({self.measure_b})"
-        mine = other and f" ({self.measure})"
-        return f"{self.a}{mine} {self.says} {self.b}{other}"
+        if self.measure_b:
+            mine, other = f" ({self.measure})", f" ({self.measure_b})"
+            return f"{self.a}{mine} {self.says} {self.b}{other}"
+        what = "" if self.measure == "observation" else f" ({self.measure})"
+        return f"{self.a} {self.says} {self.b}{what}"
 
 
 @dataclass(frozen=True, kw_only=True)

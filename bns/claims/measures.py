@@ -162,7 +162,7 @@ MEASURES: Mapping[str, Measure] = {
         "trials from the damage until solved again, counted from 1",
         stats.trials_to_recover,
     ),
-    "within-50": Measure("the same, never if more than 50", _within(50)),
+    "within-50": Measure("trials to recover, never if more than 50", _within(50)),
     "before": Measure("cost summed over the trials before the damage", _before),
     "before-10": Measure(
         "cost, ten trials before the damage",
@@ -183,8 +183,10 @@ MEASURES: Mapping[str, Measure] = {
         "error of the forward motion, five trials before the damage",
         _over(SNN, lambda r: _onset(r) - 5, 5),
     ),
-    "snn-end": Measure("the same, last ten trials", _end(SNN)),
-    "snn-first": Measure("the same, first trial", _over(SNN, lambda r: 0, 1)),
+    "snn-end": Measure("error of the forward motion, last ten trials", _end(SNN)),
+    "snn-first": Measure(
+        "error of the forward motion, first trial", _over(SNN, lambda r: 0, 1)
+    ),
     **_diversity("41"),
     **_diversity("51"),
     **_diversity("73"),

@@ -3,7 +3,8 @@
 from collections.abc import Mapping, Sequence
 
 from bns.claims import verdict
-from bns.claims.claim import INVESTIGATIONS
+from bns.claims.claim import INVESTIGATIONS, claims
+from bns.claims.measures import MEASURES
 from bns.claims.report import HEAD, Judged, cells, counts, kind
 
 TITLES = {
@@ -27,7 +28,13 @@ with what is data, in `bns/claims/data/`; how campaigns work is in
 ```
 
 p is Mann-Whitney's, or that of the sign test where one side is held against a number.
-Where two measures of the same runs are compared, their pairing is not used.
+Where two measures of the same runs are compared, their pairing is not used. What is
+measured, where it is not the cost after the damage (lower is better), stands in
+brackets:
+
+| measure | what it is |
+| --- | --- |
+{measures}
 """
 
 
@@ -38,7 +45,8 @@ def page(worlds: Mapping[str, Sequence[Judged]]) -> str:
         worlds: name of the world -> all claims, judged.
     """
     rule = (verdict.__doc__ or "").partition("\n\n")[2].strip()
-    parts = [INTRO.replace("{rule}", rule), "## Summary\n", _summary(worlds)]
+    intro = INTRO.replace("{rule}", rule).replace("{measures}", _measures())
+    parts = [intro, "## Summary\n", _summary(worlds)]
     for letter in INVESTIGATIONS:
         parts += [f"## {TITLES[letter]}\n", _overview(worlds, letter)]
         parts += [
@@ -48,6 +56,17 @@ def page(worlds: Mapping[str, Sequence[Judged]]) -> str:
             if (row := rows[number]).findings and row.claim.investigation == letter
         ]
     return "\n".join(parts).rstrip() + "\n"
+
+
+def _measures() -> str:
+    used = {
+        name
+        for claim in claims().values()
+        for cell in claim.cells
+        for name in (cell.measure, cell.measure_b)
+    }
+    known = ((name, each.doc) for name, each in MEASURES.items() if name in used)
+    return "\n".join(f"| {name} | {doc} |" for name, doc in known)
 
 
 def _summary(worlds: Mapping[str, Sequence[Judged]]) -> str:

@@ -123,6 +123,16 @@ def test_a_changed_default_is_noticed():
     assert identity.changed_default(RunConfig(), RunConfig(seed=3)) == ""
 
 
+def test_settings_of_other_learners_are_no_part_of_it():
+    other = from_mapping({"light": {"goal": 0.9}})
+    assert identity.identity(other) == identity.identity(RunConfig())
+    assert identity.changed_default(RunConfig(), other) == ""
+    mine = from_mapping({"learner": "light", "light": {"goal": 0.9}})
+    plain = from_mapping({"learner": "light"})
+    assert identity.identity(mine) != identity.identity(plain)
+    assert "light.goal = 0.9" in identity.changed_default(plain, mine)
+
+
 def test_members_that_differ_in_adaptation_share_a_batch():
     jobs = plan(campaign(), {})
     assert [len(job.configs) for job in jobs] == [2, 2]

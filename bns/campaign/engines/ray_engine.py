@@ -77,7 +77,16 @@ class RayEngine:
         ray = _ray()
         options: dict[str, Any] = {"log_to_driver": False, "logging_level": "error"}
         if not self.address:
-            ray.init(num_cpus=self.workers, include_dashboard=False, **options)
+            options |= {"num_cpus": self.workers, "include_dashboard": False}
+            try:
+                ray.init(**options)
+            except Exception as error:
+                if type(error) is not Exception:  # Ray has no class for this one
+                    raise
+                raise BnsError(
+                    f"Ray does not start here: {work.describe(error)} Try again when "
+                    "the machine is less busy, or use --engine local."
+                ) from error
             return ray
         self.check()
         try:
