@@ -1,5 +1,7 @@
 """Open-loop navigation on a real robot: evolution goes on while the robot moves."""
 
+import contextlib
+import os
 import sys
 import threading
 from collections.abc import Sequence
@@ -68,6 +70,10 @@ class Background:
         return proposal
 
     def _evolve(self, trial: int) -> None:
+        with contextlib.suppress(OSError, AttributeError):
+            # the robot's thread has precedence, this one has not
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 0)
         whole = False
         try:
             while self.generations < LONGEST and not self._enough():

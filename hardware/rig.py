@@ -12,6 +12,7 @@ from bns.hardware.leash import Leash
 from bns.hardware.limits import Limits, Operator
 from bns.hardware.line import Line, SerialLine, check_port
 from bns.hardware.motion import Mover
+from bns.hardware.priority import urgent
 from bns.hardware.tracking.eyes import Eyes
 
 EMULATED = "emulated"
@@ -82,6 +83,7 @@ def connect(
         BnsError: something is missing or wrong. Nothing has moved.
     """
     clock, limits = RealClock(), limits or Limits()
+    urgent()
     check_port(port)
     faults = FaultLog(clock, log)
     line = SerialLine(port, protocol.BAUD)

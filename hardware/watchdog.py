@@ -10,8 +10,8 @@ driving process is gone, however it died), makes it send the stop until the robo
 acknowledged it twice; where the line is dead it opens the port anew, for as long as its
 patience lasts. It says what it does in lines on its standard output.
 
-Only the standard library is imported, and Ctrl-C and hang-ups are ignored, so it starts
-fast and outlives the terminal.
+Little but the standard library is imported, and Ctrl-C and hang-ups are ignored, so it
+starts fast and outlives the terminal.
 """
 
 import argparse
@@ -23,6 +23,8 @@ import sys
 import termios
 import time
 import tty
+
+from bns.hardware.priority import urgent
 
 KINDS = {
     "khepera3": (b"D,l0,l0\n", b"d"),
@@ -40,6 +42,7 @@ def main(argv: list[str] | None = None) -> int:
     given = _arguments(argv)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
+    urgent()
     dog = Watchdog(given.fd, given.port, given.baud, given.stop, given.patience)
     _say("ready")
     moving = False
@@ -92,6 +95,8 @@ class Watchdog:
         return False
 
     def _once(self) -> bool:
+        if self.fd < 0:
+            raise OSError("the port is not there")
         self._drain(0.0)
         if self.answer:
             os.write(self.fd, b"\n")  # ends a line that was cut

@@ -132,6 +132,9 @@ def _emulate(given: Emulate) -> int:
         if not 0 <= getattr(given, name) <= 0.5:
             raise BnsError(f"--{name} = {getattr(given, name)}: give 0 to 0.5.")
     print(f"{given.robot} on {given.port}; Ctrl-C ends it.", flush=True)
+    from bns.hardware.priority import urgent
+
+    urgent()
     if given.robot == "phantomx":
         from bns.hardware.emulators.run_bus import phantomx
 

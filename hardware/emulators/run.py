@@ -15,6 +15,7 @@ from bns.hardware.emulators.khepera_body import KheperaBody
 from bns.hardware.emulators.khepera_device import KheperaDevice
 from bns.hardware.emulators.pty_host import PtyHost
 from bns.hardware.khepera import protocol
+from bns.hardware.priority import urgent
 
 
 def khepera3(
@@ -51,6 +52,7 @@ def khepera3(
         log: file for a line whenever the set point or the wheels' motion changes.
         stop: asked all the time; None = signals decide.
     """
+    urgent()
     now = time.monotonic()
     body = KheperaBody(effects, start=start, at=now)
     device = KheperaDevice(

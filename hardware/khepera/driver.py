@@ -143,9 +143,9 @@ class Khepera3:
         moving = bool(left or right)
         if moving and self.guard is None:
             raise BnsError("Nobody guards the robot: it moves with a watchdog only.")
-        self._moving = moving
+        self._moving = self._moving or moving  # until `stop` has seen it stand
         if self.guard is not None:
-            self.guard.feed(moving=moving)
+            self.guard.feed(moving=self._moving)
         pair = (round(self.units.units(left)), round(self.units.units(right)))
         command = protocol.speeds(*pair)
         begin = self.clock.now()
@@ -221,14 +221,14 @@ class Khepera3:
 
     def _repeat(self, once: Callable, what: str):
         for _ in range(RETRIES + 1):
+            if self.guard is not None and self._moving:
+                self.guard.feed(moving=True)
             begin = self.clock.now()
             answer = once()
             if answer is not None:
                 self.round_trips.append(self.clock.now() - begin)
                 del self.round_trips[:-1000]
                 return answer
-            if self.guard is not None:
-                self.guard.feed(moving=self._moving)
             self.resynchronise()
         raise LinkError(
             f"No proper answer to {what!r} in {RETRIES + 1} tries: check the link; a "

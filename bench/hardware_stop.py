@@ -1,0 +1,145 @@
+"""Whether the motors stop whatever becomes of the process that drives them."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from bench._hardware import emulator, folder
+from bench.result import Result
+
+DOC = "time to the last stop order of a moving robot after its driver dies, 7 ways"
+BAR = "all stop, <= 0.5 s where the link lives"
+LIMIT = 0.5  # s
+DRIVE = """
+import sys
+from bns.hardware.priority import urgent
+urgent()
+from bns.hardware.world import HardwareWorld
+from bns.worlds import alarm
+from bns.worlds.trial import Commands
+world = HardwareWorld(port=sys.argv[1], start=(-0.9, 0.0, 0.0))
+world.connected()
+if sys.argv[2] == "learner":
+    import threading, time
+    def fail():
+        sys.stdin.readline()
+        print("now", time.monotonic(), flush=True)
+        alarm.ring("the learner failed")
+    threading.Thread(target=fail, daemon=True).start()
+print("ready", flush=True)
+world.run([Commands([[0.06, 0.07]], [25.0])])
+"""
+WAYS = ("SIGINT", "SIGTERM", "SIGKILL", "SIGSTOP", "unplugged", "camera", "learner")
+"""SIGSTOP: the process hangs; unplugged: the cable comes back 2 s later"""
+
+
+def run(quick: bool) -> Result:
+    """Drive an emulated robot in real time, let something happen, read its log.
+
+    The time counts from the event (for the cable: from its return) to the moment at
+    which the robot has the order to stand; how long its wheels then roll on is beside
+    it. The figure is the slowest.
+    """
+    repeats = 1 if quick else 5
+    with folder() as path:
+        port, log = path / "robot", path / "log.jsonl"
+        with emulator(port, "--log", str(log), "--start", "-0.9", "0", "0") as robot:
+            rows = {
+                way: [_once(way, port, log, robot) for _ in range(repeats)]
+                for way in WAYS
+            }
+    worst = {way: max(row["told"] for row in tried) for way, tried in rows.items()}
+    details: dict[str, object] = {f"{w}, slowest [s]": v for w, v in worst.items()}
+    details["wheels stand after, slowest [s]"] = max(
+        row["stands"] for tried in rows.values() for row in tried
+    )
+    details["load of the machine (1 min)"] = round(os.getloadavg()[0], 1)
+    slowest = max(worst.values())
+    return Result(
+        figure=round(slowest, 4),
+        unit="s",
+        holds=slowest <= LIMIT,
+        n=repeats * len(WAYS),
+        details=details,
+    )
+
+
+def _once(way: str, port: Path, log: Path, robot: subprocess.Popen) -> dict[str, float]:
+    begin = time.monotonic()
+    words = [sys.executable, "-c", DRIVE, str(port), way]
+    driver = subprocess.Popen(
+        words,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    try:
+        _wait(log, lambda rows: _steady(rows, begin), 60.0)
+        at = _happen(way, driver, robot)
+        _wait(log, lambda rows: _stood(rows, at), 5.0)
+    finally:
+        driver.kill()
+        driver.wait()
+        if way == "camera":
+            robot.send_signal(signal.SIGUSR2)
+    rows = _rows(log)
+    told = [r["at"] for r in rows if r.get("told") == [0, 0] and r["at"] >= at]
+    stands = [r["at"] for r in rows if r.get("stands") and r["at"] >= at]
+    never = 1e3
+    return {
+        "told": round(min(told, default=at + never) - at, 4),
+        "stands": round(min(stands, default=at + never) - at, 4),
+    }
+
+
+def _happen(way: str, driver: subprocess.Popen, robot: subprocess.Popen) -> float:
+    """Let it happen; gives the moment from which time counts [s]."""
+    if way.startswith("SIG"):
+        driver.send_signal(getattr(signal, way))
+        return time.monotonic()
+    if way == "unplugged":
+        robot.send_signal(signal.SIGUSR1)
+        time.sleep(2.0)
+        robot.send_signal(signal.SIGUSR1)
+        return time.monotonic()
+    if way == "camera":
+        robot.send_signal(signal.SIGUSR2)
+        return time.monotonic()
+    driver.stdin.write("now\n")
+    driver.stdin.flush()
+    for line in driver.stdout:
+        if line.startswith("now"):
+            return float(line.split()[1])
+    return time.monotonic()
+
+
+def _rows(log: Path) -> list[dict]:
+    if not log.exists():
+        return []
+    lines = log.read_text().splitlines()
+    return [json.loads(line) for line in lines if line.endswith("}")]
+
+
+def _steady(rows: list[dict], begin: float) -> bool:
+    """Whether the long drive of the trial has gone on for a moment."""
+    told = [row for row in rows if "told" in row and row["at"] > begin]
+    return bool(
+        told
+        and told[-1]["told"] == [8641, 10081]
+        and time.monotonic() - told[-1]["at"] > 0.7
+    )
+
+
+def _stood(rows: list[dict], since: float) -> bool:
+    return any(row.get("stands") and row["at"] >= since for row in rows)
+
+
+def _wait(log: Path, good, seconds: float) -> None:
+    until = time.monotonic() + seconds
+    while time.monotonic() < until and not good(_rows(log)):
+        time.sleep(0.05)

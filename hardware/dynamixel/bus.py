@@ -1,0 +1,228 @@
+"""The bus through ROBOTIS's SDK, with its defects worked round.
+
+What is worked round of dynamixel-sdk 4.1: an exception inside a transaction leaves the
+port marked as in use, so that every later call fails; opening a missing port raises
+instead of saying no; only the first of several error bits is named; there is no bulk
+read on AX servos. It is not safe for several threads: neither is this.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from bns.errors import BnsError, MissingDependencyError
+from bns.hardware.clock import Clock
+from bns.hardware.dynamixel import packets
+from bns.hardware.dynamixel.joints import Joint
+from bns.hardware.errors import LinkError, SafetyStop
+from bns.hardware.faults import FaultLog
+from bns.hardware.khepera.driver import Guard
+from bns.hardware.line import INSTALL, check_port
+
+TRIES = 4
+HOT, FULL, EMPTY = 65, 0.85, 9.9  # C, share of torque, V: beyond it the robot rests
+OVERLOAD = 3  # reads in a row with too much load before it counts
+LATENCY = 0.02  # s allowed for an answer beside its bytes
+
+
+class Bus:
+    """Servos on a port.
+
+    Args:
+        port: device.
+        joints: which servo is which.
+        clock: of the session.
+        faults: where what goes wrong is noted.
+        guard: has to watch while torque is on.
+
+    Raises:
+        BnsError: no such port, in use, no SDK.
+
+    Attributes:
+        states: newest state of each servo by its number.
+    """
+
+    def __init__(
+        self,
+        port: str,
+        joints: Sequence[Joint],
+        clock: Clock,
+        *,
+        faults: FaultLog | None = None,
+        guard: Guard | None = None,
+    ):
+        check_port(port)
+        sdk = _sdk()
+        self.joints = tuple(joints)
+        self.clock, self.guard = clock, guard
+        self.faults = faults if faults is not None else FaultLog(clock)
+        self._port = _port(sdk, port)
+        self._protocol = sdk.PacketHandler(1.0)
+        self._goals = sdk.GroupSyncWrite(self._port, self._protocol, packets.GOAL, 2)
+        self._sdk = sdk
+        self.states: dict[int, packets.State] = {}
+        self._loaded: dict[int, int] = {}
+        self._next = 0
+
+    def fileno(self) -> int:
+        """The open file's number, for the watchdog."""
+        return int(self._port.ser.fileno())
+
+    def identify(self) -> None:
+        """See that every servo is there, once, and is an AX-12A.
+
+        Raises:
+            BnsError: one is missing, doubled, or another model. Nothing has moved.
+        """
+        missing, garbled, others = [], [], []
+        for joint in self.joints:
+            results = [self._call("ping", joint.id) for _ in range(2)]
+            good = [value for value, result, _ in results if result == 0]
+            if not good:
+                corrupt = any(r == self._sdk.COMM_RX_CORRUPT for _, r, _ in results)
+                (garbled if corrupt else missing).append(joint.id)
+            elif good[0] != packets.MODEL:
+                others.append(joint.id)
+        if len(missing) == len(self.joints):
+            raise BnsError(
+                "No servo answers: switch the hexapod on, check the adapter, and that "
+                f"the servos talk at {packets.BAUD} baud."
+            )
+        if garbled:
+            raise BnsError(
+                f"Servos {garbled} answer on top of another: two have one number; "
+                "connect them one by one and give each its own."
+            )
+        if missing:
+            raise BnsError(
+                f"Servos {missing} do not answer: check their cables; a number given "
+                "twice elsewhere on the bus shows like this as well."
+            )
+        if others:
+            raise BnsError(f"Servos {others} are no AX-12A: nothing was moved.")
+
+    def read(self, servo: int) -> packets.State:
+        """The state of a servo; one read of eight bytes.
+
+        Raises:
+            LinkError: no proper answer in any of the tries.
+        """
+        for _ in range(TRIES):
+            values, result, error = self._call("readTxRx", servo, packets.PRESENT, 8)
+            state = packets.state(list(values)) if result == 0 else None
+            if state is not None:
+                if error:
+                    self.faults.note("servo error", str(servo), packets.words(error))
+                self.states[servo] = state
+                return state
+            self.faults.note("no answer" if result else "bad state", str(servo))
+            if self.guard is not None:
+                self.guard.feed(moving=True)
+        raise LinkError(f"Servo {servo} gives no proper answer in {TRIES} tries.")
+
+    def look(self, count: int = 2) -> None:
+        """Read the next few servos in turn and see that they are well.
+
+        Raises:
+            SafetyStop: one is too hot, overloaded, or the battery is low.
+        """
+        for _ in range(count):
+            joint = self.joints[self._next % len(self.joints)]
+            self._next += 1
+            self._well(joint, self.read(joint.id))
+
+    def _well(self, joint: Joint, state: packets.State) -> None:
+        if state.temperature >= HOT:
+            raise SafetyStop(
+                f"{joint.name} has {state.temperature} C", "let it cool down"
+            )
+        if state.voltage < EMPTY:
+            raise SafetyStop(f"the bus has {state.voltage} V", "charge the battery")
+        over = self._loaded.get(joint.id, 0) + 1 if abs(state.load) > FULL else 0
+        self._loaded[joint.id] = over
+        if over >= OVERLOAD:
+            raise SafetyStop(f"{joint.name} is overloaded", "free the leg")
+
+    def write(self, angles: Mapping[str, float]) -> None:
+        """Send the goals of all joints in one packet.
+
+        Args:
+            angles: by name of the joint [rad]; kept between the end stops.
+
+        Raises:
+            BnsError: nobody guards.
+            LinkError: the line is dead.
+        """
+        if self.guard is None:
+            raise BnsError("Nobody guards the robot: it moves with a watchdog only.")
+        self.guard.feed(moving=True)
+        self._goals.clearParam()
+        for joint in self.joints:
+            units = joint.units(angles[joint.name])
+            self._goals.addParam(joint.id, [units & 0xFF, units >> 8])
+        result = self._guarded(self._goals.txPacket)
+        if result != 0:
+            raise LinkError("The goals could not be sent: check the adapter.")
+
+    def torque(self, on: bool) -> None:
+        """Switch the torque of all servos; off is sent three times."""
+        for _ in range(1 if on else 3):
+            self._call("write1ByteTxOnly", packets.BROADCAST, packets.TORQUE, int(on))
+        if not on and self.guard is not None:
+            self.guard.feed(moving=False)
+
+    def close(self) -> None:
+        """Torque off, port given back."""
+        try:
+            self.torque(False)
+        finally:
+            self._port.closePort()
+
+    def _call(self, name: str, *words: int) -> Any:
+        function = getattr(self._protocol, name)
+        return self._guarded(lambda: function(self._port, *words))
+
+    def _guarded(self, function: Any) -> Any:
+        """A call of the SDK; the port is free afterwards, whatever happened."""
+        import termios
+
+        try:
+            return function()
+        except (OSError, termios.error, IndexError, TypeError) as error:
+            if isinstance(error, OSError | termios.error):
+                raise LinkError(f"The bus is dead ({error}): check it.") from error
+            self.faults.note("broken packet", str(error))  # the SDK trips over it
+            return [], self._sdk.COMM_RX_CORRUPT, 0
+        finally:
+            self._port.is_using = False
+
+
+def _sdk() -> Any:
+    try:
+        import dynamixel_sdk
+    except ImportError as error:
+        raise MissingDependencyError(
+            "a hexapod on its bus", "dynamixel-sdk", INSTALL
+        ) from error
+    return dynamixel_sdk
+
+
+def _port(sdk: Any, name: str) -> Any:
+    """The SDK's port, opened for this process alone, with a shorter time allowance."""
+
+    class Port(sdk.PortHandler):
+        def setPacketTimeout(self, packet_length: int) -> None:
+            self.packet_start_time = self.getCurrentTime()
+            self.packet_timeout = self.tx_time_per_byte * packet_length + LATENCY * 1e3
+
+    port = Port(name)
+    try:
+        good = port.openPort() and port.setBaudRate(packets.BAUD)
+        port.ser.exclusive = True
+    except (OSError, ValueError) as error:
+        raise BnsError(
+            f"Port {name} cannot be opened ({error}): end other programs on it, check "
+            "that it is the hexapod's adapter."
+        ) from error
+    if not good:
+        raise BnsError(f"Port {name} does not take {packets.BAUD} baud.")
+    return port

@@ -1,0 +1,142 @@
+"""Eighteen emulated AX-12A: their packets, their tables, and a simple law of motion.
+
+Each servo moves to its goal by itself, at most at its speed, with a lag; there is no
+body behind them. What bites between packets and table follows the e-manual.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bns.hardware.dynamixel import packets
+from bns.hardware.emulators.device import Reply
+
+TOP = 6.18 * packets.UNITS  # units/s: 59 rpm without load (e-manual)
+LAG = 0.05  # s (assumed)
+BYTE = 10 / packets.BAUD  # s
+
+
+class ServoBank:
+    """Servos on an emulated bus.
+
+    Args:
+        numbers: of the servos; one given twice answers twice.
+        delay: return delay [s] (250 x 2 us from the factory).
+        voltage: of the bus [V].
+        upset: probability that a status carries a random error bit.
+        rng: for that.
+        at: time of the start [s].
+
+    Attributes:
+        goals: times and goals of every sync write, newest last.
+    """
+
+    def __init__(
+        self,
+        numbers: Sequence[int] = range(1, 19),
+        *,
+        delay: float = 0.0005,
+        voltage: float = 11.1,
+        upset: float = 0.0,
+        rng: np.random.Generator | None = None,
+        at: float = 0.0,
+    ):
+        self.numbers, self.delay, self.upset = list(numbers), delay, upset
+        self.rng = rng or np.random.default_rng(0)
+        self.tables = {number: _table(number, voltage) for number in set(numbers)}
+        self.place = dict.fromkeys(self.tables, 512.0)
+        self.goals: list[float] = []
+        self._now, self._buffer = at, b""
+
+    def advance(self, now: float) -> None:
+        """Let all servos move until `now` [s]."""
+        dt = max(now - self._now, 0.0)
+        self._now = now
+        for number, table in self.tables.items():
+            if not table[packets.TORQUE]:
+                continue
+            goal = table[packets.GOAL] | table[packets.GOAL + 1] << 8
+            asked = table[packets.SPEED] | table[packets.SPEED + 1] << 8
+            top = (
+                TOP
+                if asked == 0
+                else min(asked * packets.SPEED_UNIT * packets.UNITS, TOP)
+            )
+            gap = (goal - self.place[number]) * (1 - np.exp(-dt / LAG))
+            self.place[number] += float(np.clip(gap, -top * dt, top * dt))
+
+    def receive(self, data: bytes, now: float) -> list[Reply]:
+        """Take bytes; gives the status packets."""
+        self.advance(now)
+        found, self._buffer = packets.instructions(self._buffer + data)
+        at = now + len(data) * BYTE
+        return [reply for item in found for reply in self._obey(item, at)]
+
+    def _obey(self, item: packets.Instruction, at: float) -> list[Reply]:
+        if item.code == packets.SYNC_WRITE:
+            self._sync(item.parameters, at)
+            return []
+        replies = []
+        for number in self.numbers:
+            if item.servo not in (number, packets.BROADCAST):
+                continue
+            error, values = self._one(number, item)
+            if item.servo == packets.BROADCAST:
+                continue
+            if self.rng.random() < self.upset:
+                error |= 1 << int(self.rng.integers(7))
+            answer = packets.status(number, error, values)
+            replies.append(Reply(at + self.delay + len(answer) * BYTE, answer))
+        if len(replies) > 1:  # two servos of one number talk at once
+            mixed = bytes(
+                a & b ^ 0x15
+                for a, b in zip(replies[0].data[2:], replies[1].data[2:], strict=True)
+            )
+            return [Reply(replies[0].at, b"\xff\xff" + mixed)]
+        return replies
+
+    def _one(self, number: int, item: packets.Instruction) -> tuple[int, bytes]:
+        table, given = self.tables[number], item.parameters
+        if item.code == packets.PING:
+            return 0, b""
+        if item.code == packets.READ and len(given) == 2:
+            self._refresh(number)
+            return 0, bytes(table[given[0] : given[0] + given[1]])
+        if item.code == packets.WRITE and given:
+            return self._write(number, given[0], given[1:]), b""
+        return 1 << 6, b""
+
+    def _write(self, number: int, at: int, data: bytes) -> int:
+        table = self.tables[number]
+        if at + len(data) > len(table):
+            return 1 << 3
+        if at == packets.GOAL and len(data) >= 2 and data[0] | data[1] << 8 > 1023:
+            return 1 << 1
+        table[at : at + len(data)] = data
+        return 0
+
+    def _sync(self, given: bytes, at: float) -> None:
+        if len(given) < 2 or given[1] == 0:
+            return
+        start, size = given[0], given[1] + 1
+        for place in range(2, len(given) - size + 1, size):
+            number = given[place]
+            if number in self.tables:
+                self._write(number, start, given[place + 1 : place + size])
+        self.goals.append(at)
+
+    def _refresh(self, number: int) -> None:
+        table = self.tables[number]
+        position = int(np.clip(round(self.place[number]), 0, 1023))
+        table[36], table[37] = position & 0xFF, position >> 8
+
+
+def _table(number: int, voltage: float) -> bytearray:
+    table = bytearray(50)
+    table[0], table[2], table[3], table[4], table[5] = packets.MODEL, 24, number, 1, 250
+    table[8:10], table[14:16], table[34:36] = b"\xff\x03", b"\xff\x03", b"\xff\x03"
+    table[26] = table[27] = 1
+    table[28] = table[29] = 32
+    table[30:32] = table[36:38] = b"\x00\x02"
+    table[42], table[43], table[48] = round(voltage * 10), 35, 32
+    return table
