@@ -52,23 +52,25 @@ def irradiance(
         Irradiance weighted by the angular response, shape ``(n, S)`` [W/m2].
     """
     poses = np.asarray(poses, dtype=np.float64)
-    points = _points(law, poses)
-    way = law["lamp_position"][..., None, :, :] - points[:, :, None, :]  # (n, S, L, 3)
-    square = np.maximum((way**2).sum(-1), 1e-6)  # [m2] no nearer than 1 mm
-    unit = way / np.sqrt(square)[..., None]
-    look = law["heading"] + poses[:, 2, None]
-    cosine = (
-        unit[..., 0] * np.cos(look)[..., None] + unit[..., 1] * np.sin(look)[..., None]
-    )
-    light = _shining(law, times) / (4 * np.pi * square)
-    light = light * np.maximum(cosine, 0.0) ** law["exponent"][..., None, None]
+    lamps, height = _lamps_in_body(law, poses)
+    place, look = law["position"], law["heading"]
+    x = lamps[..., 0][:, None] - place[..., 0, None]  # from sensor to lamp, (n, S, L)
+    y = lamps[..., 1][:, None] - place[..., 1, None]
+    z = height[..., None, :] - place[..., 2, None]
+    square = np.maximum(x * x + y * y + z * z, 1e-6)  # [m2] no nearer than 1 mm
+    ahead = x * np.cos(look)[..., None] + y * np.sin(look)[..., None]
+    exponent = law["exponent"][..., None, None]
+    light = np.maximum(ahead, 0.0) ** exponent / square ** (exponent / 2)
+    light = light * _shining(law, times) / (4 * np.pi * square)
     if sight is not None:
-        light = light * sight(_in_body(unit, poses[:, 2]))
+        unit = np.stack(np.broadcast_arrays(x, y, z), axis=-1)
+        light = light * sight(unit / np.sqrt(square)[..., None])
     if screen is not None:
-        lamps = np.broadcast_to(law["lamp_position"], (len(poses), *unit.shape[2:]))
-        light = light * screen(points, lamps)
+        given = law["lamp_position"]
+        where = np.broadcast_to(given, (len(poses), *given.shape[-2:]))
+        light = light * screen(_points(law, poses), where)
     if law["shadow_width"].any():
-        light = light * _shadow(law, way)
+        light = light * _shadow(law, poses)
     return (light.sum(-1) + law["ambient"][..., None]) * law["sensitivity"]
 
 
@@ -106,11 +108,15 @@ def _points(law: Law, poses: np.ndarray) -> np.ndarray:
     return points
 
 
-def _in_body(unit: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-    """Directions turned into the robot's frame."""
-    cos, sin = np.cos(yaw)[:, None, None], np.sin(yaw)[:, None, None]
-    x, y, z = np.moveaxis(unit, -1, 0)
-    return np.stack([cos * x + sin * y, cos * y - sin * x, z], axis=-1)
+def _lamps_in_body(law: Law, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the lamps are from each robot: planar ``(n, L, 2)``, and their heights."""
+    given = law["lamp_position"]
+    way = given[..., :2] - poses[:, None, :2]
+    cos, sin = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
+    lamps = np.empty(way.shape)
+    lamps[..., 0] = cos * way[..., 0] + sin * way[..., 1]
+    lamps[..., 1] = cos * way[..., 1] - sin * way[..., 0]
+    return lamps, given[..., 2]
 
 
 def _shining(law: Law, times: np.ndarray | float) -> np.ndarray:
@@ -122,9 +128,11 @@ def _shining(law: Law, times: np.ndarray | float) -> np.ndarray:
     return (law["lamp_power"] * (1 - law["flicker_depth"] * wave))[:, None, :]
 
 
-def _shadow(law: Law, way: np.ndarray) -> np.ndarray:
+def _shadow(law: Law, poses: np.ndarray) -> np.ndarray:
     """What passes where a shadow falls from the lamp, ``(n, S, L)``."""
-    azimuth = np.arctan2(-way[..., 1], -way[..., 0])  # from the lamp to the sensor
+    lamps = law["lamp_position"][..., None, :, :]
+    way = _points(law, poses)[:, :, None] - lamps
+    azimuth = np.arctan2(way[..., 1], way[..., 0])  # from the lamp to the sensor
     off = azimuth - law["shadow_azimuth"][..., None, None]
     off = np.abs((off + np.pi) % (2 * np.pi) - np.pi)
     inside = off < law["shadow_width"][..., None, None] / 2

@@ -18,7 +18,6 @@ import numpy as np
 from mujoco.rollout import Rollout
 
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS.value
-SHARES = 4  # that a thread gets of a batch: few to hand out, enough to balance
 CONTROL = mujoco.mjtState.mjSTATE_CTRL.value
 
 
@@ -69,11 +68,13 @@ class Job(NamedTuple):
         segments: in order of time; the states go through.
         warm: where the solver starts, shape ``(nv,)``, as the `Motion` before left it:
             with it a motion goes on to the same bytes. None = from scratch.
+        out: where the states are to be written, as `Motion.states`; None = anywhere.
     """
 
     start: np.ndarray
     segments: tuple[Segment, ...]
     warm: np.ndarray | None = None
+    out: np.ndarray | None = None
 
 
 class Motion(NamedTuple):
@@ -98,8 +99,10 @@ def run(job: Job) -> Motion:
     the last state. Such a job is cut there and its remaining states are NaN.
     """
     _quiet()
-    total = sum(len(segment.control) for segment in job.segments)
-    states = np.empty((total + 1, len(job.start)))
+    states = job.out
+    if states is None:
+        total = sum(len(segment.control) for segment in job.segments)
+        states = np.empty((total + 1, len(job.start)))
     states[0] = job.start
     warm = None if job.warm is None else job.warm[None]
     at = 0
@@ -156,15 +159,20 @@ class Pool:
 
     def map(self, jobs: Sequence[Job]) -> list[Motion]:
         """Roll out all jobs; the result depends on neither order nor threads."""
-        if self.threads == 1 or len(jobs) == 1:
+        if self.threads == 1 or len(jobs) < 2:
             return [run(job) for job in jobs]
         if self._executor is None:
-            self._executor = ThreadPoolExecutor(self.threads)
-        size = max(len(jobs) // (self.threads * SHARES), 1)
-        shares = [jobs[i : i + size] for i in range(0, len(jobs), size)]
-        done = self._executor.map(_run_all, shares)
-        return [motion for motions in done for motion in motions]
+            self._executor = ThreadPoolExecutor(self.threads - 1)
+        done: list = [None] * len(jobs)
+        todo = iter(range(len(jobs)))  # its next number goes to one thread only
 
+        def work() -> None:
+            for number in todo:
+                done[number] = run(jobs[number])
 
-def _run_all(jobs: Sequence[Job]) -> list[Motion]:
-    return [run(job) for job in jobs]
+        others = min(self.threads, len(jobs)) - 1
+        helpers = [self._executor.submit(work) for _ in range(others)]
+        work()
+        for helper in helpers:
+            helper.result()
+        return done

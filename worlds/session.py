@@ -1,5 +1,6 @@
 """N robots that are told one command at a time: `Session`."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -157,11 +158,16 @@ class Session:
             for robot in live
         }
         jobs = [
-            Job(self.states[robot, begin], self.segments[robot], self._warm[robot])
+            Job(
+                self.states[robot, begin],
+                self.segments[robot],
+                self._warm[robot],
+                self.states[robot, begin : begin + setting.steps + 1],
+            )
             for robot in live
         ]
         for robot, motion in zip(live, setting.pool.map(jobs), strict=True):
-            self._keep(robot, begin, motion)
+            self._keep(robot, motion)
         for robot in set(range(n)) - set(live):
             self._still(robot, begin)
         self.cycle = at + 1
@@ -169,9 +175,7 @@ class Session:
         self.readings = self._read(moved)
         return self.readings
 
-    def _keep(self, robot: int, begin: int, motion: Motion) -> None:
-        end = begin + len(motion.states)
-        self.states[robot, begin:end] = motion.states
+    def _keep(self, robot: int, motion: Motion) -> None:
         self._warm[robot] = motion.warm
         self.diverged[robot] |= motion.diverged >= 0
 
@@ -218,7 +222,7 @@ class Session:
         if not (self.stopped[robot] or self.diverged[robot]):
             free = self.free(self.states[robot, self.cycle * self.setting.steps])
             yaw = supervisor.heading(free[:2], lamp, self._turner(robot))
-            free[:] = compile.posed(free, (free[0], free[1], yaw))
+            free[3:] = _turned(free[3:].tolist(), yaw)
 
     def _turner(self, robot: int) -> np.random.Generator:
         if robot not in self._turning:
@@ -240,6 +244,19 @@ class Session:
     def free(self, states: np.ndarray) -> np.ndarray:
         """Position and orientation of the robots' bodies, ``(..., 7)``, from states."""
         return states[..., self._free]
+
+
+def _turned(quaternion: Sequence[float], yaw: float) -> tuple[float, ...]:
+    """An orientation (w, x, y, z) turned to a yaw [rad], its tilt kept."""
+    w, x, y, z = quaternion
+    angle = yaw - math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    cos, sin = math.cos(angle / 2), math.sin(angle / 2)
+    return (
+        cos * w - sin * z,
+        cos * x - sin * y,
+        cos * y + sin * x,
+        cos * z + sin * w,
+    )
 
 
 def _columns(controls: Sequence[LoopControl]) -> tuple[slice, slice]:
