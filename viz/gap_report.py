@@ -25,8 +25,8 @@ CAPTIONS = {
     "horizons": (
         "Where the gap is",
         "Root mean square of recorded minus predicted motion, by channel and by how "
-        "far ahead was predicted from an observed state. An error that grows is one of "
-        "motion; one that stays is one of a sensor. Bars are 90 % intervals over "
+        "far ahead was predicted. For a robot that drives, an error that grows is one "
+        "of motion, one that stays is one of a sensor. Bars are 90 % intervals over "
         "trials.",
     ),
     "over_time": (

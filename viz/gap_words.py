@@ -42,7 +42,7 @@ def where(found: Diagnosis) -> str:
     if found.where.get("wheels"):
         said.append(_largest(found.where["wheels"], "wheels"))
     nature = found.where["nature"]["verdict"]
-    if nature != "too small to say":
+    if found.where.get("wheels") and nature != "too small to say":
         said.append(f"its growth with time says {nature}")
     text = "; ".join(said)
     text = text[0].upper() + text[1:] + "."
