@@ -12,7 +12,8 @@ def run(quick: bool) -> Result:
     from bns.gap import scoring
 
     rows = ensure(quick)
-    rows = [r for r in scoring.of(rows, "single", 1.0) if scoring.aliased(r)]
+    rows = [*scoring.of(rows, "single", 1.0), *scoring.of(rows, "alias", 1.0)]
+    rows = [row for row in rows if scoring.aliased(row)]
     rows = [r for r in rows if r["said"]["verdict"] != "no gap"]
     figure = scoring.share(
         rows, lambda r: r["said"]["verdict"] == "either" and scoring.covered(r)
@@ -23,6 +24,7 @@ def run(quick: bool) -> Result:
         holds=figure >= 0.95,
         n=len(rows),
         details={
+            "planted": sum(row["kind"] == "alias" for row in rows),
             "confident and wrong": scoring.share(rows, scoring.confident_wrong),
             "failures": scoring.failures(rows, scoring.covered),
         },

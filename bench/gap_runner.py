@@ -1,8 +1,10 @@
 """Cases of the gap benches: made, diagnosed once, kept as JSON lines, scored many ways.
 
-    python -m bench.gap_runner KIND FIRST LAST [FILE]
+    python -m bench.gap_runner scored|calibrate [PART PARTS]
 
-runs the missing cases of a kind with seeds FIRST to LAST - 1.
+diagnoses the missing cases of a set (every PARTS-th, from PART on) and keeps the
+results in `runs/bench/`, one file per part. Thresholds play no role in that: verdicts
+are taken from what was kept, with the package's calibration, when it is read.
 """
 
 import json
@@ -10,73 +12,113 @@ import sys
 import time
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parent / "results"
-FILE = HERE / "gap_cases.jsonl"
+DIRECTORY = Path(__file__).resolve().parent.parent / "runs" / "bench"
 SEALED = 1_000_000  # seeds of the scored cases begin here; development uses lower ones
-COUNTS = {"single": 180, "pair": 45, "none": 60, "off-library": 30, "fault": 15}
+CALIBRATION = 300  # seeds of the calibration cases begin here
+SPAN = 10_000  # seeds between the scored kinds
+SETS = {
+    "scored": {
+        "single": 140,
+        "pair": 40,
+        "none": 60,
+        "off-library": 30,
+        "fault": 10,
+        "alias": 24,
+    },
+    "calibrate": {"single": 90, "none": 40, "off-library": 10, "pair": 10},
+}
+# Planted for "alias": two delays that no command parts, and what a short one is like.
+ALIKE = ("command_latency", "tracker_latency", "wheel_stuck_max[both]")
 QUICK = {"single": 2, "none": 1}
-_ORDER = tuple(COUNTS)
 
 
-def seed_of(kind: str, number: int) -> int:
-    """Seed of the scored case `number` of a kind."""
-    return SEALED + 10_000 * _ORDER.index(kind) + number
+def seed_of(name: str, kind: str, number: int) -> int:
+    """Seed of the case `number` of a kind in a set."""
+    if name == "calibrate":
+        return CALIBRATION + number
+    return SEALED + SPAN * list(SETS[name]).index(kind) + number
 
 
-def rows(file: Path = FILE) -> list[dict]:
-    """All results so far."""
-    if not file.is_file():
-        return []
-    return [json.loads(line) for line in file.read_text().splitlines() if line]
+def wanted(name: str, counts: dict[str, int] | None = None) -> list[tuple[str, int]]:
+    """Kinds and seeds of a set, kinds mixed, should it be cut short."""
+    share = {
+        (kind, seed_of(name, kind, n)): n / count
+        for kind, count in (counts or SETS[name]).items()
+        for n in range(count)
+    }
+    return sorted(share, key=share.__getitem__)
 
 
-def ensure(quick: bool = False, file: Path = FILE) -> list[dict]:
-    """Run what is missing; the results of the scored cases."""
-    wanted = QUICK if quick else COUNTS
-    seeds = {(k, seed_of(k, n)) for k, count in wanted.items() for n in range(count)}
-    produce([*sorted(seeds)], file)
-    return [row for row in rows(file) if (row["kind"], row["seed"]) in seeds]
+def rows(name: str = "scored") -> list[dict]:
+    """All results of a set so far, by kind and seed."""
+    found = {}
+    for file in sorted(DIRECTORY.glob(f"gap_{name}_*.jsonl")):
+        for line in file.read_text().splitlines():
+            row = json.loads(line)
+            found[row["kind"], row["seed"]] = row
+    return [found[key] for key in sorted(found)]
 
 
-def produce(cases: list[tuple[str, int]], file: Path = FILE) -> None:
-    """Make and diagnose the cases that the file lacks, appending as they come."""
-    from bns.gap.wheeled import WheeledModel
+def ensure(quick: bool = False) -> list[dict]:
+    """Run what is missing of the scored cases; their results, judged."""
+    cases = wanted("scored", QUICK if quick else None)
+    produce(cases, "scored")
+    return judged([r for r in rows() if (r["kind"], r["seed"]) in set(cases)])
 
-    done = {(row["kind"], row["seed"]) for row in rows(file)}
-    file.parent.mkdir(exist_ok=True)
-    model = WheeledModel("khepera3", threads=2)
+
+def judged(found: list[dict]) -> list[dict]:
+    """Rows with the verdicts that the package's calibration gives."""
+    from bns.gap import scoring, verdict
+
+    rules = verdict.calibration()
+    return [scoring.judged(row, rules) for row in found]
+
+
+def produce(cases: list[tuple[str, int]], name: str, part: int = 0) -> None:
+    """Make and diagnose the cases that are missing, appending as they come."""
+    done = {(row["kind"], row["seed"]) for row in rows(name)}
+    DIRECTORY.mkdir(parents=True, exist_ok=True)
     for kind, seed in cases:
         if (kind, seed) not in done:
-            row = one(kind, seed, model)
-            with file.open("a") as out:
+            row = one(kind, seed)
+            with (DIRECTORY / f"gap_{name}_{part}.jsonl").open("a") as out:
                 out.write(json.dumps(row) + "\n")
 
 
-def one(kind: str, seed: int, model) -> dict:
+def one(kind: str, seed: int) -> dict:
     """One case: what is true, what was said, and how long it took."""
     from bench.gap_effects import off_library, other_solver
     from bns.errors import BnsError
     from bns.gap import cases, scoring
-    from bns.gap.diagnose import diagnose
+    from bns.gap.diagnose import analyse
     from bns.gap.records import plain
+    from bns.gap.wheeled import WheeledModel
 
+    model = WheeledModel("khepera3", threads=1)
     case = cases.build(
-        seed, kind, model, off_library=off_library(), extra=other_solver()
+        seed,
+        "single" if kind == "alias" else kind,
+        model,
+        off_library=off_library(),
+        extra=other_solver(),
+        wanted=ALIKE[seed % len(ALIKE)] if kind == "alias" else "",
     )
-    begin = time.perf_counter()
+    begin, busy = time.perf_counter(), time.process_time()
     try:
-        found = diagnose(case.trials, model, seed=seed)
-        said = scoring.said(found, case, model)
+        made = analyse(case.trials, model, seed=seed)
+        said = scoring.said(made, case, model)
     except BnsError as error:
         said = {"error": str(error)}
-    seconds = time.perf_counter() - begin
-    row = {"kind": kind, "seed": seed, "seconds": seconds}
+    row = {
+        "kind": kind,
+        "seed": seed,
+        "seconds": time.perf_counter() - begin,
+        "cpu": time.process_time() - busy,
+    }
     return plain({**row, "answer": case.answer.as_dict(), "said": said})
 
 
 if __name__ == "__main__":
-    kind, first, last, *rest = sys.argv[1:]
-    produce(
-        [(kind, seed) for seed in range(int(first), int(last))],
-        Path(rest[0]) if rest else FILE,
-    )
+    name, *rest = sys.argv[1:]
+    part, parts = (int(word) for word in rest or ("0", "1"))
+    produce(wanted(name)[part::parts], name, part)

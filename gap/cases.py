@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from bns import seeding
-from bns.gap import fit, select, signatures
+from bns.gap import fit, signatures
+from bns.gap.aliases import alike
 from bns.gap.faults import faulty
 from bns.gap.model import GapModel
 from bns.gap.null import Null
@@ -29,14 +30,11 @@ from bns.worlds.mujoco_world import MujocoWorld
 from bns.worlds.trial import Commands, Trial
 
 KINDS = ("single", "pair", "none", "off-library", "fault")
-TRIALS, LENGTH = 8, 10.0  # recordings of a case, and how long each is [s]
+TRIALS, LENGTH = 5, 8.0  # recordings of a case, and how long each is [s]
 FASTEST = 0.14  # [m/s] largest wheel speed told
 SIZES = 0.5, 8.0  # magnitudes over what is detected, drawn evenly in the logarithm
 PAIR_SIZES = 2.0, 8.0  # of each of two
 LEAST = 0.4  # size below which an effect counts as not excited, and is drawn again
-# A pair of signatures d noise units apart is confused with probability Phi(-d / 2);
-# 20 % is reached at d = 1.68.
-ALIKE = 1.68**2
 POWER = 1.2816  # standard normal: 90 %
 
 
@@ -88,7 +86,7 @@ def commands(rng: np.random.Generator, count: int = TRIALS) -> list[Commands]:
     """Random wheel speeds, each held for 0.4 to 1.6 s."""
     made = []
     for _ in range(count):
-        number = int(rng.integers(6, 12))
+        number = int(rng.integers(5, 10))
         held = rng.uniform(0.4, 1.6, number)
         held = np.maximum(np.rint(held * LENGTH / held.sum() / 0.005), 20) * 0.005
         values = rng.uniform(-FASTEST, FASTEST, (number, 2))
@@ -206,7 +204,9 @@ def _hide(
         term = _draw(
             rng, curves, size * seen, {t.candidate.effect for t in terms}, wanted
         )
-        if term and _length(problem, term) > LEAST * seen:
+        reached = _length(problem, term) / seen if term else 0.0
+        least = LEAST if count == 1 else 0.9 * low
+        if least < reached < 3 * high:
             terms.append(term)
     effects = [term.effect() for term in terms]
     lengths = np.linalg.norm(problem.signatures([[e] for e in effects]), axis=1)
@@ -216,7 +216,7 @@ def _hide(
         effects=tuple(str(effect) for effect in effects),
         magnitudes=tuple(term.magnitude for term in terms),
         sizes=tuple((lengths / seen).tolist()),
-        aliases=tuple(alike(problem, curves, null, term) for term in terms),
+        aliases=tuple(alike(problem, curves, term) for term in terms),
         detected=seen,
     )
     return made, effects
@@ -269,17 +269,3 @@ def _level(item: Candidate, magnitude, lengths, length: float) -> float:
     i = over[0]
     share = (length - grown[i - 1]) / max(grown[i] - grown[i - 1], 1e-12)
     return float(at[i - 1] + share * (at[i] - at[i - 1]))
-
-
-def alike(
-    problem: Problem, curves: Curves, null: Null, term: fit.Term
-) -> tuple[str, ...]:
-    """Candidates that a recording of this kind cannot tell from an effect."""
-    (predicted,) = problem.model.simulate(problem.trials, [[term.effect()]])
-    shown = tuple(
-        map(problem.model.compare, problem.trials, predicted, problem.windows)
-    )
-    clean = replace(problem, recorded=shown)
-    found = select.search(clean, curves, null, worth=np.inf, most=1)
-    near = [point.names[0] for point in found.sizes[0] if point.loss < ALIKE]
-    return tuple(sorted({term.candidate.name, *near}))

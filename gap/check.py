@@ -137,6 +137,10 @@ def _spikes(observed: np.ndarray) -> np.ndarray:
         apart = np.abs(kept[2:] - kept[:-2]) / 2
         scale = np.median(np.abs(off)) / 0.6745 + 1e-9
         hit = (np.abs(off) > SPIKE * scale) & (np.abs(off) > 4 * apart)
+        # where a motion turns back, going on from either side leads to the sample
+        before = 2 * kept[1:-3] - kept[:-4] - kept[2:-2]
+        after = 2 * kept[3:-1] - kept[4:] - kept[2:-2]
+        hit[1:-1] &= np.minimum(np.abs(before), np.abs(after)) > SPIKE * scale
         found[seen[1:-1][hit]] = True
     return found
 

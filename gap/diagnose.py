@@ -3,6 +3,7 @@
 import time
 from collections.abc import Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,8 +13,9 @@ from bns.gap.fit import Point
 from bns.gap.model import GapModel
 from bns.gap.null import Null
 from bns.gap.problem import Problem
-from bns.gap.records import Candidate, Diagnosis, Fit
+from bns.gap.records import Candidate, Diagnosis, Fit, Verdict
 from bns.gap.select import Search
+from bns.gap.signatures import Curves
 from bns.worlds.trial import Trial
 
 ALPHA_MORE = 0.01  # chance that a further effect is added where there is none
@@ -59,11 +61,54 @@ def diagnose(
         BnsError: too few trials, faults that cannot be repaired, channels that do not
             fit the model.
     """
+    made = analyse(
+        trials, model, seed=seed, candidates=candidates, rules=calibration, most=most
+    )
+    return report(made, full=full)
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """All that a diagnosis rests on, before it is written down.
+
+    Attributes:
+        problem, curves, null, search, choice, verdict: see there.
+        faults: what `check` found.
+        seed: of what was drawn.
+        clock: seconds by stage.
+    """
+
+    problem: Problem
+    curves: Curves
+    null: Null
+    search: Search
+    choice: verdict.Choice
+    verdict: Verdict
+    faults: tuple[str, ...]
+    seed: int
+    clock: _Clock
+
+    @property
+    def seen(self) -> float:
+        """Whitened length of a signature that is found with 90 % power."""
+        return float(np.sqrt(self.null.threshold(0.05)) + POWER)
+
+
+def analyse(
+    trials: Sequence[Trial],
+    model: GapModel,
+    *,
+    seed: int = 0,
+    candidates: Sequence[Candidate] | None = None,
+    rules: verdict.Calibration | None = None,
+    most: int = 3,
+) -> Analysis:
+    """From a recording to a verdict with all it rests on, see `diagnose`."""
     clock = _Clock()
     with clock("check"):
         trials, faults = _checked(trials, model)
     candidates = tuple(model.candidates() if candidates is None else candidates)
-    rules = calibration or verdict.calibration()
+    rules = rules or verdict.calibration()
     with clock("signatures"):
         problem = Problem.of(trials, model, candidates=candidates)
         curves = signatures.trace(problem, candidates)
@@ -74,26 +119,38 @@ def diagnose(
         choice = verdict.choose(problem, search, null, worth)
         excite = {item.name: item.excite for item in candidates}
         answer = verdict.decide(problem, choice, rules, excite)
-        fits = _fits(problem, search)
-    seen = float(np.sqrt(null.threshold(0.05)) + POWER)
+    return Analysis(problem, curves, null, search, choice, answer, faults, seed, clock)
+
+
+def report(made: Analysis, *, full: bool = True) -> Diagnosis:
+    """An analysis written down.
+
+    Args:
+        made: the analysis.
+        full: with localisation and closed fractions; False = the verdict alone.
+    """
+    problem, choice, clock = made.problem, made.choice, made.clock
+    fits = _fits(problem, made.search)
     where_found, closed = {}, {}
     if full:
         with clock("where"):
-            where_found = where.where(problem, choice.best, seed=seed)
+            where_found = where.where(problem, choice.best, seed=made.seed)
         with clock("closed"):
-            closed = quantify.quantify(problem, null, search, choice.best, seed=seed)
+            closed = quantify.quantify(
+                problem, made.null, made.search, choice.best, seed=made.seed
+            )
     return Diagnosis(
-        model=model.name,
-        trials=len(trials),
-        faults=faults,
-        verdict=answer,
+        model=problem.model.name,
+        trials=len(problem.trials),
+        faults=made.faults,
+        verdict=made.verdict,
         fits=fits,
         where=where_found,
-        signatures=_signatures(curves, choice, seen),
+        signatures=_signatures(made.curves, choice, made.seen),
         floor=_floor(problem),
         closed=closed,
-        warnings=_warnings(problem, curves, fits, answer),
-        seed=seed,
+        warnings=_warnings(problem, made.curves, fits, made.verdict),
+        seed=made.seed,
         seconds=clock.seconds,
         partial={} if full else {"where, closed": "not asked for"},
     )

@@ -1,6 +1,6 @@
 """Bounded fits of one to three effects, started from the signatures."""
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +16,7 @@ ROUNDS = 5  # of Gauss-Newton
 ENOUGH = 0.05  # improvement of the loss below which a fit stops
 AHEAD = 4.0  # times the last improvement that a fit may still gain
 ZOOM, ZOOMS = 8, 3  # points and rounds where there is no slope
+HOPELESS = 60.0  # a fit so much worse than the best is not worth its while
 FLAT = 0.3  # slope over the chord's below which a parameter counts as without slope
 
 
@@ -71,11 +72,14 @@ class Point:
         return tuple(term.candidate.name for term in self.terms)
 
 
-def evaluate(problem: Problem, supports: Sequence[Sequence[Term]]) -> list[Point]:
+def evaluate(
+    problem: Problem, supports: Sequence[Sequence[Term]], *, rough: bool = False
+) -> list[Point]:
     """The loss of supports as they are, in one batch of simulations."""
     if not supports:
         return []
-    rests = problem.rests([[term.effect() for term in terms] for terms in supports])
+    effects = [[term.effect() for term in terms] for terms in supports]
+    rests = problem.rest - problem.signatures(effects, rough=rough)
     return [
         Point(tuple(terms), rest, _finite(loss(rest)), np.zeros((0, len(rest))))
         for terms, rest in zip(supports, rests, strict=True)
@@ -86,25 +90,87 @@ def _finite(value: float) -> float:
     return float(value) if np.isfinite(value) else np.inf
 
 
-def refine(problem: Problem, start: Sequence[Term], *, target: float = np.inf) -> Point:
-    """Fit the magnitudes (and extras) of a support from a start.
+Asking = Generator[list[tuple[Term, ...]], list[Point], Point]
+
+
+class Bar:
+    """The best loss among fits that are made side by side."""
+
+    def __init__(self, loss: float = np.inf):
+        self.loss = loss
+
+    @property
+    def target(self) -> float:
+        """A loss that a fit has to be on its way to."""
+        return self.loss + HOPELESS
+
+
+def refine(problem: Problem, start: Sequence[Term]) -> Point:
+    """Fit the magnitudes (and extras) of a support from a start, see `refine_all`."""
+    return refine_all(problem, [start])[0]
+
+
+def refine_all(problem: Problem, starts: Sequence[Sequence[Term]]) -> list[Point]:
+    """Fit the magnitudes (and extras) of several supports, side by side.
 
     Bounded Gauss-Newton on the simulation itself with secant updates of the slopes;
-    a parameter without slope (or a whole number) is searched on a shrinking grid.
-    The result is never worse than the start.
+    a parameter without slope (or a whole number) is searched on a shrinking grid. What
+    all fits want simulated next is simulated in one batch. A fit that is not on its way
+    to within `HOPELESS` of the best is given up. The result is never worse than the
+    start. Where the model has a rough simulation, fits are made on it and finished on
+    the true one where the two differ.
 
     Args:
         problem: the recording.
-        start: terms to start from.
-        target: a fit that is not on its way to this loss is given up.
+        starts: terms to start from, of each support.
     """
-    (point,) = evaluate(problem, [start])
-    point = _descend(problem, point, target)
-    hopeless = point.loss > 4 * target + 1e3
+    points = _side_by_side(problem, starts, rough=True)
+    exact = evaluate(problem, [point.terms for point in points])
+    best = min((point.loss for point in exact), default=np.inf)
+    again = [
+        number
+        for number, (point, true) in enumerate(zip(points, exact, strict=True))
+        if abs(point.loss - true.loss) > ENOUGH and true.loss < best + HOPELESS
+    ]
+    made = [replace(t, slopes=p.slopes) for p, t in zip(points, exact, strict=True)]
+    better = _side_by_side(problem, [points[n].terms for n in again], rough=False)
+    for number, point in zip(again, better, strict=True):
+        made[number] = point
+    return made
+
+
+def _side_by_side(
+    problem: Problem, starts: Sequence[Sequence[Term]], *, rough: bool
+) -> list[Point]:
+    bar = Bar()
+    tasks = [_refining(tuple(start), bar) for start in starts]
+    wanted = {number: next(task) for number, task in enumerate(tasks)}
+    done: dict[int, Point] = {}
+    while wanted:
+        supports = [terms for ask in wanted.values() for terms in ask]
+        points = evaluate(problem, supports, rough=rough)
+        asked, wanted = wanted, {}
+        for number, ask in asked.items():
+            given, points = points[: len(ask)], points[len(ask) :]
+            try:
+                wanted[number] = tasks[number].send(given)
+            except StopIteration as finished:
+                done[number] = finished.value
+    return [done[number] for number in range(len(tasks))]
+
+
+def _refining(start: tuple[Term, ...], bar: Bar) -> Asking:
+    (point,) = yield [start]
+    bar.loss = min(bar.loss, point.loss)
+    point = yield from _descending(point, bar)
+    bar.loss = min(bar.loss, point.loss)
     for place, term in enumerate(point.terms):
+        hopeless = point.loss > 4 * bar.target + 1e3
         stepped = integer(term.candidate) or term.candidate.stepped
-        if stepped or (not hopeless and _is_flat(point, place)):
-            point = _zoom(problem, point, place)
+        near = point.loss < bar.target
+        if (stepped and near) or (not hopeless and _is_flat(point, place)):
+            point = yield from _zooming(point, place)
+            bar.loss = min(bar.loss, point.loss)
     return point
 
 
@@ -136,20 +202,20 @@ def _box(terms: Sequence[Term]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return low, high, step
 
 
-def slopes(problem: Problem, point: Point) -> np.ndarray:
-    """Change of the prediction by each parameter, by differences, ``(p, N)``."""
+def _sloping(point: Point) -> Asking:
+    """The point with its slopes: change of the prediction by each parameter."""
     values = _values(point.terms)
     _, high, step = _box(point.terms)
     step = np.where(values + step > high, -step, step)
-    moved = [_with(point.terms, values + row) for row in np.diag(step)]
-    rests = np.array([found.rest for found in evaluate(problem, moved)])
-    return np.nan_to_num((point.rest - rests) / step[:, None])
+    moved = yield [_with(point.terms, values + row) for row in np.diag(step)]
+    rests = np.array([found.rest for found in moved])
+    return replace(point, slopes=np.nan_to_num((point.rest - rests) / step[:, None]))
 
 
-def _descend(problem: Problem, point: Point, target: float) -> Point:
-    if not np.isfinite(point.loss):
+def _descending(point: Point, bar: Bar) -> Asking:
+    if not np.isfinite(point.loss) or not point.terms:
         return point
-    point = replace(point, slopes=slopes(problem, point))
+    point = yield from _sloping(point)
     for _ in range(ROUNDS):
         values, (low, high, _) = _values(point.terms), _box(point.terms)
         weight = weights(point.rest)
@@ -162,9 +228,8 @@ def _descend(problem: Problem, point: Point, target: float) -> Point:
             bounds=((low - values) * size - 1e-9, (high - values) * size + 1e-9),
         ).x
         step = np.clip(values + step / size, low, high) - values
-        (best,) = evaluate(problem, [_with(point.terms, values + step)])
-        if best.loss >= point.loss:
-            (best,) = evaluate(problem, [_with(point.terms, values + 0.3 * step)])
+        tried = yield [_with(point.terms, values + k * step) for k in (1.0, 0.3)]
+        best = min(tried, key=lambda found: found.loss)
         if best.loss >= point.loss - 1e-9:
             break
         moved = _values(best.terms) - values
@@ -172,7 +237,8 @@ def _descend(problem: Problem, point: Point, target: float) -> Point:
         update = point.slopes + np.outer(moved, missing) / max(moved @ moved, 1e-300)
         gain = point.loss - best.loss
         point = replace(best, slopes=update)
-        if gain < ENOUGH or point.loss - AHEAD * gain > target:
+        bar.loss = min(bar.loss, point.loss)
+        if gain < ENOUGH or point.loss - AHEAD * gain > bar.target:
             break
     return point
 
@@ -192,7 +258,7 @@ def _is_flat(point: Point, place: int) -> bool:
     )
 
 
-def _zoom(problem: Problem, point: Point, place: int) -> Point:
+def _zooming(point: Point, place: int) -> Asking:
     term = point.terms[place]
     item = term.candidate
     marks = np.unique([*item.grid, item.nominal, item.low, item.high])
@@ -213,7 +279,7 @@ def _zoom(problem: Problem, point: Point, place: int) -> Point:
             )
             for value in tried
         ]
-        found = evaluate(problem, supports)
+        found = yield supports
         losses = np.array([other.loss for other in found])
         best = int(losses.argmin())
         if losses[best] < point.loss:

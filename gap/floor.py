@@ -10,7 +10,7 @@ from bns.worlds.trial import Trial
 
 # Third differences of independent noise have a variance of 1 + 9 + 9 + 1 = 20.
 THIRD = np.sqrt(20.0)
-QUANTILE, NORMAL = 0.3, 0.38532  # share, and the 30 % point of |N(0, 1)|
+QUANTILE, NORMAL = 0.5, 0.67449  # share, and the median of |N(0, 1)|
 REPEATS = 2  # trials with the same commands that make a floor
 MOTION = 1e-6  # step of numerical derivatives, in the channel's unit
 
@@ -66,9 +66,8 @@ def _measurement(
 ) -> np.ndarray:
     pieces: tuple[list, list] = ([], [])
     for trial, simulated in zip(trials, predicted, strict=True):
-        for kept, series in zip(
-            pieces, (trial.observed, trial.observed - simulated), strict=True
-        ):
+        seen = trial.observed[:, : simulated.shape[1]]  # further channels do not count
+        for kept, series in zip(pieces, (seen, seen - simulated), strict=True):
             third = np.diff(series, n=3, axis=0)
             kept.append(np.abs(third[np.isfinite(third).all(axis=1)]))
     found = [
@@ -76,7 +75,7 @@ def _measurement(
         for kept in pieces
         if sum(map(len, kept)) > 10
     ]
-    return np.min(found, axis=0) if found else np.zeros(trials[0].observed.shape[1])
+    return np.min(found, axis=0) if found else np.zeros(predicted[0].shape[1])
 
 
 def _repeats(trials: Sequence[Trial]) -> list[list[Trial]]:

@@ -30,7 +30,7 @@ class Null:
         """By drawing whitened recordings without an effect."""
         rng = seeding.generator(seed, "gap", "null")
         rows = curves.signature
-        size = (rows.astype(float) ** 2).sum(axis=1)
+        size = np.maximum((rows.astype(float) ** 2).sum(axis=1), 1e-12)
         draws = rng.standard_normal((DRAWS, rows.shape[1])).astype(np.float32)
         # best position between the nominal and each level
         along = draws @ rows.T
@@ -57,7 +57,9 @@ class Null:
         Returns:
             p-value; what the flexible model would improve beyond chance.
         """
-        z = np.clip(z / spread(z), -5, 5)
+        by_channel = z.reshape(-1, len(problem.model.features))
+        scale = np.array([spread(column) for column in by_channel.T])
+        z = np.clip(by_channel / scale, -5, 5).ravel()
         explained = float(((z @ self.basis) ** 2).sum())
         degrees = self.basis.shape[1]
         p_flexible = chi2.sf(explained, degrees)

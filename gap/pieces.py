@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bns.gap.model import Windows
+from bns.gap.travel import EVERY
 from bns.worlds.trial import Trial
 
 LENGTH = 2.5  # [s] of a piece; a heading drifts little in it
@@ -65,11 +66,14 @@ def stitched(poses: Sequence[np.ndarray]) -> np.ndarray:
     return np.concatenate(path)
 
 
-def moved(poses: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Poses as if they had begun at `start`."""
-    turn = start[2] - poses[0, 2]
+def moved(
+    poses: np.ndarray, start: np.ndarray, origin: np.ndarray | None = None
+) -> np.ndarray:
+    """Poses as if they had begun at `start`, not at `origin` (None = the first)."""
+    origin = poses[0] if origin is None else origin
+    turn = start[2] - origin[2]
     cos, sin = np.cos(turn), np.sin(turn)
-    x, y = (poses[:, :2] - poses[0, :2]).T
+    x, y = (poses[:, :2] - origin[:2]).T
     return np.column_stack(
         [start[0] + cos * x - sin * y, start[1] + sin * x + cos * y, poses[:, 2] + turn]
     )
@@ -95,3 +99,14 @@ def windows(trial: Trial, length: float) -> Windows:
     first, last = marks[:-1], marks[1:]
     begin, end = trial.times[first], trial.times[last]
     return Windows(first, last, (begin + end) / 2, end - begin)
+
+
+def thinned(poses: np.ndarray) -> np.ndarray:
+    """Every `EVERY`-th pose; the last interval is made whole by going on straight."""
+    missing = -(len(poses) - 1) % EVERY
+    if missing:
+        beyond = poses[-1] + np.arange(1, missing + 1)[:, None] * (
+            poses[-1] - poses[-2]
+        )
+        poses = np.concatenate([poses, beyond])
+    return poses[::EVERY].copy()

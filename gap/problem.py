@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -53,7 +54,7 @@ class Problem:
             candidates: their slack says how uncertain the nominal model is.
             floor: None = estimated.
         """
-        trials = tuple(trials)
+        trials = tuple(narrowed(trial, model) for trial in trials)
         (predicted,) = model.simulate(trials, [()])
         windows = tuple(model.windows(trial) for trial in trials)
         floor = floor or floors.estimate(model, trials, predicted)
@@ -72,36 +73,48 @@ class Problem:
         sets = [[item.make(item.nominal + item.slack)] for item in uncertain]
         return replace(made, whiten=made.whiten.uncertain(made.signatures(sets)))
 
-    @property
+    @cached_property
     def rest(self) -> np.ndarray:
         """Whitened recorded minus nominal motion, ``(N,)``."""
         return self._whitened(self.recorded, self.nominal)
 
-    def signatures(self, effects: Sequence[Sequence[Effect]]) -> np.ndarray:
+    def signatures(
+        self, effects: Sequence[Sequence[Effect]], *, rough: bool = False
+    ) -> np.ndarray:
         """Whitened change of the motion by sets of effects, ``(E, N)``.
 
-        NaN in a row whose simulation diverged.
+        Args:
+            effects: sets of effects.
+            rough: where the model has a quicker, rougher simulation (`sketch`), by it.
+
+        Returns:
+            NaN in a row whose simulation diverged.
         """
-        rows = [
-            self._whitened(features, self.nominal)
-            for features in self._features(effects)
-        ]
-        return np.array(rows)
+        simulate = self.model.simulate
+        if rough:
+            simulate = getattr(self.model, "sketch", simulate)
+        made = simulate(self.trials, effects)
+        parts = []
+        for number, (trial, windows, nominal) in enumerate(
+            zip(self.trials, self.windows, self.nominal, strict=True)
+        ):
+            seen = np.stack([paths[number] for paths in made])
+            parts.append(self.model.compare(trial, seen, windows) - nominal)
+        return self.whiten.many(parts)
 
     def rests(self, effects: Sequence[Sequence[Effect]]) -> np.ndarray:
         """Whitened recorded minus predicted motion, ``(E, N)``."""
         return self.rest - self.signatures(effects)
 
-    def _features(self, effects: Sequence[Sequence[Effect]]) -> list[list[np.ndarray]]:
-        return [
-            [
-                self.model.compare(trial, seen, windows)
-                for trial, seen, windows in zip(
-                    self.trials, predicted, self.windows, strict=True
-                )
-            ]
-            for predicted in self.model.simulate(self.trials, effects)
-        ]
-
     def _whitened(self, left: Sequence, right: Sequence) -> np.ndarray:
         return self.whiten([a - b for a, b in zip(left, right, strict=True)])
+
+
+def narrowed(trial: Trial, model: GapModel) -> Trial:
+    """A trial with the channels of the model alone, which come first."""
+    count = len(model.channels)
+    if len(trial.channels) == count:
+        return trial
+    return trial.replace(
+        observed=trial.observed[:, :count], channels=trial.channels[:count]
+    )

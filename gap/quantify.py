@@ -86,9 +86,18 @@ def plain_gap(problem: Problem, effects: Sequence[Effect]) -> dict[str, Any]:
     }
 
 
-def flexible(problem: Problem, null: Null, *, folds: int = 5) -> np.ndarray:
-    """Held-out loss by trial of a flexible model of the gap: what is predictable."""
-    rest, rows = problem.rest, problem.whiten.rows
+def flexible(
+    problem: Problem, null: Null, rest: np.ndarray | None = None, *, folds: int = 5
+) -> np.ndarray:
+    """Held-out loss by trial of a flexible model of the gap: what is predictable.
+
+    Args:
+        problem: the recording.
+        null: its flexible directions.
+        rest: what is predicted; None = all that the nominal model leaves.
+        folds: groups of trials.
+    """
+    rest, rows = problem.rest if rest is None else rest, problem.whiten.rows
     made = np.zeros(len(rows))
     for group in [range(k, len(rows), folds) for k in range(min(folds, len(rows)))]:
         kept = np.ones(len(rest), dtype=bool)

@@ -2,36 +2,40 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise, permutations
 from typing import Any
 
 import numpy as np
 
-from bns.gap import baselines, fit, select, signatures
+from bns.gap import baselines, fit, select, verdict
 from bns.gap.cases import Case, record
+from bns.gap.diagnose import ALPHA_MORE, Analysis, report
 from bns.gap.model import GapModel
 from bns.gap.problem import Problem
 from bns.gap.quantify import edit_error
-from bns.gap.records import Diagnosis
 from bns.worlds.effects import registry
 
 LARGE = 3.0  # sizes from which effects have to be named
 
 
-def said(found: Diagnosis, case: Case, model: GapModel) -> dict[str, Any]:
+def said(made: Analysis, case: Case, model: GapModel) -> dict[str, Any]:
     """What a diagnosis said of a case, the oracle and the baselines, as plain data."""
-    answer = case.answer
-    candidates = model.candidates()
-    problem = Problem.of(case.trials, model, candidates=candidates)
+    answer, problem = case.answer, made.problem
+    found = report(made)
+    choice = made.choice
     row = {
         "verdict": found.verdict.kind,
         "named": found.verdict.named,
         "sets": found.verdict.sets,
         "p_gap": found.verdict.p_gap,
         "p_misfit": found.verdict.p_misfit,
-        "excess": found.signatures["misfit_excess"],
-        "explained": found.signatures["explained"],
+        "excess": choice.excess,
+        "explained": choice.explained,
+        "left": choice.left,
+        "size": choice.size,
+        "residuals": len(problem.rest),
+        "worth": made.null.threshold(ALPHA_MORE),
         "ranked": found.signatures["ranked"],
         "faults": found.faults,
         "closed": found.closed.get("closed"),
@@ -39,6 +43,7 @@ def said(found: Diagnosis, case: Case, model: GapModel) -> dict[str, Any]:
         "after": found.closed.get("after"),
         "best": found.signatures["best"],
         "loss": {"+".join(fit.names): fit.loss for fit in found.fits},
+        "held_out": {"+".join(fit.names): fit.held_out for fit in found.fits},
         "intervals": [
             (fit.names, fit.magnitudes, fit.intervals)
             for fit in found.fits
@@ -47,12 +52,11 @@ def said(found: Diagnosis, case: Case, model: GapModel) -> dict[str, Any]:
         "seconds": found.seconds,
     }
     if answer.kind in ("single", "pair"):
-        row["oracle"] = _oracle(problem, case, candidates)
-    if answer.kind == "pair" and found.verdict.named:
-        row["edit"] = _edit(found, case, model)
+        row["oracle"] = _oracle(problem, case, model.candidates())
+    if answer.kind == "pair" and choice.size:
+        row["edit"] = _edit(choice.best, case, model)
     if answer.kind in ("single", "none"):
-        curves = signatures.trace(problem, candidates)
-        row["baselines"] = baselines.name(problem, curves)
+        row["baselines"] = baselines.name(problem, made.curves)
     return row
 
 
@@ -77,11 +81,36 @@ def _branch(item, values) -> int:
     return 0
 
 
-def _edit(found: Diagnosis, case: Case, model: GapModel) -> dict[str, float]:
+@dataclass(frozen=True)
+class _Stored:
+    """What a row keeps of a choice."""
+
+    size: int
+    p_gap: float
+    p_misfit: float
+    excess: float
+    explained: float
+    scores: tuple[tuple[tuple[str, ...], float], ...]
+
+
+def judged(row: dict[str, Any], rules: verdict.Calibration) -> dict[str, Any]:
+    """A row with the verdict that a calibration gives."""
+    said = row["said"]
+    if "ranked" not in said or "size" not in said:
+        return row
+    scores = tuple((tuple(r["names"]), r["score"]) for r in said["ranked"])
+    keys = ("size", "p_gap", "p_misfit", "excess", "explained")
+    kind, named, sets = verdict.judge(
+        _Stored(*(said[key] for key in keys), scores), rules
+    )
+    return {**row, "said": {**said, "verdict": kind, "named": named, "sets": sets}}
+
+
+def _edit(best: fit.Point, case: Case, model: GapModel) -> dict[str, float]:
     """Take the first true effect away; predict a recording with the second alone."""
     first, second = (registry.parse(text) for text in case.answer.effects)
     alone = record(case.commands, [*case.reality, second], 7, model.name)
-    effects = [registry.parse(text) for text in found.best.effects]
+    effects = [term.effect() for term in best.terms]
     ours = edit_error(alone, model, effects, first.name)["edited"]
     oracle = edit_error(alone, model, [first, second], first.name)["edited"]
     return {"ours": ours, "oracle": oracle}

@@ -13,9 +13,9 @@ from bns.gap.signatures import Curves, integer
 from bns.gap.whiten import loss, weights
 
 SINGLES, NEAR = 10, 5  # single effects fitted in full: at most, and at least
-PAIRS, TRIPLES = 8, 4
-HOPELESS, PATIENCE = 60.0, 3  # a fit so much worse than the best; so many in a row
-STRUCTURE = 0.1  # p-value below which a rest has structure
+PAIRS, TRIPLES = 5, 3
+COARSE = 4.0  # loss per residual beyond which a third effect would not save it
+STRUCTURE = 0.03  # p-value below which a rest has structure
 CHUNK = 256  # levels whose loss is taken at once
 
 
@@ -64,6 +64,7 @@ def search(
         sizes.append(_pairs(problem, curves, nothing, singles))
         best = sizes[1][0]
         more = most > 2 and singles[0].loss - best.loss > worth
+        more = more and best.loss < COARSE * len(best.rest)
         if more and _unexplained(problem, curves, null, best, worth):
             sizes.append(_triples(problem, curves, sizes[1]))
     return Search(nothing, tuple(sizes), screened)
@@ -76,20 +77,6 @@ def _unexplained(
     if null.misfit(problem, point.rest)[0] < STRUCTURE:
         return True
     return point.loss - level_losses(curves, point.rest).min() > worth
-
-
-def _fitted(problem: Problem, starts: Sequence[Sequence[Term]]) -> list[Point]:
-    """Fits in the order of the starts, until they stop coming near the best."""
-    points: list[Point] = []
-    failures = 0
-    best = np.inf
-    for start in starts:
-        points.append(fit.refine(problem, start, target=best + HOPELESS))
-        best = min(best, points[-1].loss)
-        failures = failures + 1 if points[-1].loss > best + HOPELESS else 0
-        if failures >= PATIENCE:
-            break
-    return points
 
 
 def _count(curves: Curves) -> int:
@@ -132,7 +119,7 @@ def _singles(
         for candidate in chosen[:SINGLES]
         for start in _starts(curves, losses, candidate)
     ]
-    return _unique(_fitted(problem, starts))
+    return _unique(fit.refine_all(problem, starts))
 
 
 def _pairs(
@@ -150,7 +137,7 @@ def _pairs(
     for a, b in zip(first[order[:PAIRS]], second[order[:PAIRS]], strict=True):
         if np.isfinite(table[a, b]):
             starts.append([_term(curves, level) for level in at[a, b]])
-    return _unique(_fitted(problem, starts))
+    return _unique(fit.refine_all(problem, starts))
 
 
 def _term(curves: Curves, level: int) -> Term:
@@ -178,7 +165,7 @@ def _triples(
         for pair in pairs[:2]
         for added in _additions(curves, pair)[: TRIPLES // 2]
     ]
-    return _unique(_fitted(problem, starts))
+    return _unique(fit.refine_all(problem, starts))
 
 
 def _unique(points: Sequence[Point]) -> tuple[Point, ...]:

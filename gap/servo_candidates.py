@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bns.errors import BnsError
 from bns.gap.records import Candidate
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect, ServoEffect
@@ -91,7 +92,11 @@ def columns(law: Law, sets: Sequence[Sequence[Effect]]) -> Law:
     for effects in sets:
         changed = law
         for effect in effects:
-            assert isinstance(effect, ServoEffect), effect
+            if not isinstance(effect, ServoEffect):
+                raise BnsError(
+                    f"{effect} does not act on a servo; take effects whose name begins "
+                    "with servo_ (`bns effects`)."
+                )
             changed = effect.change(changed)
         made.append(changed)
     result = {}

@@ -48,7 +48,9 @@ class ServoModel:
         process: Sequence[float] = (0.06,),
         resolution: Sequence[float] = (1.5e-3,),
     ):
-        assert models.robot(self.name).kind == "servo"
+        kind = models.robot(self.name).kind
+        if kind != "servo":
+            raise BnsError(f"{self.name!r} is of kind {kind!r}; it has to be a servo.")
         self.nominal = nominal or Nominal(servo_pendulum.law(), 0.0)
         self.process = np.array(process, dtype=float)
         self.resolution = np.array(resolution, dtype=float)

@@ -61,7 +61,7 @@ def trace(problem: Problem, candidates: Sequence[Candidate]) -> Curves:
             for value in item.grid:
                 sets.append([item.make(value, branch)])
                 where.append((number, branch, value))
-    found = problem.signatures(sets)
+    found = problem.signatures(sets, rough=True)
     finite = np.isfinite(found).all(axis=1)
     diverged = tuple(str(s[0]) for s, ok in zip(sets, finite, strict=True) if not ok)
     curves: dict[tuple[int, int], list] = {}
@@ -162,6 +162,36 @@ def distance(curves: Curves, signature: np.ndarray) -> np.ndarray:
             for number in range(len(curves.candidates))
         ]
     )
+
+
+def nearest(curves: Curves, signature: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Squared distance of a signature to each candidate's curve, and the level there.
+
+    A curve is the line through its levels, from the nominal on.
+
+    Returns:
+        ``(C,)`` each; infinite and 0 for a candidate without levels.
+    """
+    count = len(curves.candidates)
+    gaps, at = np.full(count, np.inf), np.zeros(count, dtype=int)
+    for number, item in enumerate(curves.candidates):
+        for branch in range(len(item.branches)):
+            mine = np.flatnonzero((curves.owner == number) & (curves.branch == branch))
+            for side in (-1, 1):
+                offset = (curves.magnitude[mine] - item.nominal) * side
+                order = mine[offset > 0][np.argsort(offset[offset > 0])]
+                ends = curves.signature[order].astype(float)
+                if not len(ends):
+                    continue
+                begins = np.concatenate([np.zeros((1, ends.shape[1])), ends[:-1]])
+                step = ends - begins
+                size = np.maximum((step**2).sum(axis=1), 1e-12)
+                share = ((signature - begins) * step).sum(axis=1) / size
+                share = np.clip(share, 0.0, 1.0)[:, None]
+                gap = ((signature - begins - share * step) ** 2).sum(axis=1)
+                if gap.min() < gaps[number]:
+                    gaps[number], at[number] = gap.min(), order[gap.argmin()]
+    return gaps, at
 
 
 def angle(a: np.ndarray, b: np.ndarray) -> float:

@@ -5,15 +5,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from typing import Protocol
 
 import numpy as np
 
 from bns.gap.fit import Point
 from bns.gap.null import Null, spread
 from bns.gap.problem import Problem
+from bns.gap.quantify import flexible
 from bns.gap.records import Verdict
 from bns.gap.select import Search, held_out
 from bns.gap.signatures import angle
+from bns.gap.whiten import loss
 
 MINOR = 0.015  # share of what is explained below which a further effect is not named
 LISTED = 4  # supports named in a sentence at most
@@ -67,6 +70,8 @@ class Choice:
         ranked: all fitted supports of that size with their scores, best first.
         p_gap, p_misfit, excess: see `Null`.
         explained: improvement of the best support on nothing.
+        left: what a flexible model, fitted on other trials, still improves on the best
+            support, and the standard error of that over trials.
     """
 
     size: int
@@ -76,6 +81,12 @@ class Choice:
     p_misfit: float
     excess: float
     explained: float
+    left: tuple[float, float]
+
+    @property
+    def scores(self) -> list[tuple[tuple[str, ...], float]]:
+        """Names and scores of the supports, best first."""
+        return [(point.names, score) for point, score in self.ranked]
 
 
 def choose(problem: Problem, search: Search, null: Null, worth: float) -> Choice:
@@ -107,7 +118,14 @@ def choose(problem: Problem, search: Search, null: Null, worth: float) -> Choice
     ranked = tuple((point, (point.loss - best.loss) / scale) for point in points)
     p_misfit, excess = null.misfit(problem, best.rest)
     explained = nothing.loss - best.loss
-    return Choice(size, best, ranked, p_gap, p_misfit, excess, explained)
+    left = _left(problem, null, best)
+    return Choice(size, best, ranked, p_gap, p_misfit, excess, explained, left)
+
+
+def _left(problem: Problem, null: Null, best: Point) -> tuple[float, float]:
+    rows = problem.whiten.rows
+    gain = [loss(best.rest[own]) for own in rows] - flexible(problem, null, best.rest)
+    return float(gain.sum()), float(gain.std(ddof=1) * np.sqrt(len(gain)))
 
 
 def decide(
@@ -121,19 +139,10 @@ def decide(
         calibration: thresholds.
         excite: by candidate, which commands make it felt.
     """
+    kind, named, sets = judge(choice, calibration)
     tied = [point for point, score in choice.ranked if score <= calibration.tie]
-    sets = tuple(point.names for point in tied)
     rivals = [(p, s) for p, s in choice.ranked if s > calibration.tie]
     second, margin = (rivals[0][0].names, rivals[0][1]) if rivals else ((), np.inf)
-    if choice.p_gap > calibration.alpha_gap and choice.size < 2:
-        kind, named = "no gap", ()
-        sets = ((), *(sets if choice.size else ()))
-    elif _unexplained(choice, calibration) or not choice.size:
-        kind, named = "none of the library", ()
-    elif len(tied) > 1:
-        kind, named = "either", sets
-    else:
-        kind, named = ("effect" if choice.size == 1 else "together"), sets[:1]
     between = _angle(problem, tied) if kind == "either" else 90.0
     return Verdict(
         kind=kind,
@@ -149,11 +158,35 @@ def decide(
     )
 
 
-def _unexplained(choice: Choice, calibration: Calibration) -> bool:
+class Weighed(Protocol):
+    """What is needed of a `Choice` to judge it."""
+
+    size: int
+    p_gap: float
+    p_misfit: float
+    excess: float
+    explained: float
+
+    @property
+    def scores(self) -> Sequence[tuple[tuple[str, ...], float]]:
+        """Names and scores of the supports, best first."""
+        ...
+
+
+def judge(
+    choice: Weighed, rules: Calibration
+) -> tuple[str, tuple[tuple[str, ...], ...], tuple[tuple[str, ...], ...]]:
+    """Kind, named supports and the 90 % set, see `Verdict`."""
+    sets = tuple(names for names, score in choice.scores if score <= rules.tie)
+    if choice.p_gap > rules.alpha_gap and choice.size < 2:
+        return "no gap", (), ((), *(sets if choice.size else ()))
     share = choice.excess / max(choice.explained, 1e-9)
-    return (
-        choice.p_misfit < calibration.alpha_misfit and share > calibration.misfit_share
-    )
+    strange = choice.p_misfit < rules.alpha_misfit and share > rules.misfit_share
+    if strange or not choice.size:
+        return "none of the library", (), sets
+    if len(sets) > 1:
+        return "either", sets, sets
+    return ("effect" if choice.size == 1 else "together"), sets[:1], sets
 
 
 def _angle(problem: Problem, tied: Sequence[Point]) -> float:

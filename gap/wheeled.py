@@ -3,27 +3,29 @@
 import hashlib
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from bns import models
 from bns.errors import BnsError
-from bns.gap import wheeled_library
+from bns.gap import travel, wheeled_library
 from bns.gap.model import Windows
-from bns.gap.pieces import WHOLE, Piece, moved, pieces_of, stitched, windows
+from bns.gap.pieces import WHOLE, Piece, moved, pieces_of, stitched, thinned, windows
 from bns.gap.records import Candidate
-from bns.gap.reduced import Reduced, reduced
+from bns.gap.reduced import STEEPEST, Reduced, between, reduced
+from bns.gap.travel import EVERY
 from bns.worlds import compile, control, observe
 from bns.worlds.active import Placed
-from bns.worlds.effects.base import Effect, PoseSignal
+from bns.worlds.effects.base import ControlSignal, Effect, PoseSignal
 from bns.worlds.physics import Job, Pool
-from bns.worlds.trial import POSE_CHANNELS, Channel, Trial
+from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Trial
 
-EVERY = 2  # physics steps between kept poses
 KEPT = 40_000  # simulated drives kept in memory, about 24 kB each
 WINDOW = 0.1  # [s] shortest piece of motion that is compared
 ABSOLUTE = ("floor_slope",)  # effects that tell one heading in the world from another
 FAR = np.inf
+AT_ONCE = 600  # drives that are computed together
 
 
 class WheeledModel:
@@ -60,6 +62,7 @@ class WheeledModel:
         self.resolution = np.array(resolution, dtype=float)
         self._pool = Pool(threads)
         self._cache: OrderedDict[tuple, np.ndarray] = OrderedDict()
+        self._given: WeakKeyDictionary[Commands, ControlSignal] = WeakKeyDictionary()
 
     @property
     def dt(self) -> float:
@@ -74,10 +77,22 @@ class WheeledModel:
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
         """Predicted poses, see `GapModel.simulate`."""
+        return self._simulated(trials, effects, rough=False)
+
+    def sketch(
+        self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
+    ) -> list[list[np.ndarray]]:
+        """As `simulate`, quicker: the reduced dynamics also where they are rough."""
+        return self._simulated(trials, effects, rough=True)
+
+    def _simulated(
+        self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]], rough: bool
+    ) -> list[list[np.ndarray]]:
         keys = {}
+        ways = [self._learnt(self._body(items), rough) for items in effects]
         for place, items in enumerate(effects):
             for number, trial in enumerate(trials):
-                keys[place, number] = self._key(trial, items)
+                keys[place, number] = (*self._key(trial, items), ways[place])
         wanted: dict[tuple, tuple[Trial, Sequence[Effect]]] = {}
         for (place, number), key in keys.items():
             if key not in self._cache:
@@ -97,7 +112,8 @@ class WheeledModel:
         self._cache.move_to_end(key)
         return self._cache[key]
 
-    def _key(self, trial: Trial, effects: Sequence[Effect]) -> tuple:
+    @staticmethod
+    def _key(trial: Trial, effects: Sequence[Effect]) -> tuple:
         moving = tuple(str(e) for e in effects if e.stage != "tracking")
         seen = trial.observed.tobytes() if _absolute(effects) else b""
         told = trial.commands.values.tobytes() + trial.commands.durations.tobytes()
@@ -105,13 +121,13 @@ class WheeledModel:
 
     def _run(self, wanted: Mapping[tuple, tuple]) -> dict[tuple, np.ndarray]:
         """Poses from the origin, every `EVERY` steps, ``(S, 3)`` by key."""
-        groups: dict[tuple, list] = {}
+        quick: list[tuple] = []
         jobs: list[Job] = []
         slow: dict[tuple, list] = {}
         for key, (trial, items) in wanted.items():
-            told, body = self._told(trial, items), self._body(items)
-            if not self.exact and not _absolute(items) and self._reduced(body).good:
-                groups.setdefault((body, len(told)), []).append((key, told))
+            told, body, learnt = self._told(trial, items), self._body(items), key[-1]
+            if learnt is not None:
+                quick.append((key, learnt, told, self._pull(trial, body, len(told))))
                 continue
             pieces = (
                 pieces_of(trial, len(told), self.dt) if _absolute(items) else [WHOLE]
@@ -119,10 +135,10 @@ class WheeledModel:
             slow[key] = [(len(jobs) + n, piece) for n, piece in enumerate(pieces)]
             jobs += [self._job(told, body, piece) for piece in pieces]
         made = {}
-        for (body, _), members in groups.items():
-            poses = self._reduced(body).poses(np.stack([told for _, told in members]))
-            for (key, _), pose in zip(members, poses, strict=True):
-                made[key] = _thinned(pose)
+        for at in range(0, len(quick), AT_ONCE):
+            keys, maps, told, pulls = zip(*quick[at : at + AT_ONCE], strict=True)
+            halves = [travel.halved(values) for values in told]
+            made.update(zip(keys, travel.poses(maps, halves, pulls), strict=True))
         place = compile.free_joint(compile.compiled(self.name).model)
         free = slice(1 + place.start, 1 + place.stop)
         rolled = [motion.states[:, free] for motion in self._pool.map(jobs)]
@@ -131,18 +147,58 @@ class WheeledModel:
                 observe.planar(rolled[number], piece.yaw)[piece.lead :]
                 for number, piece in parts
             ]
-            made[key] = _thinned(stitched(poses))
+            made[key] = thinned(stitched(poses))
         self._cache.update(made)
         while len(self._cache) > KEPT:
             self._cache.popitem(last=False)
         return made
 
-    def _reduced(self, body: tuple) -> Reduced:
-        return reduced(self.name, body, self._robot.ctrl_per_command)
+    def _learnt(self, body: tuple, rough: bool) -> travel.Map | None:
+        """The reduced dynamics of a robot, None where they do not do."""
+        if self.exact:
+            return None
+        level = tuple(effect for effect in body if effect.name not in ABSOLUTE)
+        steepest = sum(e["angle"] for e in body if e.name in ABSOLUTE)
+        if steepest > STEEPEST:
+            return None
+        found = self._reduced(level, rough, slopes=steepest > 0)
+        return found.map if found.good or (rough and found.rough) else None
+
+    def _reduced(self, body: tuple, rough: bool, *, slopes: bool = False) -> Reduced:
+        per_command = self._robot.ctrl_per_command
+        if len(body) == 1:
+            return between(self.name, body[0], per_command, slopes=slopes)
+        whole = reduced(self.name, () if rough else body, per_command, slopes=slopes)
+        if not rough or not body:
+            return whole
+        parts = [between(self.name, e, per_command, slopes=slopes) for e in body]
+        maps = [whole.map, *(part.map for part in parts)]
+        summed = travel.mixed(maps, [1 - len(parts), *[1] * len(parts)])
+        return Reduced(summed, max(1.0, *(part.error for part in parts)))
+
+    def _pull(self, trial: Trial, body: tuple, steps: int) -> np.ndarray | None:
+        """Gravity along the heading that was observed; None on a level floor."""
+        if not _absolute(body):
+            return None
+        down = np.linalg.norm(compile.compiled(self.name).model.opt.gravity)
+        gravity = np.zeros(3)
+        for effect in body:
+            if effect.name in ABSOLUTE:
+                along = -down * np.sin(effect["angle"])
+                gravity[0] += along * np.cos(effect["direction"])
+                gravity[1] += along * np.sin(effect["direction"])
+        times = np.arange(0, steps, EVERY) * self.dt
+        yaw = trial.channel("yaw")
+        seen = np.isfinite(yaw)
+        stamps = trial.times[seen] - trial.times[trial.boundaries[0]]
+        return travel.pull(np.interp(times, stamps, yaw[seen]), gravity)
 
     def _told(self, trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
-        counts = control.steps(trial.commands.durations, self.dt)
-        given = control.signal(trial.commands, counts, self.dt)
+        given = self._given.get(trial.commands)
+        if given is None:
+            counts = control.steps(trial.commands.durations, self.dt)
+            given = control.signal(trial.commands, counts, self.dt)
+            self._given[trial.commands] = given
         placed = [
             Placed(effect, 0.0, FAR, ("gap", effect.name, number))
             for stage in ("command", "actuator")
@@ -166,16 +222,23 @@ class WheeledModel:
         self, trial: Trial, effects: Sequence[Effect], poses: np.ndarray
     ) -> np.ndarray:
         """Poses put at the recorded start, through the tracker, at the samples."""
-        times = np.arange(len(poses)) * self.dt * EVERY
+        every = self.dt * EVERY
+        at = trial.times - trial.times[trial.boundaries[0]]
+        tracking = [effect for effect in effects if effect.stage == "tracking"]
+        if not tracking:
+            place = np.clip(at / every, 0.0, len(poses) - 1.0)
+            before = np.minimum(place.astype(int), len(poses) - 2)
+            share = (place - before)[:, None]
+            seen = (1 - share) * poses[before] + share * poses[before + 1]
+            return moved(seen, _start(trial), origin=poses[0])
+        times = np.arange(len(poses)) * every
         poses = moved(poses, _start(trial))
         stamps, seen = times, poses
-        for effect in effects:
-            if effect.stage == "tracking":
-                signal = PoseSignal(stamps, seen, times, poses)
-                rng = np.random.default_rng(0)
-                on = np.ones(len(stamps), dtype=bool)
-                stamps, seen = effect.apply(signal, on, rng)
-        at = trial.times - trial.times[trial.boundaries[0]]
+        for effect in tracking:
+            signal = PoseSignal(stamps, seen, times, poses)
+            rng = np.random.default_rng(0)
+            on = np.ones(len(stamps), dtype=bool)
+            stamps, seen = effect.apply(signal, on, rng)
         return np.stack([np.interp(at, stamps, axis) for axis in seen.T], axis=1)
 
     def windows(self, trial: Trial) -> Windows:
@@ -216,17 +279,6 @@ class WheeledModel:
             "y": pose[:, 1],
             "time in the trial": at,
         }
-
-
-def _thinned(poses: np.ndarray) -> np.ndarray:
-    """Every `EVERY`-th pose; the last interval is made whole by going on straight."""
-    missing = -(len(poses) - 1) % EVERY
-    if missing:
-        beyond = poses[-1] + np.arange(1, missing + 1)[:, None] * (
-            poses[-1] - poses[-2]
-        )
-        poses = np.concatenate([poses, beyond])
-    return poses[::EVERY].copy()
 
 
 def _absolute(effects: Sequence[Effect]) -> bool:

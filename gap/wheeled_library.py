@@ -5,13 +5,15 @@ from collections.abc import Iterable
 import numpy as np
 
 from bns.gap.records import Candidate
+from bns.gap.reduced import WEAKER, on_lattice
 from bns.worlds.effects import registry
+from bns.worlds.effects.base import BodyEffect
 from bns.worlds.effects.common import TOP_SPEED
 
 SIDES = ("left", "right", "both")
 HEADINGS = tuple({"direction": k * np.pi / 2} for k in (-1, 0, 1, 2))
 WAYS = tuple({"direction": way} for way in ("forward", "backward", "commanded"))
-FACTORS = (0.7, 0.85, 0.95, 1.05, 1.15, 1.3)
+FACTORS = (0.75, 0.93, 1.07, 1.25)
 BANDS = (0.003, 0.006, 0.01, 0.015, 0.02, 0.03, 0.04, 0.06, 0.075, 0.09, 0.11, 0.13)
 TURNS = "turns in place and arcs"
 
@@ -22,8 +24,8 @@ TURNS = "turns in place and arcs"
 # by, 10 g, 1 ms); "both_slack" belongs to both wheels together.
 _TABLE = (
     ("axle_length", "factor", FACTORS, 0.7, 1.3, False, {"slack": 0.005}),
-    ("battery_sag", "per_second", (0.002, 0.01, 0.04, 0.15), 0, 0.2, False, {}),
-    ("battery_sag", "per_metre", (0.02, 0.1, 0.4, 2.0), 0, 2, False, {}),
+    ("battery_sag", "per_second", (0.003, 0.02, 0.1), 0, 0.2, False, {}),
+    ("battery_sag", "per_metre", (0.05, 0.3, 1.5), 0, 2, False, {}),
     (
         "centre_of_mass",
         "dx",
@@ -48,8 +50,8 @@ _TABLE = (
         {"both_slack": 1e-3},
     ),
     ("payload", "mass", (0.2, 0.7, 2.0), 0, 2, False, {"slack": 0.01}),
-    ("rolling_drag", "torque", (0.0005, 0.002, 0.005, 0.012), 0, 0.03, True, {}),
-    ("rolling_drag", "viscous", (5e-5, 2e-4, 1e-3, 5e-3), 0, 0.01, True, {}),
+    ("rolling_drag", "torque", (0.0003, 0.001, 0.003, 0.01), 0, 0.03, True, {}),
+    ("rolling_drag", "viscous", (5e-5, 4e-4, 3e-3), 0, 0.01, True, {}),
     (
         "speed_saturation",
         "limit",
@@ -61,12 +63,12 @@ _TABLE = (
     ),
     ("torque_limit", "factor", (0.02, 0.05, 0.09, 0.13, 0.2), 0, 1, True, {}),
     ("tracker_latency", "delay", (0.05, 0.1, 0.2, 0.4, 0.8), 0, 1, False, {}),
-    ("tracker_scale", "factor", (0.8, 0.95, 1.05, 1.25), 0.8, 1.25, False, {}),
+    ("tracker_scale", "factor", (0.85, 0.95, 1.05, 1.2), 0.8, 1.25, False, {}),
     ("wheel_diameter", "factor", FACTORS, 0.7, 1.3, True, {"slack": 0.003}),
-    ("wheel_gain", "factor", (0, 0.5, 0.8, 1.2, 1.6, 2.0), 0, 2, True, {}),
+    ("wheel_gain", "factor", (0, 0.5, 0.85, 1.15, 1.7), 0, 2, True, {}),
     ("wheel_intermittent", "every", (2, 3, 4, 5, 6, 8), 2, 12, True, {"nominal": 0}),
-    ("wheel_stuck_max", "blend", (0.1, 0.3, 0.6, 1), 0, 1, True, {"branches": WAYS}),
-    ("wheel_stuck_min", "blend", (0.1, 0.3, 0.6, 1), 0, 1, True, {"branches": WAYS}),
+    ("wheel_stuck_max", "blend", (0.1, 0.4, 1), 0, 1, True, {"branches": WAYS}),
+    ("wheel_stuck_min", "blend", (0.1, 0.4, 1), 0, 1, True, {"branches": WAYS}),
 )
 EXCITE = {
     "floor_slope": "long drives in several headings",
@@ -95,7 +97,7 @@ def candidates() -> tuple[Candidate, ...]:
             nominal=0.0,
             low=0.0,
             high=0.35,
-            grid=(0.03, 0.12, 0.3),
+            grid=(0.02, 0.1),
             branches=HEADINGS,
             extras=("direction",),
             excite=EXCITE["floor_slope"],
@@ -116,6 +118,9 @@ def _rows(
     described = registry.get(effect)
     about = next(p for p in described.parameters if p.name == parameter)
     several = sum(p.scales for p in described.parameters) > 1
+    if issubclass(described, BodyEffect) and effect not in WEAKER:
+        grid = on_lattice(effect, parameter, [v for v in grid if low <= v <= high])
+        grid = tuple(value for value in grid if low <= value <= high)
     stem = f"{effect}.{parameter}" if several else effect
     for side in SIDES if sided else ("",):
         settings = {"nominal": about.nominal, **more}

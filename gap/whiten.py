@@ -71,11 +71,20 @@ class Whitener:
         Returns:
             ``(N,)``; NaN anywhere if any is not finite.
         """
+        return self.many([values[None] for values in features])[0]
+
+    def many(self, features: Sequence[np.ndarray]) -> np.ndarray:
+        """Whitened features of E predictions: per trial ``(E, W, C)``; ``(E, N)``."""
         parts = [
-            solve_triangular(factor, values.ravel(), lower=True, check_finite=False)
+            solve_triangular(
+                factor,
+                values.reshape(len(values), -1).T,
+                lower=True,
+                check_finite=False,
+            ).T
             for factor, values in zip(self.factors, features, strict=True)
         ]
-        return self.damp(np.concatenate(parts))
+        return self.damp(np.concatenate(parts, axis=1))
 
     def damp(self, z: np.ndarray) -> np.ndarray:
         """The uncertain directions damped; ``(..., N)``."""

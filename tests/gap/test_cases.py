@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.gap import casebook, cases, check, scoring
+from bns.gap import casebook, cases, check, scoring, verdict
 from bns.gap.wheeled import WheeledModel
 
 
@@ -85,3 +85,17 @@ def test_a_casebook_keeps_its_answers_apart(model, tmp_path):
 class FewCandidates(WheeledModel):
     def candidates(self):
         return tuple(c for c in super().candidates() if c.slack)
+
+
+def test_thresholds_are_applied_to_what_was_kept():
+    kept = row([["a"]])
+    kept["said"] |= {"size": 1, "p_gap": 1e-9, "p_misfit": 0.5, "excess": 0.0}
+    kept["said"] |= {"explained": 90.0}
+    kept["said"]["ranked"] = [
+        {"names": ["a"], "score": 0.0},
+        {"names": ["b"], "score": 4.0},
+    ]
+    narrow, wide = verdict.Calibration(tie=3.0), verdict.Calibration(tie=5.0)
+    assert scoring.judged(kept, narrow)["said"]["verdict"] == "effect"
+    assert scoring.judged(kept, wide)["said"]["verdict"] == "either"
+    assert scoring.judged(kept, wide)["said"]["sets"] == (("a",), ("b",))

@@ -4,16 +4,17 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError, FormatError
-from bns.gap import check, pieces, verdict
+from bns.gap import check, pieces, signatures, travel, verdict
 from bns.gap.cases import commands
 from bns.gap.diagnose import diagnose
+from bns.gap.problem import Problem
 from bns.gap.records import Candidate, Diagnosis
-from bns.gap.reduced import reduced
+from bns.gap.reduced import between, reduced
 from bns.gap.wheeled import WheeledModel
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import CommandEffect, Parameter
 from bns.worlds.mujoco_world import MujocoWorld
-from bns.worlds.trial import Channel, body_displacements
+from bns.worlds.trial import Channel, Commands, body_displacements
 
 NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.01"
 KEPT = (
@@ -151,6 +152,64 @@ def test_dynamics_that_do_not_fit_are_simulated(told):
     assert not reduced("khepera3", (drag,), 1 / 0.0205).good
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "wheel_diameter:wheel=left,factor=1.013",
+        "rolling_drag:wheel=left,torque=0.0001",
+        "torque_limit:wheel=both,factor=0.2",
+    ],
+)
+def test_maps_between_levels_are_as_those_learnt_there(text):
+    effect = registry.parse(text)
+    found = between("khepera3", effect, 1 / 0.0205)
+    learnt = reduced("khepera3", (effect,), 1 / 0.0205)
+    told = np.random.default_rng(0).uniform(-0.1, 0.1, (8, 2)).repeat(100, axis=0)
+    made = travel.poses([found.map, learnt.map], [travel.halved(told)] * 2, [None] * 2)
+    apart = body_displacements(made[0]) - body_displacements(made[1])
+    assert np.abs(apart).max() < 4e-4
+    assert found.good
+
+
+def test_a_sloping_floor_is_as_simulated(told):
+    slope = registry.parse("floor_slope:angle=0.03,direction=1")
+    trials = MujocoWorld(reality=[slope], threads=1).run(told[:1])
+    ((quick,),) = WheeledModel(threads=1).simulate(trials, [[slope]])
+    error = body_displacements(quick) - body_displacements(trials[0].poses_world)
+    assert np.abs(error).max() < 1e-3
+    assert np.abs(quick[-1, :2] - trials[0].poses_world[-1, :2]).max() < 0.01
+
+
+def test_further_channels_do_not_count(model, told):
+    trials = MujocoWorld(reality=[NOISE], threads=1).run(told, seeds=range(4))
+    more = [
+        trial.replace(
+            observed=np.hstack(
+                [trial.observed, np.full_like(trial.observed[:, :1], 7)]
+            ),
+            channels=(*trial.channels, Channel("battery", "V")),
+        )
+        for trial in trials
+    ]
+    plain, wide = (Problem.of(which, model) for which in (trials, more))
+    assert np.array_equal(plain.rest, wide.rest)
+    assert np.array_equal(plain.floor.sigma, wide.floor.sigma)
+
+
+def test_the_distance_to_a_curve_is_taken_along_it(model):
+    curves = signatures.Curves(
+        model.candidates()[:1],
+        np.zeros(1, dtype=int),
+        np.zeros(1, dtype=int),
+        np.array([1.1]),
+        np.array([[3.0, 0.0]]),
+        (),
+    )
+    gaps, at = signatures.nearest(curves, np.array([1.5, 2.0]))
+    assert gaps[0] == pytest.approx(4.0)
+    assert at[0] == 0
+
+
 def test_stitched_pieces_keep_the_path():
     path = np.cumsum(np.random.default_rng(0).normal(size=(30, 3)), axis=0)
     parts = [path[:11], pieces.moved(path[10:], np.array([5.0, -1.0, 2.0]))]
@@ -184,6 +243,13 @@ def test_faults_are_repaired_and_listed(model, told):
     assert "spikes" in text and "the same samples" in text
     assert np.abs(np.diff(made[0].observed[:, 2])).max() < 3
     assert np.isnan(made[1].observed[20]).all()
+
+
+def test_a_motion_that_turns_back_is_no_spike(model):
+    there = Commands([[-0.1, 0.1], [0.1, -0.1]], [1.0, 1.0])
+    trials = MujocoWorld(threads=1).run([there, there])
+    _, notes = check.check(trials[:1], model)
+    assert "spikes" not in " ".join(notes)
 
 
 def test_channels_have_to_fit(model, told):
