@@ -1,7 +1,7 @@
 """What a closed loop costs beside the bare physics of the same cycles."""
 
+import os
 import time
-from statistics import median
 from typing import Any
 
 import numpy as np
@@ -37,33 +37,44 @@ def run(quick: bool) -> Result:
 
     The bare call gets the controls that the closed loop sent, cycle by cycle, all
     robots that were not stopped in one call of `mujoco.rollout`, each from the state
-    that the cycle before left it in. The figure is the worst case.
+    that the cycle before left it in. The figure is the worst case. Beside it stands
+    the ratio of processor times, which says what is worked in addition; the wall clock
+    also has the waiting of threads for each other, once a cycle, which a busy machine
+    multiplies.
     """
-    repeats = 3 if quick else 15
+    repeats = 2 if quick else 7
     cases = {
         "undamaged": [()] * ROBOTS,
         "wheel_gain each": [
             (f"wheel_gain:wheel=left,factor={0.5 + 0.01 * i}",) for i in range(ROBOTS)
         ],
-        "sensor_stuck_min each": [
-            ("sensor_stuck_min:sensor=left",) for i in range(ROBOTS)
+        "sensor_gain each": [
+            (f"sensor_gain:factor={0.5 + 0.01 * i}",) for i in range(ROBOTS)
         ],
         "sensor_noise each": [
-            (f"sensor_noise:factor={1 + 0.1 * i}",) for i in range(1, ROBOTS + 1)
+            (f"sensor_noise:factor={1.5 + 0.1 * i}",) for i in range(ROBOTS)
         ],
         "payload each": [(f"payload:mass={0.01 * (i + 1)}",) for i in range(ROBOTS)],
     }
-    figures = {
-        name: round(median(_ratios(damage, repeats)), 4)
-        for name, damage in cases.items()
-    }
-    worst = max(figures.values())
+    details: dict[str, object] = {}
+    worst = 0.0
+    for name, damage in cases.items():
+        wall, processor = np.median(_ratios(damage, repeats), axis=0)
+        details[name] = round(float(wall), 4)
+        details[f"{name}, processor time"] = round(float(processor), 4)
+        worst = max(worst, float(wall))
+    details["load of the machine"] = round(os.getloadavg()[0], 1)
     return Result(
-        figure=worst, unit="x", holds=worst <= LIMIT, n=repeats, details=figures
+        figure=round(worst, 4),
+        unit="x",
+        holds=worst <= LIMIT,
+        n=repeats,
+        details=details,
     )
 
 
-def _ratios(damage: list, repeats: int) -> list[float]:
+def _ratios(damage: list, repeats: int) -> list[tuple[float, float]]:
+    """Closed loop over bare call: wall clock and processor time, of each repeat."""
     from bns.worlds import registry
 
     world: Any = registry.make("light", damage=damage, threads=THREADS)
@@ -72,12 +83,17 @@ def _ratios(damage: list, repeats: int) -> list[float]:
     bare()
     ratios = []
     for _ in range(repeats):
-        begin = time.perf_counter()
+        begin = _clocks()
         bare()
-        middle = time.perf_counter()
+        middle = _clocks()
         world.drive(policy, cycles=CYCLES, seeds=seeds)
-        ratios.append((time.perf_counter() - middle) / (middle - begin))
+        wall, processor = (_clocks() - middle) / (middle - begin)
+        ratios.append((wall, processor))
     return ratios
+
+
+def _clocks() -> np.ndarray:
+    return np.array([time.perf_counter(), time.process_time()])
 
 
 def _bare(world: Any, policy: Networks, seeds: range) -> Any:
