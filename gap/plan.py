@@ -14,6 +14,7 @@ from itertools import combinations
 import numpy as np
 from scipy.stats import norm
 
+from bns.errors import BnsError
 from bns.gap import excite, inputs, store, verdict
 from bns.gap.excite import Excitation
 from bns.gap.floor import Floor
@@ -167,6 +168,12 @@ def _family(model: GapModel, seed: int) -> tuple[Excitation, ...]:
     if hasattr(model, "excitations"):
         return tuple(model.excitations(seed=seed))
     limits = inputs.limits(model)
+    if not limits:
+        raise BnsError(
+            f"No safe commands are known for {model.name!r}: give a family of "
+            "excitations in Python (bns.gap.plan.plan), or describe the robot in a "
+            "TOML file with limits (docs/gap_your_robot.md)."
+        )
     if set(limits) == {"left_speed", "right_speed"}:
         top = min(high for _, high, _ in limits.values())
         return excite.wheeled(seed=seed, fastest=min(excite.FAST, 0.95 * top))
