@@ -83,7 +83,7 @@ def _ends(lists: np.ndarray, step: float, cone: str, impratio: float) -> Any:
 
     spec = models.spec("phantomx", visuals=False)
     spec.option.timestep, spec.option.impratio = step, impratio
-    spec.option.cone = mujoco.mjtCone[f"mjCONE_{cone.upper()}"]
+    spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{cone.upper()}")
     scene = Compiled(spec.compile())
     held = round(HOLD / step)
     goals = [

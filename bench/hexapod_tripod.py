@@ -10,8 +10,8 @@ DOC = "distance of the tripod gait made by hand, eleven commands of the hexapod"
 BAR = "the farthest of a grid of such gaits"
 COMMANDS = 11
 LIMIT = 1.5  # [s] of a command
-STRIDES, LIFTS = (0.12, 0.14, 0.16), (0.045, 0.06)
-REACHES, HEIGHTS = (0.13, 0.14, 0.15, 0.16), (0.12, 0.13, 0.14)
+STRIDES, LIFTS = (0.14, 0.16, 0.18), (0.045, 0.06)
+REACHES, HEIGHTS = (0.12, 0.13, 0.14, 0.15), (0.12, 0.13, 0.14)
 
 
 def run(quick: bool) -> Result:

@@ -32,19 +32,19 @@ def outcome(
 
     Args:
         free: the base's free joint on the physics grid, shape ``(S + 1, 7)``.
-        angles, speeds: of the servos, shape ``(S + 1, C)`` [rad, rad/s].
-        goals: in force in each step, shape ``(S, C)`` [rad].
+        angles, speeds: of the servos, shape ``(L, C)`` [rad, rad/s].
+        goals: in force then, shape ``(L, C)`` [rad].
         laws: numbers of the servos, each of shape ``(C,)``.
         carried: what may not touch the floor, see `lies`.
-        dt: physics step [s].
+        dt: between two of these L moments [s].
         arena: size of the board along x and y [m], centred on the origin.
         touched: whether the robot's own parts touched.
         rested: whether every command ended at rest.
         diverged: whether the physics did.
     """
-    duty = _duty(goals, angles[:-1], laws)
+    duty = _duty(goals, angles, laws)
     pushing = (np.abs(duty) > SATURATED * laws["duty_limit"]) & (
-        np.abs(speeds[:-1]) < STALLED
+        np.abs(speeds) < STALLED
     )
     seen = observe.outcome(free, arena, diverged)
     return seen._replace(
@@ -52,7 +52,7 @@ def outcome(
         collided=touched,
         unrested=not rested,
         overloaded=_for_long(pushing & (laws["powered"] > 0), OVERLOAD_TIME / dt),
-        overheated=bool((_heated(duty, speeds[:-1], laws, dt) > HOTTEST).any()),
+        overheated=bool((_heated(duty, speeds, laws, dt) > HOTTEST).any()),
     )
 
 

@@ -54,6 +54,12 @@ class Servos:
         return {"qpos": states[:, 1:end], "qvel": states[:, end : end + self._nv]}
 
 
+@lru_cache(maxsize=256)
+def servos(scene: Compiled) -> Servos:
+    """The servos of a compiled model."""
+    return Servos(scene.model)
+
+
 def _carried(model: mujoco.MjModel) -> np.ndarray:
     """The corners of the box `belly` and the femurs' hips, with a thigh's radius."""
     belly = model.geom("belly")
@@ -116,10 +122,10 @@ def refuse_fallen(
         return
     stages = Stages.of(reality, Damage.none(), 0, 1.0)
     still = Commands(np.zeros((1, len(channels))), [1.0], tuple(channels))
-    made, servos = job(robot, still, stages, start=start, speed=1.0, seed=0, trial=0)
+    made, parts = job(robot, still, stages, start=start, speed=1.0, seed=0, trial=0)
     free = made.start[None, 1:8]
     upright = 1 - 2 * (free[0, 4] ** 2 + free[0, 5] ** 2)
-    if not upright >= np.cos(observe.FALLEN) or legged_flags.lies(free, servos.carried):
+    if not upright >= np.cos(observe.FALLEN) or legged_flags.lies(free, parts.carried):
         raise BnsError(
             f"With {', '.join(stages.texts['reality'])} the robot starts fallen; leave "
             "it legs to stand on, or take a gentler effect."
@@ -159,17 +165,17 @@ def job(
     segments = compile.segments(robot, stages.body, values, dt)
     first = segments[0].compiled
     _refuse_other_sizes(segments)
-    laws, before, goals = servo_joint.laws(first.model), home, []
+    laws, before, goals = servos(first).laws, home, []
     home = legged_goals.shaped(home[None], laws, home, dt)[0]
     for compiled, told in segments:
-        laws = servo_joint.laws(compiled.model)
+        laws = servos(compiled).laws
         goals.append(legged_goals.shaped(told, laws, before, dt))
         before = told[-1]
     ramps = legged_goals.ramps(np.concatenate(goals), home, speed * dt)
     cuts = np.cumsum([len(told) for _, told in segments])
     pieces = _pieces(segments, cuts, ramps, counts, legged_goals.limits(commands, dt))
     begin = stand(first, start, home.tobytes())
-    return WalkJob(begin, pieces), Servos(segments[-1].compiled.model)
+    return WalkJob(begin, pieces), servos(segments[-1].compiled)
 
 
 def _home(told: ControlSignal, stages: Stages, seed: int, trial: int) -> np.ndarray:

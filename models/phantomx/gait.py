@@ -27,15 +27,15 @@ class Tripod(NamedTuple):
         height: of the hips above the feet [m].
     """
 
-    stride: float = 0.14
+    stride: float = 0.16
     lift: float = 0.06
-    reach: float = 0.14
-    height: float = 0.13
+    reach: float = 0.13
+    height: float = 0.14
 
 
 BEST = Tripod()
-"""the farthest in eleven commands of a grid of such gaits (`python -m bench
-hexapod-gait`)"""
+"""the farthest in eleven commands of a grid of such gaits whose legs do not touch
+(`python -m bench hexapod-tripod`)"""
 
 
 def tripod(gait: Tripod = BEST, *, commands: int = 11, heading: int = 1) -> np.ndarray:
