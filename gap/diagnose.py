@@ -14,6 +14,7 @@ from bns.gap.model import GapModel
 from bns.gap.null import Null
 from bns.gap.problem import Problem
 from bns.gap.records import Candidate, Diagnosis, Fit, Verdict
+from bns.gap.reference import Reference
 from bns.gap.select import Search
 from bns.gap.signatures import Curves
 from bns.worlds.trial import Trial
@@ -45,6 +46,7 @@ def diagnose(
     calibration: verdict.Calibration | None = None,
     most: int = 3,
     full: bool = True,
+    reference: Sequence[Trial] = (),
 ) -> Diagnosis:
     """Where a recording and a nominal model part, why, and how far it can be closed.
 
@@ -56,13 +58,21 @@ def diagnose(
         calibration: thresholds; None = those of the package.
         most: largest number of effects at once.
         full: with localisation and closed fractions; False = the verdict alone.
+        reference: recordings of the same robot in which nothing was changed; they tell
+            how far the nominal model is off anyway (`gap/reference.py`).
 
     Raises:
         BnsError: too few trials, faults that cannot be repaired, channels that do not
             fit the model.
     """
     made = analyse(
-        trials, model, seed=seed, candidates=candidates, rules=calibration, most=most
+        trials,
+        model,
+        seed=seed,
+        candidates=candidates,
+        rules=calibration,
+        most=most,
+        reference=reference,
     )
     return report(made, full=full)
 
@@ -102,6 +112,7 @@ def analyse(
     candidates: Sequence[Candidate] | None = None,
     rules: verdict.Calibration | None = None,
     most: int = 3,
+    reference: Sequence[Trial] = (),
 ) -> Analysis:
     """From a recording to a verdict with all it rests on, see `diagnose`."""
     clock = _Clock()
@@ -110,7 +121,12 @@ def analyse(
     candidates = tuple(model.candidates() if candidates is None else candidates)
     rules = rules or verdict.calibration()
     with clock("signatures"):
-        problem = Problem.of(trials, model, candidates=candidates)
+        if reference:
+            usable, _ = check.check(reference, model)
+            known = Reference.of(usable, model, candidates)
+            problem = known.problem(trials, model)
+        else:
+            problem = Problem.of(trials, model, candidates=candidates)
         curves = signatures.trace(problem, candidates)
         null = Null.of(problem, curves, seed=seed)
     worth = null.threshold(ALPHA_MORE)

@@ -10,6 +10,7 @@ from bns.gap.diagnose import diagnose
 from bns.gap.problem import Problem
 from bns.gap.records import Candidate, Diagnosis
 from bns.gap.reduced import between, reduced
+from bns.gap.reference import Reference
 from bns.gap.wheeled import WheeledModel
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import CommandEffect, Parameter
@@ -106,6 +107,26 @@ def test_an_effect_outside_the_library_is_none_of_it(find):
     assert found.verdict.kind == "none of the library"
     assert found.verdict.named == ()
     assert found.verdict.p_misfit < 0.01
+
+
+def test_recordings_without_a_change_make_the_nominal_model_surer(model, told):
+    few = tuple(item for item in model.candidates() if item.slack)
+    off = ["axle_length:factor=1.006", NOISE]
+    before = MujocoWorld(reality=off, threads=1).run(told, seeds=range(4))
+    planted = ["axle_length:factor=0.993", NOISE]
+    after = MujocoWorld(reality=planted, threads=1).run(told, seeds=range(4, 8))
+    known = Reference.of(before, model, few)
+    place = [item.name for item in few].index("axle_length")
+    assert known.mean[place] * few[place].slack == pytest.approx(0.006, abs=0.001)
+    alone = Problem.of(after, model, candidates=few)
+    better = known.problem(after, model)
+    effect = [[few[place].make(0.987)]]  # 0.993 / 1.006
+    seen = [np.linalg.norm(p.signatures(effect)) for p in (alone, better)]
+    assert seen[1] > 2 * seen[0]
+    # the empty recording fits: what was off before is no gap
+    same = MujocoWorld(reality=off, threads=1).run(told, seeds=range(8, 12))
+    rest = known.problem(same, model).rest
+    assert (rest**2).mean() == pytest.approx(1.0, abs=0.25)
 
 
 def test_where_and_how_far(find):
