@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import norm
 
 from bns.errors import BnsError
-from bns.gap import excite, inputs, store, verdict
+from bns.gap import excite, inputs, plan_words, store, verdict
 from bns.gap.excite import Excitation
 from bns.gap.floor import Floor
 from bns.gap.model import GapModel
@@ -87,7 +87,7 @@ def plan(
     """
     fits = tied(found)
     if len(fits) < 2:
-        return Plan(tuple(f.names for f in fits), (), 0, _nothing(found))
+        return Plan(tuple(f.names for f in fits), (), 0, plan_words.nothing(found))
     effects = [[store.parse(text, model) for text in fit.effects] for fit in fits]
     family = tuple(family) or _family(model, seed)
     family = _safe(family, model, effects, arena)
@@ -112,7 +112,7 @@ def _ranked(names: tuple[tuple[str, ...], ...], made: Sequence[Option]) -> Plan:
     alike = tuple(p for p, parted in zip(pairs, open_, strict=True) if not parted)
     counts = [repeats(float(d)) for d in options[0].distances[open_]]
     count = max(counts, default=0)
-    said = _sentence(names, options[0], open_, count, alike)
+    said = plan_words.sentence(names, options[0], open_, count, alike)
     return Plan(names, options, count, said, alike)
 
 
@@ -269,34 +269,3 @@ def _floor(found: Diagnosis, model: GapModel) -> Floor:
         str(given["source"]),
         int(given["repeats"]),
     )
-
-
-def _nothing(found: Diagnosis) -> str:
-    said = {
-        "no gap": "no gap was found",
-        "none of the library": "no effect of the library explains the gap",
-    }
-    reason = said.get(found.verdict.kind, "one explanation stands alone")
-    return f"Nothing is tied: {reason}."
-
-
-def _sentence(names, best: Option, open_, count: int, alike) -> str:
-    words = [" + ".join(name) for name in names]
-    tied_ = " or ".join(words)
-    if not count:
-        return (
-            f"Tied: {tied_}. No safe command of the family tells them apart (the best, "
-            f"{best.excitation.name}, by {best.distances.max():.2g} deviations): they "
-            "do the same whatever is commanded. Observe another quantity."
-        )
-    often = "once" if count == 1 else f"{count} times"
-    parted = best.distances[open_]
-    text = (
-        f"Tied: {tied_}. Run {often}: {best.excitation.name} "
-        f"({best.excitation.commands.duration:.0f} s); it parts them by "
-        f"{parted.min():.2g} deviations (expected log Bayes factor "
-        f"{parted.min() ** 2 / 2:.3g}, wrong one named {100 * best.wrong:.2g} %)."
-    )
-    for first, second in alike:
-        text += f" No command parts {words[first]} from {words[second]}."
-    return text
