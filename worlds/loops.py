@@ -50,6 +50,8 @@ class Loops:
         Raises:
             BnsError: numbers of robots disagree, a start or command that can not be.
         """
+        if not self._robots(seeds, starts):
+            return []
         session = self.session(
             cycles=cycles, cycle=cycle, trial=trial, seeds=seeds, starts=starts
         )
@@ -70,6 +72,8 @@ class Loops:
     ) -> Session:
         """The same robots, to be told one command at a time; arguments as `drive`."""
         n = self._robots(seeds, starts)
+        if not n:
+            raise BnsError("There is no robot: give a start or a seed at least.")
         damages, seeds = shared(self.damage, seeds, n)
         where = self._starts(n, seeds, trial) if starts is None else starts
         where = self._checked_starts(where, n)

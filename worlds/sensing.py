@@ -83,7 +83,8 @@ class Sensing:
 
         Args:
             time: at which the readings are there [s].
-            poses: of the robots when they were taken, shape ``(n, 3)``.
+            poses: of the robots when they were taken, shape ``(n, 3)``; NaN = lost,
+                its last reading is held.
             moments: when they were taken [s], shape ``(n,)``.
 
         Returns:
@@ -91,13 +92,15 @@ class Sensing:
         """
         at = self.count
         law = self._law_at(time)
+        lost = ~np.isfinite(poses).all(axis=1)  # robots that diverged
+        if lost.any():
+            poses = np.where(lost[:, None], 0.0, poses)
         light = light_law.irradiance(
             law, poses, moments, sight=self.sensors.sight, screen=self.screen
         )
         noise = (self._noise[0, :, at], self._noise[1, :, at])
         raw = light_law.counts(law, light, noise)
         if at:
-            lost = ~np.isfinite(raw).all(axis=1)  # a robot that diverged
             raw[lost] = self._raw[lost, at - 1]
         self._times[at] = time
         self._raw[:, at] = self._seen[:, at] = raw

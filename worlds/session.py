@@ -65,7 +65,7 @@ class Session:
 
     Args:
         setting: what they share.
-        stages: what holds for each of them in this trial.
+        stages: what holds for each of them in this trial; one at least.
         starts: poses, shape ``(n, 3)`` [m, m, rad].
         seeds: of each.
         sensing: their sensors; None = they have none.
@@ -111,10 +111,8 @@ class Session:
             compile.start_state(item.first, tuple(start.tolist()))
             for item, start in zip(self._controls, starts, strict=True)
         ]
-        size = len(begin[0]) if n else 0
-        self.states = np.empty((n, cycles * steps + 1, size))
-        if n:
-            self.states[:, 0] = begin
+        self.states = np.empty((n, cycles * steps + 1, len(begin[0])))
+        self.states[:, 0] = begin
         self._free, self._speeds = _columns(self._controls)
         every = max(round(PERIOD / setting.dt), 1)
         self._looks = np.append(np.arange(0, steps, every), steps)
@@ -191,7 +189,7 @@ class Session:
         """Stop and turn who has to be; which of the robots were put somewhere."""
         setting, moved = self.setting, np.zeros(len(self.stages), bool)
         self.handled[:, self.cycle - 1] = self.stopped
-        if setting.supervisor is None or not len(self.stages):
+        if setting.supervisor is None:
             return moved
         places = self.states[:, begin + self._looks, 1:3]
         calls = setting.supervisor.calls(places, setting.lamps, setting.arena)
@@ -261,8 +259,6 @@ def _turned(quaternion: Sequence[float], yaw: float) -> tuple[float, ...]:
 
 def _columns(controls: Sequence[LoopControl]) -> tuple[slice, slice]:
     """Where a full physics state has the base's pose, and where all speeds."""
-    if not controls:
-        return slice(0, 7), slice(0, 0)
     model = controls[0].first.model
     place = compile.free_joint(model)
     speeds = slice(1 + model.nq, 1 + model.nq + model.nv)
