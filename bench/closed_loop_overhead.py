@@ -11,7 +11,7 @@ from bench.result import Result
 DOC = "closed-loop World.drive of 30 robots against bare mujoco.rollout of its cycles"
 BAR = "<= 1.25 x"
 LIMIT = 1.25
-ROBOTS, CYCLES, THREADS = 30, 100, 2
+ROBOTS, CYCLES, THREADS = 30, 50, 2
 
 
 class Networks:
@@ -42,7 +42,7 @@ def run(quick: bool) -> Result:
     also has the waiting of threads for each other, once a cycle, which a busy machine
     multiplies.
     """
-    repeats = 2 if quick else 7
+    repeats = 2 if quick else 5
     cases = {
         "undamaged": [()] * ROBOTS,
         "wheel_gain each": [
