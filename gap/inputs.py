@@ -90,8 +90,6 @@ def trials(
     Raises:
         BnsError: something is missing, malformed, or of another robot.
     """
-    if not paths:
-        raise BnsError("Give recordings: dataset directories, or logs with --columns.")
     if importer and columns:
         raise BnsError("Give --importer or --columns, not both.")
     found = [trial for path in paths for trial in _read(path, model, columns, importer)]

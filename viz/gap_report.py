@@ -77,8 +77,9 @@ def _command(found: Diagnosis) -> str:
     for key in ("importer", "columns"):
         if about.get(key):
             words.append(f"--{key} {about[key]}")
-    if about.get("only"):
-        words.append("--only " + " ".join(about["only"]))
+    for key in ("only", "reference"):
+        if about.get(key):
+            words.append(f"--{key} " + " ".join(about[key]))
     return " ".join([*words, f"--seed {found.seed}", "--out DIR"])
 
 

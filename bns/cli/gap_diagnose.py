@@ -44,6 +44,9 @@ class Diagnose(Check):
     """write report.html"""
     rerun: bool = True
     """write recording.rrd"""
+    reference: tuple[str, ...] = ()
+    """recordings of the same robot in which nothing was changed: they tell how far the
+    nominal model is off anyway"""
     seed: int = 0
     """of what is drawn (null distributions, bootstraps)"""
     most: int = 3
@@ -68,9 +71,11 @@ def nominal(given: Check, threads: int = 1) -> Any:
 
 
 def recorded(given: Check, model: Any) -> list[Any]:
-    """The trials that were asked for."""
+    """The trials that were asked for; none if nothing was given."""
     from bns.gap import inputs
 
+    if not given.data:
+        return []
     return inputs.trials(
         given.data,
         model,
@@ -80,11 +85,17 @@ def recorded(given: Check, model: Any) -> list[Any]:
     )
 
 
+def _some(trials: list[Any]) -> list[Any]:
+    if not trials:
+        raise BnsError("Give recordings: dataset directories, or logs with --columns.")
+    return trials
+
+
 def _check(given: Check) -> int:
     from bns.gap import check, inputs
 
     model = nominal(given)
-    trials = recorded(given, model)
+    trials = _some(recorded(given, model))
     inputs.tellable(trials, model)
     usable, notes = check.check(trials, model)
     for note in notes:
@@ -103,7 +114,7 @@ def _diagnose(given: Diagnose) -> int:
         found, model, trials = _odometry(given), None, []
     else:
         model = nominal(given, given.threads)
-        trials = recorded(given, model)
+        trials = _some(recorded(given, model))
         found = _general(given, model, trials, out)
     found = replace(found, provenance=_provenance(given, model))
     if out:
@@ -122,7 +133,10 @@ def _general(given: Diagnose, model: Any, trials: list[Any], out: Path | None) -
     try:
         usable, _ = check.check(trials, model)
         advice.reproducible(usable, model)
-        found = diagnose(trials, model, seed=given.seed, most=given.most)
+        unchanged = recorded(replace(given, data=given.reference), model)
+        found = diagnose(
+            trials, model, seed=given.seed, most=given.most, reference=unchanged
+        )
         more = advice.warnings(found, model)
         return replace(found, warnings=(*found.warnings, *more))
     except BnsError as error:
@@ -150,6 +164,7 @@ def _provenance(given: Diagnose, model: Any) -> dict[str, Any]:
         "importer": given.importer,
         "columns": given.columns,
         "only": list(given.only),
+        "reference": list(given.reference),
         "versions": dict(versions.collect()),
     }
 

@@ -99,6 +99,8 @@ class Record(Connection):
     """trials; every second one repeats the one before"""
     commands: int = 10
     """commands of a trial"""
+    plan: str = ""
+    """drive these commands instead: a file that `bns gap plan` wrote"""
     damage: tuple[str, ...] = ()
     """software damage, see `bns effects`"""
     seed: int = 0

@@ -42,10 +42,12 @@ def calibrate(given: Any) -> int:
 
 def record(given: Any) -> int:
     """`bns hardware record`."""
+    from bns.gap import command_file
     from bns.hardware import excitation
     from bns.hardware.world import HardwareWorld
     from bns.worlds import dataset
 
+    planned = command_file.read(given.plan) if given.plan else None
     if not given.move:
         raise BnsError(
             "The robot drives for a recording: clear the board, give --move."
@@ -64,7 +66,7 @@ def record(given: Any) -> int:
     trials = []
     try:
         for number in range(given.trials):
-            told = excitation.commands(
+            told = planned or excitation.commands(
                 given.commands, seed=given.seed, number=number // 2
             )
             (trial,) = world.run([told], trial=number)
