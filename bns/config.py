@@ -9,6 +9,7 @@ from typing import Literal
 
 from bns.config_light import LightConfig
 from bns.config_walk import WalkConfig
+from bns.config_watch import WatchConfig
 
 Selection = Literal["tournament", "best", "roulette", "random"]
 Crossover = Literal["single-point", "n-point", "uniform", "sbx"]
@@ -177,6 +178,7 @@ class RunConfig:
     world: WorldConfig = field(default_factory=WorldConfig)
     light: LightConfig = field(default_factory=LightConfig)
     walk: WalkConfig = field(default_factory=WalkConfig)
+    watch: WatchConfig = field(default_factory=WatchConfig)
     choose: RealChoice = "best"
     """which controller is tried in the world"""
     choose_tournament: float = 0.1

@@ -15,9 +15,10 @@ from bns import choice, seeding
 from bns.adaptation import Adaptations
 from bns.chromosome import Population
 from bns.config import RunConfig
+from bns.detection import Detector
 from bns.draws import Draws
 from bns.evolution.generation import Breeder, Rates
-from bns.light import alike, islands, observing, patterns
+from bns.light import alike, islands, observing, patterns, resets, watching
 from bns.light.controller import Weights
 from bns.light.loops import LightLoops, Snns
 from bns.light.memory import Learned
@@ -79,7 +80,10 @@ class LightLearner:
         )
         breeder = Breeder(evolution, self.weights, True)
         self.loops = LightLoops(config, self.simulator, breeder, self.draws)
-        self.adaptations = Adaptations(configs, onsets)
+        watch = config.watch
+        told = [-1] * self.runs if watch.detect else onsets
+        self.adaptations = Adaptations(configs, told)
+        self.detector = Detector.fresh(watch, self.runs, len(watching.CHANNELS))
         windows, batch = self.adaptations.windows, config.light.batch
         sim = self.simulator
         self.motion = Learned(sim.motion, MOTION_OUTPUTS, windows, batch, self.draws)
@@ -156,45 +160,32 @@ class LightLearner:
         )
 
     def _reset(self, trial: int) -> None:
-        resets = self.adaptations.resets(trial)
-        self._restart(resets.population, 0)
+        due = self.adaptations.resets(trial)
+        self._restart(due.population, elitists=False)
         every = np.array([config.light.reset_every for config in self.configs])
-        due = (every > 0) & (trial > 0) & (trial % np.maximum(every, 1) == 0)
-        if due.any():
-            self._restart(due, max(c.light.reset_elitists for c in self.configs))
-        for run in np.flatnonzero(resets.data):
-            self.motion.buffer.clear(run)
-            self.sensors.buffer.clear(run)
-        if resets.simulator.any():
-            which = torch.from_numpy(resets.simulator).to(self.config.device)
+        turn = (every > 0) & (trial > 0) & (trial % np.maximum(every, 1) == 0)
+        self._restart(turn, elitists=True)
+        for run in np.flatnonzero(due.data):
+            self.motion.clear(run)
+            self.sensors.clear(run)
+        if due.simulator.any():
+            which = torch.from_numpy(due.simulator).to(self.config.device)
             for learned in (self.motion, self.sensors):
                 fresh = learned.fresh()
                 learned.theta = torch.where(which[:, None], fresh, learned.theta)
-                learned.train(self.loops, resets.simulator)
+                learned.train(self.loops, due.simulator)
 
-    def _restart(self, which: np.ndarray, elitists: int) -> None:
-        """Fresh random populations in some runs, but for the best of each run."""
+    def _restart(self, which: np.ndarray, *, elitists: bool) -> None:
+        """Fresh random populations in some runs, but for their elitists if asked."""
         if not which.any():
             return
         fresh, old = self._random_population().genes, self.population.genes
         if elitists:
-            fresh = self._with_elitists(fresh, elitists)
+            cost = self.loops.cost_of(self.snns, self.population)
+            wanted = [config.light.reset_elitists for config in self.configs]
+            fresh = resets.with_elitists(fresh, old, cost, wanted)
         rows = self._rows(which).bool()[:, None, None, None]
         self.population = self.population._replace(genes=torch.where(rows, fresh, old))
-
-    def _with_elitists(self, fresh: Tensor, most: int) -> Tensor:
-        cost = self.loops.cost_of(self.snns, self.population).reshape(self.runs, -1)
-        shape = (self.runs, -1, *fresh.shape[2:])
-        fresh, old = fresh.reshape(shape), self.population.genes.reshape(shape)
-        order = cost.topk(most, dim=1, largest=False).indices
-        kept = old.gather(1, order[..., None, None].expand(-1, -1, *fresh.shape[2:]))
-        wanted = torch.tensor([c.light.reset_elitists for c in self.configs])
-        mine = torch.arange(most) < wanted[:, None]
-        mine = mine.to(fresh.device)[..., None, None]
-        fresh = torch.cat(
-            [torch.where(mine, kept, fresh[:, :most]), fresh[:, most:]], 1
-        )
-        return fresh.reshape(self.population.genes.shape)
 
     def observe(
         self, trial: int, tried: Sequence[Trial], best: Sequence[Trial] | None
@@ -215,28 +206,35 @@ class LightLearner:
                 self.simulator, self.snns.thetas, self._chosen, self.task, tried
             )
         )
-        row.update(self._learn(tried))
+        row.update(self._learn(trial, tried))
         row.update(observing.diversity(self.population.genes, self.runs))
         return row
 
-    def _learn(self, tried: Sequence[Trial]) -> dict[str, np.ndarray]:
+    def _learn(self, number: int, tried: Sequence[Trial]) -> dict[str, np.ndarray]:
         """Add the patterns, say how wrong the SNNs were on them, train."""
         errors = np.full((self.runs, MOTION_OUTPUTS + SENSORS), np.nan)
+        innovations = np.full((self.runs, len(watching.CHANNELS)), np.nan)
         for run, trial in enumerate(tried):
             moved = patterns.motion(trial, self.simulator.scales)
             light = patterns.sensors(trial, self.task.lamp)
+            views = self._views(light)
             errors[run] = observing.errors(
                 self.motion.miss(run, moved),
-                self.sensors.miss(run, self._views(light)),
+                self.sensors.miss(run, views),
                 self.simulator.scales,
             )
-            self._keep(run, moved, light)
+            innovations[run] = watching.innovations(
+                self.motion, moved, self.sensors, views, run
+            )
+            self._keep(run, number, moved, light)
             if self.configs[run].light.mirror:
                 self._keep(
                     run,
+                    number,
                     patterns.mirrored_motion(moved),
                     patterns.mirrored_sensors(light),
                 )
+        watched = self._watch(number, innovations)
         for learned in (self.motion, self.sensors):
             if not self.config.snn.warm_start:
                 learned.theta = learned.fresh()
@@ -246,7 +244,25 @@ class LightLearner:
             "sensor_loss": self.sensors.loss.numpy().astype(np.float64),
             "patterns": self.motion.buffer.counts.astype(np.float64),
             "sensor_patterns": self.sensors.buffer.counts.astype(np.float64),
+            **watched,
         }
+
+    def _watch(self, trial: int, innovations: np.ndarray) -> dict[str, np.ndarray]:
+        """Look for damage, and forget what is contradicted, where that is asked for."""
+        watch, row = self.config.watch, {}
+        if watch.detect:
+            alarms = self.detector.update(innovations)
+            self.adaptations.onsets[alarms.on] = trial
+            row["detected"] = alarms.on.astype(np.float64)
+            row["suspect"] = alarms.suspect.astype(np.float64)
+            row["alarm_score"] = alarms.score
+        if watch.forget:
+            gone = [
+                sum(part.forget(run, watch) for part in (self.motion, self.sensors))
+                for run in range(self.runs)
+            ]
+            row["forgotten"] = np.array(gone, np.float64)
+        return row
 
     def _views(self, light: patterns.Patterns) -> patterns.Patterns:
         """Sensor patterns with the inputs that the SNNs take."""
@@ -255,16 +271,18 @@ class LightLearner:
         return light._replace(inputs=views)
 
     def _keep(
-        self, run: int, moved: patterns.Patterns, light: patterns.Patterns
+        self, run: int, trial: int, moved: patterns.Patterns, light: patterns.Patterns
     ) -> None:
-        self.motion.append(run, moved)
-        self.sensors.append(run, self._views(light))
+        self.motion.append(run, trial, moved)
+        self.sensors.append(run, trial, self._views(light))
 
     def state(self) -> dict[str, np.ndarray]:
         """All that the next trial depends on, as arrays."""
         return {
             "genes": self.population.genes.cpu().numpy(),
             "draws": self.draws.state(),
+            "onsets": self.adaptations.onsets,
+            "innovations": self.detector.past,
             **self.motion.state("motion"),
             **self.sensors.state("sensors"),
         }
@@ -274,5 +292,7 @@ class LightLearner:
         genes = torch.from_numpy(arrays["genes"]).to(self.config.device)
         self.population = self.population._replace(genes=genes)
         self.draws.restore(arrays["draws"])
+        self.adaptations.onsets = arrays["onsets"].copy()
+        self.detector.past = arrays["innovations"].copy()
         self.motion.restore("motion", arrays)
         self.sensors.restore("sensors", arrays)

@@ -4,12 +4,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from bns.config_watch import WatchConfig
 from bns.draws import Draws, whole_below
+from bns.forgetting import contradicted
 from bns.light.loops import LightLoops
 from bns.light.patterns import Patterns
 from bns.patterns import PatternBuffer
 from bns.snn import fitting
-from bns.snn.network import Shape, predict
+from bns.snn.network import Shape, forward, predict
 
 BUCKET = 256  # patterns; training tensors grow in these steps, so shapes recur
 
@@ -36,6 +38,7 @@ class Learned:
         self.shape, self.batch, self.draws = shape, batch, draws
         runs = len(windows)
         self.buffer = PatternBuffer(runs, windows, (shape.inputs, targets), BUCKET)
+        self.trials = [np.zeros(0, np.int64) for _ in range(runs)]
         self.theta = self.fresh()
         self.loss = torch.full((runs,), torch.nan)
         self.spread = torch.zeros(runs, targets, device=self.theta.device)
@@ -51,9 +54,36 @@ class Learned:
         said = predict(self.shape, self.theta[run : run + 1], seen)[0]
         return said.cpu().numpy().T - patterns.targets
 
-    def append(self, run: int, patterns: Patterns) -> None:
+    def doubt(self, run: int, patterns: Patterns) -> np.ndarray:
+        """Variance of the ensemble's members on patterns, ``(N, O)``; 0 without one."""
+        if self.shape.outputs == 1:
+            return np.zeros_like(patterns.targets)
+        seen = torch.from_numpy(patterns.inputs.T.astype(np.float32))
+        seen = seen.to(self.theta.device)[None]
+        said = forward(self.shape, self.theta[run : run + 1], seen)[0]
+        return said.var(0, unbiased=False).cpu().numpy().T
+
+    def append(self, run: int, trial: int, patterns: Patterns) -> None:
         """Keep a trial's patterns."""
         self.buffer.append(run, patterns.inputs, patterns.targets)
+        mark = np.full(len(patterns.inputs), trial)
+        joined = np.concatenate([self.trials[run], mark])
+        self.trials[run] = joined[len(joined) - len(self.buffer.inputs[run]) :]
+
+    def clear(self, run: int) -> None:
+        """Forget all patterns of a run."""
+        self.buffer.clear(run)
+        self.trials[run] = self.trials[run][:0]
+
+    def forget(self, run: int, config: WatchConfig) -> int:
+        """Drop the old trials that the newest one contradicts; how many there were."""
+        buffer, trials = self.buffer, self.trials[run]
+        gone = contradicted(buffer.inputs[run], buffer.targets[run], trials, config)
+        kept = ~np.isin(trials, gone)
+        buffer.inputs[run] = buffer.inputs[run][kept]
+        buffer.targets[run] = buffer.targets[run][kept]
+        self.trials[run] = trials[kept]
+        return len(gone)
 
     def train(self, loops: LightLoops, which: np.ndarray) -> None:
         """Train the networks of runs marked in `which` ``(R,)`` that have patterns."""
@@ -95,6 +125,7 @@ class Learned:
             "theta": self.theta.cpu().numpy(),
             "loss": self.loss.numpy(),
             "spread": self.spread.cpu().numpy(),
+            "trials": np.concatenate(self.trials),
             **self.buffer.state(),
         }
         return {f"{prefix}.{name}": value for name, value in arrays.items()}
@@ -109,4 +140,6 @@ class Learned:
         self.theta = torch.from_numpy(own["theta"]).to(self.theta.device)
         self.loss = torch.from_numpy(own["loss"])
         self.spread = torch.from_numpy(own["spread"]).to(self.theta.device)
+        edges = np.cumsum(own["pattern_counts"])[:-1]
+        self.trials = np.split(own["trials"], edges)
         self.buffer.restore(own)

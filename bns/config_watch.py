@@ -1,0 +1,27 @@
+"""Settings of a learner that watches its data for a change of the robot."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class WatchConfig:
+    """Damage detection, and forgetting by evidence (light following)."""
+
+    detect: bool = False
+    """watch for damage; the adaptations to damage then follow what is detected
+    instead of being told"""
+    threshold: float = 6.0
+    """an alarm is an innovation so many spreads above those before"""
+    warmup: int = 6
+    """trials that are seen before the first alarm, and after each one"""
+    history: int = 12
+    """trials before this one that an innovation is compared with"""
+    forget: bool = False
+    """drop old trials whose patterns the newest trial contradicts"""
+    forget_factor: float = 3.0
+    """an old trial is contradicted when it differs from the newest one by so many
+    times what the newest one differs from itself"""
+    forget_reach: float = 0.2
+    """patterns are compared where their scaled inputs lie no further apart"""
+    forget_least: int = 8
+    """patterns of an old trial that have to be comparable before it is judged"""

@@ -1,0 +1,77 @@
+"""Forgetting by evidence: drop the old trials that the newest one contradicts.
+
+An alternative to a sliding window, which forgets by age. Patterns of an old trial are
+compared with the nearest ones of the newest trial; what the newest trial's own
+patterns differ by among each other, at their distances, is the yardstick. So noise
+alone is no contradiction, and neither is ground that the newest trial did not see.
+"""
+
+import numpy as np
+
+from bns.config_watch import WatchConfig
+
+FLOOR = 1e-3  # scaled outputs; differences below do not matter; assumed
+
+
+def contradicted(
+    inputs: np.ndarray, targets: np.ndarray, trials: np.ndarray, config: WatchConfig
+) -> np.ndarray:
+    """Old trials that the newest one contradicts.
+
+    Args:
+        inputs, targets: all patterns, scaled, ``(N, I)`` and ``(N, O)``.
+        trials: the trial each pattern is of, ``(N,)``.
+        config: thresholds.
+
+    Returns:
+        Numbers of these trials, sorted.
+    """
+    if not len(trials):
+        return np.empty(0, dtype=np.int64)
+    newest = trials == trials.max()
+    new, told = inputs[newest], targets[newest]
+    if len(new) < 2:
+        return np.empty(0, dtype=np.int64)
+    own = _differences(new, told, new, told, config.forget_reach, itself=True)
+    if len(own[0]) < config.forget_least:
+        return np.empty(0, dtype=np.int64)
+    usual = np.maximum(_typical(own[1]), FLOOR)
+    found = []
+    for trial in np.unique(trials[~newest]):
+        of = trials == trial
+        rows, apart = _differences(
+            inputs[of], targets[of], new, told, config.forget_reach
+        )
+        if len(rows) < config.forget_least:
+            continue
+        if (_typical(apart) > config.forget_factor * usual).any():
+            found.append(trial)
+    return np.array(found, dtype=np.int64)
+
+
+def _differences(
+    inputs: np.ndarray,
+    targets: np.ndarray,
+    new: np.ndarray,
+    told: np.ndarray,
+    reach: float,
+    *,
+    itself: bool = False,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Patterns with a near one in the newest trial, and how far their outputs are off.
+
+    Returns:
+        indices ``(n,)``, absolute differences ``(n, O)``.
+    """
+    square = (inputs**2).sum(1)[:, None] + (new**2).sum(1) - 2 * inputs @ new.T
+    if itself:
+        np.fill_diagonal(square, np.inf)
+    near = square.argmin(1)
+    rows = np.flatnonzero(square[np.arange(len(inputs)), near] <= reach**2)
+    return rows, np.abs(targets[rows] - told[near[rows]])
+
+
+def _typical(apart: np.ndarray) -> np.ndarray:
+    """RMS of differences, the largest tenth left out, ``(O,)``."""
+    kept = np.sort(apart, axis=0)[: max(1, int(np.ceil(0.9 * len(apart))))]
+    return np.sqrt(np.mean(kept**2, axis=0))

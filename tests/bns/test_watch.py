@@ -1,0 +1,153 @@
+"""Damage detection and forgetting by evidence, on data whose answer is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bns import detection
+from bns.config_watch import WatchConfig
+from bns.detection import Detector
+from bns.forgetting import contradicted
+from bns.light.learner import LightLearner
+from bns.light.policy import GenomePolicy
+from bns.light.watching import CHANNELS
+from tests.bns.light_fakes import FakeLightWorld, small
+
+WATCH = WatchConfig()
+
+
+class TestInnovation:
+    def test_misses_as_large_as_expected_give_one(self):
+        miss = np.array([[0.3, -0.5], [-0.3, 0.5]])
+        got = detection.innovation(miss, np.zeros((2, 2)), np.array([0.3, 0.5]))
+        np.testing.assert_allclose(got, [1.0, 1.0])
+
+    def test_disagreement_excuses_a_miss(self):
+        miss, usual = np.full((4, 1), 0.5), np.array([0.3])
+        got = detection.innovation(miss, np.full((4, 1), 0.16), usual)
+        np.testing.assert_allclose(got, 1.0)
+
+    def test_without_patterns_nothing_is_said(self):
+        got = detection.innovation(np.zeros((0, 2)), np.zeros((0, 2)), np.ones(2))
+        assert np.isnan(got).all()
+
+
+class TestDetector:
+    def noise(self, trials, runs=20, seed=1):
+        rng = np.random.default_rng(seed)
+        return np.exp(0.15 * rng.normal(size=(trials, runs, 4)))
+
+    def test_undamaged_robots_raise_hardly_an_alarm(self):
+        detector = Detector.fresh(WATCH, 20, 4)
+        alarms = sum(detector.update(row).on.sum() for row in self.noise(500))
+        assert alarms <= 20  # of 10 000 trials: 1 in 500
+
+    def test_a_channel_that_trebles_is_named_at_once(self):
+        detector, rows = Detector.fresh(WATCH, 20, 4), self.noise(30)
+        for row in rows[:-1]:
+            assert not detector.update(row).on.any()
+        rows[-1, :, 2] *= 5.0
+        found = detector.update(rows[-1])
+        assert found.on.all()
+        assert (found.suspect == 2).all()
+
+    def test_learning_and_the_first_trials_raise_none(self):
+        detector = Detector.fresh(WATCH, 1, 4)
+        for trial in range(30):
+            level = max(0.02, np.exp(-0.3 * trial))
+            assert not detector.update(np.full((1, 4), level)).on.any()
+
+    def test_after_an_alarm_the_new_robot_is_learned(self):
+        detector = Detector.fresh(WATCH, 1, 4)
+        rows = np.ones((40, 1, 4))
+        rows[20:] = 9.0
+        on = [bool(detector.update(row).on[0]) for row in rows]
+        assert np.flatnonzero(on).tolist() == [20]
+
+    def test_lost_trials_are_no_news(self):
+        detector = Detector.fresh(WATCH, 1, 4)
+        for trial in range(30):
+            row = np.full((1, 4), np.nan if trial % 4 == 3 else 1.0)
+            assert not detector.update(row).on.any()
+
+
+class TestForgetting:
+    def data(self, *, gain=1.0, noise=0.02, trials=6, seed=3):
+        """Patterns of a linear robot whose last trial has another gain."""
+        rng = np.random.default_rng(seed)
+        inputs = rng.uniform(-1, 1, (trials * 80, 2))
+        number = np.repeat(np.arange(trials), 80)
+        factor = np.where(number == trials - 1, gain, 1.0)[:, None]
+        targets = factor * inputs @ np.array([[0.5], [0.3]])
+        return inputs, targets + noise * rng.normal(size=targets.shape), number
+
+    def test_the_same_robot_keeps_everything(self):
+        assert len(contradicted(*self.data(), WATCH)) == 0
+
+    def test_another_robot_drops_all_that_came_before(self):
+        got = contradicted(*self.data(gain=0.2), WATCH)
+        assert got.tolist() == [0, 1, 2, 3, 4]
+
+    def test_noise_alone_is_no_contradiction(self):
+        inputs, targets, trials = self.data()
+        rng = np.random.default_rng(0)
+        last = trials == trials.max()
+        targets[last] += 0.04 * rng.normal(size=targets[last].shape)
+        assert len(contradicted(inputs, targets, trials, WATCH)) == 0
+
+    def test_ground_that_was_not_seen_again_is_kept(self):
+        inputs, targets, trials = self.data(gain=0.2)
+        far = trials == 1
+        inputs[far] += 5.0
+        assert contradicted(inputs, targets, trials, WATCH).tolist() == [0, 2, 3, 4]
+
+    @pytest.mark.parametrize("count", [0, 1])
+    def test_too_little_to_judge(self, count):
+        inputs, targets, trials = (part[:count] for part in self.data())
+        assert len(contradicted(inputs, targets, trials, WATCH)) == 0
+
+
+class TestInTheLearner:
+    def drive(self, learner, trial):
+        """A trial of a random controller, with readings as noisy as real ones."""
+        genome = learner._random_population().genes[0, :1, :, 0]
+        policy = GenomePolicy(learner.simulator.controllers, genome)
+        (seen,) = FakeLightWorld().drive(policy, cycles=60, seeds=[trial])
+        noise = np.zeros_like(seen.observed)
+        noise[:, 3:] = np.random.default_rng(trial).normal(0, 100, noise[:, 3:].shape)
+        return [seen.replace(observed=seen.observed + noise)]
+
+    @pytest.mark.parametrize(
+        ("broken", "name"), [(3, "left sensor"), (4, "right sensor")]
+    )
+    def test_a_dead_sensor_is_named_and_reacted_to(self, broken, name):
+        config = small()
+        config = replace(config, snn=replace(config.snn, epochs=60))
+        watch = WatchConfig(detect=True, threshold=4.0, warmup=4, history=6)
+        reset = replace(config.adaptation, population_reset=True)
+        config = replace(config, watch=watch, adaptation=reset)
+        learner = LightLearner([config], replicates=[0], onsets=[10])
+        for trial in range(10):
+            row = learner.observe(trial, self.drive(learner, trial), None)
+            assert not row["detected"].any()
+        seen = self.drive(learner, 10)[0]
+        damaged = seen.observed.copy()
+        damaged[:, broken] = 0.0  # in full light, wherever it is
+        row = learner.observe(10, [seen.replace(observed=damaged)], None)
+        assert row["detected"] == 1
+        assert CHANNELS[int(row["suspect"][0])] == name
+        assert learner.adaptations.resets(11).population.all()
+
+    def test_what_is_contradicted_is_dropped_with_its_trial_numbers(self):
+        config = replace(small(), watch=WatchConfig(forget=True))
+        learner = LightLearner([config], replicates=[0], onsets=[-1])
+        for trial in range(3):
+            row = learner.observe(trial, self.drive(learner, trial), None)
+        for part in (learner.motion, learner.sensors):
+            assert len(part.trials[0]) == part.buffer.counts[0]
+        state = learner.state()
+        other = LightLearner([config], replicates=[0], onsets=[-1])
+        other.restore(state)
+        assert np.array_equal(other.motion.trials[0], learner.motion.trials[0])
+        assert "forgotten" in row
