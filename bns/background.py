@@ -1,20 +1,21 @@
-"""Open-loop navigation on a real robot: evolution goes on while the robot moves."""
+"""Learning beside a robot that moves: evolution goes on in a process of its own.
 
-import contextlib
-import os
-import sys
+A process and not a thread, so that the robot's loop never waits for the learner: it may
+be slow, hang or fail, and the robot is stopped in time.
+"""
+
 import threading
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from multiprocessing import get_context
+from multiprocessing.connection import Connection, wait
+from typing import Any
 
 import numpy as np
-import torch
 
 from bns.config import RunConfig
 from bns.errors import BnsError
-from bns.evolution.generation import Rates
-from bns.learner import Learner, Proposal
 from bns.worlds import alarm
 from bns.worlds.damage import Damage
 from bns.worlds.trial import Trial
@@ -22,18 +23,17 @@ from bns.worlds.trial import Trial
 CHUNK = 5  # generations between two looks whether the trial is over
 LEAST = 20  # generations in a trial, even where it takes no time
 LONGEST = 2000  # generations in a trial: beyond, the population has long converged
-SWITCH = 0.001  # s after which Python lets the robot's thread have its turn
 
 
 class Background:
-    """A `Learner` whose generations run in a thread between proposal and observation.
+    """A learner whose generations run between proposal and observation.
 
-    How many there are is what the robot's time allows, and is recorded; so results
-    are not reproducible bit for bit. Where the thread fails it rings the alarm, which
-    stops the robot, and `observe` raises.
+    How many there are is what the robot's time allows, and is recorded ("generations");
+    so results are not reproducible bit for bit. Where its process fails it rings the
+    alarm, which stops the robot.
 
     Args:
-        configs, replicates, onsets: see `Learner`.
+        configs, replicates, onsets: see `bns.learner.Learner`.
     """
 
     def __init__(
@@ -43,6 +43,87 @@ class Background:
         replicates: Sequence[int],
         onsets: Sequence[int],
     ):
+        spawn = get_context("spawn")
+        self._line, other = spawn.Pipe()
+        words = (other, list(configs), list(replicates), list(onsets))
+        self._process = spawn.Process(target=_serve, args=words, daemon=True)
+        self._process.start()
+        other.close()
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def _watch(self) -> None:
+        """Ring the alarm when the process is gone."""
+        wait([self._process.sentinel])
+        if self._process.exitcode:
+            alarm.ring("the learner failed, see its message")
+
+    def propose(self, trial: int) -> Any:
+        """What to try; from now on evolution goes on until `observe`."""
+        return self._ask("propose", trial)
+
+    def observe(
+        self, trial: int, tried: Sequence[Trial], best: Sequence[Trial] | None
+    ) -> dict[str, np.ndarray]:
+        """Learn from the trial, see `Learner.observe`; adds "generations"."""
+        return self._ask("observe", trial, list(tried), best and list(best))
+
+    def state(self) -> dict[str, np.ndarray]:
+        """All that the next trial depends on, see `Learner.state`."""
+        return self._ask("state")
+
+    def restore(self, arrays: dict[str, np.ndarray]) -> None:
+        """Go on from `state`."""
+        self._ask("restore", arrays)
+
+    def _ask(self, name: str, *words: Any) -> Any:
+        try:
+            self._line.send((name, words))
+            return self._line.recv()
+        except (OSError, EOFError) as error:
+            raise BnsError("The learner failed; its message is above.") from error
+
+
+def _serve(
+    line: Connection,
+    configs: list[RunConfig],
+    replicates: list[int],
+    onsets: list[int],
+) -> None:
+    """The learner's process: answer what is asked, evolve in between."""
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it ends with the robot's process
+    worker = Worker(configs, replicates=replicates, onsets=onsets)
+    while True:
+        while worker.busy and not line.poll():
+            worker.breed()
+        try:
+            name, words = line.recv()
+        except EOFError:
+            return
+        line.send(getattr(worker, name)(*words))
+
+
+class Worker:
+    """The learner itself, with its generations taken out and counted.
+
+    Args:
+        configs, replicates, onsets: see `bns.learner.Learner`.
+
+    Attributes:
+        busy: whether there is something to evolve now.
+        generations: since the newest proposal.
+    """
+
+    def __init__(
+        self,
+        configs: Sequence[RunConfig],
+        *,
+        replicates: Sequence[int],
+        onsets: Sequence[int],
+    ):
+        from bns.learner import Learner
+
         still = [
             replace(config, evolution=replace(config.evolution, generations=0))
             for config in configs
@@ -52,86 +133,52 @@ class Background:
         chunk = replace(configs[0].evolution, generations=CHUNK)
         self._inner.config = replace(configs[0], evolution=chunk)
         self._first = configs[0].evolve_from
-        self._thread: threading.Thread | None = None
-        self._over = threading.Event()
-        self._failed = False
-        self.generations = 0
+        self._trial, self.generations, self.busy = 0, 0, False
 
-    def propose(self, trial: int) -> Proposal:
-        """What to try; from now on evolution goes on until `observe`."""
-        proposal = self.learner.propose(trial)
-        self.generations, self._failed = 0, False
-        self._over.clear()
-        sys.setswitchinterval(SWITCH)
-        self._thread = threading.Thread(
-            target=self._evolve, args=(trial,), name="evolution", daemon=True
-        )
-        self._thread.start()
-        return proposal
-
-    def _evolve(self, trial: int) -> None:
-        with contextlib.suppress(OSError, AttributeError):
-            # the robot's thread has precedence, this one has not
-            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 0)
-        whole = False
-        try:
-            while self.generations < LONGEST and not self._enough():
-                self._breed(trial)
-            whole = True
-        finally:
-            if not whole:
-                self._failed = True
-                alarm.ring("the learner failed, see its message")
-
-    def _enough(self) -> bool:
-        return self._over.is_set() and self.generations >= LEAST
-
-    def _breed(self, trial: int) -> None:
+    def breed(self) -> None:
         """A few generations."""
+        import torch
+
+        from bns.evolution.generation import Rates
+
         learner = self.learner
-        if trial + 1 < self._first:
-            self.generations = LONGEST
-            return
+        rate, magnitude = learner.adaptations.mutation(self._trial)
+        rates = Rates(torch.from_numpy(rate), torch.from_numpy(magnitude))
         learner.population, learner.cost = self._inner.evolve(
-            learner.theta, learner.population, learner.cost, self._rates(trial)
+            learner.theta, learner.population, learner.cost, rates
         )
         self.generations += CHUNK
+        self.busy = self.generations < LONGEST
 
-    def _rates(self, trial: int) -> Rates:
-        rate, magnitude = self.learner.adaptations.mutation(trial)
-        return Rates(torch.from_numpy(rate), torch.from_numpy(magnitude))
-
-    def _join(self) -> None:
-        if self._thread is not None:
-            self._over.set()
-            self._thread.join()
-            self._thread = None
-        if self._failed:
-            raise BnsError("The learner failed in the background: see its message.")
+    def propose(self, trial: int) -> Any:
+        """What to try."""
+        proposal = self.learner.propose(trial)
+        self._trial, self.generations = trial, 0
+        self.busy = trial + 1 >= self._first
+        return proposal
 
     def observe(
         self, trial: int, tried: Sequence[Trial], best: Sequence[Trial] | None
     ) -> dict[str, np.ndarray]:
-        """Learn from the trial, see `Learner.observe`; adds "generations".
-
-        Raises:
-            BnsError: the thread failed; its message is on the error stream.
-        """
-        self._join()
+        """Learn; where time was short, breed the least number of generations."""
+        evolving, during = self.busy or self.generations > 0, self.generations
+        self.busy = False
         row = self.learner.observe(trial, tried, best)
-        if trial + 1 < self._first:
-            self.generations = 0
+        self.learner.cost = self.learner.inner.cost(
+            self.learner.theta, self.learner.population
+        )
+        while evolving and self.generations < max(LEAST, during + CHUNK):
+            self.breed()  # with what was learned from this trial
+        self.busy = False
         row["generations"] = np.full(self.learner.runs, float(self.generations))
         return row
 
     def state(self) -> dict[str, np.ndarray]:
-        """All that the next trial depends on, see `Learner.state`."""
-        self._join()
+        """See `Learner.state`."""
         return self.learner.state()
 
     def restore(self, arrays: dict[str, np.ndarray]) -> None:
-        """Go on from `state`."""
+        """See `Learner.restore`."""
         self.learner.restore(arrays)
 
 

@@ -18,10 +18,12 @@ def execute(given: Any) -> int:
     """
     from bns.cli import outputs
     from bns.hardware.errors import LinkError, SafetyStop
+    from bns.hardware.priority import urgent
     from bns.hardware.world import HardwareWorld
     from bns.run import train
     from bns.tasks import NavigationTask
 
+    urgent()
     config = replace(given.config, replicates=1, record_replicates=1, threads=1)
     out = Path(given.out)
     world = HardwareWorld(

@@ -6,6 +6,7 @@ from typing import Protocol
 
 from bns.errors import BnsError
 from bns.hardware.clock import VirtualClock
+from bns.hardware.priority import urgent
 from bns.hardware.tracking.sources import Source
 from bns.hardware.tracking.tracker import Frame, Sighting, Tracker
 
@@ -53,6 +54,7 @@ class ThreadedEyes:
         self._thread.start()
 
     def _look(self) -> None:
+        urgent()
         try:
             while not self._done.is_set():
                 frame = self.source.read(WAIT)

@@ -20,4 +20,5 @@ def cv2() -> Any:
         ) from error
     if not hasattr(module, "aruco"):
         raise MissingDependencyError("tracking", "ArUco in OpenCV", INSTALL)
+    module.setNumThreads(1)  # its threads would not share this one's precedence
     return module
