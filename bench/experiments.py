@@ -27,7 +27,7 @@ DAMAGES = {
     "left-50": "wheel_gain:wheel=left,factor=0.5",
     "right-50": "wheel_gain:wheel=right,factor=0.5",
 }
-LATER = ("learner", "light", "walk", "watch")  # settings added since the first stored runs
+LATER = ("learner", "light", "walk", "watch")  # newer than the first stored runs
 QUICK = {"replicates": 6, "trials": 12}
 
 
