@@ -39,7 +39,8 @@ class LightWorld(MujocoWorld):
         posts: things in the way, as `Post` or as tables with its fields.
         sensors: which way the sensors look, "thesis" or "public" headings.
         singles: whether trials have each single sensor beside the virtual two.
-        supervisor: what happens at the lamp and at the edge.
+        supervisor: what happens at the lamp and at the edge, as `Supervisor` or as a
+            table with its fields.
         damage, reality, sample_dt, threads, start, arena, name, truth: those of
             `MujocoWorld`; `start` is that of `run`.
 
@@ -58,7 +59,7 @@ class LightWorld(MujocoWorld):
         posts: Sequence[Post | Mapping] = (),
         sensors: str = "thesis",
         singles: bool = False,
-        supervisor: Supervisor | None = None,
+        supervisor: Supervisor | Mapping | None = None,
         damage: Damage | Sequence = (),
         reality: Damage | Sequence = (),
         sample_dt: float = 0.1,
@@ -90,7 +91,8 @@ class LightWorld(MujocoWorld):
         self._screen = RayScreen(self.posts) if self.posts else None
         self.sensors = light_sensors.khepera3(sensors)
         self.singles = singles
-        self.supervisor = supervisor or Supervisor()
+        given = {} if supervisor is None else supervisor
+        self.supervisor = _one(Supervisor, "supervisor", given)
 
     def _supervisor(self) -> Supervisor:
         return self.supervisor
