@@ -17,7 +17,7 @@ from bns.worlds.trial import Trial
 GAP = 1.0
 """s of pause between two trials"""
 
-FEWEST = 6
+MOST = 6
 """trials that are shown at most, those with the largest gap"""
 
 
@@ -36,7 +36,7 @@ def write(
 
     seen = view(found, trials, model)
     losses = [seen.energy(number).mean() for number in range(len(seen.trials))]
-    chosen = sorted(np.argsort(losses)[::-1][:FEWEST].tolist())
+    chosen = sorted(np.argsort(losses)[::-1][:MOST].tolist())
     starts = _starts(seen, chosen)
     identity = sha256(found.to_json().encode()).hexdigest()[:12]
     stream = rr.RecordingStream("bns", recording_id=identity, send_properties=False)
@@ -48,7 +48,7 @@ def write(
     stream.send_recording_name(f"gap of {found.model}: {found.verdict.kind}")
     _styles(stream, seen)
     if planar:
-        gap_scene.log_static(stream, seen, chosen)
+        gap_scene.log_static(stream, seen)
     for number, start in zip(chosen, starts, strict=True):
         _residuals(stream, seen, number, start)
         _observed(stream, seen, number, start)

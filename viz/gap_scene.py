@@ -65,16 +65,15 @@ def _lane(seen: View, name: str) -> np.ndarray:
     return np.array([LANES[name] * (high - low)[0], 0.0, 0.0])
 
 
-def log_static(stream, seen: View, chosen) -> None:
-    """Log coordinates and shapes."""
+def log_static(stream, seen: View) -> None:
+    """Log coordinates, shapes and names."""
     import rerun as rr
 
-    del chosen
     stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    low, _ = _driven(seen)
+    low, high = _driven(seen)
     for name, (model, _) in _robots(seen).items():
         geometry.log_static(stream, model, f"world/{name}")
-        beside = np.array([low[0] + MARGIN, low[1] + MARGIN / 2, HEIGHT])
+        beside = np.array([(low[0] + high[0]) / 2, low[1] + MARGIN / 2, HEIGHT])
         place = _lane(seen, name) + beside
         stream.log(
             f"world/names/{name}",
@@ -158,7 +157,7 @@ def _hurts(stream, seen: View, number: int, start: float) -> None:
         rr.Arrows3D(
             origins=_lift(poses[windows.last])[large] + [0, 0, 0.002],
             vectors=-ENLARGED * step[large],
-            colors=[style.rgb(NOMINAL)] * int(large.sum()),
+            colors=[style.rgb(style.BLACK)] * int(large.sum()),
             radii=TRAIL / 3,
         ),
     )
@@ -185,7 +184,7 @@ def view_3d(seen: View, background):
         background=list(background),
         line_grid=False,
         eye_controls=rrb.EyeControls3D(
-            position=(centre[0], centre[1] - 0.85 * away, 1.3 * away),
+            position=(centre[0], centre[1] - 0.9 * away, 1.4 * away),
             look_target=(centre[0], centre[1] - 0.05, 0.0),
             eye_up=(0, 0, 1),
         ),
