@@ -7,6 +7,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -79,7 +80,12 @@ def _finish(driver: subprocess.Popen) -> float:
 
 
 def _parts(out: Path) -> dict[str, bytes]:
-    return {p.name: p.read_bytes() for p in (out / "parts").glob("[0-9a-f]*.parquet")}
+    """Bytes of the batches that are stored one by one; they may go meanwhile."""
+    found = {}
+    for path in (out / "parts").glob("[0-9a-f]*.parquet"):
+        with suppress(FileNotFoundError):
+            found[path.name] = path.read_bytes()
+    return found
 
 
 def _strike(
@@ -118,9 +124,9 @@ def _resume(file: Path, out: Path, kept: dict[str, bytes]) -> tuple[int, float]:
     began, changed = time.monotonic(), set()
     while driver.poll() is None:
         time.sleep(0.2)
-        now = _parts(out) if (out / "parts").exists() else {}
-        if len(now) >= len(kept):
-            changed |= {name for name in kept if now.get(name) != kept[name]}
+        for name, data in _parts(out).items():  # at the end they are compacted
+            if kept.get(name, data) != data:
+                changed.add(name)
     if driver.returncode != 0:
         raise RuntimeError(f"the resumed campaign exited with {driver.returncode}")
     return len(changed), time.monotonic() - began

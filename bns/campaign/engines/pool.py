@@ -66,7 +66,7 @@ class PoolEngine:
                     if outcome:
                         yield outcome
                     if again:
-                        waiting.append(again)
+                        waiting.appendleft(again)
         finally:
             for worker in self.crew:
                 worker.stop()
