@@ -62,7 +62,7 @@ def test_standing_feet_hardly_slip(walked):
     stands = (feet[1:, :, 2] < 0.003) & (feet[:-1, :, 2] < 0.003)
     slips = np.linalg.norm(np.diff(feet[..., :2], axis=0), axis=-1) * stands
     assert stands.mean() > 0.5
-    assert slips.sum(axis=0).mean() < 0.3 * displacement(trial)
+    assert slips.sum(axis=0).mean() < 0.4 * displacement(trial)
 
 
 def test_energy_balances(walked):
@@ -167,3 +167,13 @@ def test_other_robots_and_effects_are_refused():
     world = registry.make("hexapod", damage=["loose_horn:angle=0.2@0:0.5s"])
     with pytest.raises(BnsError, match="adds joints"):
         world.run([TRIPOD])
+
+
+def test_trials_go_through_a_dataset(walked, tmp_path):
+    from bns.worlds import dataset
+
+    trial = walked[0].replace(truth={})
+    (back,) = dataset.read(dataset.write(tmp_path / "walk", [trial])).trials
+    np.testing.assert_allclose(back.observed, trial.observed)
+    np.testing.assert_allclose(back.commands.values, trial.commands.values)
+    assert (back.channels, back.outcome) == (trial.channels, trial.outcome)
