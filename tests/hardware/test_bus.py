@@ -1,0 +1,126 @@
+"""The hexapod's bus: ROBOTIS's SDK against emulated servos on a pseudo terminal."""
+
+import threading
+
+import numpy as np
+import pytest
+
+from bns.errors import BnsError, FormatError
+from bns.hardware.clock import RealClock
+from bns.hardware.dynamixel import joints, packets
+from bns.hardware.emulators.pty_host import PtyHost
+from bns.hardware.emulators.servo_bank import ServoBank
+from bns.hardware.errors import SafetyStop
+
+pytest.importorskip("dynamixel_sdk")
+pytest.importorskip("serial")
+
+
+class Watching:
+    def __init__(self):
+        self.fed = []
+
+    def feed(self, *, moving):
+        self.fed.append(moving)
+
+
+@pytest.fixture
+def served(tmp_path):
+    """Serves servos on a port; gives port and servos."""
+    ends = []
+
+    def serve(**settings):
+        clock = RealClock()
+        bank = ServoBank(at=clock.now(), **settings)
+        host = PtyHost(bank, tmp_path / "bus")
+        done = threading.Event()
+        thread = threading.Thread(target=host.serve, args=(done.is_set,))
+        thread.start()
+        ends.append((done, thread, host))
+        return str(tmp_path / "bus"), bank
+
+    yield serve
+    for done, thread, host in ends:
+        done.set()
+        thread.join()
+        host.unplug()
+
+
+def opened(port, **settings):
+    from bns.hardware.dynamixel.bus import Bus
+
+    return Bus(port, joints.read(), RealClock(), **settings)
+
+
+def test_goals_reach_all_servos_and_states_come_back(served):
+    port, bank = served()
+    bus = opened(port, guard=Watching())
+    bus.identify()
+    bus.torque(True)
+    bus.write({joint.name: 0.2 for joint in bus.joints})
+    RealClock().sleep(0.5)
+    for joint in bus.joints:
+        state = bus.read(joint.id)
+        assert joint.angle(state.position) == pytest.approx(0.2, abs=0.01)
+        assert (state.voltage, state.temperature) == (11.1, 35)
+    assert bus.guard.fed[-1] is True
+    bus.close()
+    RealClock().sleep(0.05)
+    assert not any(table[packets.TORQUE] for table in bank.tables.values())
+
+
+def test_missing_and_doubled_servos_are_named(served):
+    port, _ = served(numbers=[n for n in range(1, 19) if n != 7])
+    with pytest.raises(BnsError, match=r"Servos \[7\] do not answer"):
+        opened(port).identify()
+
+
+def test_doubled_servos_are_named(served):
+    port, _ = served(numbers=[*range(1, 19), 5])
+    with pytest.raises(BnsError, match=r"\[5\].*two have one number"):
+        opened(port).identify()
+
+
+def test_nothing_moves_unguarded_and_a_low_battery_stops(served):
+    port, bank = served(voltage=9.5)
+    bus = opened(port)
+    with pytest.raises(BnsError, match="Nobody guards"):
+        bus.write({joint.name: 0.0 for joint in bus.joints})
+    assert not bank.goals
+    with pytest.raises(SafetyStop, match=r"9\.5 V"):
+        bus.look()
+
+
+def test_goals_stay_between_the_end_stops():
+    joint = joints.Joint("knee", 1, -1, 512, 200, 800)
+    assert joint.units(0.0) == 512
+    assert joint.units(9.0) == 200
+    assert joint.angle(joint.units(0.5)) == pytest.approx(0.5, abs=0.003)
+
+
+def test_a_servo_given_twice_is_refused(tmp_path):
+    path = tmp_path / "r.toml"
+    line = "{ id = 1, sign = 1, zero = 512, low = 1, high = 9 }"
+    path.write_text(f"[joints]\na = {line}\nb = {line}\n")
+    with pytest.raises(FormatError, match="servo 1 is given twice"):
+        joints.read(path)
+
+
+def test_packets_of_the_manual():
+    found, rest = packets.instructions(b"\xff\xff\x01\x02\x01\xfb")
+    assert found == [packets.Instruction(1, packets.PING, b"")] and rest == b""
+    assert packets.status(1, 0) == b"\xff\xff\x01\x02\x00\xfc"
+    assert packets.words(0b100001) == "input voltage, overload"
+    spoilt = packets.instructions(b"\xff\xff\x01\x02\x01\xfa\xff\xff\x01\x02\x01\xfb")
+    assert len(spoilt[0]) == 1
+
+
+def test_a_full_turn_of_the_law_takes_the_motors_time():
+    bank = ServoBank([1])
+    bank.tables[1][packets.TORQUE] = 1
+    bank.tables[1][30:32] = b"\xff\x03"
+    for step in range(1, 101):
+        bank.advance(step * 0.01)
+    way = bank.place[1] - 512
+    assert 0.9 * 511 < way <= 511
+    assert np.isclose(packets.UNITS, 1023 / np.deg2rad(300), rtol=1e-5)

@@ -1,0 +1,94 @@
+"""The watchdog stops the robot when its driver is silent, gone, or unplugged."""
+
+import os
+import threading
+import time
+
+import pytest
+
+from bns.hardware.emulators.khepera_body import KheperaBody
+from bns.hardware.emulators.khepera_device import KheperaDevice
+from bns.hardware.emulators.pty_host import PtyHost
+from bns.hardware.errors import SafetyStop
+from bns.hardware.leash import Leash
+
+SLOW = 20.0  # s; a busy machine
+
+
+@pytest.fixture
+def robot(tmp_path):
+    device = KheperaDevice(KheperaBody(at=time.monotonic()), latency=0.002)
+    host = PtyHost(device, tmp_path / "port")
+    done, state = threading.Event(), {"plugged": True}
+
+    def plug(now):
+        if state["plugged"]:
+            host.plug()
+        elif host._master >= 0:
+            host.unplug()
+
+    thread = threading.Thread(target=host.serve, args=(done.is_set, plug))
+    thread.start()
+    yield str(tmp_path / "port"), device, state
+    done.set()
+    thread.join()
+    host.unplug()
+
+
+def moving(port):
+    fd = os.open(port, os.O_RDWR | os.O_NOCTTY)
+    os.write(fd, b"D,l9000,l9000\n")
+    return fd
+
+
+def told_to_stand(device):
+    until = time.monotonic() + SLOW
+    while time.monotonic() < until:
+        if device.log and device.log[-1][1:] == (0, 0):
+            return True
+        time.sleep(0.01)
+    return False
+
+
+def test_silence_stops_a_moving_robot_and_feeding_is_refused_then(robot):
+    port, device, _ = robot
+    fd = moving(port)
+    leash = Leash(fd, port, 115200, "khepera3", silence=0.2)
+    leash.feed(moving=True)
+    assert told_to_stand(device)
+    time.sleep(0.3)
+    with pytest.raises(SafetyStop, match="watchdog fired"):
+        leash.feed(moving=True)
+    leash.forgive()
+    leash.feed(moving=False)
+    leash.release()
+    os.close(fd)
+
+
+def test_the_end_of_the_driver_stops_it(robot):
+    port, device, _ = robot
+    fd = moving(port)
+    leash = Leash(fd, port, 115200, "khepera3")
+    leash.feed(moving=False)
+    leash._dog.stdin.close()  # as when the driving process is killed
+    assert told_to_stand(device)
+    assert leash._dog.wait(SLOW) == 0
+    leash._dog.stdout.close()
+    os.close(fd)
+
+
+def test_a_cable_that_comes_back_is_used_to_stop(robot):
+    port, device, state = robot
+    fd = moving(port)
+    leash = Leash(fd, port, 115200, "khepera3")
+    state["plugged"] = False
+    while os.path.exists(port):
+        time.sleep(0.01)
+    leash._dog.stdin.close()
+    time.sleep(0.3)
+    assert device.log[-1][1:] == (9000, 9000)
+    state["plugged"] = True
+    assert told_to_stand(device)
+    leash._dog.wait(SLOW)
+    leash._dog.stdout.close()
+    os.close(fd)
