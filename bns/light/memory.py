@@ -13,7 +13,7 @@ from bns.patterns import PatternBuffer
 from bns.snn import fitting
 from bns.snn.network import Shape, forward, predict
 
-BUCKET = 256  # patterns; training tensors grow in these steps, so shapes recur
+BUCKET = 512  # patterns; training tensors grow in these steps, so shapes recur
 
 
 class Learned:
@@ -107,11 +107,13 @@ class Learned:
     def _patterns(self) -> fitting.Patterns:
         """All patterns, or as many as a batch has, drawn anew each time."""
         patterns = fitting.Patterns(*self.buffer.tensors(self.theta.device))
-        if not 0 < self.batch < patterns.inputs.shape[2]:
+        counts = torch.from_numpy(self.buffer.counts).to(self.theta.device)[:, None]
+        if not 0 < self.batch < int(counts.max()):
             return patterns
-        counts = torch.from_numpy(self.buffer.counts).to(self.theta.device)
         coins = self.draws.uniform(len(counts), self.batch)
-        index = whole_below(coins, counts[:, None].clamp(min=1))
+        drawn = whole_below(coins, counts.clamp(min=1))
+        whole = torch.arange(self.batch, device=drawn.device)
+        index = torch.where(counts <= self.batch, whole, drawn)
         inputs, targets, weight = patterns
         return fitting.Patterns(
             inputs.gather(2, index[:, None].expand(-1, inputs.shape[1], -1)),

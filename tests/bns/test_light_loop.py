@@ -108,6 +108,22 @@ class TestLoop:
         assert row["patterns"].tolist() == [40, 20]
         assert row["sensor_patterns"].tolist() == [42, 21]
 
+    def test_a_batch_is_drawn_from_all_patterns_of_a_run(self):
+        learner = LightLearner(
+            [small(batch=32, mirror=False), small(batch=32)],
+            replicates=[0, 0],
+            onsets=[-1, -1],
+        )
+        policy = GenomePolicy.of(learner.propose(0).tried)
+        tried = FakeLightWorld().drive(policy, cycles=20, seeds=[1, 2])
+        learner.observe(0, tried, None)
+        drawn = learner.motion._patterns()
+        assert drawn.weight.sum((1, 2, 3)).tolist() == [20, 32]  # of 20 and of 40
+        kept = {tuple(row) for row in learner.motion.buffer.targets[1].tolist()}
+        assert {tuple(row) for row in drawn.targets[1].T.tolist()} <= kept
+        whole = learner.motion.buffer.targets[0]
+        np.testing.assert_array_equal(drawn.targets[0].T[:20].numpy(), whole)
+
     def test_settings_that_cannot_differ(self):
         with pytest.raises(BnsError, match="light following may differ"):
             LightLearner([small(), small(hidden=7)], replicates=[0, 1], onsets=[-1, -1])
