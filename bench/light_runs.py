@@ -4,10 +4,12 @@ Settings that the dissertation lists are those of its tables 5.19 and 6.7; what 
 leaves silent is that of the preset `khepera-light`.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from bench import experiments
 from bns.config import AdaptationConfig, RunConfig, WorldConfig
+from bns.config_watch import WatchConfig
 
 ONSET = 20  # trial of the damage (dissertation, section 6.3.2)
 AFTER = 20  # trials from the damage on
@@ -17,6 +19,25 @@ DAMAGES = {
     "noisy": "sensor_noise:factor=2",  # all sensors (6.3.1: the noise is doubled)
     "minimum": "sensor_stuck_min:sensor=left,blend=1",
     "maximum": "sensor_stuck_max:sensor=left,blend=1",
+}
+OTHERS = {  # the rest of 6.2.1; every fifth command or reading (silent)
+    "both-slow": "wheel_gain:wheel=both,factor=0.5",
+    "wheel-minimum": "wheel_stuck_min:wheel=left,blend=1",
+    "wheel-maximum": "wheel_stuck_max:wheel=left,blend=1",
+    "wheel-intermittent": "wheel_intermittent:wheel=left,every=5,speed=0.0555",
+    "sensor-intermittent": "sensor_intermittent:sensor=left,every=5",
+}
+ALL = DAMAGES | OTHERS
+AFFECTED = {  # which of `bns.light.watching.CHANNELS` a damage touches
+    "slow-wheel": ("left wheel",),
+    "noisy": ("left sensor", "right sensor"),
+    "minimum": ("left sensor",),
+    "maximum": ("left sensor",),
+    "both-slow": ("left wheel", "right wheel"),
+    "wheel-minimum": ("left wheel",),
+    "wheel-maximum": ("left wheel",),
+    "wheel-intermittent": ("left wheel",),
+    "sensor-intermittent": ("left sensor",),
 }
 
 
@@ -32,25 +53,42 @@ def undamaged(**light: object) -> RunConfig:
     return experiments.named(config, "-".join(["light", *words]))
 
 
-def damaged(damage: str, **adaptation: object) -> RunConfig:
-    """Table 6.7 over table 6.1, one of `DAMAGES` from trial `ONSET` on.
+def damaged(
+    damage: str,
+    *,
+    light: Mapping[str, object] | None = None,
+    watch: Mapping[str, object] | None = None,
+    ensemble: bool = False,
+    **adaptation: object,
+) -> RunConfig:
+    """Table 6.7 over table 6.1, one of `ALL` from trial `ONSET` on.
 
     Args:
-        damage: key of `DAMAGES`.
+        damage: key of `ALL`; empty = none.
+        light: settings of the section `light` that differ.
+        watch: settings of the section `watch`.
+        ensemble: five networks with all outputs instead of one an output.
         adaptation: fields of `AdaptationConfig` that differ from table 6.7.
     """
-    config = _preset()
+    config, light, watch = _preset(), dict(light or {}), dict(watch or {})
+    snn = replace(config.snn, kind="ensemble", hidden=15) if ensemble else config.snn
     settings = {"window": 600, "population_reset": True} | adaptation
+    own = {"hidden": 5, "weights": 5.0, "mirror": False} | light
+    texts = (f"{ALL[damage]}@{ONSET}",) if damage else ()
     config = replace(
         config,
         trials=ONSET + AFTER,
-        light=replace(config.light, hidden=5, weights=5.0, mirror=False),
+        snn=snn,
+        light=replace(config.light, **own),
+        watch=WatchConfig(**watch),
         evolution=replace(config.evolution, headless_chicken=0.05),
         adaptation=AdaptationConfig(**settings),
-        world=WorldConfig(name="light", damage=(f"{DAMAGES[damage]}@{ONSET}",)),
+        world=WorldConfig(name="light", damage=texts),
     )
-    words = [f"{key}={value}" for key, value in sorted(adaptation.items())]
-    return experiments.named(config, "-".join(["light", damage, *words]))
+    differing = light | watch | adaptation
+    words = [f"{key}={value}" for key, value in sorted(differing.items())]
+    words += ["ensemble"] if ensemble else []
+    return experiments.named(config, "-".join(["light", damage or "whole", *words]))
 
 
 def _preset() -> RunConfig:
