@@ -74,8 +74,13 @@ def main(verb: str, argv: list[str]) -> int:
 
 
 def _model(found: Any) -> Any:
-    from bns.gap import inputs
+    from bns.gap import inputs, odometry_record
 
+    if found.model == odometry_record.MODEL:
+        raise BnsError(
+            "A diagnosis of odometry has no simulated model to edit or apply; its "
+            "magnitudes stand in diagnosis.json."
+        )
     return inputs.model(str(found.provenance.get("model", found.model)), threads=1)
 
 
