@@ -37,5 +37,7 @@ class WalkConfig:
     learning_rate: float = 0.002
     """of Adam (batch > 0)"""
     adequate: float = 0.70
-    """a gait is adequate (solved) from this distance on, upright [m]: what the tripod
-    gait by hand covers in eleven commands (models/phantomx/gait.py)"""
+    """a gait is adequate (solved) from this distance on [m]: what the tripod gait by
+    hand covers in eleven commands (models/phantomx/gait.py, `hexapod-tripod`)"""
+    upright: bool = False
+    """an adequate gait may not fall (belly on the floor) either"""

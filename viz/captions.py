@@ -83,6 +83,29 @@ LIGHT = {
 }
 """Where light following reads otherwise than navigation."""
 
+WALK = {
+    "path": (
+        "One run, chosen as the typical one. Solid: where the robot went, command by "
+        "command. Dashed: where its simulator network (SNN) had said it would go. An "
+        "adequate gait gets out of the disc."
+    ),
+    "fitness": (
+        "Distance from start to end of the controller tried in each trial, higher is "
+        "better; the dotted line is an adequate gait ({adequate:g} m). The fitness "
+        "stored is its square with the sign turned (equation 7.4). " + BAND
+    ),
+    "solved": (
+        "Left: whether the gait was adequate ({adequate:g} m). Right: share of runs "
+        "whose trial was. " + BAND
+    ),
+    "waits": (
+        "Share of runs that had found an adequate gait before the damage (left), and, "
+        "counted from the first damaged trial, again (right). A curve that ends below "
+        "100 % tells of runs that never did. The dotted line drops from the median."
+    ),
+}
+"""Where walking reads otherwise than navigation."""
+
 TITLES = {
     "sensor_error": "Error of the sensor networks",
     "readings": "What the light sensors read",

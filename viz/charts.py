@@ -49,6 +49,8 @@ def log_bars(stream, record: RunRecord, replicate: int, chosen: Sequence[Choice]
     import rerun as rr
 
     fitness = np.log10(np.maximum(record["fitness"][replicate], 1.0))
+    if "distance" in record.columns:  # walking: higher is better
+        fitness = record["distance"][replicate]
     error = np.hypot(record["snn_forward"], record["snn_left"])[replicate]
     values = {
         "charts/fitness": fitness,

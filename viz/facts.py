@@ -138,8 +138,7 @@ def _recovering(facts: Facts) -> str:
 
 def rows(record: RunRecord, facts: Facts) -> list[tuple[str, str, str]]:
     """The table of key figures: name, value, explanation."""
-    light = scene.follows_light(record.config)
-    meaning = "the lamp circled" if light else "all objectives reached"
+    meaning = scene.meaning(record.config)
     found = [
         (
             "Solved" + ("" if facts.onset is None else " before damage"),

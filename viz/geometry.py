@@ -81,7 +81,7 @@ def planar_qpos(model, poses_world: np.ndarray) -> np.ndarray:
     """
     home = model.key_qpos[0] if model.nkey else model.qpos0
     qpos = np.tile(home, (len(poses_world), 1))
-    at = _free_joint(model)
+    at = free_joint(model)
     qpos[:, at : at + 2] = poses_world[:, :2]
     half = poses_world[:, 2] / 2
     zero = np.zeros_like(half)
@@ -114,7 +114,8 @@ def xyzw(quaternion: np.ndarray) -> np.ndarray:
     return np.roll(quaternion, -1, axis=-1)
 
 
-def _free_joint(model) -> int:
+def free_joint(model) -> int:
+    """Where the first free joint begins in `qpos`; 0 without one."""
     import mujoco
 
     free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bns.record import RunRecord
-from bns.viz import geometry, light_view, scene, style
+from bns.viz import geometry, light_view, scene, style, walk_view
 from bns.viz.blueprint import LIVE_TIMELINE, TRIAL_TIMELINE
 from bns.viz.choices import Choice
 from bns.viz.paths import arcs, dashes, listed
@@ -54,7 +54,8 @@ def send(
         foreseen = listed(record.predicted[at])
         foreseen = foreseen[: scene.finish(record.config, foreseen) + 1]
         _trails(stream, choice, poses, done, foreseen)
-        _wheels(stream, record.sent[at], start)
+        if not scene.walks(record.config):
+            _wheels(stream, record.sent[at], start)
         light_view.send_readings(stream, record, at, start)
         states.append((start, f"trial {choice.trial}: {choice.label}"))
         colours.append(choice.colour)
@@ -64,8 +65,19 @@ def send(
 
 def duration(record: RunRecord, replicate: int, chosen: Sequence[Choice]) -> float:
     """How long the chosen trials take one after another, pauses included [s]."""
-    sent = record.sent[replicate, [choice.trial for choice in chosen], :, 2]
-    return float(np.nansum(sent)) + GAP * len(chosen)
+    numbers = [choice.trial for choice in chosen]
+    if scene.walks(record.config):
+        told = record["seconds"][replicate, numbers]
+    else:
+        told = record.sent[replicate, numbers, :, 2]
+    return float(np.nansum(told)) + GAP * len(chosen)
+
+
+def _durations(record: RunRecord, at, count: int) -> np.ndarray:
+    """How long each of the first `count` commands took [s]."""
+    if scene.walks(record.config):
+        return walk_view.durations(record, at, count)
+    return record.sent[at][:count, 2]
 
 
 def samples(record, at, trial: Trial | None, model):
@@ -80,6 +92,8 @@ def samples(record, at, trial: Trial | None, model):
         qpos = np.asarray(trial.truth["qpos"])[keep]
         if qpos.shape[1] == model.nq:
             return times, poses, qpos
+    if walk_view.reports_servos(trial):
+        return times, poses, walk_view.qpos(model, poses, trial, keep)
     return times, poses, geometry.planar_qpos(model, poses)
 
 
@@ -87,7 +101,7 @@ def _sparse(record, at, model):
     poses = listed(record.poses[at])
     if not len(poses):
         return np.empty(0), poses, np.empty((0, model.nq))
-    durations = record.sent[at][: len(poses) - 1, 2]
+    durations = _durations(record, at, len(poses) - 1)
     ends = np.concatenate([[0.0], np.cumsum(durations)])
     times = np.interp(
         np.arange((len(poses) - 1) * _ARC_SAMPLES + 1) / _ARC_SAMPLES,
@@ -122,7 +136,7 @@ def _finish(record: RunRecord, at, times: np.ndarray) -> int:
     """Sample at which the task was done; the last one if it was not."""
     poses = listed(record.poses[at])
     done = scene.finish(record.config, poses)
-    ends = np.cumsum(record.sent[at][: len(poses) - 1, 2])
+    ends = np.cumsum(_durations(record, at, len(poses) - 1))
     if not 0 < done < len(poses) - 1:
         return len(times) - 1
     return min(int(np.searchsorted(times, ends[done - 1])), len(times) - 1)

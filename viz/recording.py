@@ -137,6 +137,11 @@ def _about(record: RunRecord, replicate: int, chosen: Sequence[Choice]):
 
 
 def _discs(config: RunConfig) -> str:
+    if scene.walks(config):
+        return (
+            "An adequate gait gets out of the disc. The body is drawn level, its legs "
+            "as the servos reported them."
+        )
     if scene.follows_light(config):
         return (
             "The disc has the radius at which the robot is to circle the lamp; at the "

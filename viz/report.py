@@ -9,7 +9,7 @@ from bns import files, loading
 from bns.errors import BnsError
 from bns.record import RunRecord
 from bns.viz import comparison, facts, figures, scene, style
-from bns.viz.captions import CAPTIONS, LIGHT, TITLES
+from bns.viz.captions import CAPTIONS, LIGHT, TITLES, WALK
 
 ALL_RUNS = ("fitness", "solved", "waits", "snn_error", "diversity")
 """Figures that lay several batches over one another."""
@@ -157,9 +157,10 @@ def _shared_figures(runs: Mapping[str, RunRecord]) -> list[dict]:
 
 
 def _entry(name: str, record: RunRecord, figure) -> dict:
+    walks = scene.walks(record.config)
     return {
         "name": name,
-        "title": TITLES[name],
+        "title": "Adequate gaits" if name == "solved" and walks else TITLES[name],
         "caption": _caption(name, record),
         "image": picture(figure),
     }
@@ -167,10 +168,13 @@ def _entry(name: str, record: RunRecord, figure) -> dict:
 
 def _caption(name: str, record: RunRecord) -> str:
     goals = scene.order(record.config)
-    light = scene.follows_light(record.config)
-    text = LIGHT.get(name) if light else None
-    return (text or CAPTIONS[name]).format(
-        order=", ".join(goals), goals=len(goals), penalty=record.config.task.penalty
+    own = LIGHT if scene.follows_light(record.config) else {}
+    own = WALK if scene.walks(record.config) else own
+    return own.get(name, CAPTIONS[name]).format(
+        order=", ".join(goals),
+        goals=len(goals),
+        penalty=record.config.task.penalty,
+        adequate=record.config.walk.adequate,
     )
 
 

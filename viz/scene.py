@@ -13,6 +13,8 @@ BOARD = (1.35, 0.9)
 """m; half the arena's board (thesis 4.2.1)"""
 
 LIGHT = "light following"
+WALK = "walking"
+ADEQUATE = "an adequate gait gets out of here"
 
 _DISC = 0.001
 """m; height of an objective's disc"""
@@ -27,7 +29,16 @@ def compiled(robot: str):
 
 def task(config: RunConfig) -> str:
     """What the robot has to do, in a word or two."""
+    if walks(config):
+        return WALK
     return LIGHT if follows_light(config) else config.task.name
+
+
+def meaning(config: RunConfig) -> str:
+    """What it means to have solved it."""
+    if walks(config):
+        return f"{config.walk.adequate:g} m walked"
+    return "the lamp circled" if follows_light(config) else "all objectives reached"
 
 
 def follows_light(config: RunConfig) -> bool:
@@ -35,8 +46,15 @@ def follows_light(config: RunConfig) -> bool:
     return config.learner == "light"
 
 
+def walks(config: RunConfig) -> bool:
+    """Whether the run is one of a walking robot."""
+    return config.learner == "walk"
+
+
 def radius(config: RunConfig) -> float:
-    """Radius of an objective's disc, or at which to circle the lamp [m]."""
+    """Radius of an objective's disc, at which to circle the lamp, or to leave [m]."""
+    if walks(config):
+        return config.walk.adequate
     return config.light.goal if follows_light(config) else config.task.radius
 
 
@@ -44,6 +62,8 @@ def objectives(config: RunConfig) -> dict[str, tuple[float, float]]:
     """Positions of the objectives that the run's task uses [m]."""
     from bns.tasks import objectives as places
 
+    if walks(config):
+        return {ADEQUATE: (0.0, 0.0)}
     if follows_light(config):
         from bns.light.task import LightTask
 
@@ -57,15 +77,18 @@ def order(config: RunConfig) -> tuple[str, ...]:
     """Names of the objectives in the order in which they are to be reached."""
     from bns import tasks
 
+    if walks(config):
+        return (ADEQUATE,)
     return ("lamp",) if follows_light(config) else tuple(tasks.order(config.task.name))
 
 
 def finish(config: RunConfig, poses_world: np.ndarray) -> int:
     """Row of `poses_world` at which the task was done; the last one if it was not.
 
-    A robot that has found the lamp stays there, so its task ends with the trial.
+    A robot that has found the lamp stays there, and one that walks goes as far as it
+    can, so their tasks end with the trial.
     """
-    if follows_light(config):
+    if follows_light(config) or walks(config):
         return len(poses_world) - 1
     places = objectives(config)
     goals = np.array([places[name] for name in order(config)])
@@ -75,7 +98,7 @@ def finish(config: RunConfig, poses_world: np.ndarray) -> int:
 
 def extent(config: RunConfig) -> tuple[float, float]:
     """Half width and half depth of what matters [m]."""
-    if follows_light(config):
+    if follows_light(config) or walks(config):
         return BOARD
     places = np.abs(list(objectives(config).values()))
     return tuple(float(edge) for edge in places.max(axis=0) + MARGIN)

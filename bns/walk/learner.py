@@ -103,7 +103,7 @@ class WalkLearner(Learner):
     def _measured(
         self, tried: Sequence[Trial], best: Sequence[Trial] | None
     ) -> dict[str, np.ndarray]:
-        row = observing.measured(tried, best, self.config.walk.adequate)
+        row = observing.measured(tried, best, self.config.walk)
         poses = self.evaluator.poses(self.theta, self._chosen)[:, 0]
         row["predicted"] = poses.double().cpu().numpy()
         row["distance_predicted"] = observing.distance(row["predicted"])
@@ -115,7 +115,7 @@ class WalkLearner(Learner):
 
     def _predicted_cost(self) -> np.ndarray:
         poses = self.evaluator.poses(self.theta, self._chosen)[:, 0]
-        return -(observing.distance(poses.double().cpu().numpy()) ** 2)
+        return observing.cost(observing.distance(poses.double().cpu().numpy()))
 
     def _patterns(self, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
         return scaling.of_trial(trial)

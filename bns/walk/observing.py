@@ -4,8 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bns.config import WalkConfig
 from bns.worlds.trial import Trial
 
+CENTIMETRES = 100.0  # [cm/m] scores are in the dissertation's unit
 FLAGS = ("fell", "collided", "overloaded", "overheated", "unrested")
 """of the outcome, each a column of 0 and 1"""
 
@@ -26,6 +28,14 @@ def distance(poses_world: np.ndarray) -> np.ndarray:
     return np.hypot(*np.moveaxis(end - places[..., 0, :], -1, 0))
 
 
+def cost(ways: np.ndarray) -> np.ndarray:
+    """Fitness, lower is better: the square of distances [m], its sign turned [cm2].
+
+    Its sum over the trials after damage is equation 7.4, the sign turned.
+    """
+    return -((CENTIMETRES * ways) ** 2)
+
+
 def of_trials(trials: Sequence[Trial]) -> np.ndarray:
     """How far N robots got, ``(N,)`` [m]; one whose physics diverged got nowhere."""
     ways = distance(np.stack([trial.command_poses_world for trial in trials]))
@@ -34,21 +44,21 @@ def of_trials(trials: Sequence[Trial]) -> np.ndarray:
 
 
 def measured(
-    tried: Sequence[Trial], best: Sequence[Trial] | None, adequate: float
+    tried: Sequence[Trial], best: Sequence[Trial] | None, walk: WalkConfig
 ) -> dict[str, np.ndarray]:
     """Figures and arrays of a trial of every run.
 
     Args:
         tried: of the controllers tried.
         best: of the population's best, where they are others.
-        adequate: distance from which on a gait is adequate [m].
+        walk: says what is adequate.
 
     Returns:
-        fitness: the square of the displacement, its sign turned, so that less is
-            better and its sum after damage is equation 7.4's, ``(R,)`` [m2].
+        fitness: see `cost`, ``(R,)`` [cm2].
         fitness_best: the same of the population's best.
         distance: of the controller tried [m].
-        solved: 1 where it got far enough, upright.
+        solved, reached: 1 where it got far enough (and did not fall, if that counts).
+        seconds: what the trial took [s].
         commands: how many.
         fell, collided, overloaded, overheated, unrested: 0 or 1.
         sent: goals ``(R, K, C)`` [rad].
@@ -60,11 +70,14 @@ def measured(
         name: np.array([float(getattr(trial.outcome, name)) for trial in tried])
         for name in FLAGS
     }
+    solved = (ways >= walk.adequate) * (1.0 - flags["fell"] * walk.upright)
     return {
-        "fitness": -(ways**2),
-        "fitness_best": -(others**2),
+        "fitness": cost(ways),
+        "fitness_best": cost(others),
         "distance": ways,
-        "solved": (ways >= adequate) * (1.0 - flags["fell"]),
+        "solved": solved,
+        "reached": solved,
+        "seconds": np.array([float(t.times[-1] - t.times[0]) for t in tried]),
         "commands": np.array([float(len(trial.commands)) for trial in tried]),
         **flags,
         "sent": np.stack([trial.commands.values for trial in tried]),

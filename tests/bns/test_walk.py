@@ -103,7 +103,7 @@ class TestGoals:
         assert math.degrees(TICK) == pytest.approx(0.2933, abs=1e-4)
 
     def test_random_goals_lie_around_half_way_and_within_the_stops(self):
-        config = small(walk=replace(small().walk, initial=1.5))
+        config = small(walk=replace(small().walk, initial=1.5, reach=3.0))
         genes = Goals.of(config).random(2, 50, Draws(0)).genes
         low, high = models.robot("phantomx").ranges.T
         assert genes.shape == (2, 50, 11, 18)
@@ -201,10 +201,11 @@ class TestObserving:
         lost = trial((*self.STRAIGHT[:3], (np.nan,) * 3))
         assert observing.of_trials([lost]) == pytest.approx([0.2])
 
-    def test_fitness_is_equation_7_4_turned_round(self):
-        row = observing.measured([trial(self.STRAIGHT)], None, adequate=0.5)
-        assert row["fitness"] == pytest.approx([-0.25])
-        assert row["fitness_best"] == pytest.approx([-0.25])
+    def test_fitness_is_equation_7_4_in_centimetres_turned_round(self):
+        walk = replace(small().walk, adequate=0.5)
+        row = observing.measured([trial(self.STRAIGHT)], None, walk)
+        assert row["fitness"] == pytest.approx([-2500.0])
+        assert row["fitness_best"] == pytest.approx([-2500.0])
         assert row["solved"] == [1.0]
 
     @pytest.mark.parametrize(
@@ -212,7 +213,8 @@ class TestObserving:
         [({"fell": True}, 0.0, 0.5), ({"diverged": True}, 0.0, 0.0)],
     )
     def test_who_fell_or_diverged_has_not_solved(self, flags, solved, way):
-        row = observing.measured([trial(self.STRAIGHT, **flags)], None, adequate=0.4)
+        walk = replace(small().walk, adequate=0.4, upright=True)
+        row = observing.measured([trial(self.STRAIGHT, **flags)], None, walk)
         assert row["solved"] == [solved]
         assert row["distance"] == pytest.approx([way])
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from bns.record import RunRecord
 from bns.viz import style
 from bns.viz.figures import bands
+from bns.viz.scene import walks
 
 
 def fitness(runs: Mapping[str, RunRecord]):
@@ -14,6 +15,8 @@ def fitness(runs: Mapping[str, RunRecord]):
     objective that was missed costs the task's penalty, so the plateaus are counts of
     objectives.
     """
+    if any(walks(record.config) for record in runs.values()):
+        return distance(runs)
     with style.plotting() as figure_class:
         figure = figure_class(figsize=style.WIDE, layout="constrained")
         axes = figure.subplots()
@@ -25,6 +28,23 @@ def fitness(runs: Mapping[str, RunRecord]):
         bands.finish(axes, runs)
         axes.set_ylabel("fitness (lower is better)")
         axes.set_title("Fitness in the world", pad=14)
+    return figure
+
+
+def distance(runs: Mapping[str, RunRecord]):
+    """How far the controllers tried walked, over trials; an adequate gait is dotted."""
+    with style.plotting() as figure_class:
+        figure = figure_class(figsize=style.WIDE, layout="constrained")
+        axes = figure.subplots()
+        for label, record, colour in bands.coloured(runs):
+            bands.band(axes, record["distance"], colour, label)
+        enough = next(iter(runs.values())).config.walk.adequate
+        axes.axhline(enough, color=style.GREY, linewidth=0.8, ls=(0, (1, 3)))
+        axes.set_ylim(bottom=0)
+        bands.mark_damage(axes, runs)
+        bands.finish(axes, runs)
+        axes.set_ylabel("distance [m] (higher is better)")
+        axes.set_title("Distance walked in the world", pad=14)
     return figure
 
 

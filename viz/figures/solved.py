@@ -9,7 +9,7 @@ from bns.viz.figures import bands
 
 def solved(runs: Mapping[str, RunRecord]):
     """Left: objectives reached (median, middle half). Right: share of runs solving."""
-    from bns.viz.scene import order
+    from bns.viz.scene import order, walks
 
     with style.plotting() as figure_class:
         figure = figure_class(figsize=style.WIDE, layout="constrained")
@@ -21,7 +21,8 @@ def solved(runs: Mapping[str, RunRecord]):
         goals = max(len(order(record.config)) for record in runs.values())
         left.set_ylim(-0.15, goals + 0.15)
         left.set_yticks(range(goals + 1))
-        left.set_title("Objectives reached", pad=14)
+        gait = any(walks(record.config) for record in runs.values())
+        left.set_title("Adequate gait" if gait else "Objectives reached", pad=14)
         right.set_ylim(-3, 103)
         right.set_ylabel("% of runs")
         right.set_title("Runs whose trial solved the task", pad=14)
