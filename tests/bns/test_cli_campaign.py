@@ -139,7 +139,7 @@ def test_claims_are_listed_and_judged_without_runs(capsys, tiny):
     rows = json.loads(said(capsys, "claims", "list", "--json"))
     assert len(rows) == 157
     assert "p 0.05543" in " ".join(said(capsys, "claims", "list", "a15").split())
-    text = said(capsys, "claims", "table", "A15", "A5")
+    text = said(capsys, "claims", "table", "A15", "B1")
     assert "not run" in text and "not tested" in text
     said(capsys, "claims", "table", "--write", "claims.md")
     assert (tiny.parent / "claims.md").read_text().startswith("# Claims")
