@@ -16,14 +16,17 @@ def execute(given: Any) -> int:
     Args:
         given: what `bns run` was told; one replicate is run, whatever the preset says.
     """
+    from bns.hardware.line import check_port
+    from bns.hardware.priority import urgent
+
+    check_port(given.port)
+    urgent()
     from bns.cli import outputs
     from bns.hardware.errors import LinkError, SafetyStop
-    from bns.hardware.priority import urgent
     from bns.hardware.world import HardwareWorld
     from bns.run import train
     from bns.tasks import NavigationTask
 
-    urgent()
     config = replace(given.config, replicates=1, record_replicates=1, threads=1)
     out = Path(given.out)
     world = HardwareWorld(

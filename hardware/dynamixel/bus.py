@@ -6,6 +6,7 @@ instead of saying no; only the first of several error bits is named; there is no
 read on AX servos. It is not safe for several threads: neither is this.
 """
 
+import select
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -33,6 +34,7 @@ class Bus:
         clock: of the session.
         faults: where what goes wrong is noted.
         guard: has to watch while torque is on.
+        latency: allowed for an answer beside its bytes [s].
 
     Raises:
         BnsError: no such port, in use, no SDK.
@@ -49,13 +51,14 @@ class Bus:
         *,
         faults: FaultLog | None = None,
         guard: Guard | None = None,
+        latency: float = LATENCY,
     ):
         check_port(port)
         sdk = _sdk()
         self.joints = tuple(joints)
         self.clock, self.guard = clock, guard
         self.faults = faults if faults is not None else FaultLog(clock)
-        self._port = _port(sdk, port)
+        self._port = _port(sdk, port, latency)
         self._protocol = sdk.PacketHandler(1.0)
         self._goals = sdk.GroupSyncWrite(self._port, self._protocol, packets.GOAL, 2)
         self._sdk = sdk
@@ -75,7 +78,7 @@ class Bus:
         """
         missing, garbled, others = [], [], []
         for joint in self.joints:
-            results = [self._call("ping", joint.id) for _ in range(2)]
+            results = [self._call("ping", joint.id) for _ in range(3)]
             good = [value for value, result, _ in results if result == 0]
             if not good:
                 corrupt = any(r == self._sdk.COMM_RX_CORRUPT for _, r, _ in results)
@@ -206,13 +209,18 @@ def _sdk() -> Any:
     return dynamixel_sdk
 
 
-def _port(sdk: Any, name: str) -> Any:
+def _port(sdk: Any, name: str, latency: float) -> Any:
     """The SDK's port, opened for this process alone, with a shorter time allowance."""
 
     class Port(sdk.PortHandler):
         def setPacketTimeout(self, packet_length: int) -> None:
             self.packet_start_time = self.getCurrentTime()
-            self.packet_timeout = self.tx_time_per_byte * packet_length + LATENCY * 1e3
+            self.packet_timeout = self.tx_time_per_byte * packet_length + latency * 1e3
+
+        def readPort(self, length: int) -> bytes:
+            # the SDK asks without a pause: one core busy, nobody else's turn
+            select.select([self.ser.fileno()], [], [], 0.0005)
+            return super().readPort(length)
 
     port = Port(name)
     try:

@@ -49,7 +49,7 @@ def served(tmp_path):
 def opened(port, **settings):
     from bns.hardware.dynamixel.bus import Bus
 
-    return Bus(port, joints.read(), RealClock(), **settings)
+    return Bus(port, joints.read(), RealClock(), latency=0.3, **settings)
 
 
 def test_goals_reach_all_servos_and_states_come_back(served):

@@ -41,11 +41,12 @@ def test_a_trial_tells_what_the_robot_did(trial):
 
 
 def test_software_damage_changes_what_is_sent_from_its_trial_on(trial):
-    _, rig, world = trial
+    sound, rig, world = trial
     rig.device.log.clear()
     hit = world.run([AHEAD], trial=1)[0]
     assert any(row[1:] == (7200, 14401) for row in rig.device.log)
-    assert hit.poses_world[-1, 2] - hit.poses_world[0, 2] > 0
+    turns = [np.ptp(item.poses_world[[0, -1], 2]) for item in (sound, hit)]
+    assert turns[1] < turns[0] - 0.5  # the left wheel lags: less to the right
     assert hit.conditions["damage"] == ["wheel_gain:wheel=left,factor=0.5"]
 
 
