@@ -16,7 +16,7 @@ def run(quick: bool) -> Result:
     rows = [row for row in rows if scoring.aliased(row)]
     rows = [r for r in rows if r["said"]["verdict"] != "no gap"]
     figure = scoring.share(
-        rows, lambda r: r["said"]["verdict"] == "either" and scoring.covered(r)
+        rows, lambda r: r["said"]["verdict"] == "either" and scoring.listed(r)
     )
     return Result(
         figure=figure,
@@ -26,6 +26,6 @@ def run(quick: bool) -> Result:
         details={
             "planted": sum(row["kind"] == "alias" for row in rows),
             "confident and wrong": scoring.share(rows, scoring.confident_wrong),
-            "failures": scoring.failures(rows, scoring.covered),
+            "failures": scoring.failures(rows, scoring.listed),
         },
     )

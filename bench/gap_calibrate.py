@@ -13,10 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from bench.gap_runner import SEALED, rows
+from bns.gap.verdict import quantile
 
 FILE = Path(__file__).resolve().parent.parent / "gap" / "calibration.json"
 MISSED = 1e3  # score of a true support that was not among the fitted ones
 ALARMS = 0.02  # share of recordings without an effect in which a gap may be claimed
+SURE = 0.98  # coverage of what is named, at least
+LEAST, MOST = 6.0, 12.0  # for it; likelihood ratios of 20 and 400
 STRANGE = 0.02  # share of effects of the library that may be called none of it
 
 
@@ -49,34 +52,39 @@ def alpha_gap(found: list[dict]) -> float:
     return float(min(ALARMS, lowest * 0.999))
 
 
-def misfit_share(found: list[dict], alpha: float) -> float:
-    """Excess over what was explained that effects of the library hardly reach."""
-    shares = sorted(
-        row["said"]["excess"] / max(row["said"]["explained"], 1e-9)
-        if row["said"]["p_misfit"] < alpha
-        else 0.0
+def alpha_misfit(found: list[dict], share: float) -> float:
+    """p-value that the rest of effects of the library hardly falls below."""
+    rests = sorted(
+        row["said"]["p_misfit"]
         for row in found
-        if row["kind"] in ("single", "pair") and row["said"].get("size")
+        if row["kind"] in ("single", "pair")
+        and row["said"]["size"]
+        and row["said"]["excess"] > share * row["said"]["explained"]
     )
-    place = int(np.ceil((1 - STRANGE) * (len(shares) + 1))) - 1
-    return float(shares[min(place, len(shares) - 1)]) if shares else 0.05
+    count = sum(row["kind"] in ("single", "pair") for row in found)
+    place = int(np.floor(STRANGE * (count + 1)))
+    return float(min(0.01, rests[place] * 0.999)) if place < len(rests) else 0.01
+
+
+def sure(conformal: list[float]) -> float:
+    """Difference of losses beyond which the best support may be named alone."""
+    return float(np.clip(quantile(conformal, SURE), LEAST, MOST))
 
 
 def main(words: list[str]) -> None:
     """Print the thresholds; write them if asked to."""
-    from bns.gap.verdict import quantile
-
     found = [row for row in rows("calibrate") if "size" in row["said"]]
     content = json.loads(FILE.read_text(encoding="utf-8"))
     conformal = scores(found)
     new = {
         "tie": quantile(conformal, content["coverage"]),
         "alpha_gap": alpha_gap(found),
-        "misfit_share": max(0.02, misfit_share(found, content["alpha_misfit"])),
+        "sure": sure(conformal),
+        "alpha_misfit": alpha_misfit(found, content["misfit_share"]),
     }
     print(f"{len(found)} cases, {len(conformal)} scores")
     for name, value in new.items():
-        print(f"{name} {value:.4g} (was {content[name]:.4g})")
+        print(f"{name} {value:.4g} (was {content.get(name, 0.0):.4g})")
     if "--write" in words:
         content.update(new, scores=conformal)
         FILE.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")

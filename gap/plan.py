@@ -138,7 +138,7 @@ def repeats(distance: float, *, tie: float | None = None) -> int:
     Returns:
         from 1 on; 0 if `MOST` runs are not enough.
     """
-    tie = verdict.calibration().tie if tie is None else tie
+    tie = verdict.calibration().sure if tie is None else tie
     for count in range(1, MOST + 1):
         whole = distance * np.sqrt(count)
         if whole**2 - 2 * POWER * whole >= tie:

@@ -173,6 +173,12 @@ def covered(row: dict[str, Any]) -> bool:
     return any(sorted(found) == names for found in row["said"]["sets"])
 
 
+def listed(row: dict[str, Any]) -> bool:
+    """Whether the true support is among those named."""
+    names = sorted(row["answer"]["names"])
+    return any(sorted(found) == names for found in row["said"]["named"])
+
+
 def confident_wrong(row: dict[str, Any]) -> bool:
     """Whether one support was named alone and it is not exactly the true one."""
     return row["said"]["verdict"] in ("effect", "together") and not strict(row)

@@ -31,8 +31,10 @@ class Calibration:
         alpha_misfit: p-value below which the best support leaves structure.
         misfit_share: what the rest still hides, as a share of what was explained, for
             the answer to be "none of the library".
-        tie: how much larger the loss of a support may be for it to stay in the set;
-            the conformal quantile of `scores`.
+        tie: how much larger the loss of a support may be for it to stay in the 90 %
+            set; the conformal quantile of `scores`.
+        sure: the same for it to be named beside the best one; larger, since a name
+            that stands alone has to be right more often than the set covers.
         coverage: of the sets.
         scores: loss of the true support over the best one's, per calibration case.
     """
@@ -41,6 +43,7 @@ class Calibration:
     alpha_misfit: float = 0.01
     misfit_share: float = 0.02
     tie: float = 6.0
+    sure: float = 6.0
     coverage: float = 0.9
     scores: tuple[float, ...] = ()
 
@@ -140,8 +143,8 @@ def decide(
         excite: by candidate, which commands make it felt.
     """
     kind, named, sets = judge(choice, calibration)
-    tied = [point for point, score in choice.ranked if score <= calibration.tie]
-    rivals = [(p, s) for p, s in choice.ranked if s > calibration.tie]
+    tied = [point for point, score in choice.ranked if score <= calibration.sure]
+    rivals = [(p, s) for p, s in choice.ranked if s > calibration.sure]
     second, margin = (rivals[0][0].names, rivals[0][1]) if rivals else ((), np.inf)
     between = _angle(problem, tied) if kind == "either" else 90.0
     return Verdict(
@@ -178,15 +181,16 @@ def judge(
 ) -> tuple[str, tuple[tuple[str, ...], ...], tuple[tuple[str, ...], ...]]:
     """Kind, named supports and the 90 % set, see `Verdict`."""
     sets = tuple(names for names, score in choice.scores if score <= rules.tie)
+    near = tuple(names for names, score in choice.scores if score <= rules.sure)
     if choice.p_gap > rules.alpha_gap and choice.size < 2:
         return "no gap", (), ((), *(sets if choice.size else ()))
     share = choice.excess / max(choice.explained, 1e-9)
     strange = choice.p_misfit < rules.alpha_misfit and share > rules.misfit_share
     if strange or not choice.size:
         return "none of the library", (), sets
-    if len(sets) > 1:
-        return "either", sets, sets
-    return ("effect" if choice.size == 1 else "together"), sets[:1], sets
+    if len(near) > 1:
+        return "either", near, sets
+    return ("effect" if choice.size == 1 else "together"), near[:1], sets
 
 
 def _angle(problem: Problem, tied: Sequence[Point]) -> float:

@@ -95,7 +95,8 @@ def test_thresholds_are_applied_to_what_was_kept():
         {"names": ["a"], "score": 0.0},
         {"names": ["b"], "score": 4.0},
     ]
-    narrow, wide = verdict.Calibration(tie=3.0), verdict.Calibration(tie=5.0)
+    narrow = verdict.Calibration(tie=3.0, sure=3.5)
+    wide = verdict.Calibration(tie=5.0, sure=5.0)
     assert scoring.judged(kept, narrow)["said"]["verdict"] == "effect"
     assert scoring.judged(kept, wide)["said"]["verdict"] == "either"
     assert scoring.judged(kept, wide)["said"]["sets"] == (("a",), ("b",))
