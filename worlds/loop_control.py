@@ -1,10 +1,11 @@
 """What one robot of a closed loop does in a cycle: controls and models for physics."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from bns.worlds import compile, control
+from bns.worlds import compile
 from bns.worlds.active import Stages
 from bns.worlds.effects.base import ControlSignal
 from bns.worlds.physics import Compiled, Segment
@@ -39,7 +40,11 @@ class LoopControl:
     ):
         self.stages, self.dt = stages, dt
         self._steps, self._channels, self._scale = steps, channels, ctrl_per_command
-        self._seed, self._trial = seed, trial
+        self._effects = [
+            (item, rng, rng.bit_generator.state)
+            for item in stages.control
+            for rng in [item.generator(seed, trial)]
+        ]
         self._told, self._count = np.empty((cycles, len(channels))), 0
         self._memoryless = all(
             getattr(item.effect, "memoryless", False) for item in stages.control
@@ -90,5 +95,8 @@ class LoopControl:
             channels=self._channels,
             dt=self.dt,
         )
-        values = control.disturbed(given, self.stages.control, self._seed, self._trial)
-        return values[-self._steps :]
+        for item, rng, begin in self._effects:
+            rng.bit_generator.state = begin
+            values = item.effect.apply(given, item.active(given.times), rng)
+            given = replace(given, values=values)
+        return given.values[-self._steps :]
