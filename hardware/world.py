@@ -15,7 +15,7 @@ from bns.worlds.damage import Damage
 from bns.worlds.trial import Commands, Trial
 
 STAGES = ("command", "actuator")
-TRIES = 4  # of a trial that is void
+TRIES = 12  # of a trial that is void
 INSIDE = 0.15  # m from the edge at which a trial may start, at least
 
 
@@ -170,6 +170,7 @@ class HardwareWorld:
         conditions = stages.conditions(trial, seed) | {
             "battery": volts,
             "began": round(float(begin), 3),
+            "first": round(float(done.switched[0]), 4),
             "start": [round(float(v), 5) for v in stand.pose],
             "late": round(float(done.late), 4),
             "faults": len(rig.faults) - faults,

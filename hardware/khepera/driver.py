@@ -32,10 +32,12 @@ class Drive(NamedTuple):
     Attributes:
         at: when it held, the middle of the exchange [s].
         units: left and right [speed units].
+        took: duration of the exchange [s], longer where it was repeated.
     """
 
     at: float
     units: tuple[int, int]
+    took: float = 0.0
 
 
 class Khepera3:
@@ -150,10 +152,10 @@ class Khepera3:
         command = protocol.speeds(*pair)
         begin = self.clock.now()
         self.ask(command, "d")
-        middle = (begin + self.clock.now()) / 2
+        took = self.clock.now() - begin
         for _ in range(times - 1):
             self.ask(command, "d")
-        return Drive(middle, pair)
+        return Drive(begin + took / 2, pair, took)
 
     def stop(self) -> None:
         """Stop both wheels and see that they stand.
