@@ -38,11 +38,10 @@ def execute(
 def surroundings(config: RunConfig) -> dict[str, Any]:
     """The lamps, and who watches over the robots."""
     from bns.light.task import lamps
-    from bns.worlds.supervisor import Supervisor
 
     light = config.light
     return {
         "lights": lamps(light),
         "ambient": light.ambient,
-        "supervisor": Supervisor(safety=light.safety, at_lamp=light.at_lamp),
+        "supervisor": {"safety": light.safety, "at_lamp": light.at_lamp},
     }
