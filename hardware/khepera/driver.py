@@ -8,6 +8,7 @@ from bns.hardware.clock import Clock
 from bns.hardware.errors import LinkError
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera import protocol
+from bns.hardware.khepera.strangers import stranger
 from bns.hardware.line import Line
 from bns.models.khepera3.units import Firmware, firmware
 
@@ -96,7 +97,7 @@ class Khepera3:
         try:
             answer = self.ask(b"B\n", "b", heard=heard)
         except LinkError as error:
-            raise _stranger(b"".join(heard)) from error
+            raise stranger(b"".join(heard)) from error
         self.version = (answer[0], answer[1])
         if not 1 <= self.version[0] <= NEWEST:
             raise BnsError(
@@ -284,27 +285,3 @@ def _ending(buffer: bytes) -> int:
     """Where the first line ends (LF or CR), -1 if none does."""
     found = [at for at in (buffer.find(b"\n"), buffer.find(b"\r")) if at >= 0]
     return min(found) if found else -1
-
-
-def _stranger(heard: bytes) -> BnsError:
-    """What it means that `B` got no answer."""
-    if b"\xff\xff" in heard:
-        return BnsError(
-            "What answers on this port speaks the Dynamixel protocol: a hexapod, no "
-            "Khepera III. Give --robot phantomx or another --port."
-        )
-    text = heard.strip()
-    if text and all(32 <= c < 127 or c in b"\r\n" for c in text):
-        return BnsError(
-            f"What answers on this port ({text[:40].decode()!r}) is no Khepera III: "
-            "give another --port."
-        )
-    if text:
-        return BnsError(
-            "What comes from this port cannot be read: the baud rate is wrong; the "
-            f"Khepera III talks at {protocol.BAUD}."
-        )
-    return BnsError(
-        "Nothing answers on this port: switch the Khepera III on, check cable or "
-        f"Bluetooth, and that it talks at {protocol.BAUD} baud."
-    )
