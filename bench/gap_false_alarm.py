@@ -23,6 +23,7 @@ def run(quick: bool) -> Result:
         n=len(nothing),
         details={
             "found at 3 x": found,
+            "with a fault in the data": _faults(scoring.of(rows, "fault")),
             "false alarms": [
                 f"{row['seed']}: {row['said']['verdict']} {row['said']['named']}"
                 for row in nothing
@@ -34,3 +35,14 @@ def run(quick: bool) -> Result:
 
 def _claims(row: dict) -> bool:
     return row["said"]["verdict"] != "no gap"
+
+
+def _faults(rows: list[dict]) -> dict[str, float]:
+    refused = [row for row in rows if "error" in row["said"]]
+    used = [row for row in rows if "verdict" in row["said"]]
+    return {
+        "cases": len(rows),
+        "refused": len(refused),
+        "repaired or noticed": sum(bool(row["said"]["faults"]) for row in used),
+        "claimed a gap": sum(map(_claims, used)),
+    }

@@ -22,6 +22,9 @@ def run(quick: bool) -> Result:
         n=len(strange),
         details={
             "said of effects in the library": scoring.share(known, _none),
+            "without cross-talk, which is a shorter axle": scoring.share(
+                [row for row in strange if not _like_an_axle(row)], _none
+            ),
             "failures": scoring.failures(strange, _none),
         },
     )
@@ -29,3 +32,7 @@ def run(quick: bool) -> Result:
 
 def _none(row: dict) -> bool:
     return row["said"]["verdict"] == "none of the library"
+
+
+def _like_an_axle(row: dict) -> bool:
+    return any("cross_talk" in text for text in row["answer"]["effects"])

@@ -26,8 +26,13 @@ def run(quick: bool) -> Result:
         n=len(large),
         details={
             "strict": scoring.share(large, scoring.strict),
+            "named alone, and wrong": scoring.share(large, scoring.confident_wrong),
+            "named as one of several": scoring.share(
+                large, lambda row: row["said"]["verdict"] == "either"
+            ),
             "baselines": named,
             "by size": scoring.by_size(every),
+            "parameter": scoring.parameter(large),
             "confusion": scoring.confusion(large),
             "failures": scoring.failures(large, scoring.right),
         },

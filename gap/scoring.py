@@ -209,6 +209,39 @@ def failures(rows: Sequence[dict], holds) -> list[str]:
     ]
 
 
+def parameter(rows: Sequence[dict]) -> dict[str, float]:
+    """Error of the true effect's magnitude where it was fitted.
+
+    Returns:
+        median error over the true departure from nominal; share of 90 % intervals
+        that hold the truth.
+    """
+    errors, held = [], []
+    for row in rows:
+        truth = row["answer"]["magnitudes"]
+        for _, values, spans in row["said"]["intervals"]:
+            if len(truth) == 1 and len(values) == 1:
+                far = abs(truth[0] - _nominal(row["answer"]["effects"][0], truth[0]))
+                errors.append(abs(values[0] - truth[0]) / max(far, 1e-12))
+                held.append(spans[0][0] <= truth[0] <= spans[0][1])
+    if not errors:
+        return {"median relative error": float("nan"), "intervals that hold": 0.0}
+    return {
+        "median relative error": float(np.median(errors)),
+        "intervals that hold": float(np.mean(held)),
+    }
+
+
+def _nominal(text: str, magnitude: float) -> float:
+    """Nominal value of the parameter of an effect that has a magnitude."""
+    effect = registry.parse(text)
+    near = min(
+        (p for p in effect.parameters if p.scales),
+        key=lambda p: abs(effect[p.name] - magnitude),
+    )
+    return near.nominal
+
+
 def by_size(rows: Sequence[dict]) -> list[dict[str, float]]:
     """Accuracy and abstention by size of the effect."""
     edges = [0.0, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0, np.inf]
