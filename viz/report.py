@@ -170,7 +170,7 @@ def _caption(name: str, record: RunRecord) -> str:
     goals = scene.order(record.config)
     own = LIGHT if scene.follows_light(record.config) else {}
     own = WALK if scene.walks(record.config) else own
-    return own.get(name, CAPTIONS[name]).format(
+    return (CAPTIONS | own)[name].format(
         order=", ".join(goals),
         goals=len(goals),
         penalty=record.config.task.penalty,
