@@ -26,7 +26,7 @@ HIDDEN = (
 COMMANDS, HELD = 6, 2.0  # of a controller; how long each lasts [s]
 MARKS = (2, 4, 6)  # commands after which it has to be at a place
 FASTEST = 0.12  # [m/s]
-SIZE, GENERATIONS, SEEDS = 7, 60, 2  # of the evolution: times genes; controllers
+SIZE, GENERATIONS, SEEDS = 7, 100, 1  # of the evolution: times genes; controllers
 SEED = 4_000_000
 
 
