@@ -22,6 +22,7 @@ def run(quick: bool) -> Result:
     """
     trials = 8 if quick else 100
     with_window = measure(_config(150, trials), after=2 if quick else 0)
+    print(f"window 150: {with_window}")  # the rest takes long
     details = {"window 150": with_window}
     if not quick:
         details["no window"] = measure(_config(0, trials))
