@@ -101,7 +101,7 @@ class Learner:
                 self.theta, self.population, self.cost, self._rates(trial)
             )
         index = choice.choose(
-            self.config, trial, self.cost, self.population, self.theta,
+            self._choosing(trial), trial, self.cost, self.population, self.theta,
             self.evaluator, self.draws,
         )  # fmt: skip
         self._chosen = self.population.pick(index)
@@ -110,6 +110,11 @@ class Learner:
         if torch.equal(best, index):
             return Proposal(tried, None)
         return Proposal(tried, self.encoding.commands(self.population.pick(best)))
+
+    def _choosing(self, trial: int) -> RunConfig:
+        """The configuration whose rule chooses what to try in a trial."""
+        del trial
+        return self.config
 
     def _rates(self, trial: int) -> Rates:
         rate, magnitude = self.adaptations.mutation(trial)

@@ -14,7 +14,7 @@ BOARD = (1.35, 0.9)
 
 LIGHT = "light following"
 WALK = "walking"
-ADEQUATE = "an adequate gait gets out of here"
+ADEQUATE = ""
 
 _DISC = 0.001
 """m; height of an objective's disc"""

@@ -5,6 +5,7 @@ what genes mean, what the networks foresee and what a trial is worth.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -84,6 +85,13 @@ class WalkLearner(Learner):
         self.loss = torch.full((self.runs,), torch.nan)
         self.cost: Tensor | None = None
         self._chosen = self.population.pick(torch.zeros(self.runs, dtype=torch.long))
+
+    def _choosing(self, trial: int) -> RunConfig:
+        """Before evolution starts, any: an SNN that has seen next to nothing would
+        choose what it has seen."""
+        if trial < self.config.evolve_from:
+            return replace(self.config, choose="random")
+        return self.config
 
     def _rates(self, trial: int) -> Rates:
         rate, _ = self.adaptations.mutation(trial)

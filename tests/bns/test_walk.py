@@ -229,7 +229,8 @@ class TestLearner:
     def test_it_walks_farther_than_it_began(self):
         record = train(small(trials=14), world=Slider())
         before, after = record["distance"][:, :5], record["distance"][:, -4:]
-        assert (after.mean(1) > 2 * before.mean(1)).all()
+        assert (np.ptp(before, axis=1) > 0).all(), "random controllers, not one"
+        assert (after.mean(1) > 1.3 * before.mean(1)).all()
         assert (record["distance"] <= STRIDE * 3 * 11).all()
         error = np.abs(record["distance_predicted"] - record["distance"])
         assert error[:, -1].max() < 0.1

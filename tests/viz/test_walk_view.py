@@ -1,0 +1,64 @@
+"""Legs of a walking robot drawn as its servos reported them."""
+
+import numpy as np
+import pytest
+
+from bns import models
+from bns.viz import walk_view
+from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Trial
+
+
+@pytest.fixture(scope="module")
+def model():
+    return models.scene_spec("phantomx").compile()
+
+
+def trial(positions):
+    """Two samples at (0.3, -0.2); servos at `positions` [rad], else half-way."""
+    robot = models.robot("phantomx")
+    names = [channel.name for channel in robot.channels]
+    row = [0.3, -0.2, 1.0, *(positions.get(name, 0.0) for name in names)]
+    channels = tuple(Channel(f"{name}_position", "rad") for name in names)
+    told = Commands(
+        np.zeros((1, 18)), [1.0], tuple(Channel(*c) for c in robot.channels)
+    )
+    return Trial(
+        told, [0.0, 1.0], [row, row], [0, 1], channels=(*POSE_CHANNELS, *channels)
+    )
+
+
+def feet(model, qpos):
+    """Heights of the feet by leg [m]."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    names = [model.site(i).name for i in range(model.nsite)]
+    return {
+        name.removesuffix("_foot"): data.site(name).xpos[2]
+        for name in names
+        if name.endswith("_foot")
+    }
+
+
+def test_it_stands_on_all_feet_half_way(model):
+    seen = trial({})
+    qpos = walk_view.qpos(model, seen.poses_world, seen, np.arange(2))
+    heights = feet(model, qpos[0])
+    assert len(heights) == 6
+    np.testing.assert_allclose(list(heights.values()), 0.0, atol=1e-3)
+    np.testing.assert_allclose(qpos[0, :2], [0.3, -0.2])
+
+
+def test_a_raised_leg_is_in_the_air_and_the_others_are_not(model):
+    seen = trial({"left_middle_femur": 1.0})
+    qpos = walk_view.qpos(model, seen.poses_world, seen, np.arange(2))
+    heights = feet(model, qpos[0])
+    assert heights.pop("left_middle") > 0.05
+    np.testing.assert_allclose(list(heights.values()), 0.0, atol=1e-3)
+
+
+def test_only_walking_robots_report_servos():
+    bare = Trial(Commands([[0.1, 0.1]], [1.0]), [0, 1], np.zeros((2, 3)), [0, 1])
+    assert walk_view.reports_servos(trial({})) and not walk_view.reports_servos(bare)
