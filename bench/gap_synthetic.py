@@ -26,6 +26,7 @@ def run(quick: bool) -> Result:
         n=len(large),
         details={
             "strict": scoring.share(large, scoring.strict),
+            "among those named": scoring.share(large, _among),
             "named alone, and wrong": scoring.share(large, scoring.confident_wrong),
             "named as one of several": scoring.share(
                 large, lambda row: row["said"]["verdict"] == "either"
@@ -37,6 +38,12 @@ def run(quick: bool) -> Result:
             "failures": scoring.failures(large, scoring.right),
         },
     )
+
+
+def _among(row: dict) -> bool:
+    from bns.gap import scoring
+
+    return any(scoring.matches(n, row["answer"]) for n in row["said"]["named"])
 
 
 def _baseline(row: dict, key: str) -> bool:

@@ -3,12 +3,13 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import pairwise, permutations
 from typing import Any
 
 import numpy as np
 
-from bns.gap import baselines, fit, select, verdict
+from bns.gap import baselines, fit, select, verdict, wheeled_library
 from bns.gap.cases import Case, record
 from bns.gap.diagnose import ALPHA_MORE, Analysis, report
 from bns.gap.model import GapModel
@@ -116,9 +117,22 @@ def _edit(best: fit.Point, case: Case, model: GapModel) -> dict[str, float]:
     return {"ours": ours, "oracle": oracle}
 
 
+@cache
+def _always() -> dict[str, tuple[str, ...]]:
+    """Wheeled candidates that look alike whatever is commanded."""
+    return {item.name: item.aliases for item in wheeled_library.candidates()}
+
+
 def matches(names: Sequence[str], answer: dict[str, Any]) -> bool:
-    """Whether a support is the true one, effects that look alike merged."""
-    classes = answer["aliases"]
+    """Whether a support is the true one, effects that look alike merged.
+
+    Merged are those that the recording cannot tell apart, and those that none can.
+    """
+    always = _always()
+    classes = [
+        {*row, *(other for name in row for other in always.get(name, ()))}
+        for row in answer["aliases"]
+    ]
     if len(names) != len(classes):
         return False
     return any(
