@@ -70,17 +70,13 @@ def write_recording(record: RunRecord, path: Path) -> Path:
 def summary(record: RunRecord) -> str:
     """What happened, in words."""
     solved = stats.trials_to_solve(record)
-    lines = [
-        f"{record.trials} trials of {record.replicates} runs, numbered from 0."
-    ]
+    lines = [f"{record.trials} trials of {record.replicates} runs, numbered from 0."]
     lines.append(sentence("Solved", solved, "after {} trials"))
     onset, damage = int(record.damage_onset.max()), record.config.world.damage
     if onset < 0:
         lines.append("No damage.")
     elif onset >= record.trials:
-        lines.append(
-            f"Damage from trial {onset} on was not met: {'; '.join(damage)}."
-        )
+        lines.append(f"Damage from trial {onset} on was not met: {'; '.join(damage)}.")
     else:
         lines.append(f"Damage from trial {onset} on: {'; '.join(damage)}.")
         recovered = stats.trials_to_recover(record)
