@@ -48,6 +48,8 @@ _TABLE_KEYS = {
     "on_for": "on_for",
 }
 
+WHOLE = ("blend", "loss")  # strengths that go from nothing (0) to everything (1)
+
 
 @dataclass(frozen=True)
 class ActiveEffect:
@@ -147,8 +149,8 @@ class Event:
             if key != "effect"
         }
         effect = registry.parse(given["effect"])
-        _refuse_weak(effect, [p for p in effect.values if f"{p}=" in given["effect"]])
-        return cls(effect, **schedule)
+        named = [p for p in effect.values if f"{p}=" in given["effect"]]
+        return cls(_strong(effect, named), **schedule)
 
     @classmethod
     def from_table(cls, table: Mapping[str, Any]) -> "Event":
@@ -161,8 +163,7 @@ class Event:
         """
         effect = {key: item for key, item in table.items() if key not in _TABLE_KEYS}
         schedule = {_TABLE_KEYS[key]: table[key] for key in table if key not in effect}
-        _refuse_weak(registry.from_table(effect), effect)
-        return cls(registry.from_table(effect), **schedule)
+        return cls(_strong(registry.from_table(effect), effect), **schedule)
 
     def __str__(self) -> str:
         """The event as text (parses back)."""
@@ -255,14 +256,22 @@ class Damage:
         return tuple(str(event) for event in self.events)
 
 
-def _refuse_weak(effect: Effect, given: Iterable[str]) -> None:
+def _strong(effect: Effect, given: Iterable[str]) -> Effect:
+    """A damage as it is meant: what can only be more or less so is wholly so.
+
+    Raises:
+        BnsError: a strength that nobody can guess is not given.
+    """
     strengths = [item for item in effect.parameters if item.scales]
-    if effect.is_nominal and not any(item.name in given for item in strengths):
-        remedy = " or ".join(f"{item.name}={item.example:g}" for item in strengths)
-        raise BnsError(
-            f"Damage {effect.name!r} without a strength changes nothing: "
-            f"give for example {remedy}."
-        )
+    if not effect.is_nominal or any(item.name in given for item in strengths):
+        return effect
+    if len(strengths) == 1 and strengths[0].name in WHOLE:
+        return registry.make(effect.name, **{**effect.values, strengths[0].name: 1.0})
+    remedy = " or ".join(f"{item.name}={item.example:g}" for item in strengths)
+    raise BnsError(
+        f"Damage {effect.name!r} without a strength changes nothing: "
+        f"give for example {remedy}."
+    )
 
 
 def _moment(trial: int, time: float) -> str:

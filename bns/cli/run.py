@@ -1,6 +1,5 @@
 """`bns run`: train a preset, a TOML file, or go on with a run directory."""
 
-import re
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,8 +13,8 @@ from bns.cli.parse import parse
 from bns.config import RunConfig
 from bns.errors import BnsError, FormatError, UnknownNameError
 
-_WORLD = re.compile(r"^--world(=.*)?$")
-"""short for --world.name"""
+_SHORT = {"world": "world.name", "damage": "world.damage"}
+"""settings that have a short name on the command line"""
 
 STOPPED = 130
 """exit code of a run that Ctrl-C stopped after a whole trial"""
@@ -68,9 +67,15 @@ def main(verb: str, argv: list[str]) -> int:
         )
     config, out = source(argv[0])
     start = Arguments(source=argv[0], config=config, out=out)
-    words = [_WORLD.sub(r"--world.name\1", word) for word in argv]
-    given = parse(Arguments, words, prog="bns run", default=start)
+    given = parse(Arguments, list(map(_long, argv)), prog="bns run", default=start)
     return execute(replace(given, config=expanded(given.config)))
+
+
+def _long(word: str) -> str:
+    """A word of the command line, the short name of a setting written out."""
+    name, equals, value = word.partition("=")
+    full = _SHORT.get(name.removeprefix("--")) if name.startswith("--") else None
+    return f"--{full}{equals}{value}" if full else word
 
 
 def expanded(config: RunConfig) -> RunConfig:
