@@ -50,6 +50,8 @@ class OwnModel:
         self._cache: OrderedDict[tuple, np.ndarray] = OrderedDict()
         model = self.compiled(()).model
         self.actuators = [_index(model, "actuator", t.actuator) for t in config.told]
+        if config.keyframe:
+            _index(model, "key", config.keyframe)  # there, before anything runs
         self.view = own_view.View.of(config, model)
         self._candidates = own_candidates.candidates(config, model)
 

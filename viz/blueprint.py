@@ -47,20 +47,7 @@ def blueprint(
 
     world = _world(rrb, half_width, half_depth)
     seen = [_readings(rrb, seconds)] if readings else []
-    left = rrb.Vertical(
-        world,
-        rrb.StateTimelineView(
-            origin="/moment", name="Which trial is on", time_view=_axis(rrb, seconds)
-        ),
-        rrb.TimeSeriesView(
-            origin="/wheels",
-            name="Wheel speeds as sent [m/s]",
-            axis_x=_axis(rrb, seconds),
-            plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
-        ),
-        *seen,
-        row_shares=[6, 1.1, 1.9, *[1.9 for _ in seen]],
-    )
+    left = _left(rrb, world, seconds, seen)
     curves = rrb.Vertical(
         *(_curve(rrb, path, name) for path, name in CURVES),
         name="Curves (choose the timeline 'trial')",
@@ -86,6 +73,24 @@ def blueprint(
         rrb.BlueprintPanel(state="hidden"),
         auto_views=False,
         auto_layout=False,
+    )
+
+
+def _left(rrb, world, seconds: float, seen: list):
+    """The world, which trial is on, the wheels, and what else is seen over time."""
+    return rrb.Vertical(
+        world,
+        rrb.StateTimelineView(
+            origin="/moment", name="Which trial is on", time_view=_axis(rrb, seconds)
+        ),
+        rrb.TimeSeriesView(
+            origin="/wheels",
+            name="Wheel speeds as sent [m/s]",
+            axis_x=_axis(rrb, seconds),
+            plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+        ),
+        *seen,
+        row_shares=[6, 1.1, 1.9, *[1.9 for _ in seen]],
     )
 
 

@@ -69,10 +69,7 @@ def khepera3(
     server = PoseServer(body, port, rate=rate)
     state = _State()
     if stop is None:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, state.end)
-        signal.signal(signal.SIGUSR1, state.pull)
-        signal.signal(signal.SIGUSR2, state.cover)
+        state.listen()
     diary = _Diary(device, log)
 
     def handle(at: float) -> None:
@@ -96,6 +93,13 @@ class _State:
 
     def __init__(self):
         self.ended = self.pulled = self.covered = False
+
+    def listen(self) -> None:
+        """Take the signals of this process."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self.end)
+        signal.signal(signal.SIGUSR1, self.pull)
+        signal.signal(signal.SIGUSR2, self.cover)
 
     def end(self, number: int, frame: FrameType | None) -> None:
         self.ended = True
