@@ -88,7 +88,7 @@ def settings(name: str) -> tuple[str, ...]:
     return tuple(inspect.signature(get(name)).parameters)
 
 
-def make(name: str, **settings: Any) -> World:
+def make(name: str, /, **settings: Any) -> World:
     """The world called `name`.
 
     Args:
