@@ -189,14 +189,15 @@ def on_grid(trial: Trial, step: float) -> Trial:
     """A trial whose commands end on the grid of a simulation.
 
     Each end is rounded by itself, so that rounding does not add up over many commands;
-    commands shorter than a step fall away.
+    commands shorter than a step fall away. What MuJoCo itself recorded is left as it
+    is: there each command was rounded, as the models of the diagnosis do.
 
     Args:
         trial: recorded.
         step: of the simulation [s]; 0 = none.
     """
     told = trial.commands
-    if not step or not len(told):
+    if not step or not len(told) or "mujoco" in trial.conditions:
         return trial
     ends = np.concatenate([[0.0], np.cumsum(told.durations)])
     steps = np.rint(ends / step)

@@ -8,7 +8,7 @@ from bns.gap import advice, inputs, store
 from bns.gap.diagnose import diagnose
 from bns.gap.unicycle import UnicycleModel
 from bns.gap.wheeled import WheeledModel
-from bns.worlds import dataset
+from bns.worlds import dataset, registry
 from bns.worlds.mujoco_world import MujocoWorld
 from bns.worlds.trial import Channel, Commands, Trial
 
@@ -72,6 +72,15 @@ def test_rounding_to_the_grid_does_not_add_up():
     assert len(coarse.commands) == 100
     assert coarse.commands.duration == pytest.approx(10.0)
     assert coarse.boundaries[-1] == count
+
+
+def test_what_mujoco_recorded_keeps_its_commands():
+    """There each command was rounded by itself, and so does the model."""
+    told = Commands(np.ones((9, 2)) * 0.1, np.full(9, 0.5024))
+    (trial,) = registry.make("mujoco", threads=1).run([told])
+    assert trial.times[-1] == pytest.approx(9 * 0.5)
+    assert inputs.on_grid(trial, 0.005) is trial
+    assert inputs.on_grid(trial.replace(conditions={}), 0.005) is not trial
 
 
 def test_many_samples_are_thinned():
