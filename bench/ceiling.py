@@ -1,4 +1,8 @@
-"""The ceiling: direct evolution in the damaged world, no SNN in between."""
+"""The ceiling: direct evolution in the damaged world, no SNN in between.
+
+It starts from the best controllers that BNS tried there, so that minutes are enough;
+from random ones, 60 generations of 60 individuals reached three of five objectives.
+"""
 
 import json
 from dataclasses import asdict, replace
@@ -14,11 +18,12 @@ from bns.chromosome import Encoding, Population
 from bns.config import RunConfig
 from bns.draws import Draws
 from bns.evolution.generation import Breeder, Rates
+from bns.record import RunRecord
 from bns.tasks import NavigationTask
 from bns.tasks.trials import score_trials
 from bns.units import metres_per_second
 
-RUNS, POPULATION, GENERATIONS = 1, 100, 240
+RUNS, POPULATION, GENERATIONS = 1, 100, 12
 
 
 DOC = "damages of four that direct evolution in the damaged world solves"
@@ -26,11 +31,14 @@ BAR = "none: printed beside recover-window"
 
 
 def run(quick: bool) -> Result:
-    """One direct evolution a damage; quick: what is known already, no new one."""
+    """One direct evolution a damage; quick: what is known already, no new one.
+
+    Needs the runs of `recover-window`, and trains them where they are missing.
+    """
     names = [d for d in experiments.DAMAGES if not quick or known(d)]
     found = {damage: reached(damage) for damage in names}
     return Result(
-        figure=sum(int(row["solved"] > 0) for row in found.values()),
+        figure=sum(bool(row["solved"]) for row in found.values()),
         unit="damages of 4",
         holds=None,
         n=len(found),
@@ -56,7 +64,9 @@ def reached(damage: str) -> dict[str, object]:
         damage: key of `experiments.DAMAGES`.
 
     Returns:
-        runs, how many solved the simple problem, generations each took, best cost.
+        whether the damaged robot can solve the simple problem at all; the best cost
+        [cm] that BNS came to there, and what direct evolution made of it; commands in
+        its list.
     """
     before = known(damage)
     if before is not None:
@@ -71,6 +81,7 @@ def _search(config: RunConfig) -> dict[str, object]:
     from bns.run import make_world
 
     torch.set_num_threads(1)
+    record = experiments.records([replace(config, threads=1)])[config.preset]
     always = tuple(text.split("@")[0] for text in config.world.damage)
     world = make_world(replace(config, world=replace(config.world, damage=always)))
     config = replace(config, evolution=replace(config.evolution, population=POPULATION))
@@ -78,24 +89,37 @@ def _search(config: RunConfig) -> dict[str, object]:
     task = NavigationTask.of(config.task)
     draws = Draws(seeding.integer(config.seed, "ceiling"))
     breeder = Breeder(config.evolution, encoding, False)
-    population = encoding.random(RUNS, config.evolution.population, draws)
-    rates = _rates(config)
-    solved_at: list[int | None] = [None] * RUNS
-    for generation in range(GENERATIONS):
-        cost, goals = _in_world(world, encoding, task, population)
-        for run in np.flatnonzero((goals == len(task.goals)).any(1)):
-            solved_at[run] = solved_at[run] or generation + 1
-        if all(solved_at):
-            break
+    population = _tried(record, encoding)
+    cost, goals = _in_world(world, encoding, task, population)
+    begun = float(cost.min())
+    for _ in range(GENERATIONS):
         coins = breeder.draw(RUNS, draws)
-        population = breeder.breed(population, cost, rates, coins)
+        population = breeder.breed(population, cost, _rates(config), coins)
+        cost, goals = _in_world(world, encoding, task, population)
+    best = int(cost[0].argmin())
     return {
-        "runs": RUNS,
-        "solved": sum(at is not None for at in solved_at),
-        "generations": solved_at,
-        "best cost": [round(float(value), 1) for value in cost.min(1).values],
-        "settings": asdict(config.evolution),
+        "solved": bool(goals[0, best] == len(task.goals)),
+        "best cost by BNS [cm]": round(begun, 1),
+        "best cost by direct evolution [cm]": round(float(cost[0, best]), 1),
+        "commands": int(population.lengths[0, best]),
+        "settings": asdict(config.evolution) | {"generations": GENERATIONS},
     }
+
+
+def _tried(record: RunRecord, encoding: Encoding) -> Population:
+    """The best controllers that BNS tried on the damaged robot, as genes.
+
+    A stop becomes the lowest speed gene, which means a stop as well.
+    """
+    onset = int(record.damage_onset[0])
+    cost = record["fitness"][:, onset:]
+    runs, trials = np.unravel_index(np.argsort(cost, axis=None), cost.shape)
+    sent = record.sent[runs[:POPULATION], trials[:POPULATION] + onset]
+    lengths = np.isfinite(sent[..., 2]).sum(1)
+    genes = torch.from_numpy(np.nan_to_num(sent).astype(np.float32))
+    made = Population(genes[None], torch.from_numpy(lengths)[None])
+    inside = torch.maximum(made.genes, encoding.low) * made.valid.unsqueeze(-1)
+    return made._replace(genes=inside)
 
 
 def _rates(config: RunConfig) -> Rates:
