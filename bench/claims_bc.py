@@ -1,16 +1,12 @@
 """Claims of light following (investigations B, C) that survive Holm, or nearly."""
 
-from bench import experiments
+from bench._claims import judged
 from bench.result import Result
-from bench.versions import ROOT
-from bns.claims import report, runner
-from bns.claims.claim import claims
 
 DOC = "claims of closed-loop control (B and C) with a verdict"
 BAR = "14 of 14, printed whichever way"
 WANTED = ("B2", "B3", "B9", "B15", "B16", "B24", "B30", "B31")
 WANTED += ("C11", "C13", "C15", "C17", "C19", "C22")
-WORLD = "mujoco"
 
 
 def run(quick: bool) -> Result:
@@ -19,26 +15,4 @@ def run(quick: bool) -> Result:
     Settings are the dissertation's (tables 5.1 and 6.1) over the preset; runs are
     kept, so a run that is stopped goes on.
     """
-    from bns.campaign.engines import registry
-
-    chosen = [claims()[name] for name in WANTED]
-    root = ROOT / "runs" / "claims"
-    engine = registry.make("local", workers=experiments.WORKERS)
-    runner.run(chosen, engine, world=WORLD, quick=quick, root=root)
-    place = runner.directory(WORLD, quick=quick, root=root)
-    rows = report.judged(chosen, place, world=WORLD, quick=quick)
-    judged = [row for row in rows if row.findings]
-    return Result(
-        figure=len(judged),
-        unit=f"of {len(WANTED)}",
-        holds=None if quick else len(judged) == len(WANTED),
-        n=min((min(f.runs) for row in judged for f in row.findings), default=0),
-        details={
-            row.claim.id: {
-                "says": row.claim.says,
-                "verdict": row.verdict,
-                "cells": [list(cell) for cell in report.cells(row)],
-            }
-            for row in rows
-        },
-    )
+    return judged(WANTED, quick=quick)

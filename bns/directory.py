@@ -1,5 +1,6 @@
-"""Whether a directory is free for a run, or is one."""
+"""Whether a directory is free for a run, or is one; who may write in it."""
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -59,3 +60,41 @@ def read_head(directory: Path) -> dict[str, Any]:
             "install a newer bns. Nothing was changed."
         )
     return head
+
+
+class Lock:
+    """Only one process writes in a directory.
+
+    Args:
+        directory: there already.
+    """
+
+    def __init__(self, directory: Path):
+        self.directory = directory
+        self._descriptor: int | None = None
+
+    def take(self) -> None:
+        """Keep other processes from writing here until this one ends.
+
+        Raises:
+            BnsError: another process is writing here.
+        """
+        if os.name != "posix":  # no such lock elsewhere
+            return
+        import fcntl
+
+        self._descriptor = os.open(self.directory, os.O_RDONLY)
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            self.release()
+            raise BnsError(
+                f"{self.directory} is being written by another process: "
+                "wait for it, or give another --out."
+            ) from error
+
+    def release(self) -> None:
+        """Let others write here."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None

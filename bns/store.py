@@ -18,7 +18,6 @@ arrays and dataset hold all that was in it.
 """
 
 import json
-import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -29,7 +28,7 @@ import numpy as np
 
 from bns import files, loading
 from bns.config import RunConfig
-from bns.directory import FORMAT, SCHEMA, check_free, read_head
+from bns.directory import FORMAT, SCHEMA, Lock, check_free, read_head
 from bns.errors import BnsError, FormatError
 from bns.record import RunRecord
 from bns.step import ARRAYS, Step, assemble
@@ -56,7 +55,7 @@ class RunStore:
     versions: Mapping[str, str]
     conditions: Mapping[str, object]
     damage_onset: Sequence[int]
-    _lock: int | None = field(default=None, repr=False)
+    _lock: Lock | None = field(default=None, repr=False)
 
     def create(self) -> "RunStore":
         """Make the directory.
@@ -111,25 +110,13 @@ class RunStore:
         Raises:
             BnsError: another process is writing here.
         """
-        if os.name != "posix":  # no such lock elsewhere
-            return
-        import fcntl
-
-        self._lock = os.open(self.directory, os.O_RDONLY)
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            self.close()
-            raise BnsError(
-                f"{self.directory} is being written by another process: "
-                "wait for it, or give another --out."
-            ) from error
+        self._lock = Lock(self.directory)
+        self._lock.take()
 
     def close(self) -> None:
         """Let others write here."""
         if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+            self._lock.release()
 
     @property
     def exists(self) -> bool:

@@ -15,7 +15,6 @@ bytes in everything but `log.jsonl`.
 """
 
 import json
-import os
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -26,6 +25,7 @@ from bns import files
 from bns.campaign.compact import FORMAT, SCHEMA, Compact, write
 from bns.campaign.part import Part, decode
 from bns.campaign.work import packages
+from bns.directory import Lock
 from bns.errors import BnsError, FormatError
 
 HEAD, FILE = "campaign.json", "campaign.toml"
@@ -46,7 +46,7 @@ class CampaignStore:
     name: str
     seed: int
     versions: Mapping[str, str]
-    _lock: int | None = field(default=None, repr=False)
+    _lock: Lock | None = field(default=None, repr=False)
 
     @classmethod
     def create(cls, directory: Path, name: str, seed: int) -> "CampaignStore":
@@ -132,27 +132,15 @@ class CampaignStore:
         Raises:
             BnsError: another process is writing here.
         """
-        if os.name != "posix":  # no such lock elsewhere
-            return
-        import fcntl
-
-        self._lock = os.open(self.directory, os.O_RDONLY)
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            self.close()
-            raise BnsError(
-                f"{self.directory} is being written by another process: wait for it, "
-                "or give another --out."
-            ) from error
+        self._lock = Lock(self.directory)
+        self._lock.take()
         for folder in (self.directory, self.parts, self.failed):
             files.remove_temporary(folder)
 
     def close(self) -> None:
         """Let others write here."""
         if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+            self._lock.release()
 
     @property
     def parts(self) -> Path:

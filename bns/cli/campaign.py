@@ -6,11 +6,10 @@ from typing import Any, Literal
 
 import tyro
 
-from bns.cli.parse import parse
+from bns.cli.parse import dispatch
 from bns.cli.tables import show
-from bns.errors import BnsError, UnknownNameError
+from bns.errors import BnsError
 
-VERBS = ("run", "status", "table", "plot")
 MANUAL = """usage: bns campaign {run,status,table,plot} ... [...]
 
   run FILE.toml --out DIR  run what is missing; --resume goes on
@@ -90,20 +89,13 @@ class Plot:
 
 def main(verb: str, argv: list[str]) -> int:
     """Run a verb of campaigns; gives the exit code."""
-    del verb
-    if not argv or argv[0] in ("-h", "--help"):
-        print(MANUAL)
-        raise SystemExit(0)
     does = {
         "run": (Run, _run),
         "status": (Status, _status),
         "table": (TableOf, _table),
         "plot": (Plot, _plot),
     }
-    if argv[0] not in does:
-        raise UnknownNameError("verb of `bns campaign`", argv[0], VERBS)
-    kind, do = does[argv[0]]
-    return do(parse(kind, argv[1:], prog=f"bns campaign {argv[0]}"))
+    return dispatch(verb, argv, does, MANUAL)
 
 
 def _run(given: Run) -> int:

@@ -6,11 +6,10 @@ from typing import Literal
 
 import tyro
 
-from bns.cli.parse import parse
+from bns.cli.parse import dispatch
 from bns.cli.tables import show
-from bns.errors import BnsError, UnknownNameError
+from bns.errors import BnsError
 
-VERBS = ("list", "run", "take", "table")
 MANUAL = """usage: bns claims {list,run,take,table} [...]
 
   list           all 157 claims: where, what is compared, what the dissertation says
@@ -98,20 +97,13 @@ class Table:
 
 def main(verb: str, argv: list[str]) -> int:
     """Run a verb of claims; gives the exit code."""
-    del verb
-    if not argv or argv[0] in ("-h", "--help"):
-        print(MANUAL)
-        raise SystemExit(0)
     does = {
         "list": (List, _list),
         "run": (Run, _run),
         "take": (Take, _take),
         "table": (Table, _table),
     }
-    if argv[0] not in does:
-        raise UnknownNameError("verb of `bns claims`", argv[0], VERBS)
-    kind, do = does[argv[0]]
-    return do(parse(kind, argv[1:], prog=f"bns claims {argv[0]}"))
+    return dispatch(verb, argv, does, MANUAL)
 
 
 def _chosen(ids: tuple[str, ...]) -> list:

@@ -3,12 +3,12 @@
 import contextlib
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import tyro
 
-from bns.errors import BnsError
+from bns.errors import BnsError, UnknownNameError
 
 T = TypeVar("T")
 _FRAME = " │╭╮╰╯"
@@ -34,6 +34,32 @@ def parse(
         if not end.code:
             raise
         raise BnsError(f"{_one_line(heard.getvalue())} See {prog} --help.") from end
+
+
+def dispatch(
+    verb: str,
+    argv: Sequence[str],
+    does: Mapping[str, tuple[type, Callable[[Any], int]]],
+    manual: str,
+) -> int:
+    """Do one of a verb's own verbs; gives the exit code.
+
+    Args:
+        verb: as in "campaign".
+        argv: what follows it; nothing, or a call for help, prints the manual and exits.
+        does: its verbs: what their arguments are, and what they do with them.
+        manual: of the verb.
+
+    Raises:
+        UnknownNameError: no such verb.
+    """
+    if not argv or argv[0] in ("-h", "--help"):
+        print(manual)
+        raise SystemExit(0)
+    if argv[0] not in does:
+        raise UnknownNameError(f"verb of `bns {verb}`", argv[0], does)
+    kind, do = does[argv[0]]
+    return do(parse(kind, argv[1:], prog=f"bns {verb} {argv[0]}"))
 
 
 def _one_line(box: str) -> str:
