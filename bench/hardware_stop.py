@@ -34,6 +34,7 @@ if sys.argv[2] == "learner":
 print("ready", flush=True)
 world.run([Commands([[0.06, 0.07]], [25.0])])
 """
+DRIVEN = [8641, 10081]  # speed units of 0.06 and 0.07 m/s, firmware 2
 WAYS = ("SIGINT", "SIGTERM", "SIGKILL", "SIGSTOP", "unplugged", "camera", "learner")
 """SIGSTOP: the process hangs; unplugged: the cable comes back 2 s later"""
 
@@ -53,21 +54,21 @@ def run(quick: bool) -> Result:
         port, log = path / "robot", path / "log.jsonl"
         with emulator(port, "--log", str(log), "--start", "-0.9", "0", "0") as robot:
             rows: dict[str, list] = {way: [] for way in WAYS}
-            failed = 0
+            failed: list[str] = []
             for way in WAYS:
-                while len(rows[way]) < repeats and failed < 10:
-                    row = _once(way, port, log, robot)
+                while len(rows[way]) < repeats and len(failed) < 10:
+                    row, why = _once(way, port, log, robot)
                     rows[way] += [row] if row else []
-                    failed += not row
+                    failed += [] if row else [f"{way}: {why}"]
     worst = {
         way: max((row["told"] for row in tried), default=NEVER)
         for way, tried in rows.items()
     }
     details: dict[str, object] = {f"{w}, slowest [s]": v for w, v in worst.items()}
     details["wheels stand after, slowest [s]"] = max(
-        row["stands"] for tried in rows.values() for row in tried
+        (row["stands"] for tried in rows.values() for row in tried), default=NEVER
     )
-    details["drives that did not get under way, repeated"] = failed
+    details["drives that ended before the event, repeated"] = failed
     details["load of the machine (1 min)"] = round(os.getloadavg()[0], 1)
     slowest = max(worst.values())
     return Result(
@@ -81,19 +82,20 @@ def run(quick: bool) -> Result:
 
 def _once(
     way: str, port: Path, log: Path, robot: subprocess.Popen
-) -> dict[str, float] | None:
+) -> tuple[dict[str, float] | None, str]:
+    """Times of one drive, or why there are none."""
     begin, at = time.monotonic(), 0.0
     words = [sys.executable, "-c", DRIVE, str(port), way]
     driver = subprocess.Popen(
         words,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
         text=True,
     )
     try:
         if not _wait(log, lambda rows: _steady(rows, begin), 60.0):
-            return None
+            return None, _last(driver)
         at = _happen(way, driver, robot)
         _wait(log, lambda rows: _stood(rows, at), 5.0)
     finally:
@@ -102,12 +104,28 @@ def _once(
         if way == "camera" and at:
             robot.send_signal(signal.SIGUSR2)
     rows = _rows(log)
+    if not _driven(rows, at):
+        return None, _last(driver)
     told = [r["at"] for r in rows if r.get("told") == [0, 0] and r["at"] >= at]
     stands = [r["at"] for r in rows if r.get("stands") and r["at"] >= at]
-    return {
+    row = {
         "told": round(min(told, default=at + NEVER) - at, 4),
         "stands": round(min(stands, default=at + NEVER) - at, 4),
     }
+    return row, ""
+
+
+def _driven(rows: list[dict], at: float) -> bool:
+    """Whether the newest order before a moment was to drive."""
+    told = [row["told"] for row in rows if "told" in row and row["at"] < at]
+    return bool(told) and told[-1] == DRIVEN
+
+
+def _last(driver: subprocess.Popen) -> str:
+    """The last line that a driver wrote before it ended."""
+    driver.kill()
+    lines = driver.stderr.read().strip().splitlines()
+    return lines[-1][-200:] if lines else "it did not get under way"
 
 
 def _happen(way: str, driver: subprocess.Popen, robot: subprocess.Popen) -> float:
@@ -145,9 +163,7 @@ def _steady(rows: list[dict], begin: float) -> bool:
     """Whether the long drive of the trial has gone on for a moment."""
     told = [row for row in rows if "told" in row and row["at"] > begin]
     return bool(
-        told
-        and told[-1]["told"] == [8641, 10081]
-        and time.monotonic() - told[-1]["at"] > 0.7
+        told and told[-1]["told"] == DRIVEN and time.monotonic() - told[-1]["at"] > 0.7
     )
 
 
