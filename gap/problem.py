@@ -52,11 +52,12 @@ class Problem:
             trials: checked recording.
             model: nominal model.
             candidates: their slack says how uncertain the nominal model is.
-            floor: None = estimated.
+            floor: None = the model's own, if it knows it, else estimated.
         """
         trials = tuple(narrowed(trial, model) for trial in trials)
         (predicted,) = model.simulate(trials, [()])
         windows = tuple(model.windows(trial) for trial in trials)
+        floor = floor or getattr(model, "floor", None)
         floor = floor or floors.estimate(model, trials, predicted)
         made = cls(
             model,
