@@ -19,14 +19,16 @@ class UnknownNameError(BnsError):
         kind: what was looked up, in singular ("effect", "preset", "world").
         given: the name that was given.
         known: the names that exist.
+        also: a sentence on what else may be given.
     """
 
-    def __init__(self, kind: str, given: str, known: Iterable[str]):
+    def __init__(self, kind: str, given: str, known: Iterable[str], also: str = ""):
         self.kind, self.given, self.known = kind, given, sorted(known)
         close = get_close_matches(given, self.known, n=1, cutoff=0.5)
         hint = f" Did you mean {close[0]!r}?" if close else ""
+        end = f" {also}" if also else ""
         super().__init__(
-            f"Unknown {kind} {given!r}.{hint} Available: {', '.join(self.known)}."
+            f"Unknown {kind} {given!r}.{hint} Available: {', '.join(self.known)}.{end}"
         )
 
 

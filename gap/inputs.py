@@ -249,7 +249,7 @@ def limits(model: GapModel) -> dict[str, tuple[float, float, str]]:
     own = getattr(model, "limits", None)
     if own is not None:
         return dict(own)
-    if model.name not in models.names():
+    if not models.known(model.name):
         return {}
     robot = models.robot(model.name)
     if robot.kind != "wheeled":

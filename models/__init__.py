@@ -1,6 +1,8 @@
 """Robot models and the arena, each number with its unit and source.
 
-A robot is a directory here that holds a `robot.toml`; adding one adds the robot.
+A robot is a directory that holds a `robot.toml`. Those here have a name, and so have
+those of packages that register theirs by the entry point `bns.models`; any other is
+given by its path (docs/your_robot.md).
 """
 
 from collections.abc import Mapping
@@ -8,13 +10,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from bns.errors import UnknownNameError
-from bns.models.robot_model import FACTS, CommandChannel, RobotModel, Wheel, read
+from bns.models.places import find, known, names
+from bns.models.robot_model import CommandChannel, RobotModel, Wheel, read
 
 __all__ = [
     "CommandChannel",
     "RobotModel",
     "Wheel",
+    "known",
     "names",
     "path",
     "robot",
@@ -22,25 +25,16 @@ __all__ = [
     "spec",
 ]
 
-_HERE = Path(__file__).parent
-
-
-@cache
-def names() -> tuple[str, ...]:
-    """Names of all robots, sorted."""
-    return tuple(sorted(file.parent.name for file in _HERE.glob(f"*/{FACTS}")))
-
 
 @cache
 def robot(name: str) -> RobotModel:
-    """The robot called `name`.
+    """The robot called `name`, or the one whose directory that is.
 
     Raises:
         UnknownNameError: there is none.
+        FormatError: the directory describes no robot.
     """
-    if name not in names():
-        raise UnknownNameError("robot", name, names())
-    return read(_HERE / name)
+    return read(find(name))
 
 
 def path(name: str) -> Path:
@@ -56,7 +50,7 @@ def spec(name: str, *, scene: bool = True, visuals: bool = True, **options: str)
     """The robot as a `mujoco.MjSpec`, to be edited and compiled.
 
     Args:
-        name: of the robot.
+        name: of the robot, or its directory.
         scene: with a floor (geom `floor`), a light and a camera.
         visuals: with what only shows. Without, the motion is the same bit for bit and
             a step costs less.
@@ -81,7 +75,7 @@ def scene_spec(
     """The robot on the arena's board, as a `mujoco.MjSpec`.
 
     Args:
-        name: of the robot.
+        name: of the robot, or its directory.
         objectives: places to show [m], by name.
         radius: within which an objective counts as reached [m] (thesis, Algorithm 5).
         visuals: see `spec`.

@@ -147,7 +147,7 @@ def read(directory: Path) -> RobotModel:
         facts["sensor_sites"] = tuple(facts.get("sensor_sites", ()))
         if "nominal_wheel_radius" in facts:
             facts["ctrl_per_command"] = 1.0 / facts.pop("nominal_wheel_radius")
-        return RobotModel(name=directory.name, directory=directory, **facts)
+        return RobotModel(name=directory.resolve().name, directory=directory, **facts)
     except (tomllib.TOMLDecodeError, KeyError, TypeError) as error:
         raise FormatError(
             f"{file} does not describe a robot ({error}); compare it with that of "

@@ -24,7 +24,7 @@ def planar(seen: View) -> bool:
     from bns import models
 
     names = [channel.name for channel in seen.trials[0].channels]
-    return names[:3] == ["x", "y", "yaw"] and seen.problem.model.name in models.names()
+    return names[:3] == ["x", "y", "yaw"] and models.known(seen.problem.model.name)
 
 
 @lru_cache(maxsize=8)

@@ -1,4 +1,4 @@
-"""`bns models view`: a robot model on the screen or in a picture."""
+"""`bns models`: a robot model checked, on the screen or in a picture."""
 
 import os
 import sys
@@ -7,15 +7,17 @@ from pathlib import Path
 
 import tyro
 
-from bns.cli.parse import parse
-from bns.errors import BnsError, UnknownNameError
+from bns.cli.parse import dispatch
+from bns.errors import BnsError
 
-VERBS = ("view",)
 MANUAL = """usage: bns models view ROBOT [--png FILE]
+       bns models check ROBOT
 
-  view  open a robot model in MuJoCo's viewer, or draw it to a file
+  view   open a robot model in MuJoCo's viewer, or draw it to a file
+  check  see whether a robot's directory is what the worlds and the learner need
 
-`bns robots` lists the robots; `bns models view --help` is the manual."""
+ROBOT is a name that `bns robots` lists, or a directory of your own that holds a
+robot.toml (docs/your_robot.md). `bns models VERB --help` is the manual of each."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +25,7 @@ class View:
     """Open a robot model in MuJoCo's viewer, or draw it to a file."""
 
     robot: tyro.conf.Positional[str]
-    """name of the robot, see `bns robots`"""
+    """name of the robot, see `bns robots`, or its directory"""
     png: str = ""
     """write a picture to this file instead; needs no display"""
     width: int = 960
@@ -32,20 +34,54 @@ class View:
     """of the picture [px]"""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """See whether a robot's directory is what worlds and learner need."""
+
+    robot: tyro.conf.Positional[str]
+    """name of the robot, see `bns robots`, or its directory"""
+
+
 def main(verb: str, argv: list[str]) -> int:
     """Run a verb on robot models; gives the exit code.
 
     Raises:
         BnsError: what the user gave cannot be used.
     """
-    del verb
-    if not argv or argv[0] in ("-h", "--help"):
-        print(MANUAL)
-        raise SystemExit(0)
-    if argv[0] not in VERBS:
-        raise UnknownNameError("verb of `bns models`", argv[0], VERBS)
-    given = parse(View, argv[1:], prog="bns models view")
+    does = {"view": (View, view), "check": (Check, check)}
+    return dispatch(verb, argv, does, MANUAL)
+
+
+def view(given: View) -> int:
+    """Draw the robot, or show it.
+
+    Raises:
+        UnknownNameError: no such robot.
+        BnsError: the file or its size cannot be; there is no display.
+    """
     return draw(given) if given.png else show(given.robot)
+
+
+def check(given: Check) -> int:
+    """Print each point with what is wrong; 2 if anything is.
+
+    Raises:
+        UnknownNameError: no such robot.
+        FormatError: its `robot.toml` cannot be read.
+    """
+    from bns import models
+    from bns.models import check as points
+
+    done = points.check(models.robot(given.robot))
+    for point in done:
+        print(f"  {'fault' if point.faults else 'ok   '}  {point.says}")
+        for fault in point.faults:
+            print(f"           {fault}")
+    wrong = sum(bool(point.faults) for point in done)
+    left = 2 + len(points.POINTS) - len(done)
+    rest = f", {left} not looked at because of that" if left else ""
+    print(f"{len(done) - wrong} of {len(done)} points hold{rest}.")
+    return 2 if wrong else 0
 
 
 def draw(given: View) -> int:
@@ -69,7 +105,7 @@ def draw(given: View) -> int:
             "to 8192 each."
         )
     size = (given.width, given.height)
-    render.picture(models.spec(robot.name), file, camera=robot.picture, size=size)
+    render.picture(models.spec(given.robot), file, camera=robot.picture, size=size)
     print(given.png)
     return 0
 

@@ -1,8 +1,11 @@
-"""`bns models view` as a user drives it."""
+"""`bns models` as a user drives it."""
+
+import shutil
 
 import pytest
 
 from bns.__main__ import main
+from tests.sources import ROOT
 
 
 def said(capsys, *argv) -> tuple[int, str]:
@@ -24,9 +27,23 @@ def test_a_robot_is_drawn(capsys, tmp_path):
     assert picture.shape[:2] == (64, 96) and picture.std() > 0.1
 
 
+def test_a_robot_is_checked(capsys, tmp_path):
+    code, text = said(capsys, "models", "check", ROOT / "examples" / "burger")
+    assert code == 0 and text.endswith("12 of 12 points hold.\n")
+    mine = shutil.copytree(ROOT / "examples" / "burger", tmp_path / "burger")
+    file = mine / "burger.xml"
+    file.write_text(file.read_text().replace('name="home"', 'name="rest"'))
+    code, text = said(capsys, "models", "check", mine)
+    assert code == 2
+    assert "fault  what robot.toml names" in text and "called 'home'" in text
+    assert "2 of 3 points hold, 9 not looked at because of that." in text
+
+
 @pytest.mark.parametrize(
     "words, expected",
     [
+        (["check", "."], "./ holds no robot.toml"),
+        (["check", "khepera"], "Or give a directory that holds a robot.toml"),
         (["view", "phantom", "--png", "x.png"], "Did you mean 'phantomx'"),
         (["view", "phantomx", "--png", "x.jpg"], "ends in .png"),
         (["view", "phantomx", "--png", "nowhere/x.png"], "no directory nowhere"),

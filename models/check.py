@@ -1,0 +1,219 @@
+"""What a robot directory has to be, checked one point at a time.
+
+`bns models check ROBOT` prints it; the tests hold every robot of the project to it.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bns.errors import BnsError
+from bns.models import drive, edits, numbers
+from bns.models.robot_model import RobotModel
+
+KINDS = ("wheeled", "legged", "servo")
+SPEED_TOLERANCE = 0.05
+"""share by which steady speed and spin may differ from what was told; assumed"""
+
+
+class Checked(NamedTuple):
+    """One point.
+
+    Attributes:
+        says: what was checked, in words.
+        faults: what is wrong, one line each; none if it holds.
+    """
+
+    says: str
+    faults: tuple[str, ...]
+
+
+def check(robot: RobotModel) -> list[Checked]:
+    """Every point that a robot has to keep, in the order in which to mend them."""
+    done = [Checked("robot.toml names all there is to know", tuple(_facts(robot)))]
+    try:
+        model = edits.load(robot, scene=True, visuals=True, options={}).compile()
+    except (BnsError, ValueError) as error:
+        return [*done, Checked("scene.xml compiles", (str(error),))]
+    done.append(Checked("scene.xml compiles", ()))
+    for says, point in POINTS.items():
+        done.append(Checked(says, tuple(point(robot, model))))
+        if point in _NEEDED and done[-1].faults:
+            break  # what follows would only fail for the same reason
+    return done
+
+
+def _facts(robot: RobotModel) -> list[str]:
+    faults = []
+    if robot.kind not in KINDS:
+        faults.append(f"kind {robot.kind!r} is none of {', '.join(KINDS)}")
+    if not robot.doc or "\n" in robot.doc:
+        faults.append("doc is to be one line")
+    if not robot.ctrl_per_command > 0:
+        faults.append(f"ctrl_per_command is {robot.ctrl_per_command}, not above 0")
+    for command in robot.commands:
+        if not command.unit:
+            faults.append(f"command {command.name} has no unit")
+        if not command.low < command.high:
+            faults.append(f"command {command.name}: low is not below high")
+    if robot.kind == "wheeled" and set(robot.wheels) != {"left", "right"}:
+        faults.append("a wheeled robot has [wheels.left] and [wheels.right]")
+    return faults
+
+
+def _names(robot: RobotModel, model: Any) -> list[str]:
+    """What `robot.toml` names is in the model."""
+    wanted = [("body", robot.base_body), ("joint", robot.base_joint)]
+    wanted += [("site", site) for site in (robot.tracker_site, *robot.sensor_sites)]
+    for wheel in robot.wheels.values():
+        wanted += [("body", wheel.body), ("joint", wheel.joint)]
+        wanted += [("geom", wheel.geom), ("actuator", wheel.actuator)]
+    if robot.caster_geom:
+        wanted.append(("geom", robot.caster_geom))
+    wanted += [("geom", "floor"), ("camera", robot.picture), ("key", "home")]
+    faults = []
+    for kind, name in wanted:
+        try:
+            getattr(model, kind)(name)
+        except KeyError:
+            faults.append(f"the model has no {kind} called {name!r}")
+    return faults
+
+
+def _base(robot: RobotModel, model: Any) -> list[str]:
+    import mujoco
+
+    faults = []
+    if model.body(robot.base_body).parentid != 0:
+        faults.append(f"body {robot.base_body} is not a child of the world")
+    fixed = robot.kind == "servo"  # on a stand, its base joint is the shaft
+    joint = mujoco.mjtJoint
+    wanted = joint.mjJNT_HINGE if fixed else joint.mjJNT_FREE
+    if model.joint(robot.base_joint).type != wanted:
+        kind = "hinge" if fixed else "free joint"
+        faults.append(f"joint {robot.base_joint} is no {kind}")
+    for side, wheel in robot.wheels.items():
+        geom = model.geom(wheel.geom)
+        if not (geom.conaffinity or geom.contype):
+            faults.append(f"the {side} wheel's geom {wheel.geom} touches nothing")
+    return faults
+
+
+def _controls(robot: RobotModel, model: Any) -> list[str]:
+    order = [model.actuator(index).name for index in range(model.nu)]
+    named = [command.actuator for command in robot.commands]
+    if named != order:
+        return [f"commands go to {named}, the model's actuators are {order}"]
+    reach = model.actuator_ctrlrange / robot.ctrl_per_command
+    return [
+        f"{command.name} goes from {command.low:g} to {command.high:g} {command.unit}, "
+        f"its actuator from {low:.4g} to {high:.4g}"
+        for command, (low, high) in zip(robot.commands, reach, strict=True)
+        if not np.allclose((low, high), (command.low, command.high), rtol=1e-3)
+    ]
+
+
+def _numbers(robot: RobotModel, model: Any) -> list[str]:
+    try:
+        table = numbers.read(robot.directory)
+        faults = [text for item in table.values() for text in item.disagreements(model)]
+    except (BnsError, FileNotFoundError) as error:
+        return [f"numbers.toml: {error}"]
+    return faults + [
+        f"{item.name} lacks a source, a unit, or where the model has it"
+        for item in table.values()
+        if not (item.source and item.unit and item.at)
+    ]
+
+
+def _rests(robot: RobotModel, model: Any) -> list[str]:
+    home = model.key("home")
+    still = np.tile(home.ctrl, (round(1.0 / model.opt.timestep), 1))
+    seen, _ = drive.controlled(model, still)
+    way = float(np.abs(seen[-1, :3] - home.qpos[:3]).max())
+    turn = float(np.abs(seen[-1, 3:] - home.qpos[3:]).max(initial=0))
+    faults = []
+    if not way < 1e-4:
+        faults.append(f"in one second at rest it moved by {way * 1000:.3g} mm")
+    if not turn < 1e-3:
+        faults.append(f"in one second at rest its joints turned by {turn:.3g}")
+    return faults
+
+
+def _drives(robot: RobotModel, model: Any) -> list[str]:
+    seen, data = drive.controlled(model, drive.smooth(model, 2.0, seed=1))
+    if not np.isfinite(seen).all():
+        return ["random commands make it diverge"]
+    faults = []
+    if any(int(warning.number) for warning in data.warning):
+        faults.append("MuJoCo warns while it is driven")
+    if not np.abs(np.diff(seen, axis=0)).max() < 0.5:
+        faults.append("a coordinate jumps by more than 0.5 in one step")
+    return faults
+
+
+def _repeats(robot: RobotModel, model: Any) -> list[str]:
+    controls = drive.smooth(model, 0.5, seed=2)
+    again = edits.load(robot, scene=True, visuals=True, options={}).compile()
+    first, _ = drive.controlled(model, controls)
+    second, _ = drive.controlled(again, controls)
+    same = first.tobytes() == second.tobytes()
+    return [] if same else ["the same commands gave another motion"]
+
+
+def _bare(robot: RobotModel, model: Any) -> list[str]:
+    controls = drive.smooth(model, 0.5, seed=3)
+    bare = edits.load(robot, scene=True, visuals=False, options={}).compile()
+    shown, _ = drive.controlled(model, controls)
+    hidden, _ = drive.controlled(bare, controls)
+    same = shown.tobytes() == hidden.tobytes()
+    return [] if same else ["geoms without contact have mass: give them mass 0"]
+
+
+def _touches(robot: RobotModel, model: Any) -> list[str]:
+    floor = model.geom("floor").id
+    if robot.kind == "servo":
+        met = (model.geom_contype & model.geom_conaffinity[floor]).any()
+        return ["a servo on a stand touches the floor"] if met else []
+    pairs = zip(model.pair_geom1, model.pair_geom2, strict=True)
+    own = {frozenset(pair) for pair in pairs}
+    _, data = drive.controlled(model, drive.smooth(model, 0.5, seed=4))
+    if not data.ncon:
+        return ["it does not touch the floor"]
+    return [
+        f"{model.geom(a).name} touches {model.geom(b).name}"
+        for a, b in (contact.geom for contact in data.contact)
+        if floor not in (a, b) and frozenset((a, b)) not in own
+    ]
+
+
+def _speeds(robot: RobotModel, model: Any) -> list[str]:
+    """A wheeled robot goes as fast as it is told, forwards and the right way round."""
+    if robot.kind != "wheeled":
+        return []
+    faults = []
+    told, found = drive.straight(robot, model)
+    if not abs(found / told - 1) <= SPEED_TOLERANCE:
+        faults.append(f"told {told:.3f} m/s straight on, it goes {found:.3f} m/s")
+    told, found = drive.spin(robot, model)
+    if not abs(found / told - 1) <= SPEED_TOLERANCE:
+        faults.append(
+            f"told to spin by {told:.3f} rad/s (left), it spins by {found:.3f} rad/s"
+        )
+    return faults
+
+
+POINTS: dict[str, Callable[[RobotModel, Any], list[str]]] = {
+    "what robot.toml names is in the model": _names,
+    "its base floats (or stands), its wheels touch": _base,
+    "commands are the actuators, in order, with their ranges": _controls,
+    "numbers.toml agrees with the model, each number with unit and source": _numbers,
+    "at home it rests": _rests,
+    "it is driven without warnings": _drives,
+    "the same commands give the same bytes": _repeats,
+    "what only shows moves nothing": _bare,
+    "only the floor and paired geoms touch it": _touches,
+    "a wheeled robot has the speed and the spin that it is told": _speeds,
+}
+_NEEDED = (_names, _base, _controls)

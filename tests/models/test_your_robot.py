@@ -1,0 +1,104 @@
+"""A robot outside the package: found by its directory, checked, driven, refused."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from bns import models
+from bns.errors import FormatError, UnknownNameError
+from bns.models import check, places
+from bns.worlds import registry
+from bns.worlds.trial import Commands
+from tests.sources import ROOT
+
+BURGER = ROOT / "examples" / "burger"
+
+
+@pytest.fixture
+def mine(tmp_path):
+    """A copy of the burger that a test may spoil."""
+    return shutil.copytree(BURGER, tmp_path / "burger")
+
+
+def faults(place) -> dict[str, tuple[str, ...]]:
+    """What the check finds wrong, by what was checked."""
+    points = check.check(models.robot(str(place)))
+    return {point.says: point.faults for point in points if point.faults}
+
+
+def spoil(place, file: str, old: str, new: str) -> None:
+    text = (place / file).read_text()
+    assert old in text
+    (place / file).write_text(text.replace(old, new))
+
+
+def test_every_point_holds():
+    assert faults(BURGER) == {}
+
+
+@pytest.mark.parametrize(
+    "file, old, new, expected",
+    [
+        ("burger.xml", 'axis="0 1 0"', 'axis="0 -1 0"', "goes -0.088 m/s"),
+        ("burger.xml", 'pos="0 0.08 0.033"', 'pos="0 -0.08 0.033"', "spins by -1"),
+        ("burger.xml", '<key name="home"', '<key name="rest"', "no key called 'home'"),
+        ("burger.xml", "6.6667 6.6667", "5 5", "its actuator from -0.165 to 0.165"),
+        ("burger.xml", 'mass="0.94474"', 'mass="1.2"', "body_mass: body burger mass"),
+        ("burger.xml", "<worldbody>", "<worldbodies>", "cannot read"),
+        ("robot.toml", 'actuator = "left_wheel"\n\n[wheels.right]',
+         'actuator = "left"\n\n[wheels.right]', "no actuator called 'left'"),
+        ("robot.toml", 'kind = "wheeled"', 'kind = "flying"', "none of wheeled"),
+        ("numbers.toml", "[body_mass.at]", "[body_mass.on]", "numbers.toml"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said(mine, file, old, new, expected):
+    spoil(mine, file, old, new)
+    if expected.startswith("spins"):  # swap both wheels
+        spoil(mine, file, 'right_wheel" pos="0 -0.08', 'right_wheel" pos="0 0.08')
+    found = [text for item in faults(mine).values() for text in item]
+    assert any(expected in text for text in found), found
+
+
+def test_a_missing_table_of_numbers_is_a_fault(mine):
+    (mine / "numbers.toml").unlink()
+    assert any(
+        "numbers.toml" in fault for item in faults(mine).values() for fault in item
+    )
+
+
+def test_it_drives_and_is_damaged():
+    straight = Commands(np.full((1, 2), 0.12), [3.0])
+    whole, weak = (
+        registry.make("mujoco", robot=str(BURGER), damage=damage).run([straight])[0]
+        for damage in ((), ("wheel_gain:wheel=left,factor=0.8",))
+    )
+    assert whole.robot == str(BURGER)
+    x, y, _ = whole.poses_world[-1]
+    assert 0.34 < x < 0.36 and abs(y) < 1e-3  # 0.36 m less the start
+    # By hand: 10 % slower on average, turning left by 0.024 m/s over 0.16 m.
+    turned = 3.0 * 0.2 * 0.12 / 0.16
+    assert abs(weak.poses_world[-1][2] - turned) < 0.05 * turned
+
+
+def test_what_is_no_robot_is_refused(tmp_path):
+    with pytest.raises(FormatError, match="holds no robot"):
+        models.robot(str(tmp_path))
+    with pytest.raises(UnknownNameError, match="Or give a directory"):
+        models.robot(str(tmp_path / "nowhere"))
+
+
+def test_packages_register_theirs(monkeypatch):
+    class Entry:
+        name = "burger"
+
+        def load(self):
+            return type("package", (), {"__path__": [str(BURGER)]})
+
+    places.installed.cache_clear()
+    monkeypatch.setattr(places, "entry_points", lambda group: [Entry()])
+    try:
+        assert "burger" in models.names()
+        assert places.find("burger") == BURGER
+    finally:
+        places.installed.cache_clear()
