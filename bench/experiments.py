@@ -100,7 +100,7 @@ def records(
     """
     wanted = list(configs)
     if quick:
-        wanted = [_quick(config) for config in wanted]
+        wanted = [shortened(config) for config in wanted]
     RUNS.mkdir(parents=True, exist_ok=True)
     spawn = get_context("spawn")
     with ProcessPoolExecutor(WORKERS, mp_context=spawn) as pool:
@@ -112,7 +112,8 @@ def records(
     return {config.preset: load(directory(config)) for config in wanted}
 
 
-def _quick(config: RunConfig) -> RunConfig:
+def shortened(config: RunConfig) -> RunConfig:
+    """A configuration with few replicates and trials."""
     onset = QUICK["trials"] // 2
     damage = tuple(f"{text.rpartition('@')[0]}@{onset}" for text in config.world.damage)
     generations = min(config.evolution.generations, 30)

@@ -1,13 +1,14 @@
 """The light-following experiments that several benches share (investigations B, C).
 
 Settings that the dissertation lists are those of its tables 5.19 and 6.7; what it
-leaves silent is that of the preset `khepera-light`.
+leaves silent is that of the preset `khepera-light`. Runs that differ only from the
+damage on share the trials before it, see `bench.forking`.
 """
 
 from collections.abc import Mapping
 from dataclasses import replace
 
-from bench import experiments
+from bench import experiments, forking
 from bns.config import AdaptationConfig, RunConfig, WorldConfig
 from bns.config_watch import WatchConfig
 
@@ -59,6 +60,7 @@ def damaged(
     light: Mapping[str, object] | None = None,
     watch: Mapping[str, object] | None = None,
     ensemble: bool = False,
+    runs: int = experiments.REPLICATES,
     **adaptation: object,
 ) -> RunConfig:
     """Table 6.7 over table 6.1, one of `ALL` from trial `ONSET` on.
@@ -68,6 +70,7 @@ def damaged(
         light: settings of the section `light` that differ.
         watch: settings of the section `watch`.
         ensemble: five networks with all outputs instead of one an output.
+        runs: runs a side.
         adaptation: fields of `AdaptationConfig` that differ from table 6.7.
     """
     config, light, watch = _preset(), dict(light or {}), dict(watch or {})
@@ -88,7 +91,9 @@ def damaged(
     differing = light | watch | adaptation
     words = [f"{key}={value}" for key, value in sorted(differing.items())]
     words += ["ensemble"] if ensemble else []
-    return experiments.named(config, "-".join(["light", damage or "whole", *words]))
+    config = experiments.named(config, "-".join(["light", damage or "whole", *words]))
+    config = replace(config, replicates=runs)
+    return replace(config, seed=forking.seed(config)) if damage else config
 
 
 def _preset() -> RunConfig:

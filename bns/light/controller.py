@@ -106,9 +106,9 @@ class Controllers:
         total = b1.unsqueeze(2)
         for weight, value in zip(w1.unbind(1), inputs, strict=True):
             total = total + weight.unsqueeze(2) * value.unsqueeze(1)
-        active = total.tanh()  # (R, H, S, P)
+        active = _tanh(total)  # (R, H, S, P)
         return [
-            ((active * w2[:, side].unsqueeze(2)).sum(1) + b2[:, side, None]).tanh()
+            _tanh((active * w2[:, side].unsqueeze(2)).sum(1) + b2[:, side, None])
             for side in range(OUTPUTS)
         ]
 
@@ -118,6 +118,11 @@ class Controllers:
         half = (self.fastest - self.slowest) / 2
         speed = middle + half * output
         return torch.where(speed.abs() < self.dead_band, 0.0, speed)
+
+
+def _tanh(total: Tensor) -> Tensor:
+    """tanh by a sigmoid, which compiled code computes several times as fast."""
+    return 2 * (2 * total).sigmoid() - 1
 
 
 @dataclass(frozen=True)

@@ -106,9 +106,12 @@ class LightLoops:
         self, snns: Snns, population: Population, cost: Tensor, rates: Rates
     ) -> tuple[Population, Tensor]:
         """All generations between two trials; gives the population and its costs."""
+        limit = self.config.light.weight_limit
         for _ in range(self.config.evolution.generations):
             coins = self.breeder.draw(len(cost), self.draws)
             population = self.breeder.breed(population, cost, rates, coins)
+            genes = population.genes.clamp(-limit, limit)  # SBX spreads without end
+            population = population._replace(genes=genes)
             cost = self.cost_of(snns, population)
         return population, cost
 

@@ -70,6 +70,13 @@ class TestEvolution:
         same = (learner.population.genes[:, :, None] == before[:, None]).all(-1).all(-1)
         assert same.any(2).sum(1).tolist() == [0, 3]
 
+    def test_weights_stay_within_their_limit(self):
+        config = small(weight_limit=12.0)
+        learner = LightLearner([config], replicates=[0], onsets=[-1])
+        for trial in (1, 2):
+            learner.propose(trial)  # SBX would spread them beyond it
+        assert learner.population.genes.abs().max() == 12.0
+
 
 class TestLoop:
     def test_it_learns_to_come_closer(self):
@@ -132,7 +139,10 @@ class TestLoop:
 
     def test_foreseen_and_measured_agree_where_the_snns_are_right(self):
         """A robot that was seen to stand still is foreseen where it stands."""
-        learner = LightLearner([small()], replicates=[0], onsets=[-1])
+        config = small()
+        stops = replace(config.controller, speed_low=5000.0)
+        config = replace(config, controller=stops)
+        learner = LightLearner([config], replicates=[0], onsets=[-1])
         learner._chosen = torch.zeros_like(learner._chosen)[:1]
         learner._chosen[0, -2:] = -3.0  # both wheels below the dead band
         kind = learner.simulator.controllers
