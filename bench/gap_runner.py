@@ -13,8 +13,10 @@ import time
 from pathlib import Path
 
 DIRECTORY = Path(__file__).resolve().parent.parent / "runs" / "bench"
-SEALED = 1_000_000  # seeds of the scored cases begin here; development uses lower ones
-CALIBRATION = 300  # seeds of the calibration cases begin here
+ROUND = 2  # of scoring; each has cases of its own, see docs/decisions.md
+SEEN = 1_000_000  # seeds from here on were scored once; development uses lower ones
+SEALED = 2_000_000  # seeds of the scored cases begin here
+CALIBRATION = 400_000  # seeds of the calibration cases begin here
 SPAN = 10_000  # seeds between the scored kinds
 SETS = {
     "scored": {
@@ -22,10 +24,10 @@ SETS = {
         "pair": 40,
         "none": 60,
         "off-library": 30,
-        "fault": 10,
+        "fault": 20,
         "alias": 24,
     },
-    "calibrate": {"single": 90, "none": 40, "off-library": 10, "pair": 10},
+    "calibrate": {"single": 140, "none": 60, "off-library": 16, "pair": 40},
 }
 # Planted for "alias": two delays that no command parts, and what a short one is like.
 ALIKE = ("command_latency", "tracker_latency", "wheel_stuck_max[both]")
@@ -52,7 +54,7 @@ def wanted(name: str, counts: dict[str, int] | None = None) -> list[tuple[str, i
 def rows(name: str = "scored") -> list[dict]:
     """All results of a set so far, by kind and seed."""
     found = {}
-    for file in sorted(DIRECTORY.glob(f"gap_{name}_*.jsonl")):
+    for file in sorted(DIRECTORY.glob(f"gap{ROUND}_{name}_*.jsonl")):
         for line in file.read_text().splitlines():
             row = json.loads(line)
             found[row["kind"], row["seed"]] = row
@@ -81,7 +83,7 @@ def produce(cases: list[tuple[str, int]], name: str, part: int = 0) -> None:
     for kind, seed in cases:
         if (kind, seed) not in done:
             row = one(kind, seed)
-            with (DIRECTORY / f"gap_{name}_{part}.jsonl").open("a") as out:
+            with (DIRECTORY / f"gap{ROUND}_{name}_{part}.jsonl").open("a") as out:
                 out.write(json.dumps(row) + "\n")
 
 

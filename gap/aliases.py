@@ -1,6 +1,8 @@
 """Which candidates a recording cannot tell from an effect."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from bns.gap import fit, signatures
 from bns.gap.problem import Problem
@@ -8,22 +10,52 @@ from bns.gap.signatures import Curves
 
 # A pair of signatures d noise units apart is confused with probability Phi(-d / 2);
 # 20 % is reached at d = 1.68.
-ALIKE = 1.68**2
-DOUBTFUL = 2.0  # times that, by the curves alone, a candidate is fitted to be sure
+ALIKE = 1.68
+TRIED = 5  # candidates nearest by their curves that are fitted to be sure
 
 
-def alike(problem: Problem, curves: Curves, term: fit.Term) -> tuple[str, ...]:
-    """Candidates that a recording of this kind cannot tell from an effect."""
+@dataclass(frozen=True)
+class Likeness:
+    """How near a candidate comes to an effect, its magnitude free.
+
+    Attributes:
+        name: of the candidate.
+        distance: whitened, of the two motions.
+        angle: between their whitened signatures [deg].
+    """
+
+    name: str
+    distance: float
+    angle: float
+
+    @property
+    def alike(self) -> bool:
+        """Whether one recording would confuse the two in a fifth of the cases."""
+        return self.distance < ALIKE
+
+
+def likeness(problem: Problem, curves: Curves, term: fit.Term) -> tuple[Likeness, ...]:
+    """The candidates nearest to an effect, fitted to what it alone would do.
+
+    Args:
+        problem: a recording; its commands and its noise count.
+        curves: its signatures.
+        term: the effect.
+
+    Returns:
+        the nearest first, the effect itself left out.
+    """
     (shown,) = problem.signatures([[term.effect()]])
     gaps, nearest = signatures.nearest(curves, shown)
+    order = [c for c in np.argsort(gaps) if np.isfinite(gaps[c])][: TRIED + 1]
+    levels = [nearest[candidate] for candidate in order]
     starts = [
         fit.Term.at(
             curves.candidates[curves.owner[level]],
             int(curves.branch[level]),
             float(curves.magnitude[level]),
         )
-        for gap, level in zip(gaps, nearest, strict=True)
-        if gap < DOUBTFUL * ALIKE
+        for level in levels
     ]
     starts += [  # curves with steps do not show that two are the same at one magnitude
         replace(term, candidate=item)
@@ -31,11 +63,17 @@ def alike(problem: Problem, curves: Curves, term: fit.Term) -> tuple[str, ...]:
         if item.effect == term.candidate.effect and item != term.candidate
         if item.parameter == term.candidate.parameter
     ]
+    starts = [start for start in starts if start.candidate != term.candidate]
     (predicted,) = problem.model.simulate(problem.trials, [[term.effect()]])
     motion = tuple(
         map(problem.model.compare, problem.trials, predicted, problem.windows)
     )
     clean = replace(problem, recorded=motion)
-    found = fit.refine_all(clean, [[start] for start in starts])
-    near = [point.names[0] for point in found if point.loss < ALIKE]
-    return tuple(sorted({term.candidate.name, *near}))
+    best: dict[str, Likeness] = {}
+    for point in fit.refine_all(clean, [[start] for start in starts]):
+        angle = signatures.angle(clean.rest, clean.rest - point.rest)
+        (name,) = point.names
+        made = Likeness(name, float(np.linalg.norm(point.rest)), angle)
+        if name not in best or made.distance < best[name].distance:
+            best[name] = made
+    return tuple(sorted(best.values(), key=lambda item: item.distance))

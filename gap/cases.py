@@ -17,7 +17,7 @@ import numpy as np
 
 from bns import seeding
 from bns.gap import fit, signatures
-from bns.gap.aliases import alike
+from bns.gap.aliases import likeness
 from bns.gap.faults import faulty
 from bns.gap.model import GapModel
 from bns.gap.null import Null
@@ -50,6 +50,8 @@ class Answer:
         sizes: whitened length of each effect's signature over the detected length.
         aliases: per hidden effect, the candidates that this recording cannot tell
             from it (itself included).
+        near: per hidden effect, the candidates that come nearest to it with their
+            whitened distances and angles [deg], see `aliases.Likeness`.
         nominal: how the robot departs from its model besides, as text.
         fault: of the data.
         detected: whitened length of a signature that is found with 90 % power.
@@ -62,6 +64,7 @@ class Answer:
     magnitudes: tuple[float, ...] = ()
     sizes: tuple[float, ...] = ()
     aliases: tuple[tuple[str, ...], ...] = ()
+    near: tuple[tuple[tuple[str, float, float], ...], ...] = ()
     nominal: tuple[str, ...] = ()
     fault: str = ""
     detected: float = 0.0
@@ -210,13 +213,21 @@ def _hide(
             terms.append(term)
     effects = [term.effect() for term in terms]
     lengths = np.linalg.norm(problem.signatures([[e] for e in effects]), axis=1)
+    found = [likeness(problem, curves, term) for term in terms]
     made = replace(
         answer,
         names=tuple(term.candidate.name for term in terms),
         effects=tuple(str(effect) for effect in effects),
         magnitudes=tuple(term.magnitude for term in terms),
         sizes=tuple((lengths / seen).tolist()),
-        aliases=tuple(alike(problem, curves, term) for term in terms),
+        aliases=tuple(
+            tuple(sorted({t.candidate.name, *(o.name for o in row if o.alike)}))
+            for t, row in zip(terms, found, strict=True)
+        ),
+        near=tuple(
+            tuple((o.name, round(o.distance, 3), round(o.angle, 2)) for o in row)
+            for row in found
+        ),
         detected=seen,
     )
     return made, effects

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bns.errors import BnsError, FormatError
+from bns.gap import stuck
 from bns.gap.model import GapModel
 from bns.worlds.trial import Trial
 
@@ -21,7 +22,7 @@ FAR = 1e3  # [m] beyond it a position is a slip of a unit
 def check(
     trials: Sequence[Trial], model: GapModel
 ) -> tuple[tuple[Trial, ...], tuple[str, ...]]:
-    """Repair what can be repaired.
+    """Repair what can be repaired; by the model's own `check` if it has one.
 
     Args:
         trials: recorded trials.
@@ -33,10 +34,14 @@ def check(
     Raises:
         FormatError: channels that the model lacks or needs, or no usable trial.
     """
+    own = getattr(model, "check", None)
+    if own is not None:
+        return own(trials)
     wanted = tuple(channel.name for channel in model.channels)
     notes: list[str] = []
     kept: list[Trial] = []
     seen: dict[bytes, int] = {}
+    odd = _odd_clocks(trials)
     for number, trial in enumerate(trials):
         _channels(trial, model, number)
         label = f"trial {number}"
@@ -50,7 +55,9 @@ def check(
         seen[same] = number
         trial, found = _repaired(trial, label)
         notes += found
-        fault = _unusable(trial, wanted)
+        trial, found = stuck.dropped(trial, model)
+        notes += [f"{label}: {note}" for note in found]
+        fault = odd.get(number) or _unusable(trial, wanted)
         if fault:
             notes.append(f"{label}: {fault}, left out")
             continue
@@ -151,7 +158,7 @@ def _noticed(trial: Trial, values: np.ndarray, name: str, label: str) -> list[st
         return []
     steps = np.diff(seen)
     if (steps == 0).mean() > STUCK:
-        return [f"{label}: {name} is stuck at {np.median(seen):.4g}"]
+        return []  # see `stuck`
     notes = []
     moving = np.abs(steps[steps != 0])
     if len(moving) > 20 and len(np.unique(moving.round(12))) < COARSE:
@@ -169,9 +176,7 @@ def _timing(trial: Trial, label: str) -> list[str]:
     if usual > 0 and (steps > LONG_GAP * usual).any():
         notes.append(f"{label}: a gap of {steps.max():.3g} s in the samples")
     told = trial.commands.duration
-    recorded = float(
-        trial.times[trial.boundaries[-1]] - trial.times[trial.boundaries[0]]
-    )
+    recorded = _span(trial)
     if abs(recorded - told) > CLOCK * told + usual:
         notes.append(
             f"{label}: commands last {told:.3g} s, the samples between their start and "
@@ -180,6 +185,28 @@ def _timing(trial: Trial, label: str) -> list[str]:
     if len(steps) and trial.times[0] > 1e6:
         notes.append(f"{label}: time stamps are absolute ({trial.times[0]:.6g} s)")
     return notes
+
+
+def _odd_clocks(trials: Sequence[Trial]) -> dict[int, str]:
+    """Trials whose clock runs otherwise than that of most, and by how much."""
+    ratios = np.array([_span(t) / max(t.commands.duration, 1e-9) for t in trials])
+    usual = float(np.median(ratios)) if len(ratios) else 1.0
+    if usual <= 0:
+        return {}
+    apart = np.abs(ratios / usual - 1)
+    if (apart <= CLOCK).sum() <= len(ratios) / 2:
+        return {}
+    return {
+        int(number): f"its clock runs {ratios[number] / usual:.3g} times as fast as "
+        "that of the other trials"
+        for number in np.flatnonzero(apart > CLOCK)
+    }
+
+
+def _span(trial: Trial) -> float:
+    """Recorded time from the first command to the end of the last [s]."""
+    first, last = trial.boundaries[0], trial.boundaries[-1]
+    return float(trial.times[last] - trial.times[first])
 
 
 def _unusable(trial: Trial, wanted: Sequence[str]) -> str:

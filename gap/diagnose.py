@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns.errors import BnsError
-from bns.gap import check, quantify, select, signatures, verdict, where
+from bns.gap import check, light_model, quantify, select, signatures, verdict, where
 from bns.gap.fit import Point
+from bns.gap.magnitudes import intervals
 from bns.gap.model import GapModel
 from bns.gap.null import Null
 from bns.gap.problem import Problem
@@ -21,7 +22,6 @@ from bns.worlds.trial import Trial
 
 ALPHA_MORE = 0.01  # chance that a further effect is added where there is none
 POWER = 1.2816  # standard normal: 90 % power
-LEVEL = 1.6449  # 90 % interval
 LISTED = 8  # fits of each size that are reported
 LEAST = 2  # trials
 
@@ -65,16 +65,19 @@ def diagnose(
         BnsError: too few trials, faults that cannot be repaired, channels that do not
             fit the model.
     """
-    made = analyse(
-        trials,
-        model,
-        seed=seed,
-        candidates=candidates,
-        rules=calibration,
-        most=most,
-        reference=reference,
-    )
-    return report(made, full=full)
+    given = {
+        "seed": seed,
+        "candidates": candidates,
+        "rules": calibration,
+        "most": most,
+        "reference": reference,
+    }
+    if model.name == "khepera3" and light_model.sees((*trials, *reference)):
+        from bns.gap import light_diagnosis
+
+        parts = light_diagnosis.analyse(trials, model, **given)
+        return light_diagnosis.report(*parts, full=full)
+    return report(analyse(trials, model, **given), full=full)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +89,7 @@ class Analysis:
         faults: what `check` found.
         seed: of what was drawn.
         clock: seconds by stage.
+        rules: thresholds.
     """
 
     problem: Problem
@@ -97,6 +101,7 @@ class Analysis:
     faults: tuple[str, ...]
     seed: int
     clock: _Clock
+    rules: verdict.Calibration
 
     @property
     def seen(self) -> float:
@@ -132,10 +137,12 @@ def analyse(
     worth = null.threshold(ALPHA_MORE)
     with clock("fits"):
         search = select.search(problem, curves, null, worth=worth, most=most)
-        choice = verdict.choose(problem, search, null, worth)
+        choice = verdict.choose(problem, search, null, worth, rules)
         excite = {item.name: item.excite for item in candidates}
         answer = verdict.decide(problem, choice, rules, excite)
-    return Analysis(problem, curves, null, search, choice, answer, faults, seed, clock)
+    return Analysis(
+        problem, curves, null, search, choice, answer, faults, seed, clock, rules
+    )
 
 
 def report(made: Analysis, *, full: bool = True) -> Diagnosis:
@@ -146,7 +153,7 @@ def report(made: Analysis, *, full: bool = True) -> Diagnosis:
         full: with localisation and closed fractions; False = the verdict alone.
     """
     problem, choice, clock = made.problem, made.choice, made.clock
-    fits = _fits(problem, made.search)
+    fits = _fits(problem, made.search, made.rules)
     where_found, closed = {}, {}
     if full:
         with clock("where"):
@@ -206,22 +213,26 @@ def _signatures(curves, choice, seen: float) -> dict:
         "detectability": signatures.detectability(curves, seen),
         "ranked": ranked,
         "best": [str(term.effect()) for term in best.terms],
-        "misfit_excess": choice.excess,
-        "explained": choice.explained,
+        "misfit_excess": choice.rung.excess,
+        "explained": choice.rung.explained,
     }
 
 
-def _fits(problem: Problem, search: Search) -> tuple[Fit, ...]:
+def _fits(
+    problem: Problem, search: Search, rules: verdict.Calibration
+) -> tuple[Fit, ...]:
     points = [search.nothing]
     for found in search.sizes:
         points += found[:LISTED]
     base = select.held_out(problem, search.nothing)[1]
-    return tuple(_fit(problem, point, base) for point in points)
+    return tuple(_fit(problem, point, base, rules) for point in points)
 
 
-def _fit(problem: Problem, point: Point, base: np.ndarray) -> Fit:
+def _fit(
+    problem: Problem, point: Point, base: np.ndarray, rules: verdict.Calibration
+) -> Fit:
     held_out, by_trial = select.held_out(problem, point)
-    spans, condition = _intervals(point)
+    spans, condition = intervals(point, rules)
     improved = base - by_trial
     return Fit(
         names=point.names,
@@ -236,24 +247,6 @@ def _fit(problem: Problem, point: Point, base: np.ndarray) -> Fit:
         at_bound=tuple(t.candidate.name for t in point.terms if t.at_bound),
         condition=condition,
     )
-
-
-def _intervals(point: Point) -> tuple[tuple[tuple[float, float], ...], float]:
-    """90 % interval of each magnitude from the slopes; condition of the fit."""
-    if not point.terms or not len(point.slopes):
-        return tuple((t.magnitude, t.magnitude) for t in point.terms), 1.0
-    size = np.linalg.norm(point.slopes, axis=1) + 1e-12
-    scaled = point.slopes / size[:, None]
-    normal = scaled @ scaled.T
-    condition = float(np.linalg.cond(normal))
-    spread = np.sqrt(np.abs(np.diag(np.linalg.pinv(normal)))) / size
-    spans, at = [], 0
-    for term in point.terms:
-        item, half = term.candidate, LEVEL * float(spread[at])
-        low = max(term.magnitude - half, item.low)
-        spans.append((low, min(term.magnitude + half, item.high)))
-        at += 1 + len(term.extras)
-    return tuple(spans), condition
 
 
 def _warnings(problem: Problem, curves, fits: Sequence[Fit], answer) -> tuple[str, ...]:

@@ -19,7 +19,10 @@ def faulty(
     observed, times = trial.observed.copy(), trial.times.copy()
     count = len(times)
     if name == "wrap":
-        observed[:, 2] = np.angle(np.exp(1j * (observed[:, 2] + np.pi - 0.1)))
+        turned = np.pi - 0.1  # in another frame, in which the heading crosses pi
+        cos, sin = np.cos(turned), np.sin(turned)
+        observed[:, :2] = observed[:, :2] @ [[cos, sin], [-sin, cos]]
+        observed[:, 2] = np.angle(np.exp(1j * (observed[:, 2] + turned)))
     elif name == "spikes":
         observed[rng.choice(np.arange(5, count - 5, 4), 3, replace=False), :2] += 0.5
     elif name == "duplicate":

@@ -72,12 +72,22 @@ class Problem:
         if not uncertain:
             return made
         sets = [[item.make(item.nominal + item.slack)] for item in uncertain]
-        return replace(made, whiten=made.whiten.uncertain(made.signatures(sets)))
+        return replace(
+            made, whiten=made.whiten.uncertain(made.signatures(sets, rough=True))
+        )
 
     @cached_property
     def rest(self) -> np.ndarray:
         """Whitened recorded minus nominal motion, ``(N,)``."""
         return self._whitened(self.recorded, self.nominal)
+
+    @cached_property
+    def sketched(self) -> tuple[np.ndarray, ...]:
+        """Predicted features of each trial by the model's rougher simulation."""
+        if not hasattr(self.model, "sketch"):
+            return self.nominal
+        (paths,) = self.model.sketch(self.trials, [()])
+        return tuple(map(self.model.compare, self.trials, paths, self.windows))
 
     def signatures(
         self, effects: Sequence[Sequence[Effect]], *, rough: bool = False
@@ -91,13 +101,13 @@ class Problem:
         Returns:
             NaN in a row whose simulation diverged.
         """
-        simulate = self.model.simulate
-        if rough:
-            simulate = getattr(self.model, "sketch", simulate)
+        simulate, base = self.model.simulate, self.nominal
+        if rough and hasattr(self.model, "sketch"):
+            simulate, base = self.model.sketch, self.sketched
         made = simulate(self.trials, effects)
         parts = []
         for number, (trial, windows, nominal) in enumerate(
-            zip(self.trials, self.windows, self.nominal, strict=True)
+            zip(self.trials, self.windows, base, strict=True)
         ):
             seen = np.stack([paths[number] for paths in made])
             parts.append(self.model.compare(trial, seen, windows) - nominal)

@@ -2,16 +2,17 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise, permutations
 from typing import Any
 
 import numpy as np
 
-from bns.gap import baselines, fit, select, verdict, wheeled_library
+from bns.gap import baselines, fit, ladder, select, verdict, wheeled_library
 from bns.gap.cases import Case, record
-from bns.gap.diagnose import ALPHA_MORE, Analysis, report
+from bns.gap.diagnose import Analysis, report
+from bns.gap.magnitudes import half_width, spreads
 from bns.gap.model import GapModel
 from bns.gap.problem import Problem
 from bns.gap.quantify import edit_error
@@ -30,13 +31,11 @@ def said(made: Analysis, case: Case, model: GapModel) -> dict[str, Any]:
         "named": found.verdict.named,
         "sets": found.verdict.sets,
         "p_gap": found.verdict.p_gap,
-        "p_misfit": found.verdict.p_misfit,
-        "excess": choice.excess,
-        "explained": choice.explained,
         "left": choice.left,
-        "size": choice.size,
+        "rungs": [rung.as_dict() for rung in choice.rungs],
+        "size": choice.rung.size,
         "residuals": len(problem.rest),
-        "worth": made.null.threshold(ALPHA_MORE),
+        "worth": choice.worth,
         "ranked": found.signatures["ranked"],
         "faults": found.faults,
         "closed": found.closed.get("closed"),
@@ -45,16 +44,12 @@ def said(made: Analysis, case: Case, model: GapModel) -> dict[str, Any]:
         "best": found.signatures["best"],
         "loss": {"+".join(fit.names): fit.loss for fit in found.fits},
         "held_out": {"+".join(fit.names): fit.held_out for fit in found.fits},
-        "intervals": [
-            (fit.names, fit.magnitudes, fit.intervals)
-            for fit in found.fits
-            if set(fit.names) == set(answer.names)
-        ],
+        "magnitudes": _magnitudes(made, answer.names),
         "seconds": found.seconds,
     }
     if answer.kind in ("single", "pair"):
         row["oracle"] = _oracle(problem, case, model.candidates())
-    if answer.kind == "pair" and choice.size:
+    if answer.kind == "pair" and choice.rung.size:
         row["edit"] = _edit(choice.best, case, model)
     if answer.kind in ("single", "none"):
         row["baselines"] = baselines.name(problem, made.curves)
@@ -82,29 +77,39 @@ def _branch(item, values) -> int:
     return 0
 
 
-@dataclass(frozen=True)
-class _Stored:
-    """What a row keeps of a choice."""
-
-    size: int
-    p_gap: float
-    p_misfit: float
-    excess: float
-    explained: float
-    scores: tuple[tuple[tuple[str, ...], float], ...]
-
-
 def judged(row: dict[str, Any], rules: verdict.Calibration) -> dict[str, Any]:
     """A row with the verdict that a calibration gives."""
     said = row["said"]
-    if "ranked" not in said or "size" not in said:
+    if "rungs" not in said:
         return row
-    scores = tuple((tuple(r["names"]), r["score"]) for r in said["ranked"])
-    keys = ("size", "p_gap", "p_misfit", "excess", "explained")
-    kind, named, sets = verdict.judge(
-        _Stored(*(said[key] for key in keys), scores), rules
-    )
-    return {**row, "said": {**said, "verdict": kind, "named": named, "sets": sets}}
+    rungs = [ladder.Rung.from_dict(content) for content in said["rungs"]]
+    rung = ladder.climb(rungs, said["worth"], rules)
+    kind, named, sets = verdict.judge(rung, said["p_gap"], rules)
+    changed = {"verdict": kind, "named": named, "sets": sets, "size": rung.size}
+    return {**row, "said": {**said, **changed, "intervals": intervals(said, rules)}}
+
+
+def intervals(said: dict[str, Any], rules: verdict.Calibration) -> list[list[float]]:
+    """Value, half interval and nominal value of each true effect that was fitted."""
+    return [
+        [value, half_width(spread, value - nominal, rules), nominal]
+        for value, spread, nominal in said["magnitudes"]
+    ]
+
+
+def _magnitudes(made: Analysis, names: Sequence[str]) -> list[list[float]]:
+    """Of the support that is true, where it was fitted, in the answer's order."""
+    for points in made.search.sizes:
+        for point in points:
+            if set(point.names) == set(names):
+                found = [
+                    [term.magnitude, deviation, term.candidate.nominal]
+                    for term, deviation in zip(
+                        point.terms, spreads(point)[0], strict=True
+                    )
+                ]
+                return [found[point.names.index(name)] for name in names]
+    return []
 
 
 def _edit(best: fit.Point, case: Case, model: GapModel) -> dict[str, float]:
@@ -232,28 +237,18 @@ def parameter(rows: Sequence[dict]) -> dict[str, float]:
     """
     errors, held = [], []
     for row in rows:
-        truth = row["answer"]["magnitudes"]
-        for _, values, spans in row["said"]["intervals"]:
-            if len(truth) == 1 and len(values) == 1:
-                far = abs(truth[0] - _nominal(row["answer"]["effects"][0], truth[0]))
-                errors.append(abs(values[0] - truth[0]) / max(far, 1e-12))
-                held.append(spans[0][0] <= truth[0] <= spans[0][1])
+        truth, found = row["answer"]["magnitudes"], row["said"]["intervals"]
+        if len(truth) != len(found):
+            continue
+        for true, (value, half, nominal) in zip(truth, found, strict=True):
+            errors.append(abs(value - true) / max(abs(true - nominal), 1e-12))
+            held.append(abs(value - true) <= half)
     if not errors:
         return {"median relative error": float("nan"), "intervals that hold": 0.0}
     return {
         "median relative error": float(np.median(errors)),
         "intervals that hold": float(np.mean(held)),
     }
-
-
-def _nominal(text: str, magnitude: float) -> float:
-    """Nominal value of the parameter of an effect that has a magnitude."""
-    effect = registry.parse(text)
-    near = min(
-        (p for p in effect.parameters if p.scales),
-        key=lambda p: abs(effect[p.name] - magnitude),
-    )
-    return near.nominal
 
 
 def by_size(rows: Sequence[dict]) -> list[dict[str, float]]:

@@ -5,21 +5,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import Protocol
 
 import numpy as np
 
 from bns.gap.fit import Point
-from bns.gap.null import Null, spread
+from bns.gap.ladder import Rung, climb, rungs
+from bns.gap.null import Null
 from bns.gap.problem import Problem
 from bns.gap.quantify import flexible
 from bns.gap.records import Verdict
-from bns.gap.select import Search, held_out
+from bns.gap.select import Search
 from bns.gap.signatures import angle
+from bns.gap.verdict_words import change, sentence
 from bns.gap.whiten import loss
-
-MINOR = 0.015  # share of what is explained below which a further effect is not named
-LISTED = 4  # supports named in a sentence at most
 
 
 @dataclass(frozen=True)
@@ -35,7 +33,13 @@ class Calibration:
             set; the conformal quantile of `scores`.
         sure: the same for it to be named beside the best one; larger, since a name
             that stands alone has to be right more often than the set covers.
-        coverage: of the sets.
+        more, minor: by how much a further effect has to improve the loss, at least,
+            and as a share of all that is explained with it.
+        model_error: how far the nominal model alone puts a magnitude off, as a share
+            of its departure from nominal (one standard deviation, assumed).
+        widen: factor on the intervals of magnitudes with which they hold the truth as
+            often as `coverage` says.
+        coverage: of the sets and the intervals.
         scores: loss of the true support over the best one's, per calibration case.
     """
 
@@ -44,6 +48,10 @@ class Calibration:
     misfit_share: float = 0.02
     tie: float = 6.0
     sure: float = 6.0
+    more: float = 14.0
+    minor: float = 0.015
+    model_error: float = 0.01
+    widen: float = 1.0
     coverage: float = 0.9
     scores: tuple[float, ...] = ()
 
@@ -68,61 +76,47 @@ class Choice:
     """The supports that a verdict weighs.
 
     Attributes:
-        size: number of effects needed.
-        best: the best support of that size.
+        rungs: of each size, nothing first.
+        rung: the one that the recording calls for.
+        best: its best support.
         ranked: all fitted supports of that size with their scores, best first.
-        p_gap, p_misfit, excess: see `Null`.
-        explained: improvement of the best support on nothing.
+        p_gap: probability of so large a gap if there were none.
+        worth: improvement by one effect that chance hardly exceeds.
         left: what a flexible model, fitted on other trials, still improves on the best
             support, and the standard error of that over trials.
     """
 
-    size: int
+    rungs: tuple[Rung, ...]
+    rung: Rung
     best: Point
     ranked: tuple[tuple[Point, float], ...]
     p_gap: float
-    p_misfit: float
-    excess: float
-    explained: float
+    worth: float
     left: tuple[float, float]
 
-    @property
-    def scores(self) -> list[tuple[tuple[str, ...], float]]:
-        """Names and scores of the supports, best first."""
-        return [(point.names, score) for point, score in self.ranked]
 
-
-def choose(problem: Problem, search: Search, null: Null, worth: float) -> Choice:
+def choose(
+    problem: Problem, search: Search, null: Null, worth: float, rules: Calibration
+) -> Choice:
     """How many effects, and the supports of that size in order.
 
-    An effect is added only if it improves the loss by more than chance would and by
-    more than `MINOR` of the whole (a nominal model that is a little wrong always
-    leaves something), and the held-out loss by more than one standard error.
+    Args:
+        problem: the recording.
+        search: what was fitted.
+        null: what chance gives.
+        worth: improvement by one effect that chance hardly exceeds.
+        rules: thresholds.
     """
-    size = 0
     nothing = search.nothing
     gain = nothing.loss - min(search.best(1).loss, nothing.loss)
     p_gap = min(1.0, 2 * min(null.p_gain(gain), null.misfit(problem, nothing.rest)[0]))
-    for more in range(1, len(search.sizes) + 1):
-        new, old = search.best(more), search.best(size)
-        if new is None:
-            continue
-        least = max(worth, MINOR * (nothing.loss - new.loss))
-        if old.loss - new.loss <= least:
-            continue
-        total, by_new = held_out(problem, new)
-        before, by_old = held_out(problem, old)
-        error = (by_old - by_new).std(ddof=1) * np.sqrt(len(by_old))
-        if before - total > min(error, worth):
-            size = more
-    best = search.best(size)
-    points = search.sizes[size - 1] if size else (nothing,)
-    scale = max(1.0, spread(best.rest)) ** 2
-    ranked = tuple((point, (point.loss - best.loss) / scale) for point in points)
-    p_misfit, excess = null.misfit(problem, best.rest)
-    explained = nothing.loss - best.loss
-    left = _left(problem, null, best)
-    return Choice(size, best, ranked, p_gap, p_misfit, excess, explained, left)
+    found = rungs(problem, search, null)
+    rung = climb(found, worth, rules)
+    points = search.sizes[rung.size - 1] if rung.size else (nothing,)
+    scores = [score for _, score in rung.scores]
+    left = _left(problem, null, points[0])
+    ranked = tuple(zip(points, scores, strict=True))
+    return Choice(found, rung, points[0], ranked, p_gap, worth, left)
 
 
 def _left(problem: Problem, null: Null, best: Point) -> tuple[float, float]:
@@ -142,112 +136,43 @@ def decide(
         calibration: thresholds.
         excite: by candidate, which commands make it felt.
     """
-    kind, named, sets = judge(choice, calibration)
+    kind, named, sets = judge(choice.rung, choice.p_gap, calibration)
     tied = [point for point, score in choice.ranked if score <= calibration.sure]
     rivals = [(p, s) for p, s in choice.ranked if s > calibration.sure]
     second, margin = (rivals[0][0].names, rivals[0][1]) if rivals else ((), np.inf)
     between = _angle(problem, tied) if kind == "either" else 90.0
+    p_gap, p_misfit = choice.p_gap, choice.rung.p_misfit
     return Verdict(
         kind=kind,
         named=named,
         sets=sets,
         angle=between,
-        p_gap=choice.p_gap,
-        p_misfit=choice.p_misfit,
+        p_gap=p_gap,
+        p_misfit=p_misfit,
         second=second,
         margin=float(margin),
-        sentence=sentence(kind, choice, tied, between),
+        sentence=sentence(kind, choice.best, tied, between, p_gap, p_misfit),
         change=change(kind, tied, second, float(margin), excite),
     )
 
 
-class Weighed(Protocol):
-    """What is needed of a `Choice` to judge it."""
-
-    size: int
-    p_gap: float
-    p_misfit: float
-    excess: float
-    explained: float
-
-    @property
-    def scores(self) -> Sequence[tuple[tuple[str, ...], float]]:
-        """Names and scores of the supports, best first."""
-        ...
-
-
 def judge(
-    choice: Weighed, rules: Calibration
+    rung: Rung, p_gap: float, rules: Calibration
 ) -> tuple[str, tuple[tuple[str, ...], ...], tuple[tuple[str, ...], ...]]:
     """Kind, named supports and the 90 % set, see `Verdict`."""
-    sets = tuple(names for names, score in choice.scores if score <= rules.tie)
-    near = tuple(names for names, score in choice.scores if score <= rules.sure)
-    if choice.p_gap > rules.alpha_gap and choice.size < 2:
-        return "no gap", (), ((), *(sets if choice.size else ()))
-    share = choice.excess / max(choice.explained, 1e-9)
-    strange = choice.p_misfit < rules.alpha_misfit and share > rules.misfit_share
-    if strange or not choice.size:
+    sets = tuple(names for names, score in rung.scores if score <= rules.tie)
+    near = tuple(names for names, score in rung.scores if score <= rules.sure)
+    if p_gap > rules.alpha_gap and rung.size < 2:
+        return "no gap", (), ((), *(sets if rung.size else ()))
+    share = rung.excess / max(rung.explained, 1e-9)
+    strange = rung.p_misfit < rules.alpha_misfit and share > rules.misfit_share
+    if strange or not rung.size:
         return "none of the library", (), sets
     if len(near) > 1:
         return "either", near, sets
-    return ("effect" if choice.size == 1 else "together"), near[:1], sets
+    return ("effect" if rung.size == 1 else "together"), near[:1], sets
 
 
 def _angle(problem: Problem, tied: Sequence[Point]) -> float:
     rest = problem.rest
     return angle(rest - tied[0].rest, rest - tied[1].rest)
-
-
-def _text(point: Point) -> str:
-    parts = [
-        f"{term.candidate.name} ({term.candidate.parameter} = {term.magnitude:.4g}"
-        f" {term.candidate.unit})".replace(" 1)", ")")
-        for term in point.terms
-    ]
-    return " with ".join(parts)
-
-
-def sentence(kind: str, choice: Choice, tied: Sequence[Point], between: float) -> str:
-    """The answer in words."""
-    if kind == "no gap":
-        return (
-            "No gap beyond what the recording scatters by itself "
-            f"(p = {choice.p_gap:.3g})."
-        )
-    if kind == "none of the library":
-        best = _text(choice.best) or "nothing"
-        return (
-            f"There is a gap (p = {choice.p_gap:.2g}), and no effect of the library "
-            f"explains it: after the best, {best}, the rest still has structure "
-            f"(p = {choice.p_misfit:.2g})."
-        )
-    if kind == "either":
-        names = " or ".join(_text(point) for point in tied[:LISTED])
-        more = f" or {len(tied) - LISTED} more" if len(tied) > LISTED else ""
-        return (
-            f"Either {names}{more}: these data cannot tell (angle between the first "
-            f"two {between:.1f} deg)."
-        )
-    if kind == "effect":
-        return f"The gap is explained by {_text(choice.best)}."
-    return f"The gap is explained by {_text(choice.best)} together."
-
-
-def change(
-    kind: str,
-    tied: Sequence[Point],
-    second: tuple[str, ...],
-    margin: float,
-    excite: dict[str, str],
-) -> str:
-    """What would change the answer, in words."""
-    wanted = sorted({excite.get(n, "") for p in tied for n in p.names} - {""})
-    if kind == "either":
-        return f"A recording with {' and '.join(wanted)} may separate them."
-    if kind == "no gap":
-        return "A longer or less noisy recording would show smaller effects."
-    if kind == "none of the library":
-        return "An effect that the library lacks; see where and when the gap sits."
-    if not second:
-        return "No other support that was fitted comes near."
-    return f"Second best: {' with '.join(second)}, its loss larger by {margin:.1f}."

@@ -82,14 +82,15 @@ class WheeledModel:
     def sketch(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
-        """As `simulate`, quicker: the reduced dynamics also where they are rough."""
+        """As `simulate`, quicker: by the reduced dynamics where they do."""
         return self._simulated(trials, effects, rough=True)
 
     def _simulated(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]], rough: bool
     ) -> list[list[np.ndarray]]:
         keys = {}
-        ways = [self._learnt(self._body(items), rough) for items in effects]
+        quick = rough and not self.exact
+        ways = [self._learnt(self._body(e)) if quick else None for e in effects]
         for place, items in enumerate(effects):
             for number, trial in enumerate(trials):
                 keys[place, number] = (*self._key(trial, items), ways[place])
@@ -153,23 +154,21 @@ class WheeledModel:
             self._cache.popitem(last=False)
         return made
 
-    def _learnt(self, body: tuple, rough: bool) -> travel.Map | None:
+    def _learnt(self, body: tuple) -> travel.Map | None:
         """The reduced dynamics of a robot, None where they do not do."""
-        if self.exact:
-            return None
         level = tuple(effect for effect in body if effect.name not in ABSOLUTE)
         steepest = sum(e["angle"] for e in body if e.name in ABSOLUTE)
         if steepest > STEEPEST:
             return None
-        found = self._reduced(level, rough, slopes=steepest > 0)
-        return found.map if found.good or (rough and found.rough) else None
+        found = self._reduced(level, slopes=steepest > 0)
+        return found.map if found.rough else None
 
-    def _reduced(self, body: tuple, rough: bool, *, slopes: bool = False) -> Reduced:
+    def _reduced(self, body: tuple, *, slopes: bool = False) -> Reduced:
         per_command = self._robot.ctrl_per_command
         if len(body) == 1:
             return between(self.name, body[0], per_command, slopes=slopes)
-        whole = reduced(self.name, () if rough else body, per_command, slopes=slopes)
-        if not rough or not body:
+        whole = reduced(self.name, (), per_command, slopes=slopes)
+        if not body:
             return whole
         parts = [between(self.name, e, per_command, slopes=slopes) for e in body]
         maps = [whole.map, *(part.map for part in parts)]

@@ -1,10 +1,12 @@
 """Cases of the withheld-effect bench, and how they are scored."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.gap import casebook, cases, check, scoring, verdict
+from bns.gap import casebook, cases, check, ladder, scoring, verdict
 from bns.gap.wheeled import WheeledModel
 
 
@@ -87,16 +89,33 @@ class FewCandidates(WheeledModel):
         return tuple(c for c in super().candidates() if c.slack)
 
 
+def rungs():
+    nothing = ladder.Rung(0, 190.0, (95.0, 95.0), (((), 0.0),), 0.0, 80.0, 0.0)
+    scores = ((("a",), 0.0), (("b",), 4.0))
+    one = ladder.Rung(1, 100.0, (50.0, 51.0), scores, 0.5, 0.0, 90.0)
+    two = ladder.Rung(2, 80.0, (41.0, 42.0), ((("a", "c"), 0.0),), 0.5, 0.0, 110.0)
+    return [nothing, one, two]
+
+
 def test_thresholds_are_applied_to_what_was_kept():
     kept = row([["a"]])
-    kept["said"] |= {"size": 1, "p_gap": 1e-9, "p_misfit": 0.5, "excess": 0.0}
-    kept["said"] |= {"explained": 90.0}
-    kept["said"]["ranked"] = [
-        {"names": ["a"], "score": 0.0},
-        {"names": ["b"], "score": 4.0},
-    ]
-    narrow = verdict.Calibration(tie=3.0, sure=3.5)
-    wide = verdict.Calibration(tie=5.0, sure=5.0)
+    kept["said"] |= {"p_gap": 1e-9, "worth": 13.0, "magnitudes": [[2.0, 0.1, 1.0]]}
+    kept["said"]["rungs"] = [rung.as_dict() for rung in rungs()]
+    narrow = verdict.Calibration(tie=3.0, sure=3.5, more=25.0, model_error=0.0)
+    wide = verdict.Calibration(tie=5.0, sure=5.0, more=25.0, widen=2.0)
     assert scoring.judged(kept, narrow)["said"]["verdict"] == "effect"
     assert scoring.judged(kept, wide)["said"]["verdict"] == "either"
     assert scoring.judged(kept, wide)["said"]["sets"] == (("a",), ("b",))
+    kept["answer"]["magnitudes"] = [2.2]
+    assert scoring.parameter([scoring.judged(kept, narrow)])["intervals that hold"] == 0
+    assert scoring.parameter([scoring.judged(kept, wide)])["intervals that hold"] == 1
+
+
+def test_a_further_effect_has_to_explain_its_share():
+    of = verdict.Calibration
+    assert ladder.climb(rungs(), 13.0, of(more=15.0, minor=0.1)).size == 2
+    assert ladder.climb(rungs(), 13.0, of(more=25.0, minor=0.1)).size == 1
+    assert ladder.climb(rungs(), 13.0, of(more=15.0, minor=0.2)).size == 1
+    assert ladder.climb(rungs(), 200.0, of(more=15.0, minor=0.1)).size == 0
+    worse = replace(rungs()[2], held_out=(52.0, 53.0))
+    assert ladder.climb([*rungs()[:2], worse], 13.0, of(more=15.0)).size == 1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError, FormatError
-from bns.gap import check, pieces, signatures, travel, verdict
+from bns.gap import check, fit, pieces, signatures, stuck, travel, verdict
 from bns.gap.cases import commands
 from bns.gap.diagnose import diagnose
 from bns.gap.problem import Problem
@@ -161,7 +161,7 @@ def test_reduced_dynamics_are_the_simulation(told, effects):
     assert fast.good
     trials = MujocoWorld(reality=effects, threads=1).run(told)
     model = WheeledModel(threads=1)
-    (quick,) = model.simulate(trials, [edits])
+    (quick,) = model.sketch(trials, [edits])
     for made, trial in zip(quick, trials, strict=True):
         error = body_displacements(made) - body_displacements(trial.poses_world)
         assert np.abs(error[:, :2]).max() < 2e-4
@@ -195,7 +195,7 @@ def test_maps_between_levels_are_as_those_learnt_there(text):
 def test_a_sloping_floor_is_as_simulated(told):
     slope = registry.parse("floor_slope:angle=0.03,direction=1")
     trials = MujocoWorld(reality=[slope], threads=1).run(told[:1])
-    ((quick,),) = WheeledModel(threads=1).simulate(trials, [[slope]])
+    ((quick,),) = WheeledModel(threads=1).sketch(trials, [[slope]])
     error = body_displacements(quick) - body_displacements(trials[0].poses_world)
     assert np.abs(error).max() < 1e-3
     assert np.abs(quick[-1, :2] - trials[0].poses_world[-1, :2]).max() < 0.01
@@ -231,6 +231,21 @@ def test_the_distance_to_a_curve_is_taken_along_it(model):
     assert at[0] == 0
 
 
+def test_fits_end_on_the_simulation_itself(model, told):
+    drag = "rolling_drag:wheel=left,torque=0.0002"
+    trials = MujocoWorld(reality=[drag, NOISE], threads=1).run(told, seeds=range(4))
+    problem = Problem.of(trials, model)
+    item = next(c for c in model.candidates() if c.name == "rolling_drag.torque[left]")
+    point = fit.refine(problem, [fit.Term.at(item, 0, 0.0003)])
+    (true,) = fit.evaluate(problem, [point.terms])
+    (rough,) = fit.evaluate(problem, [point.terms], rough=True)
+    assert point.loss == pytest.approx(true.loss)
+    assert abs(rough.loss - true.loss) > 1.0  # else the test shows nothing
+    around = [point.terms[0].magnitude * share for share in (0.99, 1.01)]
+    near = fit.evaluate(problem, [[fit.Term.at(item, 0, value)] for value in around])
+    assert point.loss < min(other.loss for other in near) + 0.5
+
+
 def test_stitched_pieces_keep_the_path():
     path = np.cumsum(np.random.default_rng(0).normal(size=(30, 3)), axis=0)
     parts = [path[:11], pieces.moved(path[10:], np.array([5.0, -1.0, 2.0]))]
@@ -264,6 +279,38 @@ def test_faults_are_repaired_and_listed(model, told):
     assert "spikes" in text and "the same samples" in text
     assert np.abs(np.diff(made[0].observed[:, 2])).max() < 3
     assert np.isnan(made[1].observed[20]).all()
+
+
+def test_a_stuck_channel_and_a_wrong_clock_are_left_out(model, told):
+    trials = MujocoWorld(reality=[NOISE], threads=1).run(told, seeds=range(4))
+    stuck = trials[1].observed.copy()
+    stuck[:, 1] = stuck[0, 1]
+    half = trials[2].observed.copy()
+    half[30:50, 2] = half[30, 2]
+    broken = [
+        trials[0].replace(times=trials[0].times * 1.2),
+        trials[1].replace(observed=stuck),
+        trials[2].replace(observed=half),
+        trials[3],
+        MujocoWorld(reality=[NOISE], threads=1).run(told[:1], seeds=[9])[0],
+    ]
+    made, notes = check.check(broken, model)
+    text = "\n".join(notes)
+    assert len(made) == 3
+    assert "trial 0: its clock runs 1.2 times as fast" in text
+    assert "trial 1: y is stuck" in text and "seen, left out" in text
+    assert np.isnan(made[0].observed[30:50]).all()
+    assert np.isfinite(made[0].observed[:30]).all()
+    # all clocks alike: a drift, which is for the diagnosis to find
+    slow = [trial.replace(times=trial.times * 1.2) for trial in trials]
+    assert len(check.check(slow, model)[0]) == 4
+
+
+def test_a_robot_that_stands_still_is_no_stuck_channel(model):
+    there = Commands([[0.1, 0.1], [0.0, 0.0]], [1.0, 1.0])
+    dead = "wheel_gain:wheel=both,factor=0"
+    trials = MujocoWorld(reality=[dead], threads=1).run([there])
+    assert not stuck.dropped(trials[0], model)[1]
 
 
 def test_a_motion_that_turns_back_is_no_spike(model):
