@@ -24,7 +24,7 @@ def run(quick: bool) -> Result:
 
     count = 4 if quick else TRIALS
     rig = virtual.rig([HIDDEN], rate=15.0, seed=2)
-    world = HardwareWorld(rig=rig, sample_dt=0.05)
+    world = HardwareWorld(rig=rig, sample_dt=0.05, as_told=True)
     trials = []
     for number in range(count):
         told = commands(COMMANDS, seed=1, number=number // 2)

@@ -168,18 +168,19 @@ class Mover:
         try:
             begin = None
             for point in schedule:
-                if begin is not None and not self._until(begin + point.at, done):
+                lead = self.robot.lead(point.left, point.right)
+                if begin is not None and not self._until(begin + point.at - lead, done):
                     break
                 drive = self.drive(point.left, point.right)
                 self._wheels.switched(drive)
                 if begin is None:  # it still stands where it stood
                     begin = drive.at
                     done.sightings.append(stand._replace(time=begin))
-                done.late = max(done.late, drive.at - begin - point.at)
+                done.late = max(done.late, abs(drive.at - begin - point.at))
                 if point.command >= 0:
                     done.switched.append(drive.at)
             else:
-                self._until(begin + total, done)
+                self._until(begin + total - self.robot.lead(0.0, 0.0), done)
             done.switched.append(self.drive(0.0, 0.0).at)
         finally:
             self.halt()
@@ -189,7 +190,7 @@ class Mover:
 
     def _until(self, moment: float, done: Performed) -> bool:
         """Tick until a moment; whether the robot is still inside the rim."""
-        while (left := moment - self.clock.now()) > 0.004:
+        while (left := moment - self.clock.now()) > 0.0005:
             for sighting in self.look():
                 done.sightings.append(sighting)
                 if self.limits.outside(sighting, self.limits.rim):

@@ -21,6 +21,7 @@ def trial(
     robot: str,
     world: str,
     conditions: dict,
+    as_told: bool = False,
 ) -> Trial:
     """The trial of commands that were carried out.
 
@@ -34,6 +35,9 @@ def trial(
         sample_dt: time between samples [s].
         start_yaw: heading at the start [rad], for continuous yaws.
         robot, world, conditions: see `Trial`.
+        as_told: with the durations that were wanted, so that repeats are alike: how
+            much each moment was off is then a scatter of the motion. Where a trial
+            was ended early the robot's own durations hold.
 
     Raises:
         Void: too little was seen.
@@ -43,6 +47,8 @@ def trial(
     if count < 1:
         raise BnsError("No command was carried out.")
     moments = switched - switched[0]
+    if as_told and count == len(commands):
+        moments = np.concatenate([[0.0], np.cumsum(commands.durations)])
     grid = np.arange(0.0, moments[-1], sample_dt)
     apart = np.abs(grid[:, None] - moments).min(1) > 1e-3
     times = np.union1d(grid[apart], moments)

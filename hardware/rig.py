@@ -118,28 +118,34 @@ def battery(robot: Khepera3, limits: Limits) -> float:
     return volts
 
 
-def look(port: str, camera: str, calibration: str) -> Eyes:
+def look(port: str, camera: str, calibration: str, robot: str = "khepera3") -> Eyes:
     """Tracker and camera.
+
+    Args:
+        port: of the robot, where it is emulated.
+        camera: number, a video file, or "emulated".
+        calibration: file of the camera's calibration.
+        robot: whose tag is looked for.
 
     Raises:
         BnsError: no such camera, or it is not calibrated.
     """
     from bns.hardware.tracking.camera import Camera
     from bns.hardware.tracking.eyes import ThreadedEyes
-    from bns.hardware.tracking.marker import Marker
+    from bns.hardware.tracking.marker import MARKERS
     from bns.hardware.tracking.sources import DeviceCamera, Source, VideoFile
     from bns.hardware.tracking.tracker import Tracker
 
     if not camera:
         raise BnsError("No camera was given: give --camera NUMBER, FILE or emulated.")
-    marker = Marker()
+    marker = MARKERS[robot]
     if camera == EMULATED:
         from bns.hardware.emulators.camera import EmulatedCamera
-        from bns.hardware.emulators.frames import Painter
+        from bns.hardware.emulators.frames import painter
 
         known = Camera.read(calibration) if calibration else Camera.overhead(SIZE)
         ideal = replace(Camera.overhead(known.size), latency=0.0)
-        source: Source = EmulatedCamera(port, Painter(ideal, marker))
+        source: Source = EmulatedCamera(port, painter(robot, ideal))
         return ThreadedEyes(source, Tracker(known, marker))
     if not calibration:
         raise BnsError(

@@ -38,6 +38,8 @@ class HardwareWorld:
         camera: number, video file, or "emulated".
         calibration: file of the camera's calibration.
         log: file for faults.
+        as_told: trials have the durations that were wanted, see `records.trial`; for
+            recordings with repeats.
         rig: an open one instead of port and camera (rehearsals in virtual time).
 
     Raises:
@@ -60,6 +62,7 @@ class HardwareWorld:
         camera: str = EMULATED,
         calibration: str = "",
         log: str = "",
+        as_told: bool = False,
         rig: Rig | None = None,
     ):
         del threads
@@ -77,6 +80,7 @@ class HardwareWorld:
         self.sample_dt = bounded("sample_dt", sample_dt, 0.02, 60.0, "s")
         self.port, self.camera, self.calibration = port, camera, calibration
         self.log, self._rig, self.voids = log, rig, 0
+        self.as_told = as_told
 
     def run(
         self, commands: Sequence[Commands], *, trial: int = 0, seeds: Sequence[int] = ()
@@ -186,4 +190,5 @@ class HardwareWorld:
             robot=self.robot,
             world=self.name,
             conditions=conditions,
+            as_told=self.as_told,
         )

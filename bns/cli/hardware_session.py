@@ -62,6 +62,7 @@ def record(given: Any) -> int:
         calibration=given.calibration,
         damage=given.damage,
         sample_dt=0.05,
+        as_told=True,
     )
     trials = []
     try:

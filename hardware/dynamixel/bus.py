@@ -25,6 +25,10 @@ OVERLOAD = 3  # reads in a row with too much load before it counts
 LATENCY = 0.02  # s allowed for an answer beside its bytes
 
 
+class Overload(SafetyStop):
+    """A servo pushes in vain: the trial ends, the robot need not."""
+
+
 class Bus:
     """Servos on a port.
 
@@ -64,7 +68,7 @@ class Bus:
         self._sdk = sdk
         self.states: dict[int, packets.State] = {}
         self._loaded: dict[int, int] = {}
-        self._next = 0
+        self._next, self._on = 0, False
 
     def fileno(self) -> int:
         """The open file's number, for the watchdog."""
@@ -118,20 +122,23 @@ class Bus:
                 self.states[servo] = state
                 return state
             self.faults.note("no answer" if result else "bad state", str(servo))
-            if self.guard is not None:
+            if self.guard is not None and self._on:
                 self.guard.feed(moving=True)
         raise LinkError(f"Servo {servo} gives no proper answer in {TRIES} tries.")
 
-    def look(self, count: int = 2) -> None:
+    def look(self, count: int = 2) -> list[tuple[Joint, packets.State]]:
         """Read the next few servos in turn and see that they are well.
 
         Raises:
-            SafetyStop: one is too hot, overloaded, or the battery is low.
+            SafetyStop: one is too hot, overloaded (`Overload`), or the battery is low.
         """
+        seen = []
         for _ in range(count):
             joint = self.joints[self._next % len(self.joints)]
             self._next += 1
-            self._well(joint, self.read(joint.id))
+            seen.append((joint, self.read(joint.id)))
+            self._well(*seen[-1])
+        return seen
 
     def _well(self, joint: Joint, state: packets.State) -> None:
         if state.temperature >= HOT:
@@ -143,7 +150,8 @@ class Bus:
         over = self._loaded.get(joint.id, 0) + 1 if abs(state.load) > FULL else 0
         self._loaded[joint.id] = over
         if over >= OVERLOAD:
-            raise SafetyStop(f"{joint.name} is overloaded", "free the leg")
+            self._loaded.clear()
+            raise Overload(f"{joint.name} is overloaded", "free the leg")
 
     def write(self, angles: Mapping[str, float]) -> None:
         """Send the goals of all joints in one packet.
@@ -166,8 +174,23 @@ class Bus:
         if result != 0:
             raise LinkError("The goals could not be sent: check the adapter.")
 
+    def pace(self, speed: float) -> None:
+        """Set the moving speed of all servos [rad/s]; sent three times."""
+        units = min(max(round(speed / packets.SPEED_UNIT), 1), 1023)
+        for _ in range(3):
+            self._call("write2ByteTxOnly", packets.BROADCAST, packets.SPEED, units)
+
+    def angles(self) -> dict[str, float]:
+        """Where all joints are [rad], by name; reads every servo."""
+        return {j.name: j.angle(self.read(j.id).position) for j in self.joints}
+
+    def volts(self) -> float:
+        """The lowest voltage that a servo reads [V]."""
+        return min(self.read(joint.id).voltage for joint in self.joints)
+
     def torque(self, on: bool) -> None:
         """Switch the torque of all servos; off is sent three times."""
+        self._on = on
         for _ in range(1 if on else 3):
             self._call("write1ByteTxOnly", packets.BROADCAST, packets.TORQUE, int(on))
         if not on and self.guard is not None:
@@ -178,7 +201,11 @@ class Bus:
         try:
             self.torque(False)
         finally:
-            self._port.closePort()
+            self.release()
+
+    def release(self) -> None:
+        """Give the port back and send nothing."""
+        self._port.closePort()
 
     def _call(self, name: str, *words: int) -> Any:
         function = getattr(self._protocol, name)

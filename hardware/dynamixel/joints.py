@@ -61,3 +61,20 @@ def read(path: Path | str = FILE) -> tuple[Joint, ...]:
                 f"{path}: {joint.name} needs 0 <= low < high <= 1023, sign 1 or -1."
             )
     return joints
+
+
+def write(path: Path | str, joints: tuple[Joint, ...], *, said: str) -> None:
+    """Write a robot's file.
+
+    Args:
+        path: of the file.
+        joints: in the order of the file.
+        said: a line on where the numbers come from.
+    """
+    rows = [
+        f"{joint.name} = {{ id = {joint.id}, sign = {joint.sign}, zero = {joint.zero}, "
+        f"low = {joint.low}, high = {joint.high} }}"
+        for joint in joints
+    ]
+    text = "\n".join([f"# {said}", "[joints]", *rows, ""])
+    Path(path).write_text(text, encoding="utf-8")

@@ -18,10 +18,10 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.hardware.emulators.frames import Painter
-from bns.hardware.emulators.khepera_body import KheperaBody
+from bns.hardware.emulators.live_body import LiveBody
 from bns.hardware.tracking.tracker import Frame
 
-MESSAGE = struct.Struct("<dqddd")  # time, number, x, y, yaw
+MESSAGE = struct.Struct("<dq8d")  # time, number, x, y, yaw, height, quaternion
 SUFFIX = ".camera"
 
 
@@ -37,7 +37,7 @@ class PoseServer:
 
     def __init__(
         self,
-        body: KheperaBody,
+        body: LiveBody,
         port: Path | str,
         *,
         rate: float = 15.0,
@@ -69,7 +69,7 @@ class PoseServer:
             self._next = max(self._next + 1 / self.rate, now)
             self._count += 1
             pose = self.body.pose(now)
-            message = MESSAGE.pack(now, self._count, *pose)
+            message = MESSAGE.pack(now, self._count, *pose, *self.body.attitude(now))
             self._waiting.append((now + self.latency, message))
         while self._waiting and self._waiting[0][0] <= now:
             message = self._waiting.popleft()[1]
@@ -137,7 +137,7 @@ class EmulatedCamera:
             newest = self._buffer[whole - MESSAGE.size : whole]
             self._buffer = self._buffer[whole:]
             at, number, *pose = MESSAGE.unpack(newest)
-            return Frame(at, self.painter.paint(pose), number)
+            return Frame(at, self.painter.paint(pose[:3], pose[3:]), number)
 
     def close(self) -> None:
         """Hang up."""
@@ -152,10 +152,10 @@ class BodyPainter:
         painter: of the camera above.
     """
 
-    def __init__(self, body: KheperaBody, painter: Painter):
+    def __init__(self, body: LiveBody, painter: Painter):
         self.body, self.painter = body, painter
 
     def paint_at(self, at: float) -> np.ndarray:
         """The picture taken at a time [s]."""
         self.body.advance(at)
-        return self.painter.paint(self.body.pose(at))
+        return self.painter.paint(self.body.pose(at), self.body.attitude(at))

@@ -6,14 +6,15 @@ import numpy as np
 
 from bns.hardware.tracking import marker as tags
 from bns.hardware.tracking.camera import Camera, plane_points
-from bns.hardware.tracking.marker import CELLS, Floor, Marker
+from bns.hardware.tracking.marker import CELLS, MARKERS, Floor, Marker
 from bns.hardware.tracking.opencv import cv2
 
 BOARD, BODY = 205, 70  # grey values (assumed)
 PLATE = 8 / 6  # side of the white plate in sides of the tag: a cell of white around
 FINE = 4  # subpixels a side
 CELL = 20  # px of a cell of the texture
-RADIUS = 0.064  # m; of the robot's body
+RADIUS = 0.064  # m; of the Khepera III's body
+TRUNK, HIPS = 0.12, 0.0918  # m; the hexapod's body and its height (its `home` pose)
 SPARE = 64  # px by which the stored noise is larger than a picture
 
 
@@ -27,6 +28,9 @@ class Painter:
         noise: standard deviation of grey values.
         blur: standard deviation of the lens's blur [px].
         rng: for the noise.
+        radius: of the robot's body [m].
+        base: height of the robot's frame above the board, as it stands [m]; the tag
+            tilts and sinks with it. None = a robot that does not.
     """
 
     def __init__(
@@ -38,8 +42,11 @@ class Painter:
         noise: float = 2.0,
         blur: float = 0.6,
         rng: np.random.Generator | None = None,
+        radius: float = RADIUS,
+        base: float | None = None,
     ):
         self.camera, self.marker, self.blur = camera, marker, blur
+        self.radius, self.base = radius, base
         rng = rng or np.random.default_rng(0)
         width, height = camera.size
         self._empty = np.full((height, width), BOARD, np.uint8)
@@ -55,20 +62,45 @@ class Painter:
         self._grains = _grains(rng, noise, (height, width)) if noise else None
         self._rng = rng
 
-    def paint(self, pose: Sequence[float] | None) -> np.ndarray:
-        """The picture of a robot at a pose (None: taken away), ``(H, W)`` uint8."""
+    def paint(
+        self, pose: Sequence[float] | None, attitude: Sequence[float] = ()
+    ) -> np.ndarray:
+        """The picture of a robot, ``(H, W)`` uint8.
+
+        Args:
+            pose: (x, y, yaw) [m, m, rad]; None: taken away.
+            attitude: height of its frame [m] and its quaternion.
+        """
         image = self._empty.copy()
         if pose is not None:
             marker = self.marker
             around = np.linspace(0, 2 * np.pi, 32, endpoint=False)
-            ring = RADIUS * np.column_stack([np.cos(around), np.sin(around)])
-            rim = self.camera.project(plane_points(pose, ring, marker.height))
+            ring = self.radius * np.column_stack([np.cos(around), np.sin(around)])
+            rim = self.camera.project(self._points(pose, attitude, ring))
             whole = np.rint(rim * 16).astype(np.int32)
             cv2().fillPoly(image, [whole], BODY, lineType=cv2().LINE_AA, shift=4)
             middle = marker.corners().mean(0)
             plate = middle + PLATE * (marker.corners() - middle)
-            self._lay(image, plane_points(pose, plate, marker.height), self._tag)
+            self._lay(image, self._points(pose, attitude, plate), self._tag)
         return self._grainy(image)
+
+    def _points(
+        self, pose: Sequence[float], attitude: Sequence[float], local: np.ndarray
+    ) -> np.ndarray:
+        """Points of the tag's plane in the world, ``(N, 3)``."""
+        if self.base is None or not len(attitude):
+            return plane_points(pose, local, self.marker.height)
+        height, w, x, y, z = attitude
+        turn = np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+        above = np.full(len(local), self.marker.height - self.base)
+        points = np.column_stack([local, above]) @ turn.T
+        return points + np.array([pose[0], pose[1], height])
 
     def _grainy(self, image: np.ndarray) -> np.ndarray:
         if self._grains is None:
@@ -113,6 +145,13 @@ class Painter:
         share = seen(np.ones_like(texture))
         mixed = part * (1 - share) + seen(texture)
         part[:] = np.rint(mixed).clip(0, 255).astype(np.uint8)
+
+
+def painter(robot: str, camera: Camera) -> Painter:
+    """Who draws a robot: its tag, and a disc as large as it."""
+    if robot == "khepera3":
+        return Painter(camera, MARKERS[robot])
+    return Painter(camera, MARKERS[robot], radius=TRUNK, base=HIPS)
 
 
 def _grains(

@@ -60,7 +60,7 @@ class KheperaBody(LiveBody):
         )
 
     def _drive(self) -> None:
-        while self._told and self._told[0][0] <= self.now + 1e-9:
+        while self._told and self._told[0][0] <= self.now + self.dt / 2:
             _, *point = self._told.pop(0)
             self._point = (point[0], point[1])
         self.history.append((self.now, *self._point))

@@ -10,7 +10,7 @@ import numpy as np
 from bns import models
 from bns.errors import BnsError
 from bns.worlds import active, compile, observe
-from bns.worlds.effects.base import ControlSignal, Effect
+from bns.worlds.effects.base import BodyEffect, ControlSignal, Effect, ServoEffect
 from bns.worlds.physics import STATE, Compiled
 
 KEPT = 30.0  # s of poses remembered
@@ -42,8 +42,8 @@ class LiveBody:
         given = active.as_damage(tuple(effects))
         _refuse(given, self.robot.kind)
         held = [event.effect for event in given.events]
-        body = tuple(e for e in held if e.stage not in ("command", "actuator"))
-        self.signal = [e for e in held if e.stage in ("command", "actuator")]
+        body = tuple(e for e in held if _edits(e))
+        self.signal = [e for e in held if not _edits(e)]
         scene = compile.compiled(robot, body)
         self.model = copy.copy(scene.model)  # its own: a servo can be switched off
         self.data = mujoco.MjData(self.model)
@@ -125,6 +125,11 @@ class LiveBody:
             return self.poses[-1]
         back = round((self.now - at) / self.dt)
         return self.poses[min(max(len(self.poses) - 1 - back, 0), len(self.poses) - 1)]
+
+
+def _edits(effect: Effect) -> bool:
+    """Whether it is an edit of the model; those on servos are, at whatever stage."""
+    return isinstance(effect, BodyEffect | ServoEffect)
 
 
 def _refuse(given, kind: str) -> None:

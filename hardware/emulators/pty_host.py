@@ -41,6 +41,11 @@ class PtyHost:
         self._count = 0
         self.plug()
 
+    @property
+    def plugged(self) -> bool:
+        """Whether the cable is in."""
+        return self._master >= 0
+
     def plug(self) -> None:
         """Open the terminal and point the link to it.
 

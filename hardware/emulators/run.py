@@ -31,6 +31,7 @@ def khepera3(
     rate: float = 15.0,
     seed: int = 0,
     log: str = "",
+    baud: int = protocol.BAUD,
     stop: Callable[[], bool] | None = None,
 ) -> None:
     """Emulate a Khepera III until SIGINT or SIGTERM.
@@ -50,6 +51,7 @@ def khepera3(
         rate: of the camera [1/s].
         seed: of what is random.
         log: file for a line whenever the set point or the wheels' motion changes.
+        baud: rate that it talks at.
         stop: asked all the time; None = signals decide.
     """
     urgent()
@@ -65,21 +67,38 @@ def khepera3(
     noise = Noise(
         device, lost=lost, corrupted=corrupted, rng=np.random.default_rng([seed, 1])
     )
-    host = PtyHost(noise, port, baud=protocol.BAUD)
+    host = PtyHost(noise, port, baud=baud)
     server = PoseServer(body, port, rate=rate)
+    diary = _Diary(device, log)
+    serve(host, server, diary.note, stop)
+
+
+def serve(
+    host: PtyHost,
+    server: PoseServer,
+    note: Callable[[float], None],
+    stop: Callable[[], bool] | None = None,
+) -> None:
+    """Run an emulated robot with its camera until it is told to end.
+
+    Args:
+        host: with the robot's electronics.
+        server: its camera.
+        note: called in every round with the time [s].
+        stop: asked all the time; None = signals decide, see `khepera3`.
+    """
     state = _State()
     if stop is None:
         state.listen()
-    diary = _Diary(device, log)
 
     def handle(at: float) -> None:
-        if state.pulled and host._master >= 0:
+        if state.pulled and host.plugged:
             host.unplug()
         elif not state.pulled:
             host.plug()
         server.covered = state.covered
         server.serve(at)
-        diary.note(at)
+        note(at)
 
     try:
         host.serve(stop or (lambda: state.ended), handle)

@@ -1,7 +1,8 @@
-"""Eighteen emulated AX-12A: their packets, their tables, and a simple law of motion.
+"""Eighteen emulated AX-12A: their packets and their tables, and what they move.
 
-Each servo moves to its goal by itself, at most at its speed, with a lag; there is no
-body behind them. What bites between packets and table follows the e-manual.
+Behind them is a body in MuJoCo or, without one, each servo moves to its goal by itself,
+at most at its speed, with a lag. What bites between packets and table follows the
+e-manual.
 """
 
 from collections.abc import Sequence
@@ -10,6 +11,7 @@ import numpy as np
 
 from bns.hardware.dynamixel import packets
 from bns.hardware.emulators.device import Reply
+from bns.hardware.emulators.hexapod_body import HexapodBody
 
 TOP = 6.18 * packets.UNITS  # units/s: 59 rpm without load (e-manual)
 LAG = 0.05  # s (assumed)
@@ -26,6 +28,7 @@ class ServoBank:
         upset: probability that a status carries a random error bit.
         rng: for that.
         at: time of the start [s].
+        body: what they move; None = each its own horn.
 
     Attributes:
         goals: times and goals of every sync write, newest last.
@@ -40,7 +43,9 @@ class ServoBank:
         upset: float = 0.0,
         rng: np.random.Generator | None = None,
         at: float = 0.0,
+        body: HexapodBody | None = None,
     ):
+        self.body = body
         self.numbers, self.delay, self.upset = list(numbers), delay, upset
         self.rng = rng or np.random.default_rng(0)
         self.tables = {number: _table(number, voltage) for number in set(numbers)}
@@ -52,6 +57,9 @@ class ServoBank:
         """Let all servos move until `now` [s]."""
         dt = max(now - self._now, 0.0)
         self._now = now
+        if self.body is not None:
+            self.body.advance(now)
+            return
         for number, table in self.tables.items():
             if not table[packets.TORQUE]:
                 continue
@@ -113,7 +121,16 @@ class ServoBank:
         if at == packets.GOAL and len(data) >= 2 and data[0] | data[1] << 8 > 1023:
             return 1 << 1
         table[at : at + len(data)] = data
+        if self.body is not None:
+            self._tell(number, table)
         return 0
+
+    def _tell(self, number: int, table: bytearray) -> None:
+        """Let the body's servo know its registers."""
+        speed = table[packets.SPEED] | table[packets.SPEED + 1] << 8
+        self.body.speed(number, speed * packets.SPEED_UNIT)
+        self.body.tell(number, table[packets.GOAL] | table[packets.GOAL + 1] << 8)
+        self.body.power(number, bool(table[packets.TORQUE]))
 
     def _sync(self, given: bytes, at: float) -> None:
         if len(given) < 2 or given[1] == 0:
@@ -127,8 +144,17 @@ class ServoBank:
 
     def _refresh(self, number: int) -> None:
         table = self.tables[number]
-        position = int(np.clip(round(self.place[number]), 0, 1023))
-        table[36], table[37] = position & 0xFF, position >> 8
+        position, speed, load = round(self.place[number]), 0.0, 0.0
+        if self.body is not None:
+            position, speed, load = self.body.reading(number)
+        pace = _signed(speed / packets.SPEED_UNIT)
+        for place, value in enumerate((position, pace, _signed(load * 1023))):
+            table[36 + 2 * place : 38 + 2 * place] = value.to_bytes(2, "little")
+
+
+def _signed(value: float) -> int:
+    """A register whose bit 10 is the direction, set clockwise."""
+    return min(round(abs(value)), 1023) | (1024 if value < 0 else 0)
 
 
 def _table(number: int, voltage: float) -> bytearray:

@@ -31,7 +31,7 @@ class Drive(NamedTuple):
     """A set point that the robot has acknowledged.
 
     Attributes:
-        at: when it held, the middle of the exchange [s].
+        at: when it held: the middle of the exchange, if both ways take as long [s].
         units: left and right [speed units].
         took: duration of the exchange [s], longer where it was repeated.
     """
@@ -156,7 +156,17 @@ class Khepera3:
         took = self.clock.now() - begin
         for _ in range(times - 1):
             self.ask(command, "d")
-        return Drive(begin + took / 2, pair, took)
+        return Drive(begin + (took + _longer(command)) / 2, pair, took)
+
+    def lead(self, *pair: float) -> float:
+        """How long before its moment a set point has to be sent [s].
+
+        Args:
+            pair: left and right [m/s].
+        """
+        recent = self.round_trips[-20:]
+        command = protocol.speeds(*(round(self.units.units(v)) for v in pair))
+        return (sorted(recent)[len(recent) // 2] + _longer(command)) / 2
 
     def stop(self) -> None:
         """Stop both wheels and see that they stand.
@@ -279,6 +289,11 @@ class Khepera3:
         while self.clock.now() < until and self.line.read(QUIET):
             pass
         self.line.discard()
+
+
+def _longer(command: bytes) -> float:
+    """By how much a set point is longer on the wire than its answer [s]."""
+    return (len(command) - len(b"d\r\n")) * 10 / protocol.BAUD
 
 
 def _ending(buffer: bytes) -> int:

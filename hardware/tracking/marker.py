@@ -41,6 +41,14 @@ class Marker:
         return own @ np.array([[cos, sin], [-sin, cos]]) + (self.x, self.y)
 
 
+MARKERS = {
+    "khepera3": Marker(),
+    "phantomx": Marker(number=1, side=0.100, height=0.1518),
+}
+"""robot -> its tag; the hexapod's is 0.06 m above its hips (assumed), which stand
+0.0918 m high; that changes with the gait, 10 mm shift a place by 5 mm at the edge"""
+
+
 @dataclass(frozen=True)
 class Floor:
     """Tags that lie on the board, for the place of the camera.

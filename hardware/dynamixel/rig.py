@@ -1,0 +1,134 @@
+"""A hexapod, a camera and a watchdog, connected and checked; nothing moves for that."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from bns.errors import BnsError
+from bns.hardware.clock import Clock, RealClock
+from bns.hardware.dynamixel import joints, packets
+from bns.hardware.dynamixel.bus import EMPTY, Bus
+from bns.hardware.dynamixel.walker import Walker
+from bns.hardware.faults import FaultLog
+from bns.hardware.leash import Leash
+from bns.hardware.limits import Limits, Operator
+from bns.hardware.line import check_port
+from bns.hardware.priority import urgent
+from bns.hardware.rig import EMULATED, look
+from bns.hardware.tracking.eyes import Eyes
+
+
+@dataclass
+class HexapodRig:
+    """What a session with a hexapod consists of.
+
+    Attributes:
+        bus: its servos.
+        eyes: its tracker.
+        clock: time of the session.
+        limits: bounds that hold.
+        operator: who may stop it.
+        faults: what went wrong so far.
+        leash: to the watchdog.
+        walker: moves it under the limits.
+    """
+
+    bus: Bus
+    eyes: Eyes
+    clock: Clock
+    limits: Limits
+    operator: Operator
+    faults: FaultLog
+    leash: Leash
+    walker: Walker
+
+    def close(self) -> None:
+        """Torque off; give port and camera back."""
+        try:
+            self.bus.close()
+        finally:
+            self.eyes.close()
+            self.leash.release()
+
+
+def connect(
+    port: str,
+    names: tuple[str, ...],
+    camera: str = EMULATED,
+    *,
+    calibration: str = "",
+    servos: str = "",
+    limits: Limits | None = None,
+    log: Path | str | None = None,
+) -> HexapodRig:
+    """Open bus and camera, ask every servo who it is, start the watchdog.
+
+    Args:
+        port: the robot's device.
+        names: of the joints, in the order of the commands.
+        camera: number of a camera, a video file, or "emulated".
+        calibration: file of the camera's calibration; needed for a real one.
+        servos: the robot's own file; needed for a real one.
+        limits: bounds of the session.
+        log: file for what goes wrong.
+
+    Raises:
+        BnsError: something is missing or wrong. Nothing has moved.
+    """
+    clock, limits = RealClock(), limits or Limits()
+    urgent()
+    check_port(port)
+    table = known(servos, camera)
+    faults = FaultLog(clock, log)
+    bus = Bus(port, table, clock, faults=faults)
+    try:
+        bus.identify()
+        charged(bus)
+        eyes = look(port, camera, calibration, "phantomx")
+        try:
+            leash = Leash(bus.fileno(), port, packets.BAUD, "phantomx")
+        except BnsError:
+            eyes.close()
+            raise
+    except BnsError:
+        bus.release()
+        raise
+    bus.guard = leash
+    operator = Operator()
+    walker = Walker(
+        bus,
+        eyes,
+        clock,
+        limits=limits,
+        operator=operator,
+        faults=faults,
+        names=names,
+    )
+    return HexapodRig(bus, eyes, clock, limits, operator, faults, leash, walker)
+
+
+def known(servos: str, camera: str) -> tuple[joints.Joint, ...]:
+    """The joints of the robot.
+
+    Raises:
+        BnsError: a real robot whose zeros were not calibrated, no such file.
+    """
+    if not servos and camera != EMULATED:
+        raise BnsError(
+            "The servos are not calibrated: make their file with `bns hardware "
+            "calibrate --robot phantomx` and give it as --servos FILE."
+        )
+    return joints.read(servos or joints.FILE)
+
+
+def charged(bus: Bus) -> float:
+    """The bus's voltage [V].
+
+    Raises:
+        BnsError: too low to start.
+    """
+    volts = bus.volts()
+    if volts < EMPTY:
+        raise BnsError(
+            f"The bus has {volts:.1f} V, less than {EMPTY:g} V: charge the battery."
+        )
+    return volts

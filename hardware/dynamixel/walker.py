@@ -1,0 +1,282 @@
+"""Carrying out servo goals on a hexapod, frame by frame, with an eye on all there is.
+
+A frame every 33 ms, as in the maker's firmware: the goals of all servos in one packet
+(again, where they have not changed: a broadcast is not acknowledged), then the states
+of a few servos in turn.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bns.errors import BnsError
+from bns.hardware.clock import Clock
+from bns.hardware.dynamixel.bus import Bus, Overload
+from bns.hardware.errors import LinkError, SafetyStop
+from bns.hardware.faults import FaultLog
+from bns.hardware.limits import Limits, Operator
+from bns.hardware.tracking.eyes import Eyes
+from bns.hardware.tracking.tracker import Sighting
+from bns.models.ax12a import SPEED_UNIT
+
+PERIOD = 0.033  # s; the maker's frame
+LATE = 0.005  # s after its moment at which a frame is missed
+READS = 4  # servos read in a frame
+SPEED = round(300 * SPEED_UNIT, 4)  # rad/s; moving speed, as in the world 'hexapod'
+SLOW = 0.8  # rad/s, for getting up
+SETTLE = 0.1  # s after the servos should be there, until a first look at rest
+STILL = 0.18  # s without a change: every servo was read once
+UNITS, MOVED, TURNED = 2, 0.002, np.deg2rad(0.5)  # changes that count as motion
+LOW = 0.020  # share by which the tag is smaller than at the stance: it lies (4 cm down)
+
+
+@dataclass
+class Walked:
+    """What was carried out.
+
+    Attributes:
+        switched: when each command began, the end of the last one added [s].
+        sightings: from before the start on.
+        readings: time [s] and joint angle [rad], by joint.
+        frames: sent.
+        missed: frames later than `LATE`.
+        late: the latest [s].
+        left: it came to the rim, which ended it.
+        overloaded: a servo pushed in vain, which ended it.
+        fell: its belly was on the floor.
+        unrested: a command ended by its time limit.
+    """
+
+    switched: list[float] = field(default_factory=list)
+    sightings: list[Sighting] = field(default_factory=list)
+    readings: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+    frames: int = 0
+    missed: int = 0
+    late: float = 0.0
+    left: bool = False
+    overloaded: bool = False
+    fell: bool = False
+    unrested: bool = False
+
+
+class Walker:
+    """Moves a hexapod under the limits.
+
+    Args:
+        bus: identified, guarded.
+        eyes: that see it.
+        clock: of the session.
+        limits: hold in every frame.
+        operator: may stop it at any time.
+        faults: where faults are noted.
+
+    Attributes:
+        last: newest sighting.
+        goals: in force [rad], by joint in the order of `names`.
+        up: whether it stands on its legs, torque on.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        eyes: Eyes,
+        clock: Clock,
+        *,
+        limits: Limits,
+        operator: Operator,
+        faults: FaultLog,
+        names: Sequence[str],
+    ):
+        self.bus, self.eyes, self.clock = bus, eyes, clock
+        self.limits, self.operator, self.faults = limits, operator, faults
+        self.names = tuple(names)
+        self.last: Sighting | None = None
+        self.goals = np.zeros(len(self.names))
+        self.up = False
+        self._due = 0.0
+        self._side = 0.0  # of the tag as seen at the stance [m]
+        self._rest = _Rest()
+
+    def look(self, done: Walked | None = None) -> list[Sighting]:
+        """New sightings; with the safety checks of a frame.
+
+        Raises:
+            SafetyStop: the operator, the camera or the tracker.
+        """
+        self.operator.check()
+        try:
+            seen = self.eyes.poll()
+        except BnsError as error:
+            raise SafetyStop(f"the camera is lost ({error})", "check it") from error
+        if seen:
+            self.last = seen[-1]
+            self._rest.pose(seen[-1].pose, self.clock.now())
+        late = self.limits.blind + self.eyes.tracker.camera.latency
+        since = self.clock.now() - (self.last.time if self.last else -np.inf)
+        if self.up and since > late:
+            raise SafetyStop("the tracker has lost it", "free the view of its tag")
+        if done is not None:
+            done.sightings += seen
+            done.fell |= any(s.side < self._side * (1 - LOW) for s in seen)
+        return seen
+
+    def wait_for_sight(self, seconds: float = 3.0) -> Sighting:
+        """A fresh sighting.
+
+        Raises:
+            BnsError: the tag is not in view.
+        """
+        begin = self.clock.now()
+        while self.clock.now() - begin < seconds:
+            for sighting in self.look():
+                if sighting.time >= begin:
+                    return sighting
+            if self.up:
+                self.frame()
+            else:
+                self.clock.sleep(PERIOD)
+        raise BnsError(
+            "The robot's tag is not in view: put the robot on the board, free the "
+            "camera's view, light it evenly."
+        )
+
+    def frame(self, done: Walked | None = None) -> None:
+        """Wait for the next frame, send the goals, read some servos."""
+        now = self.clock.now()
+        if now > self._due + PERIOD:  # nothing was asked for in between
+            self._due = now
+        self.clock.sleep(self._due - now)
+        late = self.clock.now() - self._due
+        self._due += PERIOD
+        self.bus.write(dict(zip(self.names, self.goals.tolist(), strict=True)))
+        if done is not None:
+            done.frames += 1
+            done.missed += late > LATE
+            done.late = max(done.late, late)
+        for joint, state in self.bus.look(READS):
+            at, angle = self.clock.now(), joint.angle(state.position)
+            self._rest.servo(joint.id, state.position, at)
+            if done is not None:
+                done.readings.setdefault(joint.name, []).append((at, angle))
+
+    def rise(self) -> None:
+        """Switch the torque on where the legs are, then stand, slowly."""
+        if self.up:
+            return
+        self.wait_for_sight()
+        present = self.bus.angles()
+        self.goals = np.array([present[name] for name in self.names])
+        self.bus.pace(SLOW)
+        self.bus.write(present)
+        self.bus.torque(True)
+        self.up = True
+        try:
+            self.go(np.zeros(len(self.names)), 8.0, speed=SLOW)
+            self.bus.pace(SPEED)
+            self._side = self.wait_for_sight().side
+        except BnsError:
+            self.halt()
+            raise
+
+    def halt(self) -> None:
+        """Torque off, whatever happened."""
+        self.up = False
+        self.bus.torque(False)
+
+    def rest(self) -> None:
+        """It stands, and goes on standing while nobody sends anything."""
+        if self.up and self.bus.guard is not None:
+            self.bus.guard.feed(moving=False)
+
+    def go(
+        self,
+        goals: np.ndarray,
+        limit: float,
+        done: Walked | None = None,
+        *,
+        speed: float = SPEED,
+        wait: bool = True,
+    ) -> bool:
+        """Send goals until the robot rests; whether it does.
+
+        Args:
+            goals: of all servos [rad], ``(18,)``.
+            limit: longest time [s].
+            done: takes what is seen; its `left` ends it, too.
+            speed: of the servos [rad/s].
+            wait: for rest; else the time that the servos need by themselves.
+        """
+        begin = self.clock.now()
+        ready = begin + float(np.abs(goals - self.goals).max()) / speed + SETTLE
+        self.goals = np.array(goals, float)
+        self._rest.again(begin)
+        while self.clock.now() - begin < limit:
+            self.frame(done)
+            for sighting in self.look(done):
+                if done is not None and self.limits.outside(sighting, self.limits.rim):
+                    done.left = True
+                    return False
+            now = self.clock.now()
+            if now >= ready and (not wait or now - self._rest.since >= STILL):
+                return True
+        return False
+
+    def perform(self, goals: np.ndarray, limits: Sequence[float]) -> Walked:
+        """Carry out commands; it stands in the last one afterwards.
+
+        Args:
+            goals: ``(K, 18)`` [rad].
+            limits: longest time of each [s].
+
+        Raises:
+            SafetyStop: it was stopped, torque is off.
+            LinkError: the line died.
+        """
+        done = Walked(sightings=[self.wait_for_sight()])
+        try:
+            self.frame()
+            done.sightings += self.look()
+            for row, limit in zip(goals, limits, strict=True):
+                done.switched.append(self.clock.now())
+                rests = self.go(row, float(limit), done)
+                done.unrested |= not rests and not done.left
+                if done.left:
+                    break
+            done.switched.append(self.clock.now())
+            self.go(self.goals, 0.25, done, wait=False)
+        except Overload:
+            done.overloaded = True
+            done.switched.append(self.clock.now())
+        except (SafetyStop, LinkError):
+            self.halt()
+            raise
+        return done
+
+
+class _Rest:
+    """Since when nothing has moved.
+
+    Attributes:
+        since: time of the newest change [s].
+    """
+
+    def __init__(self):
+        self.since = 0.0
+        self._units: dict[int, int] = {}
+        self._pose = np.full(3, np.inf)
+
+    def again(self, now: float) -> None:
+        """A new goal: motion is to be expected."""
+        self.since = now
+
+    def servo(self, number: int, units: int, now: float) -> None:
+        """A servo's position was read."""
+        if abs(units - self._units.get(number, -9)) > UNITS:
+            self._units[number], self.since = units, now
+
+    def pose(self, pose: np.ndarray, now: float) -> None:
+        """The robot was seen."""
+        off = np.abs(pose - self._pose)
+        if np.hypot(*off[:2]) > MOVED or off[2] > TURNED:
+            self._pose, self.since = pose, now
