@@ -1,17 +1,25 @@
-"""The walking experiments that several benches share (investigation D)."""
+"""The walking experiments that several benches share (investigation D).
 
-from collections.abc import Mapping
+Undamaged runs are the trunk, in batches of ten; the runs of each damage begin as copies
+of a trunk after its last trial, since up to there nothing differs (`branching`).
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from bench import experiments
+from bench import branching, experiments
 from bns.config import RunConfig
 from bns.record import RunRecord
+from bns.worlds.trial import Trial
 
 ONSET = 100  # trial of the damage (dissertation, table 7.4)
-AFTER = 100  # trials from the damage on
-SOLVING = 100  # trials of the undamaged experiment (7.4.2: about 100 for a gait)
+AFTER = 60  # trials from the damage on: more than the latest bar
+GROUPS = ("a", "b", "c")
+GROUP = 10  # runs of a batch
+RECOVERING = ("a",)  # groups that are damaged
 WINDOW = 300
 TYPES = ("type0", "type1", "type3", "type2", "type5")
 BEFORE = 10  # trials whose median distance is what the robot did before the damage
@@ -19,48 +27,115 @@ SHARE = 0.9  # of that distance = recovered
 QUICK = {"replicates": 1, "trials": 12}
 
 
-def undamaged(*, trials: int = SOLVING, replicates: int = 0, **walk: object):
-    """The preset without damage.
+class Hand(NamedTuple):
+    """What the best tripod gait made by hand does in eleven commands.
+
+    Attributes:
+        distance: how far it gets [m].
+        seconds: how long that takes.
+    """
+
+    distance: float
+    seconds: float
+
+
+def undamaged(group: str = "", *, trials: int = ONSET, **walk: object) -> RunConfig:
+    """A batch of the preset without damage.
 
     Args:
+        group: one of `GROUPS`, or another name for other seeds.
         trials: of each run.
-        replicates: runs; 0 = those of all experiments.
         walk: settings of the section `walk` that differ.
     """
     config = _preset()
     config = replace(
         config,
         trials=trials,
+        adaptation=replace(config.adaptation, window=WINDOW),
         walk=replace(config.walk, **walk),
         world=replace(config.world, damage=()),
     )
     words = [f"{key}={value}" for key, value in sorted(walk.items())]
-    named = experiments.named(config, "-".join(["walk", *words]))
-    return replace(named, replicates=replicates or named.replicates)
+    named = experiments.named(config, "-".join(["walk", group, *words]))
+    return replace(named, replicates=GROUP)
 
 
-def damaged(legs: str, **adaptation: object) -> RunConfig:
-    """The preset with legs raised from trial `ONSET` on.
+def damaged(legs: str, group: str = "a") -> RunConfig:
+    """A batch of the preset whose legs are raised from trial `ONSET` on.
 
     Args:
         legs: as the effect `leg_raised` takes them.
-        adaptation: fields of `AdaptationConfig` that differ from the preset's.
+        group: of which undamaged batch it is the continuation.
     """
-    config = _preset()
+    trunk = undamaged(group)
     damage = (f"leg_raised:legs={legs},blend=1@{ONSET}",)
-    config = replace(
-        config,
+    return replace(
+        trunk,
+        preset=f"walk-{legs}-{group}",
         trials=ONSET + AFTER,
-        adaptation=replace(config.adaptation, **{"window": WINDOW} | adaptation),
-        world=replace(config.world, damage=damage),
+        world=replace(trunk.world, damage=damage),
     )
-    words = [f"{key}={value}" for key, value in sorted(adaptation.items())]
-    return experiments.named(config, "-".join(["walk", legs, *words]))
 
 
-def records(configs, *, quick: bool = False) -> Mapping[str, RunRecord]:
+def records(
+    configs: Iterable[RunConfig], *, quick: bool = False
+) -> Mapping[str, RunRecord]:
     """As `experiments.records`, with a look of its own that takes seconds."""
     return experiments.records([small(c) if quick else c for c in configs])
+
+
+def walking(*, quick: bool = False) -> RunRecord:
+    """All undamaged runs, trained where they are missing; quick: one small run."""
+    groups = GROUPS[:1] if quick else GROUPS
+    found = records([undamaged(group) for group in groups], quick=quick)
+    return joined(list(found.values()))
+
+
+def recovering(*, quick: bool = False) -> Mapping[str, RunRecord]:
+    """The runs of each damage of `TYPES`; quick: one small run of each."""
+    wanted = [(legs, group) for legs in TYPES for group in RECOVERING]
+    configs = {key: damaged(*key) for key in wanted}
+    if not quick:
+        records([undamaged(group) for group in RECOVERING])
+        for (_, group), config in configs.items():
+            branching.begin(undamaged(group), config)
+    found = records(configs.values(), quick=quick)
+    return {
+        legs: joined([found[configs[legs, group].preset] for group in RECOVERING])
+        for legs in TYPES
+    }
+
+
+def kept(legs: str) -> list[RunRecord]:
+    """Finished runs of one damage, or of none (`"none"`); nothing is trained."""
+    from bns.store import RunStore
+
+    if legs == "none":
+        configs = [undamaged(group) for group in GROUPS]
+    else:
+        configs = [damaged(legs, group) for group in RECOVERING]
+    places = [experiments.directory(config) for config in configs]
+    stores = [RunStore.open(place) for place in places if (place / "run.json").exists()]
+    return [store.record() for store in stores if store.finished]
+
+
+def joined(parts: list[RunRecord]) -> RunRecord:
+    """Batches of one experiment as one record, in order."""
+    first = parts[0]
+    many = sum(part.replicates for part in parts)
+
+    def together(name: str) -> np.ndarray:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    names = ("sent", "poses", "predicted", "damage_onset")
+    return replace(
+        first,
+        config=replace(first.config, replicates=many),
+        columns={
+            n: np.concatenate([p.columns[n] for p in parts]) for n in first.columns
+        },
+        **{name: together(name) for name in names},
+    )
 
 
 def small(config: RunConfig) -> RunConfig:
@@ -92,6 +167,58 @@ def trials_to_regain(record: RunRecord) -> np.ndarray:
         if len(hit):
             found[run] = hit[0] + 1
     return found
+
+
+def by_hand() -> Hand:
+    """The tripod gait in the undamaged world."""
+    from bns.models.phantomx import gait
+
+    trials = walked([gait.tripod()])
+    return Hand(float(ways(trials)[0]), float(trials[0].times[-1]))
+
+
+def walked(lists: Iterable[np.ndarray], *, damage: str = "") -> list[Trial]:
+    """Trials of lists of goals, each ``(K, 18)`` [rad]; `damage`: an effect as text."""
+    world, commands = standing_by(lists, damage=damage)
+    return world.run(commands)
+
+
+def standing_by(lists: Iterable[np.ndarray], *, damage: str = ""):
+    """The world of `walked`, and its commands."""
+    from bns import models
+    from bns.worlds import registry
+    from bns.worlds.trial import Channel, Commands
+
+    world = registry.make("hexapod", damage=(f"{damage}@0",) if damage else ())
+    channels = tuple(Channel(*item) for item in models.robot("phantomx").channels)
+    limit = _preset().walk.limit
+    return world, [
+        Commands(item, np.full(len(item), limit), channels) for item in lists
+    ]
+
+
+def ways(trials: Sequence[Trial]) -> np.ndarray:
+    """How far trials got, as the learner counts it, ``(N,)`` [m]."""
+    from bns.walk import observing
+
+    return observing.of_trials(trials)
+
+
+def in_time(record: RunRecord, seconds: float) -> np.ndarray:
+    """How far each trial got within a time, ``(R, T)`` [m].
+
+    A trial that took longer counts in proportion, one that took less as it is.
+    """
+    return record["distance"] * np.minimum(1.0, seconds / record["seconds"])
+
+
+def spread(values: np.ndarray) -> dict[str, float]:
+    """Median and range over runs."""
+    return {
+        "median": round(float(np.median(values)), 4),
+        "least": round(float(values.min()), 4),
+        "most": round(float(values.max()), 4),
+    }
 
 
 def _preset() -> RunConfig:

@@ -98,7 +98,7 @@ class Breeder:
             The elites unchanged, then P - elitism children.
         """
         config = self.config
-        parents = selection.select(config.selection, cost, coins.parents)
+        parents = self.parents(cost, coins.parents)
         mothers, fathers = parents.chunk(2, dim=1)
         first, second = take(population, mothers), take(population, fathers)
         children = crossover.cross(
@@ -111,6 +111,10 @@ class Breeder:
         )
         children = self._mutate(children, rates, coins.mutation)
         return self._with_elites(population, cost, children)
+
+    def parents(self, cost: Tensor, coins: Tensor) -> Tensor:
+        """Indices of the parents, ``(R, 2 N)``; `coins` as in `Coins`."""
+        return selection.select(self.config.selection, cost, coins)
 
     def _headless_chicken(
         self, second: Population, coins: Coins, chance: Tensor | None

@@ -26,6 +26,21 @@ def tournament(cost: Tensor, coins: Tensor) -> Tensor:
     return entrants.gather(-1, winner).squeeze(-1)
 
 
+def tournament_by_rank(cost: Tensor, coins: Tensor, size: int) -> Tensor:
+    """As `tournament`, its winners drawn by their ranks: one number for each.
+
+    That all of `size` entrants rank behind place k has the chance ((P - k) / P)^size.
+
+    Args:
+        cost: ``(R, P)``.
+        coins: ``(R, N)``.
+        size: of the tournaments.
+    """
+    count = cost.shape[1]
+    rank = ((1 - coins ** (1 / size)) * count).long().clamp(max=count - 1)
+    return cost.argsort(dim=1, stable=True).gather(1, rank)
+
+
 def best(cost: Tensor, coins: Tensor) -> Tensor:
     """The best individual every time; `coins` ``(R, N, ...)`` only says how often."""
     return cost.argmin(1, keepdim=True).expand(-1, coins.shape[1])

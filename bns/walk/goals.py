@@ -1,7 +1,7 @@
 """Chromosomes of walking robots: K commands of servo goals, always all of them."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -13,6 +13,7 @@ from bns.config import RunConfig
 from bns.draws import Draws
 from bns.errors import BnsError
 from bns.evolution.generation import Breeder, Coins, Rates
+from bns.evolution.selection import tournament_by_rank
 from bns.worlds.trial import Channel, Commands
 
 TICK = math.radians(300 / 1023)  # [rad] AX-12A manual: 300 degrees are 1023 ticks
@@ -93,7 +94,22 @@ class Goals:
 
 
 class GoalBreeder(Breeder):
-    """Makes the next population; children of crossover stay within the bounds, too."""
+    """Makes the next population; children of crossover stay within the bounds, too.
+
+    The winner of a tournament is drawn by its rank, as likely as if all entrants had
+    been drawn: the dissertation's are of 200, and such numbers are dear.
+    """
+
+    def draw(self, runs: int, draws: Draws) -> Coins:
+        """The random numbers of one generation, one a parent."""
+        one = replace(self.config, tournament=1)
+        return Breeder(one, self.encoding, self.fixed_length).draw(runs, draws)
+
+    def parents(self, cost: Tensor, coins: Tensor) -> Tensor:
+        """Indices of the parents, see `Breeder.parents`."""
+        if self.config.selection != "tournament":
+            return super().parents(cost, coins)
+        return tournament_by_rank(cost, coins[..., 0], self.config.tournament)
 
     def breed(
         self, population: Population, cost: Tensor, rates: Rates, coins: Coins

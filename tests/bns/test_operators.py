@@ -30,6 +30,18 @@ def test_tournament_takes_the_best_of_the_drawn():
     assert selection.tournament(COSTS, coins).tolist() == [[2, 3, 1]]
 
 
+@pytest.mark.parametrize("size", [1, 2, 20])
+def test_winners_drawn_by_rank_are_as_likely_as_by_drawing_entrants(size):
+    draws, cost = Draws(3), Draws(1).uniform(2, 30)
+    entrants = selection.tournament(cost, draws.uniform(2, 20_000, size))
+    ranked = selection.tournament_by_rank(cost, draws.uniform(2, 20_000), size)
+    for run in range(2):
+        counts = [
+            torch.bincount(x[run], minlength=30) / 20_000 for x in (entrants, ranked)
+        ]
+        torch.testing.assert_close(*counts, atol=0.015, rtol=0)
+
+
 def test_tournament_pressure_is_that_of_the_definition():
     cost = torch.arange(10.0)[None]
     coins = Draws(1).uniform(1, 40_000, 3)
