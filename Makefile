@@ -1,6 +1,7 @@
 # make demo   train BNS against a damaged robot, leave runs/demo/ with a report
 # make test   run the test suite
 # make lint   formatting and lint checks
+# make api    write the reference of all public names to site/api/ (HTML)
 # make clean  remove the environment and build leftovers (never runs/)
 #
 # Both first make .venv with everything in it, once; PYTHON=... chooses the Python.
@@ -10,11 +11,12 @@ VENV := .venv
 STAMP := $(VENV)/.installed
 BIN := $(VENV)/bin
 DEMO := runs/demo
+API := site/api
 PYTHON ?=
 
 export RERUN_ANALYTICS ?= 0
 
-.PHONY: help demo test lint env clean
+.PHONY: help demo test lint api env clean
 
 help:
 	@sed -n '1,/^$$/s/^# \{0,1\}//p' Makefile
@@ -29,6 +31,12 @@ lint: env
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 
+# importing glfw starts a process, which pdoc forbids unless it is told
+api: env
+	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[docs]'
+	PDOC_ALLOW_EXEC=1 $(BIN)/python -m pdoc --docformat google --no-show-source \
+		--output-directory $(API) bns bns.models bns.worlds bns.gap bns.hardware bns.viz
+
 env: $(STAMP)
 
 $(STAMP): pyproject.toml setup.py constraints.txt
@@ -38,4 +46,4 @@ $(STAMP): pyproject.toml setup.py constraints.txt
 	@touch $@
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info
+	rm -rf $(VENV) site build dist *.egg-info
