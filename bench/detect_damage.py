@@ -6,25 +6,22 @@ and the next one over that of the five trials before).
 
 import numpy as np
 
-from bench import experiments, light_runs
+from bench import experiments, forking, light_runs
 from bench.result import Result
+from bns.config import RunConfig
 from bns.record import RunRecord
 
 DOC = "share of costly damages detected within 2 trials, and false alarms"
 BAR = ">= 95 % detected, <= 1 false alarm per 500 undamaged trials"
 SHARE, ALARMS, COSTLY = 0.95, 1.0, 1.2
-WATCH = {"detect": True}
+RUNS = 12  # of each damage; 30 are the full bench, which then judges the bar
+AFTER = 4  # trials from the damage on, where no other bench needs more
 
 
 def run(quick: bool) -> Result:
-    """30 runs of each of nine damages, from trial 20 of 40, nobody told."""
-    configs = {
-        damage: light_runs.damaged(
-            damage, watch=WATCH, ensemble=True, population_reset=False
-        )
-        for damage in light_runs.ALL
-    }
-    records = experiments.records(configs.values(), quick=quick)
+    """`RUNS` of each of nine damages, from trial 20 on, nobody told (table 6.7)."""
+    configs = {damage: watched(damage) for damage in light_runs.ALL}
+    records = forking.records(configs.values(), quick=quick)
     found = {
         damage: _row(records[config.preset], light_runs.AFFECTED[damage])
         for damage, config in configs.items()
@@ -33,13 +30,22 @@ def run(quick: bool) -> Result:
     hits = sum(row["of them detected"] for row in found.values())
     alarms = sum(row["false alarms"] for row in found.values())
     trials = sum(row["undamaged trials"] for row in found.values())
+    few = quick or RUNS < experiments.REPLICATES
     share, rate = hits / max(costly, 1), 500 * alarms / max(trials, 1)
     return Result(
         figure=share,
         unit="of costly damages",
-        holds=None if quick else share >= SHARE and rate <= ALARMS,
+        holds=None if few else share >= SHARE and rate <= ALARMS,
         n=costly,
         details={"false alarms per 500 trials": round(rate, 3), **found},
+    )
+
+
+def watched(damage: str) -> RunConfig:
+    """The side of a damage whose adaptations follow what is detected."""
+    after = light_runs.AFTER if damage in light_runs.DAMAGES else AFTER
+    return light_runs.damaged(
+        damage, watch={"detect": True}, ensemble=True, runs=RUNS, after=after
     )
 
 

@@ -61,6 +61,7 @@ def damaged(
     watch: Mapping[str, object] | None = None,
     ensemble: bool = False,
     runs: int = experiments.REPLICATES,
+    after: int = AFTER,
     **adaptation: object,
 ) -> RunConfig:
     """Table 6.7 over table 6.1, one of `ALL` from trial `ONSET` on.
@@ -71,6 +72,7 @@ def damaged(
         watch: settings of the section `watch`.
         ensemble: five networks with all outputs instead of one an output.
         runs: runs a side.
+        after: trials from the damage on.
         adaptation: fields of `AdaptationConfig` that differ from table 6.7.
     """
     config, light, watch = _preset(), dict(light or {}), dict(watch or {})
@@ -80,7 +82,7 @@ def damaged(
     texts = (f"{ALL[damage]}@{ONSET}",) if damage else ()
     config = replace(
         config,
-        trials=ONSET + AFTER,
+        trials=ONSET + after,
         snn=snn,
         light=replace(config.light, **own),
         watch=WatchConfig(**watch),

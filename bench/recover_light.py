@@ -1,6 +1,6 @@
 """Recovery in light following: a slow wheel and three sensor damages (table 6.7)."""
 
-from bench import experiments, light_runs, solving
+from bench import forking, light_runs, solving
 from bench.result import Result
 from bns import stats
 
@@ -13,7 +13,7 @@ THESIS = {"slow-wheel": 10, "noisy": 4, "minimum": "8 and 9", "maximum": 7}
 def run(quick: bool) -> Result:
     """30 runs of each damage, from trial 20 of 40."""
     configs = {damage: light_runs.damaged(damage) for damage in light_runs.DAMAGES}
-    records = experiments.records(configs.values(), quick=quick)
+    records = forking.records(configs.values(), quick=quick)
     found: dict[str, dict[str, object]] = {}
     holds, worst = True, 0.0
     for damage, config in configs.items():
