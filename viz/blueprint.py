@@ -10,6 +10,9 @@ CHARTS = (
 )
 """Static bar charts over trials: entity and title."""
 
+WALKED = "Distance walked over trials [m] (brown: damaged)"
+"""Title of the first chart where the robot walks."""
+
 CURVES = (
     ("curves/fitness", "Fitness"),
     ("curves/reached", "Objectives reached"),
@@ -31,6 +34,7 @@ def blueprint(
     seconds: float = 0.0,
     follow: bool = False,
     readings: bool = False,
+    walks: bool = False,
 ):
     """The layout: the world on the left, learning on the right.
 
@@ -42,19 +46,22 @@ def blueprint(
         seconds: length of what is shown on `sim_time` [s]; 0 = not known.
         follow: open on the timeline `trial` and follow its end (live streams).
         readings: show what light sensors read.
+        walks: the robot has legs: no wheels' speeds, and distances for fitness.
     """
     import rerun.blueprint as rrb
 
     world = _world(rrb, half_width, half_depth)
-    seen = [_readings(rrb, seconds)] if readings else []
+    seen = [] if walks else [_wheels(rrb, seconds)]
+    seen += [_readings(rrb, seconds)] if readings else []
     left = _left(rrb, world, seconds, seen)
+    titles = dict(CHARTS) | ({CHARTS[0][0]: WALKED} if walks else {})
     curves = rrb.Vertical(
         *(_curve(rrb, path, name) for path, name in CURVES),
         name="Curves (choose the timeline 'trial')",
     )
     right = rrb.Tabs(
         rrb.Vertical(
-            *(_bars(rrb, path, name) for path, name in CHARTS),
+            *(_bars(rrb, path, name) for path, name in titles.items()),
             name="Over trials",
         ),
         curves,
@@ -77,20 +84,23 @@ def blueprint(
 
 
 def _left(rrb, world, seconds: float, seen: list):
-    """The world, which trial is on, the wheels, and what else is seen over time."""
+    """The world, which trial is on, and what is `seen` over time besides."""
     return rrb.Vertical(
         world,
         rrb.StateTimelineView(
             origin="/moment", name="Which trial is on", time_view=_axis(rrb, seconds)
         ),
-        rrb.TimeSeriesView(
-            origin="/wheels",
-            name="Wheel speeds as sent [m/s]",
-            axis_x=_axis(rrb, seconds),
-            plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
-        ),
         *seen,
-        row_shares=[6, 1.1, 1.9, *[1.9 for _ in seen]],
+        row_shares=[6, 1.1, *[1.9 for _ in seen]],
+    )
+
+
+def _wheels(rrb, seconds: float):
+    return rrb.TimeSeriesView(
+        origin="/wheels",
+        name="Wheel speeds as sent [m/s]",
+        axis_x=_axis(rrb, seconds),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
     )
 
 

@@ -58,6 +58,7 @@ def write(
         *scene.extent(record.config),
         seconds=seconds,
         readings="readings" in record.extra,
+        walks=scene.walks(record.config),
     )
     stream.save(str(path), default_blueprint=layout)
     stream.send_recording_name(
@@ -122,7 +123,7 @@ def _about(record: RunRecord, replicate: int, chosen: Sequence[Choice]):
         "",
         "**World.** Solid trails are where the robot went, dashed trails where its "
         "simulator network (SNN) said it would go. " + _discs(record.config) + " Press "
-        "play: the robot drives through the trials below, one after another.",
+        "play: the robot goes through the trials below, one after another.",
         "",
         *(f"- trial {choice.trial}: {choice.label}" for choice in chosen),
         "",

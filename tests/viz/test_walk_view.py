@@ -62,3 +62,24 @@ def test_a_raised_leg_is_in_the_air_and_the_others_are_not(model):
 def test_only_walking_robots_report_servos():
     bare = Trial(Commands([[0.1, 0.1]], [1.0]), [0, 1], np.zeros((2, 3)), [0, 1])
     assert walk_view.reports_servos(trial({})) and not walk_view.reports_servos(bare)
+
+
+@pytest.mark.parametrize("walks", [False, True])
+def test_a_recording_of_walking_shows_distances_and_no_wheels(walks):
+    from bns.viz import blueprint
+
+    layout = blueprint.blueprint(1.0, 1.0, walks=walks)
+    shown = dict(_views(layout.root_container))
+    assert ("/wheels" in shown) != walks
+    title = shown["charts/fitness"]
+    assert title.startswith(
+        "Distance walked" if walks else "Fitness over trials (log10"
+    )
+
+
+def _views(part):
+    """(origin, name) of all views in a part of a blueprint."""
+    for inner in getattr(part, "contents", ()):
+        if hasattr(inner, "origin"):
+            yield inner.origin, inner.name
+        yield from _views(inner)
