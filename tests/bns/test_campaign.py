@@ -257,6 +257,24 @@ def test_ray_that_is_not_there_and_addresses_that_are_none(monkeypatch):
         list(ray_engine.RayEngine().run([], beat=lambda key, trials: None))
 
 
+def test_a_batch_hangs_only_once_it_has_started_and_said_nothing_new():
+    from bns.campaign.engines.pulse import Pulse, Watch
+
+    now, pulse = [0.0], Pulse()
+    watch = Watch(10.0, clock=lambda: now[0])
+    pulse.beat("a", 0)
+    assert watch.news(pulse.all()) == {"a": 0}
+    now[0] = 9.0
+    pulse.beat("a", 1)
+    assert watch.news(pulse.all()) == {"a": 1}
+    now[0] = 18.0
+    assert watch.news(pulse.all()) == {} and watch.hanging() == []
+    now[0] = 19.5
+    assert watch.hanging() == ["a"]
+    watch.forget("a")
+    assert watch.hanging() == []
+
+
 def test_engines_are_found_by_name():
     assert registry.make("local", workers=3).workers == 3
     with pytest.raises(BnsError, match="Did you mean 'local'"):

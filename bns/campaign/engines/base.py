@@ -9,6 +9,9 @@ from bns.campaign.plan import Job
 Beat = Callable[[str, int], None]
 """called with a job's key and the trials it has done"""
 
+PATIENCE = 900.0
+"""time without a sign of life after which a worker hangs [s]; compiling takes 60"""
+
 
 @dataclass(frozen=True)
 class Outcome:

@@ -19,14 +19,11 @@ from dataclasses import replace
 from typing import IO
 
 from bns.campaign.engines import frames
-from bns.campaign.engines.base import Beat, Outcome
+from bns.campaign.engines.base import PATIENCE, Beat, Outcome
 from bns.campaign.plan import Job
 
 ATTEMPTS = 5
 """times a batch is given to a worker before the worker's death is the batch's fault"""
-
-PATIENCE = 900.0
-"""time without a sign of life after which a worker hangs [s]; compiling takes 60"""
 
 ONE_THREAD = {
     "OMP_NUM_THREADS": "1",

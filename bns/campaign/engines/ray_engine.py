@@ -1,6 +1,7 @@
 """Ray: batches on the nodes of a cluster, or on one that is started here.
 
-An optional extra. A batch on a node that dies is started on another one.
+An optional extra. A batch on a node that dies is started on another one, and so is one
+that has not finished a trial for too long.
 """
 
 import os
@@ -8,15 +9,20 @@ import socket
 import time
 from collections import deque
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from bns.campaign import work
-from bns.campaign.engines.base import Beat, Outcome, outcome
+from bns.campaign.engines.base import PATIENCE, Beat, Outcome, outcome
+from bns.campaign.engines.pulse import Pulse, Watch
 from bns.campaign.plan import Job
 from bns.errors import BnsError, MissingDependencyError
 
 RETRIES = 4
 """times a batch is started again when its worker or node dies"""
+
+LISTEN_SECONDS = 2.0
+"""time between two looks at how far the batches are [s]"""
 
 ANSWER_SECONDS = 5.0
 """time in which a cluster has to answer [s]"""
@@ -29,37 +35,23 @@ class RayEngine:
         address: of a cluster, ``host:port`` or ``ray://host:port``; empty starts one
             on this machine.
         workers: CPUs of a cluster that is started here.
+        patience: time without a finished trial after which a batch hangs [s].
     """
 
     name = "ray"
 
-    def __init__(self, address: str = "", *, workers: int = 2):
-        self.address, self.workers = address, workers
+    def __init__(
+        self, address: str = "", *, workers: int = 2, patience: float = PATIENCE
+    ):
+        self.address, self.workers, self.patience = address, workers, patience
 
     def run(self, jobs: Sequence[Job], *, beat: Beat) -> Iterator[Outcome]:
         """See `Engine.run`."""
         ray = self._start()
         try:
-            task = ray.remote(num_cpus=1, max_retries=RETRIES)(work.timed)
-            yield from self._all(ray, task, jobs)
+            yield from _Session(ray, self.patience).run(jobs, beat)
         finally:
             ray.shutdown()
-
-    def _all(self, ray: Any, task: Any, jobs: Sequence[Job]) -> Iterator[Outcome]:
-        waiting = deque(jobs)
-        going: dict[Any, tuple[str, float]] = {}
-        while waiting or going:
-            room = 4 * max(1, int(ray.cluster_resources().get("CPU", 1)))
-            while waiting and len(going) < room:
-                job = waiting.popleft()
-                going[task.remote(job.to_mapping())] = (job.key, time.monotonic())
-            ready, _ = ray.wait(list(going), num_returns=1)
-            key, started = going.pop(ready[0])
-            try:
-                given = ray.get(ready[0])
-            except ray.exceptions.RayError as error:
-                given = f"worker lost: {work.describe(error)}", 0.0
-            yield outcome(key, given, time.monotonic() - started)
 
     def check(self) -> "RayEngine":
         """This engine, if Ray is there and the cluster answers.
@@ -97,6 +89,85 @@ class RayEngine:
                 f"{work.describe(error)}"
             ) from error
         return ray
+
+
+class _Session:
+    """All batches of a campaign on a cluster that is up."""
+
+    def __init__(self, ray: Any, patience: float):
+        self.ray, self.watch = ray, Watch(patience)
+        here = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(
+            ray.get_runtime_context().get_node_id(), soft=True
+        )
+        actor = ray.remote(num_cpus=0, max_restarts=-1, scheduling_strategy=here)
+        self.pulse = actor(Pulse).remote()
+        self.task = ray.remote(num_cpus=1, max_retries=RETRIES)(_heard)
+        self.going: dict[Any, tuple[Job, int, float]] = {}
+
+    def run(self, jobs: Sequence[Job], beat: Beat) -> Iterator[Outcome]:
+        """See `Engine.run`."""
+        waiting = deque((job, 1) for job in jobs)
+        while waiting or self.going:
+            room = 4 * max(1, int(self.ray.cluster_resources().get("CPU", 1)))
+            while waiting and len(self.going) < room:
+                job, attempt = waiting.popleft()
+                name = _name(job.key, attempt)
+                going = self.task.remote(job.to_mapping(), self.pulse, name)
+                self.going[going] = (job, attempt, time.monotonic())
+            ready, _ = self.ray.wait(list(self.going), timeout=LISTEN_SECONDS)
+            if ready:
+                yield self._ended(ready[0])
+            for name, trials in self._news().items():
+                beat(name.partition(" ")[0], trials)
+            for name in self.watch.hanging():
+                job, attempt = self._cancelled(name)
+                if attempt <= RETRIES:
+                    waiting.appendleft((job, attempt + 1))
+                else:
+                    reason = f"worker lost: no trial in {self.watch.patience:.0f} s"
+                    yield Outcome(job.key, None, reason, attempts=attempt)
+
+    def _ended(self, reference: Any) -> Outcome:
+        job, attempt, started = self.going.pop(reference)
+        self.watch.forget(_name(job.key, attempt))
+        try:
+            given = self.ray.get(reference)
+        except self.ray.exceptions.RayError as error:
+            given = f"worker lost: {work.describe(error)}", 0.0
+        ended = outcome(job.key, given, time.monotonic() - started)
+        return replace(ended, attempts=attempt)
+
+    def _news(self) -> dict[str, int]:
+        """What batches that are going have said since; nothing while nobody listens."""
+        try:
+            done = self.ray.get(self.pulse.all.remote(), timeout=LISTEN_SECONDS)
+        except (self.ray.exceptions.RayError, TimeoutError):
+            return {}
+        mine = {_name(job.key, attempt) for job, attempt, _ in self.going.values()}
+        return self.watch.news({name: done[name] for name in done if name in mine})
+
+    def _cancelled(self, name: str) -> tuple[Job, int]:
+        """End a batch that hangs; gives its job and how often it was started."""
+        reference = next(
+            reference
+            for reference, (job, attempt, _) in self.going.items()
+            if _name(job.key, attempt) == name
+        )
+        job, attempt, _ = self.going.pop(reference)
+        self.ray.cancel(reference, force=True)
+        self.watch.forget(name)
+        return job, attempt
+
+
+def _name(key: str, attempt: int) -> str:
+    """Of a batch while it is going; what an attempt said counts for that one only."""
+    return f"{key} {attempt}"
+
+
+def _heard(content: dict[str, Any], pulse: Any, name: str) -> tuple[bytes | str, float]:
+    """`work.timed`, saying how far it is."""
+    pulse.beat.remote(name, 0)
+    return work.timed(content, lambda trials: pulse.beat.remote(name, trials))
 
 
 def _ray() -> Any:
