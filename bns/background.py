@@ -20,6 +20,9 @@ from bns.worlds import alarm
 from bns.worlds.damage import Damage
 from bns.worlds.trial import Trial
 
+OPEN_LOOP = ("navigation", "walk")
+"""learners that can: what they try is known before it is tried"""
+
 CHUNK = 5  # generations between two looks whether the trial is over
 LEAST = 20  # generations in a trial, even where it takes no time
 LONGEST = 2000  # generations in a trial: beyond, the population has long converged
@@ -122,13 +125,14 @@ class Worker:
         replicates: Sequence[int],
         onsets: Sequence[int],
     ):
-        from bns.learner import Learner
+        from bns.learners import registry as learners
 
         still = [
             replace(config, evolution=replace(config.evolution, generations=0))
             for config in configs
         ]
-        self.learner = Learner(still, replicates=replicates, onsets=onsets)
+        kind = learners.get(configs[0].learner)
+        self.learner = kind.make(still, replicates=replicates, onsets=onsets)
         self._inner = copy(self.learner.inner)
         chunk = replace(configs[0].evolution, generations=CHUNK)
         self._inner.config = replace(configs[0], evolution=chunk)
@@ -137,15 +141,12 @@ class Worker:
 
     def breed(self) -> None:
         """A few generations."""
-        import torch
-
-        from bns.evolution.generation import Rates
-
         learner = self.learner
-        rate, magnitude = learner.adaptations.mutation(self._trial)
-        rates = Rates(torch.from_numpy(rate), torch.from_numpy(magnitude))
         learner.population, learner.cost = self._inner.evolve(
-            learner.theta, learner.population, learner.cost, rates
+            learner.theta,
+            learner.population,
+            learner.cost,
+            learner._rates(self._trial),
         )
         self.generations += CHUNK
         self.busy = self.generations < LONGEST
@@ -186,12 +187,12 @@ def behind(config: RunConfig) -> Background:
     """The learner of all replicates of a configuration.
 
     Raises:
-        BnsError: it is not one for navigation.
+        BnsError: a learner that closes a loop with the robot.
     """
-    if config.learner != "navigation":
+    if config.learner not in OPEN_LOOP:
         raise BnsError(
-            f"Learner {config.learner!r} cannot go on in the background; 'navigation' "
-            "can."
+            f"Learner {config.learner!r} cannot go on in the background; "
+            f"{' and '.join(map(repr, OPEN_LOOP))} can."
         )
     runs = config.replicates
     onset = Damage.parse(config.world.damage).first_trial

@@ -12,13 +12,10 @@ from bns.hardware.khepera.driver import Drive, Khepera3
 from bns.hardware.limits import Limits, Operator
 from bns.hardware.tracking.eyes import Eyes
 from bns.hardware.tracking.tracker import Sighting
+from bns.hardware.wheels import Wheels
 
 TICK = 0.03  # s between two looks at everything
-CHECK = 0.12  # s between two looks at the wheels' speeds
-MEMORY = 0.7  # s for which an old set point may still show in the wheels' speeds
-SLACK, SHARE = 900, 0.06  # speed units, share: what wheels may be off a set point
-SETTLED = 0.6  # s after which a set point that was sent again shows in the speeds
-ASTRAY = 0.015  # m that wrong or mistimed set points may lead a wheel astray
+ASTRAY = 0.018  # m that a wrong or mistimed set point may lead a wheel astray
 LATE = 0.25  # s by which a command may be late before the trial is void
 AFTER = 0.25  # s of looking on after the last command
 
@@ -164,7 +161,7 @@ class Mover:
         """
         stand = self.wait_for_sight()
         done = Performed(sightings=[stand])
-        self._wheels = _Wheels(self)
+        self._wheels = Wheels(self)
         try:
             begin = None
             for point in schedule:
@@ -211,78 +208,6 @@ class Mover:
         if done.late > LATE:
             raise Void(f"a command was {done.late:.2f} s late")
         if self._wheels.astray > ASTRAY:
-            raise Void(f"set points led a wheel {self._wheels.astray:.3f} m astray")
+            raise Void(f"a set point led a wheel {self._wheels.astray:.3f} m astray")
         if self._wheels.stubborn:
             done.notes.append("a wheel does not follow its set point")
-
-
-class _Wheels:
-    """Whether the wheels do as they were told; a wrong set point is sent again.
-
-    A digit that is lost on the line is acknowledged like any other number, so the
-    speeds are read. What a wrong set point did until it was put right, and what a
-    repeated one leaves open of its moment, is added up as a way that wheels were led
-    astray. A wheel that stays off after the set point was sent again is like that: a
-    damaged robot, and no fault of the line.
-    """
-
-    def __init__(self, mover: Mover):
-        self.mover, self.astray, self.stubborn = mover, 0.0, mover.stubborn
-        self._good = self._next = mover.clock.now()
-        self._doubt = 0.0  # m that the fault in question led a wheel astray
-        self._ignore = False
-        self._units = (0, 0)
-
-    def switched(self, drive: Drive) -> None:
-        """A new set point holds."""
-        if self._doubt and not self.stubborn:
-            self.astray += self._doubt
-        jump = max(abs(a - b) for a, b in zip(drive.units, self._units, strict=True))
-        normal = 3 * min(self.mover.robot.round_trips[-20:])
-        if drive.took > normal:  # repeated: either of them may have got through
-            self.astray += drive.took / 2 * self._metres(jump)
-        self._units, self._good = drive.units, drive.at
-        self._ignore, self._doubt = False, 0.0
-        self._next = drive.at + CHECK
-
-    def _metres(self, units: float) -> float:
-        return self.mover.robot.units.speed(units)
-
-    def look(self, left: float) -> None:
-        """Read the speeds where it is time and nothing else is due within 0.06 s."""
-        now = self.mover.clock.now()
-        if now < self._next or left < 0.06 or self._ignore:
-            return
-        self._next = now + CHECK
-        off = self._off() and self._off()
-        if not off:
-            self.astray += self._doubt  # sending it again has helped: it was wrong
-            self._doubt, self._good = 0.0, self.mover.clock.now()
-        elif self._doubt:  # sending it again has not helped
-            self._ignore = self.stubborn = self.mover.stubborn = True
-            self._doubt = 0.0
-        else:
-            self._again(off)
-
-    def _again(self, off: float) -> None:
-        """Send the set point again; `off` is what the wheels are off it [units]."""
-        mover, last = self.mover, self.mover.points[-1]
-        mover.faults.note("wheels not as told", str(last.units), str(off))
-        again = mover.robot.drive(*(self._metres(u) for u in last.units), times=2)
-        # the wheels lag: until now they have shown about half of what is wrong
-        self._doubt = 2 * self._metres(off) * (again.at - self._good)
-        self._next = again.at + SETTLED
-
-    def _off(self) -> float:
-        """By how much a wheel is off its set points [units], 0 where it is not."""
-        seen = self.mover.robot.speeds()
-        now, points = self.mover.clock.now(), self.mover.points
-        recent = [p.units for p in points if now - p.at < MEMORY]
-        before = [p.units for p in points if now - p.at >= MEMORY][-1:] or [(0, 0)]
-        worst = 0.0
-        for side in (0, 1):
-            told = [p[side] for p in (*before, *recent)]
-            slack = SLACK + SHARE * max(map(abs, told))
-            low, high = min(told) - slack, max(told) + slack
-            worst = max(worst, low - seen[side], seen[side] - high)
-        return worst

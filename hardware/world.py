@@ -15,7 +15,7 @@ from bns.worlds.damage import Damage
 from bns.worlds.trial import Commands, Trial
 
 STAGES = ("command", "actuator")
-TRIES = 12  # of a trial that is void
+TRIES = 20  # of a trial that is void
 INSIDE = 0.15  # m from the edge at which a trial may start, at least
 
 
@@ -68,7 +68,10 @@ class HardwareWorld:
         del threads
         self.model = models.robot(robot)
         if robot != "khepera3":
-            raise BnsError(f"World 'hardware' drives khepera3, not {robot!r}.")
+            raise BnsError(
+                f"This world drives khepera3, not {robot!r}: for a hexapod take "
+                "`bns run hexapod-walk --world hardware`, or HardwareHexapod."
+            )
         self.robot = robot
         self.damage = active.per_robot(damage)
         self.reality = active.as_damage(reality)

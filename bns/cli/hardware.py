@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import tyro
 
@@ -41,8 +41,8 @@ class Emulate:
     """version that it answers"""
     latency: float = 0.01
     """of the link, one way [s]"""
-    battery: float = 7.9
-    """voltage [V]"""
+    battery: float = 0.0
+    """voltage [V]; 0 = full, 7.9 V or 11.1 V"""
     lost: float = 0.0
     """probability that a byte is lost"""
     corrupted: float = 0.0
@@ -52,7 +52,17 @@ class Emulate:
     seed: int = 0
     """of what is random"""
     log: str = ""
-    """file for a line whenever set point or motion change"""
+    """file for a line whenever set point or motion, or the hexapod's torque, change"""
+    baud: int = 0
+    """rate that it talks at; 0 = the robot's own"""
+    servos: str = ""
+    """hexapod: file that says how its horns really sit"""
+    absent: tuple[int, ...] = ()
+    """hexapod: servos that are not there"""
+    doubled: tuple[int, ...] = ()
+    """hexapod: numbers that two servos have"""
+    upset: float = 0.0
+    """hexapod: probability that a status carries a random error bit"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,6 +77,8 @@ class Connection:
     """number of a camera, a video file, or emulated"""
     calibration: str = ""
     """file that `bns hardware calibrate` wrote; needed for a real camera"""
+    servos: str = ""
+    """hexapod: file of its servos, see `bns hardware calibrate`"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,38 +142,41 @@ def main(verb: str, argv: list[str]) -> int:
 
 
 def _emulate(given: Emulate) -> int:
-    for name in ("lost", "corrupted"):
+    for name in ("lost", "corrupted", "upset"):
         if not 0 <= getattr(given, name) <= 0.5:
             raise BnsError(f"--{name} = {getattr(given, name)}: give 0 to 0.5.")
     print(f"{given.robot} on {given.port}; Ctrl-C ends it.", flush=True)
     from bns.hardware.priority import urgent
 
     urgent()
+    x, y, yaw = given.start
+    shared: dict[str, Any] = {
+        "effects": given.effects,
+        "start": (x, y, math.radians(yaw)),
+        "lost": given.lost,
+        "corrupted": given.corrupted,
+        "rate": given.rate,
+        "seed": given.seed,
+        "log": given.log,
+    }
+    if given.baud:
+        shared["baud"] = given.baud
+    if given.battery:
+        shared["battery"] = given.battery
     if given.robot == "phantomx":
+        from bns.hardware.dynamixel.joints import FILE
         from bns.hardware.emulators.run_bus import phantomx
 
         phantomx(
             given.port,
-            lost=given.lost,
-            corrupted=given.corrupted,
-            seed=given.seed,
-            battery=given.battery if given.battery > 9 else 11.1,
+            servos=given.servos or FILE,
+            absent=given.absent,
+            doubled=given.doubled,
+            upset=given.upset,
+            **shared,
         )
         return 0
     from bns.hardware.emulators.run import khepera3
 
-    x, y, yaw = given.start
-    khepera3(
-        given.port,
-        effects=given.effects,
-        start=(x, y, math.radians(yaw)),
-        version=(given.firmware, 0),
-        latency=given.latency,
-        battery=given.battery,
-        lost=given.lost,
-        corrupted=given.corrupted,
-        rate=given.rate,
-        seed=given.seed,
-        log=given.log,
-    )
+    khepera3(given.port, version=(given.firmware, 0), latency=given.latency, **shared)
     return 0

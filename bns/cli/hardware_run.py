@@ -23,22 +23,11 @@ def execute(given: Any) -> int:
     urgent()
     from bns.cli import outputs
     from bns.hardware.errors import LinkError, SafetyStop
-    from bns.hardware.world import HardwareWorld
     from bns.run import train
-    from bns.tasks import NavigationTask
 
     config = replace(given.config, replicates=1, record_replicates=1, threads=1)
     out = Path(given.out)
-    world = HardwareWorld(
-        config.world.robot,
-        damage=config.world.damage,
-        reality=config.world.reality,
-        sample_dt=config.world.sample_dt,
-        start=NavigationTask.of(config.task).start,
-        port=given.port,
-        camera=given.camera,
-        calibration=given.calibration,
-    )
+    world = _world(given, config)
     world.connected()  # before anything is written
     try:
         with outputs.live(given.rerun, config) as on_trial:
@@ -60,3 +49,25 @@ def execute(given: Any) -> int:
         world.close()
     outputs.write(record, out, recording=given.rerun != "off", report=given.report)
     return 0
+
+
+def _world(given: Any, config: Any) -> Any:
+    """The robot of a configuration as a world."""
+    from bns.learners import registry as learners
+
+    settings: dict[str, Any] = {
+        "damage": config.world.damage,
+        "reality": config.world.reality,
+        "sample_dt": config.world.sample_dt,
+        "port": given.port,
+        "camera": given.camera,
+        "calibration": given.calibration,
+        **learners.get(config.learner).surroundings(config),
+    }
+    if config.world.robot == "phantomx":
+        from bns.hardware.hexapod_world import HardwareHexapod
+
+        return HardwareHexapod(servos=given.servos, **settings)
+    from bns.hardware.world import HardwareWorld
+
+    return HardwareWorld(config.world.robot, **settings)

@@ -18,10 +18,11 @@ from bns.hardware.errors import LinkError, SafetyStop
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera.driver import Guard
 from bns.hardware.line import INSTALL, check_port
+from bns.worlds.legged_flags import OVERLOAD_TIME, SATURATED, STALLED
 
 TRIES = 4
-HOT, FULL, EMPTY = 65, 0.85, 9.9  # C, share of torque, V: beyond it the robot rests
-OVERLOAD = 3  # reads in a row with too much load before it counts
+HOT, EMPTY = 65, 9.9  # C, V: beyond it the robot rests
+SLOWEST = STALLED / packets.SPEED_UNIT  # units; slower, a servo stands still
 LATENCY = 0.02  # s allowed for an answer beside its bytes
 
 
@@ -67,7 +68,7 @@ class Bus:
         self._goals = sdk.GroupSyncWrite(self._port, self._protocol, packets.GOAL, 2)
         self._sdk = sdk
         self.states: dict[int, packets.State] = {}
-        self._loaded: dict[int, int] = {}
+        self._loaded: dict[int, float] = {}
         self._next, self._on = 0, False
 
     def fileno(self) -> int:
@@ -147,9 +148,11 @@ class Bus:
             )
         if state.voltage < EMPTY:
             raise SafetyStop(f"the bus has {state.voltage} V", "charge the battery")
-        over = self._loaded.get(joint.id, 0) + 1 if abs(state.load) > FULL else 0
-        self._loaded[joint.id] = over
-        if over >= OVERLOAD:
+        if abs(state.load) < SATURATED or abs(state.speed) > SLOWEST:
+            self._loaded.pop(joint.id, None)
+            return
+        since = self._loaded.setdefault(joint.id, self.clock.now())
+        if self.clock.now() - since > OVERLOAD_TIME:
             self._loaded.clear()
             raise Overload(f"{joint.name} is overloaded", "free the leg")
 

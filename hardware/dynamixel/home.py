@@ -19,6 +19,7 @@ CLOSE = 0.04  # m from the start that will do
 TURNED = np.deg2rad(8.0)  # off the start's heading that will do
 STRIDE, TURN = 0.09, np.deg2rad(18.0)  # largest way and turn of a step
 LIFT = 0.04  # m of a swinging foot
+REACH, HEIGHT = 0.13, 0.12  # m of the feet from the hips, of the hips above them
 TIME = 90.0  # s to get there
 STEP = 2.0  # s, longest time of half a step
 
@@ -36,7 +37,7 @@ def go(walker: Walker, target: Sequence[float]) -> Sighting:
     """
     walker.rise()
     begin, swing = walker.clock.now(), ONE_SET
-    seen = _placed(walker, swing)
+    seen = _halfway(walker)
     while not _there(seen, target):
         if walker.clock.now() - begin > TIME:
             walker.halt()
@@ -44,10 +45,11 @@ def go(walker: Walker, target: Sequence[float]) -> Sighting:
                 "The robot does not get back to the start: see that nothing is in its "
                 "way, or put it there by hand."
             )
+        _put(walker, _stance())
         for _ in range(_steps(seen, target)):
             _step(walker, swing, target)
             swing = ~swing
-        seen = _placed(walker, swing)
+        seen = _halfway(walker)
     return seen
 
 
@@ -64,7 +66,7 @@ def _step(walker: Walker, swing: np.ndarray, target: Sequence[float]) -> None:
     away = float(np.hypot(*gap))
     way = gap * min(1.0, STRIDE / max(away, 1e-9))
     turn = float(np.clip(turn, -TURN, TURN))
-    feet = kinematics.feet(np.zeros(18))
+    feet = _stance()
     ahead, behind = _moved(feet, way / 2, turn / 2), _moved(feet, -way / 2, -turn / 2)
     placed = np.where(swing[:, None], ahead, behind)
     raised = placed + np.column_stack([np.zeros((6, 2)), LIFT * swing])
@@ -72,17 +74,29 @@ def _step(walker: Walker, swing: np.ndarray, target: Sequence[float]) -> None:
         walker.go(_inside(each), STEP, wait=False)
 
 
-def _placed(walker: Walker, swing: np.ndarray) -> Sighting:
-    """Put the feet half-way again, one tripod after the other; where it then stands."""
-    feet = kinematics.feet(np.zeros(18))
+def _halfway(walker: Walker) -> Sighting:
+    """Stand with all servos half-way; where it then is."""
+    if np.abs(walker.goals).max() > 1e-6:
+        _put(walker, kinematics.feet(np.zeros(18)))
+    walker.go(np.zeros(18), STEP)
+    return walker.wait_for_sight()
+
+
+def _put(walker: Walker, feet: np.ndarray) -> None:
+    """Put the feet somewhere else, one tripod after the other."""
     now = kinematics.feet(walker.goals)
-    for up in (swing, ~swing):
+    for up in (ONE_SET, ~ONE_SET):
         lifted = np.where(up[:, None], feet + np.array([0, 0, LIFT]), now)
         walker.go(_inside(lifted), STEP, wait=False)
         now = np.where(up[:, None], feet, now)
         walker.go(_inside(now), STEP, wait=False)
-    walker.go(np.zeros(18), STEP)
-    return walker.wait_for_sight()
+
+
+def _stance() -> np.ndarray:
+    """Feet in mid-stride, ``(6, 3)`` [m]."""
+    s = kinematics.shape()
+    out = np.column_stack([np.sin(s.heading), s.side * np.cos(s.heading)])
+    return np.column_stack([s.hips + REACH * out, np.full(6, -HEIGHT)])
 
 
 def _inside(feet: np.ndarray) -> np.ndarray:

@@ -227,10 +227,8 @@ class Khepera3:
         understood: Callable,
         heard: list[bytes] | None = None,
     ):
-        def once():
-            return self._line(command, understood, heard)
-
-        return self._repeat(once, command.decode().strip())
+        what = command.decode().strip()
+        return self._repeat(lambda: self._line(command, understood, heard), what)
 
     def _repeat(self, once: Callable, what: str):
         for _ in range(RETRIES + 1):

@@ -1,0 +1,97 @@
+"""From what a hexapod carried out and what was seen to a trial."""
+
+import numpy as np
+
+from bns.errors import BnsError
+from bns.hardware.dynamixel.walker import Walked
+from bns.hardware.errors import Void
+from bns.hardware.records import interpolated
+from bns.worlds.trial import Channel, Commands, Outcome, Trial
+
+LATE = 0.25  # s by which a frame may be late before the trial is void
+BEHIND = 0.1  # s between the samples of commands that were not reached
+
+
+def trial(
+    done: Walked,
+    commands: Commands,
+    *,
+    sample_dt: float,
+    start_yaw: float,
+    robot: str,
+    world: str,
+    channels: tuple[Channel, ...],
+    conditions: dict,
+) -> Trial:
+    """The trial of commands that were carried out.
+
+    The samples lie on a regular grid and at the moments at which commands changed;
+    what lies between pictures and between readings is interpolated. Commands that were
+    not reached are there, with NaN as poses.
+
+    Args:
+        done: what happened.
+        commands: what was wanted.
+        sample_dt: time between samples [s].
+        start_yaw: heading at the start [rad], for continuous yaws.
+        robot, world, channels, conditions: see `Trial`.
+
+    Raises:
+        Void: too little was seen, or a frame came too late.
+    """
+    if done.late > LATE:
+        raise Void(f"a frame was {done.late:.2f} s late")
+    moments = np.array(done.switched) - done.switched[0]
+    if len(moments) < 2:
+        raise BnsError("No command was carried out.")
+    grid = np.arange(0.0, moments[-1], sample_dt)
+    apart = np.abs(grid[:, None] - moments).min(1) > 1e-3
+    times = np.union1d(grid[apart], moments)
+    observed = _observed(done, times + done.switched[0], channels, start_yaw)
+    boundaries = np.searchsorted(times, moments - 1e-9)
+    lost = np.isnan(observed[:, 0])
+    if lost.mean() > 0.3 or lost[boundaries].mean() > 0.3:
+        raise Void(f"the robot was seen in {1 - lost.mean():.0%} of the samples")
+    short = len(commands) - (len(moments) - 1)
+    if short:
+        times = np.append(times, times[-1] + BEHIND * np.arange(1, short + 1))
+        observed = np.vstack([observed, np.full((short, len(channels)), np.nan)])
+        boundaries = np.append(boundaries, len(times) - short + np.arange(short))
+    spans = np.diff(times[boundaries])
+    return Trial(
+        commands=Commands(commands.values, spans, commands.channels),
+        times=times,
+        observed=observed,
+        boundaries=boundaries,
+        channels=channels,
+        outcome=Outcome(
+            left_arena=done.left,
+            fell=done.fell,
+            stopped=done.left or done.overloaded,
+            overloaded=done.overloaded,
+            unrested=done.unrested,
+        ),
+        robot=robot,
+        world=world,
+        conditions=conditions,
+        handled=np.arange(len(commands)) >= len(commands) - short,
+    )
+
+
+def _observed(
+    done: Walked, times: np.ndarray, channels: tuple[Channel, ...], start_yaw: float
+) -> np.ndarray:
+    """Poses and joint angles at some times [s], ``(T, n_channels)``."""
+    poses = interpolated(done.sightings, times)
+    turns = np.rint((poses[0, 2] - start_yaw) / (2 * np.pi))
+    if np.isfinite(turns):
+        poses[:, 2] -= turns * 2 * np.pi
+    columns = [poses]
+    for channel in channels[3:]:
+        read = done.readings.get(channel.name.removesuffix("_position"), [])
+        if read:
+            at, angle = np.array(read).T
+            columns.append(np.interp(times, at, angle)[:, None])
+        else:
+            columns.append(np.full((len(times), 1), np.nan))
+    return np.hstack(columns)
