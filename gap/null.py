@@ -10,6 +10,7 @@ from bns.gap.problem import Problem
 from bns.gap.signatures import Curves
 
 DRAWS = 1000
+LARGEST = 25.0  # square of a residual that counts in full
 LAGS = 10  # windows over which a rest may be correlated with itself
 
 
@@ -58,7 +59,9 @@ class Null:
             p-value; what the flexible model would improve beyond chance.
         """
         by_channel = z.reshape(-1, len(problem.model.features))
-        scale = np.array([spread(column) for column in by_channel.T])
+        known = problem.floor.source == "model"  # noise that is no more to be found
+        size = rough if known else spread
+        scale = np.array([size(column) for column in by_channel.T])
         z = np.clip(by_channel / scale, -5, 5).ravel()
         explained = float(((z @ self.basis) ** 2).sum())
         degrees = self.basis.shape[1]
@@ -71,6 +74,11 @@ class Null:
 def spread(z: np.ndarray) -> float:
     """Robust standard deviation."""
     return max(float(np.median(np.abs(z))) / 0.6745, 1e-3)
+
+
+def rough(z: np.ndarray) -> float:
+    """Root mean square of residuals, the largest limited, but not below the noise."""
+    return max(float(np.sqrt(np.minimum(z**2, LARGEST).mean())), 1.0)
 
 
 def _correlation(problem: Problem, z: np.ndarray) -> tuple[float, int]:

@@ -1,0 +1,187 @@
+"""Withheld-effect cases with light: recordings of robots that see, one effect hidden.
+
+Robots drive by what they see, and at random, in the light world. The sensors of the
+"real" robot differ a little from the nominal ones, the tracker is noisy, and how strong
+the hidden effect is, is drawn relative to what the recording can show.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bns import seeding
+from bns.gap import cases, signatures
+from bns.gap.aliases import alike
+from bns.gap.cases import Answer, Case
+from bns.gap.fit import Term
+from bns.gap.light_diagnosis import unhandled
+from bns.gap.light_model import SightModel
+from bns.gap.model import GapModel
+from bns.gap.null import Null
+from bns.gap.problem import Problem
+from bns.gap.signatures import Curves
+from bns.gap.wheeled import WheeledModel
+from bns.worlds.effects import registry
+from bns.worlds.effects.base import Effect
+from bns.worlds.effects.sensors import BEHIND, SINGLE
+from bns.worlds.light_world import LightWorld
+from bns.worlds.trial import Trial
+
+KINDS = ("single", "motion", "none", "off-library")
+TRIALS, CYCLES = 3, 40  # recordings of a case, and commands of 0.4 s in each
+SIZES = 0.5, 8.0  # of an effect over what is detected, drawn evenly in the logarithm
+ALL_SENSORS = (*SINGLE, *(name.removeprefix("ir_") for name in BEHIND))
+LEAST = 0.4  # size below which an effect counts as not excited, and is drawn again
+POWER = 1.2816  # standard normal: 90 %
+TRIES = 100
+
+
+class Wanderer:
+    """A policy: towards or past the light, with a turn that changes at random.
+
+    Args:
+        rng: of the robots' habits.
+        count: robots.
+    """
+
+    def __init__(self, rng: np.random.Generator, count: int):
+        self.speed = rng.uniform(0.03, 0.1, (count, 1))
+        self.turning = rng.uniform(-0.06, 0.06, (count, 1))
+        held = rng.integers(4, 12)
+        wander = rng.uniform(-0.05, 0.05, (count, CYCLES // held + 1))
+        self.wander = np.repeat(wander, held, axis=1)
+
+    def memory(self, n: int) -> np.ndarray:
+        """How many commands each has given."""
+        return np.zeros((n, 1))
+
+    def act(
+        self, readings: np.ndarray, memory: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Wheel speeds from the virtual sensors, ``(n, 2)`` [m/s]."""
+        at = int(memory[0, 0])
+        turn = self.turning[:, 0] * (readings[:, 1] - readings[:, 0]) / 4095
+        turn = turn + self.wander[:, at]
+        told = self.speed + turn[:, None] * np.array([-1.0, 1.0])
+        return np.clip(told, -0.14, 0.14), memory + 1
+
+
+def imperfection(rng: np.random.Generator) -> list[Effect]:
+    """How real sensors and lamps depart from the nominal ones; assumed."""
+    made = [registry.make("light_dimmed", factor=float(rng.normal(1, 0.01)))]
+    for sensor in ALL_SENSORS:
+        bent, lost = float(rng.normal(0, 0.01)), abs(float(rng.normal(0, 0.01)))
+        made.append(registry.make("sensor_misaligned", sensor=sensor, angle=bent))
+        made.append(registry.make("sensor_dead", sensor=sensor, loss=lost))
+    return made
+
+
+def record(seed: int, effects: Sequence[Effect], *, singles: bool) -> tuple[Trial, ...]:
+    """Drive the robots; the same habits and starts for the same seed."""
+    order = {"command": 0, "actuator": 1, "body": 2, "sensor": 3, "tracking": 4}
+    world = LightWorld(
+        singles=singles,
+        supervisor={"at_lamp": "turn"},
+        reality=sorted(effects, key=lambda effect: order[effect.stage]),
+        name="real",
+    )
+    policy = Wanderer(seeding.generator(seed, "light case", "habits"), TRIALS)
+    seeds = [seeding.integer(seed, "light case", n) for n in range(TRIALS)]
+    trials = world.drive(policy, cycles=CYCLES, seeds=seeds)
+    return tuple(trial.replace(conditions={}) for trial in trials)
+
+
+def build(
+    seed: int,
+    kind: str,
+    model: WheeledModel,
+    *,
+    singles: bool,
+    off_library: Sequence[Effect] = (),
+) -> Case:
+    """Make a case.
+
+    Args:
+        seed: of everything in it.
+        kind: one of `KINDS`; "motion" hides an effect on the wheels.
+        model: nominal model of the robot's motion.
+        singles: whether single sensors are recorded, else the virtual two.
+        off_library: effects to draw from for "off-library"; outside the registry.
+    """
+    rng = seeding.generator(seed, "light case", kind)
+    noise = cases.tracker(rng)[:1]
+    reality = [*imperfection(rng), *cases.imperfection(rng), *noise]
+    answer = Answer(kind, nominal=tuple(str(effect) for effect in reality))
+    hidden: list[Effect] = []
+    if kind in ("single", "motion"):
+        plain = record(seed, reality, singles=singles)
+        seen: GapModel = model
+        if kind == "single":
+            spread = [noise[0]["position_sd"]] * 2 + [noise[0]["heading_sd"]]
+            seen = SightModel(plain, pose_sd=spread)
+            plain, _ = seen.check(plain)
+        else:
+            plain = tuple(unhandled(plain, model))
+        answer, hidden = _hide(rng, plain, seen, answer)
+    elif kind == "off-library":
+        hidden = [off_library[int(rng.integers(len(off_library)))]]
+        answer = replace(answer, effects=tuple(map(str, hidden)))
+    trials = record(seed, [*reality, *hidden], singles=singles)
+    return Case(trials, answer, tuple(reality), tuple(t.commands for t in trials))
+
+
+def _hide(
+    rng: np.random.Generator, plain: Sequence[Trial], model: GapModel, answer: Answer
+) -> tuple[Answer, list[Effect]]:
+    """An effect, drawn evenly over effects, as strong as drawn."""
+    candidates = model.candidates()
+    problem = Problem.of(plain, model, candidates=candidates)
+    curves = signatures.trace(problem, candidates)
+    seen = float(np.sqrt(Null.of(problem, curves).threshold(0.05)) + POWER)
+    for _ in range(TRIES):
+        size = float(np.exp(rng.uniform(*np.log(SIZES))))
+        term = _draw(rng, curves, size * seen)
+        if term is None:
+            continue
+        (shown,) = problem.signatures([[term.effect()]])
+        reached = float(np.linalg.norm(shown)) / seen
+        if LEAST < reached < 3 * SIZES[1]:
+            break
+    made = replace(
+        answer,
+        names=(term.candidate.name,),
+        effects=(str(term.effect()),),
+        magnitudes=(term.magnitude,),
+        sizes=(reached,),
+        aliases=(alike(problem, curves, term),),
+        detected=seen,
+    )
+    return made, [term.effect()]
+
+
+def _draw(rng: np.random.Generator, curves: Curves, length: float) -> Term | None:
+    """A candidate near the level whose signature has about a length, or None."""
+    effects = sorted({item.effect for item in curves.candidates})
+    effect = effects[int(rng.integers(len(effects)))]
+    pool = [item for item in curves.candidates if item.effect == effect]
+    item = pool[int(rng.integers(len(pool)))]
+    branch = int(rng.integers(len(item.branches)))
+    mine = np.flatnonzero(
+        (curves.owner == curves.index(item.name)) & (curves.branch == branch)
+    )
+    if not len(mine):
+        return None
+    side = curves.magnitude[mine] > item.nominal
+    if 0 < side.sum() < len(side):
+        mine = mine[side == (rng.random() < 0.5)]
+    lengths = signatures.strength(curves)[mine]
+    if lengths.max() < 0.7 * length:
+        return None  # not excited by these drives
+    level = mine[np.abs(np.log(np.maximum(lengths, 1e-9) / length)).argmin()]
+    magnitude = float(curves.magnitude[level])
+    if not signatures.integer(item):
+        magnitude += float(rng.uniform(-0.1, 0.1)) * (magnitude - item.nominal)
+    term = Term.at(item, branch, float(np.clip(magnitude, item.low, item.high)))
+    moved = tuple(value + float(rng.uniform(-0.3, 0.3)) for value in term.extras)
+    return replace(term, extras=moved)

@@ -1,0 +1,161 @@
+"""Recordings with light: sensor effects are named, motion and light stay apart."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bns.gap import diagnose, light_cases, light_diagnosis, light_library
+from bns.gap.light_model import SightModel, sees, unlikely
+from bns.gap.light_reader import _clipped
+from bns.gap.records import Verdict
+from bns.gap.wheeled import WheeledModel
+from bns.worlds.effects import registry
+from bns.worlds.trial import Commands, Trial
+
+NOISE = registry.make("tracker_noise", position_sd=0.001, heading_sd=0.008)
+KEPT = (
+    "sensor_gain[left]",
+    "sensor_noise[front_left]",
+    "sensor_intermittent[right]",
+    "sensor_frozen[left_45]",
+    "light_dimmed",
+    "light_displaced",
+)
+
+
+def recorded(*effects, singles=True):
+    return light_cases.record(5, [*effects, NOISE], singles=singles)
+
+
+@pytest.fixture(scope="module")
+def find():
+    def run(*effects, singles=True):
+        trials = recorded(*effects, singles=singles)
+        sight = SightModel(trials, pose_sd=(1e-3, 1e-3, 8e-3))
+        few = [item for item in sight.candidates() if item.name in KEPT]
+        return diagnose.analyse(trials, sight, candidates=few).verdict
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("sensor_gain:sensor=left,factor=0.95", "sensor_gain[left]"),
+        ("sensor_noise:sensor=front_left,factor=2.5", "sensor_noise[front_left]"),
+        ("sensor_intermittent:sensor=right,every=6", "sensor_intermittent[right]"),
+        ("sensor_frozen:sensor=left_45,blend=0.2", "sensor_frozen[left_45]"),
+        ("light_displaced:x=0.05,y=-0.05", "light_displaced"),
+    ],
+)
+def test_a_planted_effect_is_named(find, text, name):
+    answer = find(registry.parse(text))
+    assert answer.kind == "effect"
+    assert answer.named == ((name,),)
+
+
+def test_nothing_planted_is_no_gap(find):
+    assert find().kind == "no gap"
+
+
+def test_the_two_virtual_sensors_are_enough(find):
+    dimmed = registry.make("light_dimmed", factor=0.85)
+    assert find(dimmed, singles=False).named == (("light_dimmed",),)
+
+
+def test_whitened_readings_are_standard_normal():
+    trials = recorded()
+    sight = SightModel(trials, pose_sd=(1e-3, 1e-3, 8e-3))
+    ready, notes = sight.check(trials)
+    seen = np.concatenate([trial.observed[:, 3:] for trial in ready])
+    assert notes == ()
+    count = len(sight.names)
+    assert seen[:, :count].std() == pytest.approx(1.0, abs=0.07)
+    assert seen[:, count:].std() == pytest.approx(1.0, abs=0.1)
+    assert abs(seen[:, :count].mean()) < 0.05
+
+
+def test_clipped_normal_numbers_have_the_moments_of_a_sample():
+    rng = np.random.default_rng(0)
+    drawn = np.clip(rng.normal(100.0, 80.0, 400_000), 0.0, 180.0)
+    low, high = np.array(0.0), np.array(180.0)
+    mean, variance = _clipped(np.array(100.0), np.array(80.0), low, high)
+    assert mean == pytest.approx(drawn.mean(), abs=0.5)
+    assert np.sqrt(variance) == pytest.approx(drawn.std(), abs=0.5)
+
+
+def test_scatter_does_not_grow_without_end():
+    assert unlikely(np.array([0.0, 1e3])) == pytest.approx([0.0, 1.0])
+
+
+def test_a_lamp_is_displaced_as_far_as_the_candidate_says():
+    (item,) = [
+        c for c in light_library.candidates(singles=True) if c.name == "light_displaced"
+    ]
+    effect = item.make(0.2, extras={"heading": np.pi / 6})
+    assert effect["x"] == pytest.approx(0.2 * np.cos(np.pi / 6))
+    assert effect["y"] == pytest.approx(0.1)
+
+
+def test_the_virtual_sensors_have_no_candidates_behind():
+    names = [c.name for c in light_library.candidates(singles=False)]
+    assert "sensor_gain[left_45]" in names
+    assert not [name for name in names if "back" in name]
+
+
+def test_stretches_in_which_the_robot_was_handled_are_cut_out():
+    told = Commands(np.full((20, 2), 0.05), np.full(20, 0.4))
+    times = np.arange(81) * 0.1
+    handled = np.zeros(20, bool)
+    handled[8] = True
+    trial = Trial(
+        told,
+        times,
+        np.zeros((81, 3)),
+        np.arange(21) * 4,
+        handled=handled,
+        robot="khepera3",
+    )
+    parts = light_diagnosis.unhandled([trial], WheeledModel(threads=1))
+    assert [len(part.commands) for part in parts] == [8, 11]
+    assert parts[1].times[0] == pytest.approx(3.6)
+
+
+def verdict(kind, *names, p_gap=0.5):
+    given = tuple((name,) for name in names)
+    return Verdict(kind, given, given or ((),), 90.0, p_gap, 0.5, (), 9.0, "words")
+
+
+def test_verdicts_on_motion_and_light_join():
+    nothing, gain = verdict("no gap"), verdict("effect", "a", p_gap=0.001)
+    assert light_diagnosis.merged(nothing, nothing).kind == "no gap"
+    alone = light_diagnosis.merged(nothing, gain)
+    assert (alone.kind, alone.named) == ("effect", (("a",),))
+    assert alone.p_gap == pytest.approx(0.002)
+    both = light_diagnosis.merged(verdict("effect", "w"), gain)
+    assert (both.kind, both.named) == ("together", (("w", "a"),))
+    tied = light_diagnosis.merged(verdict("either", "w", "v"), gain)
+    assert (tied.kind, len(tied.named)) == ("either", 2)
+    strange = replace(nothing, kind="none of the library")
+    assert light_diagnosis.merged(strange, gain).kind == "none of the library"
+
+
+def test_a_recording_with_light_is_diagnosed_whole():
+    gain = registry.make("sensor_gain", sensor="right", factor=0.9)
+    slow = registry.make("wheel_gain", wheel="left", factor=0.9)
+    trials = recorded(slow, gain, singles=False)
+    model = WheeledModel(threads=1)
+    wanted = ("wheel_gain[left]", "tracker_scale")
+    few = [item for item in model.candidates() if item.name in wanted]
+    sight = [c for c in SightModel(trials).candidates() if c.name in KEPT]
+    gained = [
+        c for c in SightModel(trials).candidates() if c.name == "sensor_gain[right]"
+    ]
+    assert sees(trials)
+    found = diagnose.diagnose(trials, model, candidates=[*few, *sight, *gained])
+    assert found.verdict.kind == "together"
+    assert found.verdict.named == (("wheel_gain[left]", "sensor_gain[right]"),)
+    assert found.best.magnitudes == pytest.approx((0.9, 0.9), abs=0.01)
+    assert json.loads(found.to_json())["verdict"]["kind"] == "together"
