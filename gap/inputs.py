@@ -156,16 +156,23 @@ def _of_robot(found: Sequence[Trial], model: GapModel) -> None:
 
 
 def _fitting(trial: Trial, model: GapModel) -> Trial:
-    """A trial with the observed channels of the model alone, if it has them."""
+    """A trial with the observed channels of the model alone (and light), if any."""
     given = {channel.name: channel.unit for channel in trial.channels}
     for channel in model.channels:
         if given.get(channel.name) != channel.unit:
             return trial  # `check` says what is wrong
-    if tuple(trial.channels) == tuple(model.channels):
+    if tuple(trial.channels) == tuple(model.channels) or _sighted(trial, model):
         return trial
     names = [channel.name for channel in model.channels]
     observed = np.stack([trial.channel(name) for name in names], axis=1)
     return trial.replace(observed=observed, channels=tuple(model.channels))
+
+
+def _sighted(trial: Trial, model: GapModel) -> bool:
+    """Whether light was recorded beside the pose of a robot that can see."""
+    from bns.gap import light_model
+
+    return model.name == light_model.ROBOT and light_model.sees([trial])
 
 
 def thinned(trial: Trial, most: int = SAMPLES) -> Trial:

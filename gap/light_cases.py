@@ -12,7 +12,7 @@ import numpy as np
 
 from bns import seeding
 from bns.gap import cases, signatures
-from bns.gap.aliases import alike
+from bns.gap.aliases import ALIKE, likeness
 from bns.gap.cases import Answer, Case
 from bns.gap.fit import Term
 from bns.gap.light_diagnosis import unhandled
@@ -154,10 +154,19 @@ def _hide(
         effects=(str(term.effect()),),
         magnitudes=(term.magnitude,),
         sizes=(reached,),
-        aliases=(alike(problem, curves, term),),
+        aliases=(_alike(problem, curves, term),),
         detected=seen,
     )
     return made, [term.effect()]
+
+
+def _alike(problem: Problem, curves: Curves, term: Term) -> tuple[str, ...]:
+    """Candidates that the recording cannot tell from an effect, itself included."""
+    (shown,) = problem.signatures([[term.effect()]])
+    gaps, _ = signatures.nearest(curves, shown)
+    near = {curves.candidates[c].name for c in np.flatnonzero(gaps < ALIKE**2)}
+    near |= {other.name for other in likeness(problem, curves, term) if other.alike}
+    return tuple(sorted(near | {term.candidate.name}))
 
 
 def _draw(rng: np.random.Generator, curves: Curves, length: float) -> Term | None:

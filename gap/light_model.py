@@ -22,6 +22,7 @@ from bns.worlds.objects import Post, RayScreen
 from bns.worlds.sensing import LEAD
 from bns.worlds.trial import POSE_CHANNELS, Channel, Trial
 
+ROBOT = "khepera3"
 FEWEST = 8  # readings of a trial
 WIDTH = 1.5  # departures beyond some of these look alike to the scatter
 SCATTER = 0.188  # standard deviation of `unlikely` of a normal number
@@ -50,7 +51,7 @@ class SightModel:
         sensors: which way the sensors look, see `light_sensors.khepera3`.
     """
 
-    name = "khepera3 light sensors"
+    name = f"{ROBOT} light sensors"
 
     def __init__(
         self,
