@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class WatchConfig:
-    """Damage detection, and forgetting by evidence (light following)."""
+    """Damage detection, and forgetting by evidence (navigation, light following)."""
 
     detect: bool = False
     """watch for damage; the adaptations to damage then follow what is detected

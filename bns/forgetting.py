@@ -14,7 +14,11 @@ FLOOR = 1e-3  # scaled outputs; differences below do not matter; assumed
 
 
 def contradicted(
-    inputs: np.ndarray, targets: np.ndarray, trials: np.ndarray, config: WatchConfig
+    inputs: np.ndarray,
+    targets: np.ndarray,
+    trials: np.ndarray,
+    config: WatchConfig,
+    usual: np.ndarray | None = None,
 ) -> np.ndarray:
     """Old trials that the newest one contradicts.
 
@@ -22,6 +26,8 @@ def contradicted(
         inputs, targets: all patterns, scaled, ``(N, I)`` and ``(N, O)``.
         trials: the trial each pattern is of, ``(N,)``.
         config: thresholds.
+        usual: the yardstick, ``(O,)``, where trials are too short to be compared with
+            themselves; None = what the newest trial's patterns differ by.
 
     Returns:
         Numbers of these trials, sorted.
@@ -32,10 +38,12 @@ def contradicted(
     new, told = inputs[newest], targets[newest]
     if len(new) < 2:
         return np.empty(0, dtype=np.int64)
-    own = _differences(new, told, new, told, config.forget_reach, itself=True)
-    if len(own[0]) < config.forget_least:
-        return np.empty(0, dtype=np.int64)
-    usual = np.maximum(_typical(own[1]), FLOOR)
+    if usual is None:
+        own = _differences(new, told, new, told, config.forget_reach, itself=True)
+        if len(own[0]) < config.forget_least:
+            return np.empty(0, dtype=np.int64)
+        usual = _typical(own[1])
+    usual = np.maximum(usual, FLOOR)
     found = []
     for trial in np.unique(trials[~newest]):
         of = trials == trial

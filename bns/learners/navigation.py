@@ -13,10 +13,13 @@ DOC = "lists of wheel commands that reach objectives in order (investigation A)"
 def make(
     configs: Sequence[RunConfig], *, replicates: Sequence[int], onsets: Sequence[int]
 ) -> Any:
-    """The learner of a batch, see `bns.learner.Learner`."""
+    """The learner of a batch, see `bns.learner.Learner`; one that watches if asked."""
     from bns.learner import Learner
+    from bns.watched import WatchedLearner
 
-    return Learner(configs, replicates=replicates, onsets=onsets)
+    watch = configs[0].watch
+    kind = WatchedLearner if watch.detect or watch.forget else Learner
+    return kind(configs, replicates=replicates, onsets=onsets)
 
 
 def execute(

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from bns.config import RunConfig
+from bns.errors import BnsError
 from bns.worlds.trial import Commands, Trial
 from bns.worlds.world import World
 
@@ -19,6 +20,12 @@ def make(
     """The learner of a batch, see `bns.walk.learner.WalkLearner`."""
     from bns.walk.learner import WalkLearner
 
+    watch = configs[0].watch
+    if watch.detect or watch.forget:
+        raise BnsError(
+            "watch.detect and watch.forget are for navigation and light following; "
+            "leave them out."
+        )
     return WalkLearner(configs, replicates=replicates, onsets=onsets)
 
 
