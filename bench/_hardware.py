@@ -37,6 +37,25 @@ def emulator(port: Path, *words: str, robot: str = "khepera3") -> Iterator[objec
             process.kill()
 
 
+def learned(words: list[str], path: Path) -> str:
+    """`bns run PRESET ... --world hardware` on the robot at `path / "robot"`.
+
+    A session that was stopped is gone on with, as a person would. The run is in
+    `path / "run"`; gives the end of what was said.
+    """
+    command = [sys.executable, "-m", "bns", "run", *words, "--world", "hardware"]
+    command += ["--port", str(path / "robot"), "--out", str(path / "run")]
+    command += ["--no-report", "--rerun", "off"]
+    said = ""
+    for _ in range(5):
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        said += done.stdout[-300:] + done.stderr[-300:]
+        if done.returncode == 0:
+            break
+        command = [w for w in command if w != "--resume"] + ["--resume"]
+    return said
+
+
 def alive(pid: int) -> bool:
     """Whether a process is there."""
     try:

@@ -1,14 +1,12 @@
 """BNS on the emulated Khepera III, its port and its camera, in real time."""
 
 import os
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
 
-from bench._hardware import emulator, folder
+from bench._hardware import emulator, folder, learned
 from bench.result import Result
 
 DOC = "one BNS run over an emulated port and camera in real time, wheel damaged midway"
@@ -34,19 +32,10 @@ def run(quick: bool) -> Result:
 
 
 def _learn(path: Path, trials: int, onset: int) -> str:
-    words = [sys.executable, "-m", "bns", "run", "khepera-simple", "--world"]
-    words += ["hardware", "--port", str(path / "robot"), "--out", str(path / "run")]
-    words += ["--trials", str(trials), "--no-report", "--rerun", "off"]
+    words = ["khepera-simple", "--trials", str(trials)]
     words += ["--adaptation.window", str(WINDOW)]
     words += ["--world.damage", f"wheel_gain:wheel=left,factor=0.8@{onset}"]
-    said = ""
-    for _ in range(5):  # a session that was stopped is gone on with, as a person would
-        done = subprocess.run(words, capture_output=True, text=True, check=False)
-        said += done.stdout[-300:] + done.stderr[-300:]
-        if done.returncode == 0:
-            break
-        words = [w for w in words if w != "--resume"] + ["--resume"]
-    return said
+    return learned(words, path)
 
 
 def _result(directory: Path, onset: int, took: float, said: str) -> Result:

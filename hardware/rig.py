@@ -136,11 +136,11 @@ def look(port: str, camera: str, calibration: str, robot: str = "khepera3") -> E
     from bns.hardware.tracking.eyes import ThreadedEyes
     from bns.hardware.tracking.marker import MARKERS
     from bns.hardware.tracking.sources import DeviceCamera, Source, VideoFile
-    from bns.hardware.tracking.tracker import Tracker
+    from bns.hardware.tracking.tracker import CROOKED, LEANING, Tracker
 
     if not camera:
         raise BnsError("No camera was given: give --camera NUMBER, FILE or emulated.")
-    marker = MARKERS[robot]
+    marker, crooked = MARKERS[robot], LEANING if robot == "phantomx" else CROOKED
     if camera == EMULATED:
         from bns.hardware.emulators.camera import EmulatedCamera
         from bns.hardware.emulators.frames import painter
@@ -148,7 +148,7 @@ def look(port: str, camera: str, calibration: str, robot: str = "khepera3") -> E
         known = Camera.read(calibration) if calibration else Camera.overhead(SIZE)
         ideal = replace(Camera.overhead(known.size), latency=0.0)
         source: Source = EmulatedCamera(port, painter(robot, ideal))
-        return ThreadedEyes(source, Tracker(known, marker))
+        return ThreadedEyes(source, Tracker(known, marker, crooked=crooked))
     if not calibration:
         raise BnsError(
             "The camera is not calibrated: make a calibration with `bns hardware "
@@ -161,4 +161,4 @@ def look(port: str, camera: str, calibration: str, robot: str = "khepera3") -> E
         source = VideoFile(camera)
     else:
         raise BnsError(f"No camera {camera!r}: give its number, a file or 'emulated'.")
-    return ThreadedEyes(source, Tracker(known, marker))
+    return ThreadedEyes(source, Tracker(known, marker, crooked=crooked))

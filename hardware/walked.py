@@ -67,7 +67,7 @@ def trial(
         outcome=Outcome(
             left_arena=done.left,
             fell=done.fell,
-            stopped=done.left or done.overloaded,
+            stopped=done.left or done.overloaded or done.fell,
             overloaded=done.overloaded,
             unrested=done.unrested,
         ),

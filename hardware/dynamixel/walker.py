@@ -28,7 +28,9 @@ SLOW = 0.8  # rad/s, for getting up
 SETTLE = 0.1  # s after the servos should be there, until a first look at rest
 STILL = 0.18  # s without a change: every servo was read once
 UNITS, MOVED, TURNED = 2, 0.002, np.deg2rad(0.5)  # changes that count as motion
-LOW = 0.020  # share by which the tag is smaller than at the stance: it lies (4 cm down)
+LEAN = 0.13  # share by which the tag is smaller than at the stance: it leans by 45 deg
+AFTER = 0.25  # s of looking on after the last command
+FALLEN = 0.5  # s of leaning so far, after which it is taken for fallen
 
 
 @dataclass
@@ -44,7 +46,7 @@ class Walked:
         late: the latest [s].
         left: it came to the rim, which ended it.
         overloaded: a servo pushed in vain, which ended it.
-        fell: its belly was on the floor.
+        fell: it leant by 45 deg for a while, which ended it.
         unrested: a command ended by its time limit.
     """
 
@@ -96,6 +98,7 @@ class Walker:
         self.up = False
         self._due = 0.0
         self._side = 0.0  # of the tag as seen at the stance [m]
+        self._leans = np.inf  # s, since when it leans too far
         self._rest = _Rest()
 
     def look(self, done: Walked | None = None) -> list[Sighting]:
@@ -118,8 +121,14 @@ class Walker:
             raise SafetyStop("the tracker has lost it", "free the view of its tag")
         if done is not None:
             done.sightings += seen
-            done.fell |= any(s.side < self._side * (1 - LOW) for s in seen)
+            self._watch_leaning(seen, done)
         return seen
+
+    def _watch_leaning(self, seen: list[Sighting], done: Walked) -> None:
+        for sighting in seen:
+            upright = sighting.side > self._side * (1 - LEAN)
+            self._leans = np.inf if upright else min(self._leans, sighting.time)
+            done.fell |= sighting.time - self._leans > FALLEN
 
     def wait_for_sight(self, seconds: float = 3.0) -> Sighting:
         """A fresh sighting.
@@ -203,7 +212,7 @@ class Walker:
         Args:
             goals: of all servos [rad], ``(18,)``.
             limit: longest time [s].
-            done: takes what is seen; its `left` ends it, too.
+            done: takes what is seen; its `left` or `fell` ends it, too.
             speed: of the servos [rad/s].
             wait: for rest; else the time that the servos need by themselves.
         """
@@ -216,7 +225,8 @@ class Walker:
             for sighting in self.look(done):
                 if done is not None and self.limits.outside(sighting, self.limits.rim):
                     done.left = True
-                    return False
+            if done is not None and (done.left or done.fell):
+                return False
             now = self.clock.now()
             if now >= ready and (not wait or now - self._rest.since >= STILL):
                 return True
@@ -240,18 +250,25 @@ class Walker:
             for row, limit in zip(goals, limits, strict=True):
                 done.switched.append(self.clock.now())
                 rests = self.go(row, float(limit), done)
-                done.unrested |= not rests and not done.left
-                if done.left:
+                if done.left or done.fell:
                     break
-            done.switched.append(self.clock.now())
-            self.go(self.goals, 0.25, done, wait=False)
+                done.unrested |= not rests
+            self._end(done)
         except Overload:
             done.overloaded = True
-            done.switched.append(self.clock.now())
+            self._end(done)
         except (SafetyStop, LinkError):
             self.halt()
             raise
         return done
+
+    def _end(self, done: Walked) -> None:
+        """Stay, and look on."""
+        now = self.clock.now()
+        done.switched.append(now)
+        while self.clock.now() < now + AFTER:
+            self.frame()
+            self.look(done)
 
 
 class _Rest:

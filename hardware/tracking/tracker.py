@@ -10,6 +10,7 @@ from bns.hardware.tracking.finder import Finder
 from bns.hardware.tracking.marker import Marker
 
 CROOKED = 0.12  # share of its side by which a seen side may differ: else no tag
+LEANING = 0.40  # the same of a robot that may lean, by 50 deg at most
 TURN = 2 * np.pi
 
 
@@ -59,13 +60,14 @@ class Tracker:
     Args:
         camera: calibrated.
         marker: on the robot.
+        crooked: share by which a side may be off its length; else it is no tag.
 
     Attributes:
         loss: pictures with and without the tag.
     """
 
-    def __init__(self, camera: Camera, marker: Marker):
-        self.camera, self.marker = camera, marker
+    def __init__(self, camera: Camera, marker: Marker, *, crooked: float = CROOKED):
+        self.camera, self.marker, self.crooked = camera, marker, crooked
         self.loss = Loss()
         self._finder = Finder()
         self._last: Sighting | None = None
@@ -90,7 +92,7 @@ class Tracker:
     def _posed(self, time: float, corners: np.ndarray) -> Sighting | None:
         places = self.camera.on_plane(corners, self.marker.height)
         sides = np.linalg.norm(places - np.roll(places, 1, axis=0), axis=1)
-        if np.abs(sides / self.marker.side - 1).max() > CROOKED:
+        if np.abs(sides / self.marker.side - 1).max() > self.crooked:
             return None
         ahead = places[[0, 1]].mean(0) - places[[2, 3]].mean(0)
         yaw = np.arctan2(ahead[1], ahead[0]) - np.arctan2(
