@@ -31,6 +31,10 @@ def nets_for(config: RunConfig) -> StaticNets:
     """Nets that imitate the undamaged MuJoCo world of a configuration's robot."""
     from bns.worlds import registry
 
+    if config.learner == "walk":
+        from bns import static_walk
+
+        return static_walk.nets_for(config)
     source = registry.make("mujoco", robot=config.world.robot, threads=config.threads)
     return fit(source, config)
 

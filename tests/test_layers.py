@@ -36,6 +36,7 @@ EXPERIMENT = {
     "bns.loading",
     "bns.robots",
     "bns.static_snn",
+    "bns.static_walk",
     "bns.doctor",
 }
 """modules around the learner that set experiments up: they make worlds by name"""

@@ -5,6 +5,7 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -18,23 +19,25 @@ _ARRAYS = ("w1", "b1", "w2", "b2", "input_scale", "output_scale")
 
 @dataclass(frozen=True, eq=False)
 class StaticNets:
-    """Three networks with one hidden layer of H logistic neurons, one output each.
+    """Three networks with one hidden layer of H neurons, one output each.
 
-    Inputs: previous left, previous right, left, right speed [m/s], duration [s].
+    Inputs: the previous command, the command, and where robots have wheels its
+    duration [s]; so I = 5 for two wheels [m/s], 36 for eighteen servos [rad].
     Outputs: forward, left [m], turn [rad] in the body frame at the command's start
     (dissertation, Figure 4.4). Output k is
 
-        output_scale[k] * (w2[k] . sigmoid((input_scale * inputs) @ w1[k] + b1[k])
+        output_scale[k] * (w2[k] . active((input_scale * inputs) @ w1[k] + b1[k])
                            + b2[k])
 
     Attributes:
-        w1: ``(3, 5, H)``, inputs by hidden neurons.
+        w1: ``(3, I, H)``, inputs by hidden neurons.
         b1: ``(3, H)``.
         w2: ``(3, H)``.
         b2: ``(3,)``.
-        input_scale: ``(5,)`` [s/m x4, 1/s].
+        input_scale: ``(I,)`` [1/unit of the input].
         output_scale: ``(3,)`` [m, m, rad].
         provenance: where they come from; kept in the file.
+        activation: of the hidden neurons, logistic or rectified.
 
     Raises:
         BnsError: shapes disagree, or a number is not finite.
@@ -47,6 +50,7 @@ class StaticNets:
     input_scale: np.ndarray
     output_scale: np.ndarray
     provenance: Mapping[str, object] = field(default_factory=dict)
+    activation: Literal["sigmoid", "relu"] = "sigmoid"
 
     def __post_init__(self):
         for name in _ARRAYS:
@@ -54,7 +58,8 @@ class StaticNets:
             array.setflags(write=False)
             object.__setattr__(self, name, array)
         hidden = self.w2.shape[-1] if self.w2.ndim else 0
-        shapes = ((3, 5, hidden), (3, hidden), (3, hidden), (3,), (5,), (3,))
+        count = self.inputs
+        shapes = ((3, count, hidden), (3, hidden), (3, hidden), (3,), (count,), (3,))
         for name, shape in zip(_ARRAYS, shapes, strict=True):
             array = getattr(self, name)
             if array.shape != shape:
@@ -64,19 +69,26 @@ class StaticNets:
             if not np.isfinite(array).all():
                 raise BnsError(f"StaticNets.{name} holds NaN or infinity.")
 
+    @property
+    def inputs(self) -> int:
+        """How many, I."""
+        return self.input_scale.size
+
     def __call__(self, inputs: np.ndarray) -> np.ndarray:
         """Displacements of commands.
 
         Args:
-            inputs: ``(K, 5)``, previous left, previous right, left, right [m/s],
-                duration [s].
+            inputs: ``(K, I)``, see the class.
 
         Returns:
             ``(K, 3)``: forward, left [m], turn [rad].
         """
         scaled = inputs * self.input_scale
         drive = np.einsum("ki,gih->gkh", scaled, self.w1) + self.b1[:, None]
-        active = 0.5 * (1 + np.tanh(0.5 * drive))  # logistic, without overflow
+        if self.activation == "relu":
+            active = np.maximum(drive, 0.0)
+        else:
+            active = 0.5 * (1 + np.tanh(0.5 * drive))  # logistic, without overflow
         raw = np.einsum("gkh,gh->kg", active, self.w2) + self.b2
         return raw * self.output_scale
 
@@ -91,6 +103,8 @@ class StaticNets:
             "version": VERSION,
             "provenance": dict(self.provenance),
         }
+        if self.activation != "sigmoid":
+            header["activation"] = self.activation
         text = np.array(json.dumps(header, sort_keys=True))
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         try:
@@ -123,7 +137,11 @@ class StaticNets:
                 f"{path} holds {', '.join(sorted(arrays))}; static networks are "
                 f"{', '.join(_ARRAYS)}."
             )
-        return cls(**arrays, provenance=header.get("provenance", {}))
+        return cls(
+            **arrays,
+            provenance=header.get("provenance", {}),
+            activation=header.get("activation", "sigmoid"),
+        )
 
 
 def _check_header(header: object, path: str | Path) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from bns import models, seeding
+from bns.errors import BnsError
 from bns.worlds import active, control, observe
 from bns.worlds.active import Stages
 from bns.worlds.checks import bounded, checked_start, shared
@@ -22,10 +23,12 @@ class StaticSnnWorld:
 
     Each command's displacement depends on it and on the one before; the path is their
     sum. The robot is seen at the end of each command only. A command that an effect
-    changes partly acts with its mean. Body effects cannot be represented.
+    changes partly acts with its mean. Body effects cannot be represented. A robot with
+    legs stands half-way before its first command, unless an effect holds it otherwise.
 
     Args:
-        nets: the networks, or a file of them; None = an ideal two-wheeled robot.
+        nets: the networks, or a file of them; None = an ideal two-wheeled robot (one
+            with legs has no such default).
         robot: name of the robot model whose commands they take.
         damage: as in `MujocoWorld`, command, actuator and tracking effects only.
         reality: effects that always hold (unless they have a schedule), likewise.
@@ -37,7 +40,7 @@ class StaticSnnWorld:
     Raises:
         UnknownNameError: no such robot or effect.
         OutOfBoundsError: a number outside its bounds, a start outside the arena.
-        BnsError: an effect that this world cannot represent.
+        BnsError: an effect that this world cannot represent, networks of another robot.
         FormatError: `nets` is not a file of static networks.
     """
 
@@ -55,9 +58,9 @@ class StaticSnnWorld:
     ):
         self.model = models.robot(robot)
         self.robot, self.name = robot, name
-        if nets is None:
-            nets = kinematic_nets()
-        self.nets = nets if isinstance(nets, StaticNets) else StaticNets.load(nets)
+        self._legged = self.model.kind == "legged"
+        self.nets = _nets(nets, robot, self.model.channels, self._legged)
+        self._limits = self.model.ranges if self._legged else self.model.limits
         self.damage = active.per_robot(damage)
         self.reality = active.as_damage(reality)
         given = self.damage if isinstance(self.damage, tuple) else (self.damage,)
@@ -86,11 +89,9 @@ class StaticSnnWorld:
         ]
 
     def _run(self, commands: Commands, damage: Damage, trial: int, seed: int) -> Trial:
-        control.check(commands, self.model.channels, self.model.limits, self.robot)
+        control.check(commands, self.model.channels, self._limits, self.robot)
         stages = Stages.of(self.reality, damage, trial, commands.duration)
-        speeds = _speeds(commands, stages, seed, trial)
-        before = np.vstack([np.zeros((1, 2)), speeds[:-1]])
-        moved = self.nets(np.column_stack([before, speeds, commands.durations]))
+        moved = self.nets(self._inputs(commands, stages, seed, trial))
         if self.noise.any():
             rng = seeding.generator(seed, "world", trial, "static-snn")
             moved = moved + self.noise * rng.standard_normal(moved.shape)
@@ -112,9 +113,47 @@ class StaticSnnWorld:
             conditions=stages.conditions(trial, seed),
         )
 
+    def _inputs(
+        self, commands: Commands, stages: Stages, seed: int, trial: int
+    ) -> np.ndarray:
+        """What the networks get for each command, ``(K, I)``."""
+        told = _told(commands, stages, seed, trial)
+        home = np.zeros((1, told.shape[1]))
+        if not self._legged:
+            before = np.vstack([home, told[:-1]])
+            return np.column_stack([before, told, commands.durations])
+        still = Commands(home, [STEP], commands.channels)
+        home = _told(still, stages, seed, trial)
+        return np.column_stack([np.vstack([home, told[:-1]]), told])
 
-def _speeds(commands: Commands, stages: Stages, seed: int, trial: int) -> np.ndarray:
-    """Mean speeds of each command after the effects, shape ``(K, 2)`` [m/s]."""
+
+def _nets(
+    nets: StaticNets | str | Path | None, robot: str, channels: Sequence, legged: bool
+) -> StaticNets:
+    """The networks of a robot.
+
+    Raises:
+        BnsError: there are none, or they are those of another robot.
+    """
+    if nets is None and legged:
+        raise BnsError(
+            f"Robot {robot!r} has no ideal networks: give `nets`, such as those of "
+            "bns.static_walk.nets_for, or run `bns run hexapod-walk --world.name "
+            "static-snn`, which trains them."
+        )
+    found = kinematic_nets() if nets is None else nets
+    found = found if isinstance(found, StaticNets) else StaticNets.load(found)
+    wanted = 2 * len(channels) + (not legged)
+    if found.inputs != wanted:
+        raise BnsError(
+            f"The networks have {found.inputs} inputs, robot {robot!r} needs {wanted}: "
+            "give those that were trained for it."
+        )
+    return found
+
+
+def _told(commands: Commands, stages: Stages, seed: int, trial: int) -> np.ndarray:
+    """Mean values of each command after the effects, shape ``(K, C)``."""
     if not stages.control:
         return commands.values
     counts = control.steps(commands.durations, STEP)
