@@ -16,7 +16,7 @@ from bns.record import RunRecord
 from bns.worlds.trial import Trial
 
 ONSET = 100  # trial of the damage (dissertation, table 7.4)
-AFTER = 60  # trials from the damage on: more than the latest bar
+AFTER = 50  # trials from the damage on: more than the latest bar
 GROUPS = ("a", "b", "c")
 GROUP = 10  # runs of a batch
 RECOVERING = ("a",)  # groups that are damaged

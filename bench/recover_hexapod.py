@@ -13,7 +13,7 @@ MILD, LIMIT_MILD, LIMIT = ("type0", "type1", "type3"), 30, 46
 
 
 def run(quick: bool) -> Result:
-    """Damage from trial 100 of 160, ten runs a type; quick: one of 12 trials.
+    """Damage from trial 100 of 150, ten runs a type; quick: one of 12 trials.
 
     The runs of all types are those of `hexapod-gait` up to the damage.
     """
