@@ -77,6 +77,12 @@ def imperfection(rng: np.random.Generator) -> list[Effect]:
     return made
 
 
+def pose_sd(effects: Sequence[Effect]) -> tuple[float, float, float]:
+    """Noise of the tracker among some effects [m, m, rad]."""
+    noise = next(effect for effect in effects if effect.name == "tracker_noise")
+    return (noise["position_sd"], noise["position_sd"], noise["heading_sd"])
+
+
 def record(seed: int, effects: Sequence[Effect], *, singles: bool) -> tuple[Trial, ...]:
     """Drive the robots; the same habits and starts for the same seed."""
     order = {"command": 0, "actuator": 1, "body": 2, "sensor": 3, "tracking": 4}
@@ -118,8 +124,7 @@ def build(
         plain = record(seed, reality, singles=singles)
         seen: GapModel = model
         if kind == "single":
-            spread = [noise[0]["position_sd"]] * 2 + [noise[0]["heading_sd"]]
-            seen = SightModel(plain, pose_sd=spread)
+            seen = SightModel(plain, pose_sd=pose_sd(noise))
             plain, _ = seen.check(plain)
         else:
             plain = tuple(unhandled(plain, model))
