@@ -138,6 +138,14 @@ class HardwareHexapod:
             )
         return self._rig
 
+    def ready(self) -> None:
+        """See that a trial could begin.
+
+        Raises:
+            BnsError: it could not. Nothing has moved.
+        """
+        self.connected().walker.wait_for_sight()
+
     def close(self) -> None:
         """Torque off; give port and camera back."""
         if self._rig is not None:

@@ -46,11 +46,11 @@ def go(mover: Mover, target: Sequence[float], *, speed: float = 0.10) -> Sightin
             if _away(seen, target) > CLOSE:
                 _approach(mover, target, speed, begin)
             mover.halt()
-            seen = _settled(mover)
+            seen = settled(mover)
             off = _wrapped(target[2] - seen.pose[2])
             if abs(off) > TURNED:
                 _turn(mover, off)
-                seen = _settled(mover)
+                seen = settled(mover)
     finally:
         mover.halt()
     return seen
@@ -95,7 +95,7 @@ def _turn(mover: Mover, off: float) -> None:
     mover.halt()
 
 
-def _settled(mover: Mover) -> Sighting:
+def settled(mover: Mover) -> Sighting:
     """Where it stands: the mean of a few sightings at rest."""
     mover.clock.sleep(0.15)
     begin, seen = mover.clock.now(), []

@@ -12,6 +12,7 @@ from bns.hardware.leash import Leash
 from bns.hardware.limits import Limits, Operator
 from bns.hardware.line import Line, SerialLine, check_port
 from bns.hardware.motion import Mover
+from bns.hardware.odometry import Wheels
 from bns.hardware.priority import urgent
 from bns.hardware.tracking.eyes import Eyes
 
@@ -67,6 +68,7 @@ def connect(
     camera: str = EMULATED,
     *,
     calibration: str = "",
+    wheels: str = "",
     limits: Limits | None = None,
     log: Path | str | None = None,
 ) -> Rig:
@@ -76,6 +78,7 @@ def connect(
         port: the robot's device.
         camera: number of a camera, a video file, or "emulated".
         calibration: file of the camera's calibration; needed for a real one.
+        wheels: file of the wheels' sizes; empty = nominal.
         limits: bounds of the session.
         log: file for what goes wrong.
 
@@ -83,6 +86,7 @@ def connect(
         BnsError: something is missing or wrong. Nothing has moved.
     """
     clock, limits = RealClock(), limits or Limits()
+    sizes = Wheels.read(wheels).factors if wheels else (1.0, 1.0)
     urgent()
     check_port(port)
     faults = FaultLog(clock, log)
@@ -90,6 +94,7 @@ def connect(
     try:
         robot = Khepera3(line, clock, faults=faults, limit=limits.speed)
         robot.identify()
+        robot.wheels = sizes
         battery(robot, limits)
         eyes = look(port, camera, calibration)
         try:

@@ -10,12 +10,13 @@ from bns.hardware.clock import RealClock
 from bns.hardware.tracking import calibrate
 from bns.hardware.tracking.camera import Camera
 from bns.hardware.tracking.eyes import ThreadedEyes
-from bns.hardware.tracking.marker import Floor, Marker
+from bns.hardware.tracking.marker import MARKERS, Floor
 from bns.hardware.tracking.opencv import cv2
 from bns.hardware.tracking.sources import DeviceCamera, Source, VideoFile
 from bns.hardware.tracking.tracker import Tracker
 
 PICTURES = 40  # in which the tag's size is measured
+ASKEW = 8.0  # deg that the tag's edges have to be off the rows of the picture
 TIME = 20.0  # s for them
 
 
@@ -35,7 +36,13 @@ def lens(paths: Sequence[str]) -> calibrate.Lens:
 
 
 def camera(
-    port: str, name: str, known: str, found: calibrate.Lens | None, out: Path
+    port: str,
+    name: str,
+    known: str,
+    found: calibrate.Lens | None,
+    out: Path,
+    *,
+    robot: str = "khepera3",
 ) -> Iterator[str]:
     """Find the camera's place, write it, and say what was found, line by line.
 
@@ -45,11 +52,13 @@ def camera(
         known: file of an earlier calibration, whose lens is taken.
         found: the lens, where it was calibrated now.
         out: file to write.
+        robot: whose tag is looked for.
 
     Raises:
         BnsError: no lens, no camera, no floor tags.
     """
-    source, base = _source(port, name, known, found)
+    marker = MARKERS[robot]
+    source, base = _source(port, name, known, found, robot)
     frame = None
     clock = RealClock()
     until = clock.now() + TIME
@@ -63,7 +72,7 @@ def camera(
     x, y, z = placed.position
     yield f"place   {x:.3f}, {y:.3f}, {z:.3f} m"
     placed.write(out)
-    eyes = ThreadedEyes(source, Tracker(placed, Marker()))
+    eyes = ThreadedEyes(source, Tracker(placed, marker))
     try:
         seen: list = []
         while len(seen) < PICTURES and clock.now() < until:
@@ -74,7 +83,13 @@ def camera(
     if len(seen) < 5:
         yield "tag     not in view: its height was not checked"
         return
-    height = calibrate.height(seen, placed, Marker(), image=frame.image, floor=Floor())
+    if calibrate.askew(seen[-1], placed) < ASKEW:
+        yield (
+            "tag     its edges lie along the picture's rows, which blurs its size: "
+            "turn the robot by 20 to 70 deg to have its height checked"
+        )
+        return
+    height = calibrate.height(seen, placed, marker, image=frame.image, floor=Floor())
     said = (
         f"{height.height * 1e3:.1f} mm high by its size, {height.said * 1e3:.1f} said"
     )
@@ -82,14 +97,14 @@ def camera(
 
 
 def _source(
-    port: str, name: str, known: str, found: calibrate.Lens | None
+    port: str, name: str, known: str, found: calibrate.Lens | None, robot: str
 ) -> tuple[Source, Camera | calibrate.Lens]:
     if name == rigs.EMULATED:
         from bns.hardware.emulators.camera import EmulatedCamera
-        from bns.hardware.emulators.frames import Painter
+        from bns.hardware.emulators.frames import painter
 
         ideal = replace(Camera.overhead(rigs.SIZE))
-        return EmulatedCamera(port, Painter(ideal, Marker())), ideal
+        return EmulatedCamera(port, painter(robot, ideal)), ideal
     base = found or (Camera.read(known) if known else None)
     if base is None:
         raise BnsError(

@@ -87,7 +87,8 @@ class Wheels:
         """Send the set point again; the one in force seems to be off [units]."""
         mover, last = self.mover, self.mover.points[-1]
         mover.faults.note("wheels not as told", str(last.units), f"{off:.0f}")
-        again = mover.robot.drive(*(self._metres(u) for u in last.units), times=2)
+        sizes = zip(last.units, mover.robot.wheels, strict=True)
+        again = mover.robot.drive(*(self._metres(u) * f for u, f in sizes), times=2)
         self._doubt += self._metres(off) * (again.at - self._good)
         seen = self._seen
         self._low, self._high, self._from = seen - SLACK, seen + SLACK, seen

@@ -37,6 +37,7 @@ class HardwareWorld:
         port: the robot's device; opened by the first trial.
         camera: number, video file, or "emulated".
         calibration: file of the camera's calibration.
+        wheels: file of the wheels' sizes; empty = nominal.
         log: file for faults.
         as_told: trials have the durations that were wanted, see `records.trial`; for
             recordings with repeats.
@@ -61,6 +62,7 @@ class HardwareWorld:
         port: str = "",
         camera: str = EMULATED,
         calibration: str = "",
+        wheels: str = "",
         log: str = "",
         as_told: bool = False,
         rig: Rig | None = None,
@@ -82,6 +84,7 @@ class HardwareWorld:
         self.start = checked_start(start, self.arena)
         self.sample_dt = bounded("sample_dt", sample_dt, 0.02, 60.0, "s")
         self.port, self.camera, self.calibration = port, camera, calibration
+        self.wheels = wheels
         self.log, self._rig, self.voids = log, rig, 0
         self.as_told = as_told
 
@@ -126,10 +129,19 @@ class HardwareWorld:
                 self.port,
                 self.camera,
                 calibration=self.calibration,
+                wheels=self.wheels,
                 limits=Limits(arena=self.arena),
                 log=self.log or None,
             )
         return self._rig
+
+    def ready(self) -> None:
+        """See that a trial could begin.
+
+        Raises:
+            BnsError: it could not. Nothing has moved.
+        """
+        self.connected().mover().wait_for_sight()
 
     def close(self) -> None:
         """Give port and camera back."""

@@ -14,7 +14,7 @@ MANUAL = """usage: bns hardware {emulate,check,calibrate,record} [...]
 
   emulate    a virtual robot on a serial port, with a camera above it
   check      battery, firmware, sensors, link, camera, tag: nothing moves without --move
-  calibrate  the camera: its lens, its place, the height of the robot's tag
+  calibrate  camera (lens, place, height of the robot's tag), wheels, servo zeros
   record     drive safe commands and write a dataset for `bns gap`
 
 `bns run PRESET --world hardware --port DEVICE --camera N` learns on the robot.
@@ -77,6 +77,8 @@ class Connection:
     """number of a camera, a video file, or emulated"""
     calibration: str = ""
     """file that `bns hardware calibrate` wrote; needed for a real camera"""
+    wheels: str = ""
+    """Khepera: file of its wheels, see `bns hardware calibrate`; else nominal"""
     servos: str = ""
     """hexapod: file of its servos, see `bns hardware calibrate`"""
 
@@ -91,14 +93,20 @@ class Check(Connection):
 
 @dataclass(frozen=True, kw_only=True)
 class Calibrate(Connection):
-    """Find the camera's place from the floor tags and check the height of the robot's
-    tag; with --views the lens first. Nothing moves.
+    """camera: find its place from the floor tags and check the height of the robot's
+    tag; with --views the lens first. wheels: drive a little, find their sizes and the
+    axle. servos: read the hexapod's zeros, its legs held half-way, torque off. Nothing
+    moves but for wheels, with --move.
     """
 
+    what: Literal["camera", "wheels", "servos"] = "camera"
+    """what to calibrate"""
     views: tuple[str, ...] = ()
     """pictures of the ChArUco board (8 x 6 squares of 40 mm), for the lens"""
-    out: str = "camera.json"
-    """file to write"""
+    out: str = ""
+    """file to write (default: camera.json, wheels.json, servos.toml)"""
+    move: bool = False
+    """wheels: say that the robot may move"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,9 +16,15 @@ def execute(given: Any) -> int:
     Args:
         given: what `bns run` was told; one replicate is run, whatever the preset says.
     """
+    from bns.background import OPEN_LOOP
     from bns.hardware.line import check_port
     from bns.hardware.priority import urgent
 
+    if given.config.learner not in OPEN_LOOP:
+        raise BnsError(
+            f"Learner {given.config.learner!r} cannot drive a real robot yet: take a "
+            f"preset whose learner is {' or '.join(map(repr, OPEN_LOOP))}."
+        )
     check_port(given.port)
     urgent()
     from bns.cli import outputs
@@ -28,8 +34,8 @@ def execute(given: Any) -> int:
     config = replace(given.config, replicates=1, record_replicates=1, threads=1)
     out = Path(given.out)
     world = _world(given, config)
-    world.connected()  # before anything is written
     try:
+        world.ready()  # before anything is written
         with outputs.live(given.rerun, config) as on_trial:
             record = train(
                 config,
@@ -70,4 +76,4 @@ def _world(given: Any, config: Any) -> Any:
         return HardwareHexapod(servos=given.servos, **settings)
     from bns.hardware.world import HardwareWorld
 
-    return HardwareWorld(config.world.robot, **settings)
+    return HardwareWorld(config.world.robot, wheels=given.wheels, **settings)

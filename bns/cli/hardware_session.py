@@ -1,5 +1,6 @@
 """The verbs of `bns hardware` that talk to a robot."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,9 @@ def check(given: Any) -> int:
     if given.robot == "phantomx":
         from bns.hardware.dynamixel.check import report
 
-        for line in report(given.port):
-            print(line)
+        for line in report(given.port, given.servos):
+            print(line, flush=True)
+        print("Nothing has moved.")
         return 0
     from bns.hardware.checklist import report as khepera
 
@@ -26,18 +28,57 @@ def check(given: Any) -> int:
     return 0
 
 
+OUT = {"camera": "camera.json", "wheels": "wheels.json", "servos": "servos.toml"}
+"""what is calibrated -> file"""
+
+
 def calibrate(given: Any) -> int:
     """`bns hardware calibrate`."""
-    from bns.hardware import setup
-
-    out = Path(given.out)
+    out = Path(given.out or OUT[given.what])
     if out.exists():
         raise BnsError(f"{out} exists and is not overwritten; give another --out.")
-    lens = setup.lens(given.views) if given.views else None
-    for line in setup.camera(given.port, given.camera, given.calibration, lens, out):
-        print(line)
-    print(f"camera: {out}")
+    lines = {"camera": _camera, "wheels": _wheels, "servos": _servos}[given.what]
+    for line in lines(given, out):
+        print(line, flush=True)
+    print(f"{given.what}: {out}")
     return 0
+
+
+def _camera(given: Any, out: Path) -> Iterator[str]:
+    from bns.hardware import setup
+
+    lens = setup.lens(given.views) if given.views else None
+    yield from setup.camera(
+        given.port, given.camera, given.calibration, lens, out, robot=given.robot
+    )
+
+
+def _servos(given: Any, out: Path) -> Iterator[str]:
+    from bns.hardware.dynamixel import zeros
+
+    if given.robot != "phantomx":
+        raise BnsError("A Khepera III has no servos: give --robot phantomx.")
+    yield from zeros.calibrate(given.port, given.servos, out)
+
+
+def _wheels(given: Any, out: Path) -> Iterator[str]:
+    from bns.hardware import odometry
+
+    if given.robot != "khepera3":
+        raise BnsError("A hexapod has no wheels: give --what servos.")
+    if not given.move:
+        raise BnsError(
+            "The robot drives to measure its wheels: clear the board, give --move."
+        )
+    with _rig(given) as rig, rig.operator:
+        rig.robot.wheels = (1.0, 1.0)
+        done = list(odometry.drives(rig.mover(), (0.0, 0.0, 0.0)))
+    ways, moved = (np.array(part) for part in zip(*done, strict=True))
+    found = odometry.fit(ways, moved)
+    for name, error in zip(("left", "right", "axle"), found.error, strict=True):
+        size = getattr(found, name)
+        yield f"{name:<7} {size * 1e3:.3f} mm, standard error {error * 1e3:.3f} mm"
+    found.write(out)
 
 
 def record(given: Any) -> int:
@@ -60,6 +101,7 @@ def record(given: Any) -> int:
         port=given.port,
         camera=given.camera,
         calibration=given.calibration,
+        wheels=given.wheels,
         damage=given.damage,
         sample_dt=0.05,
         as_told=True,
@@ -91,7 +133,10 @@ class _rig:
         from bns.hardware.rig import connect
 
         self.rig = connect(
-            self.given.port, self.given.camera, calibration=self.given.calibration
+            self.given.port,
+            self.given.camera,
+            calibration=self.given.calibration,
+            wheels=self.given.wheels,
         )
         return self.rig
 

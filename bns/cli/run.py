@@ -44,6 +44,8 @@ class Arguments:
     """number of the camera above it, or emulated; for --world hardware"""
     calibration: str = ""
     """of that camera, see `bns hardware calibrate`"""
+    wheels: str = ""
+    """a Khepera's file of wheels, see `bns hardware calibrate`"""
     servos: str = ""
     """a hexapod's file of servos, see `bns hardware calibrate`"""
     config: Annotated[RunConfig, tyro.conf.arg(name="")] = field(

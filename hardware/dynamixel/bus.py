@@ -92,8 +92,8 @@ class Bus:
                 others.append(joint.id)
         if len(missing) == len(self.joints):
             raise BnsError(
-                "No servo answers: switch the hexapod on, check the adapter, and that "
-                f"the servos talk at {packets.BAUD} baud."
+                "No servo answers: switch the hexapod on, check the adapter, that the "
+                f"servos talk at {packets.BAUD} baud, and that it is no Khepera III."
             )
         if garbled:
             raise BnsError(
@@ -125,6 +125,19 @@ class Bus:
             self.faults.note("no answer" if result else "bad state", str(servo))
             if self.guard is not None and self._on:
                 self.guard.feed(moving=True)
+        raise LinkError(f"Servo {servo} gives no proper answer in {TRIES} tries.")
+
+    def holds(self, servo: int) -> bool:
+        """Whether the torque of a servo is on.
+
+        Raises:
+            LinkError: no proper answer.
+        """
+        for _ in range(TRIES):
+            value, result, _ = self._call("read1ByteTxRx", servo, packets.TORQUE)
+            if result == 0:
+                return bool(value)
+            self.faults.note("no answer", str(servo))
         raise LinkError(f"Servo {servo} gives no proper answer in {TRIES} tries.")
 
     def look(self, count: int = 2) -> list[tuple[Joint, packets.State]]:

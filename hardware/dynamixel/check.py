@@ -8,16 +8,22 @@ from bns.hardware.dynamixel import joints, packets
 from bns.hardware.dynamixel.bus import EMPTY, Bus
 
 
-def report(port: str) -> Iterator[str]:
+def report(port: str, servos: str = "") -> Iterator[str]:
     """Look at every servo; nothing moves.
+
+    Args:
+        port: of the robot.
+        servos: its file; empty = the one that comes with the driver.
 
     Raises:
         BnsError: the port, a servo or the battery is not as it should be.
     """
     clock = RealClock()
-    bus = Bus(port, joints.read(), clock)
+    bus = Bus(port, joints.read(servos or joints.FILE), clock)
     try:
         bus.identify()
+        if not servos:
+            yield "zeros      assumed; see `bns hardware calibrate --what servos`"
         yield f"servos     {len(bus.joints)} AX-12A at {packets.BAUD} baud"
         begin = clock.now()
         for joint in bus.joints:
@@ -32,4 +38,4 @@ def report(port: str) -> Iterator[str]:
         if min(state.voltage for state in bus.states.values()) < EMPTY:
             raise BnsError(f"The bus has less than {EMPTY} V: charge the battery.")
     finally:
-        bus.close()
+        bus.release()

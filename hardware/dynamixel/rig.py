@@ -115,7 +115,7 @@ def known(servos: str, camera: str) -> tuple[joints.Joint, ...]:
     if not servos and camera != EMULATED:
         raise BnsError(
             "The servos are not calibrated: make their file with `bns hardware "
-            "calibrate --robot phantomx` and give it as --servos FILE."
+            "calibrate --robot phantomx --what servos` and give it as --servos FILE."
         )
     return joints.read(servos or joints.FILE)
 

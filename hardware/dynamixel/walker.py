@@ -245,8 +245,9 @@ class Walker:
         """
         done = Walked(sightings=[self.wait_for_sight()])
         try:
-            self.frame()
-            done.sightings += self.look()
+            for _ in range(-(-len(self.names) // READS)):  # every servo once
+                self.frame(done)
+                self.look(done)
             for row, limit in zip(goals, limits, strict=True):
                 done.switched.append(self.clock.now())
                 rests = self.go(row, float(limit), done)

@@ -19,6 +19,8 @@ from bns.worlds.effects.base import Effect
 from bns.worlds.legged_goals import in_units
 from bns.worlds.physics import Compiled
 
+LIFTED = 0.01  # m; how far the stand lifts it off the board
+
 
 class Reading(NamedTuple):
     """What a servo knows of itself.
@@ -76,6 +78,8 @@ class HexapodBody(LiveBody):
         self.pace = np.full(len(names), NO_LOAD_SPEED)
         self.on = np.zeros(len(names), bool)
         self.stand = True
+        self.data.qpos[self._places] = -self._laws["offset"]  # a jig, no weight on it
+        self.data.qpos[self._free][2] += LIFTED
 
     def _begin(self, scene: Compiled, start: tuple[float, float, float]) -> np.ndarray:
         return legged_plan.stand(scene, start, np.zeros(scene.model.nu).tobytes())
@@ -127,7 +131,7 @@ class HexapodBody(LiveBody):
         push = self.data.actuator_force[column]
         most = max(self.model.actuator_forcerange[column, 1], 1e-9)
         speed = float(self.data.qvel[self._rates[column]]) * joint.sign
-        load = float(np.clip(push / most, -1, 1)) * joint.sign
+        load = float(np.clip(push / most, -1, 1)) * joint.sign * self.on[column]
         return Reading(int(np.clip(units, 0, 1023)), speed, load)
 
     def _angles(self) -> np.ndarray:

@@ -53,6 +53,7 @@ class Khepera3:
         timeout: for an answer [s].
 
     Attributes:
+        wheels: diameters of the left and right wheel as shares of nominal.
         round_trips: duration of each exchange that went well [s], the newest 1000.
     """
 
@@ -71,6 +72,7 @@ class Khepera3:
         self.limit, self.timeout = limit, timeout
         self.units: Firmware | None = None
         self.version: tuple[int, int] = (0, 0)
+        self.wheels = (1.0, 1.0)
         self.round_trips: list[float] = []
         self._moving = False
 
@@ -149,14 +151,19 @@ class Khepera3:
         self._moving = self._moving or moving  # until `stop` has seen it stand
         if self.guard is not None:
             self.guard.feed(moving=self._moving)
-        pair = (round(self.units.units(left)), round(self.units.units(right)))
+        pair = self._device(left, right)
         command = protocol.speeds(*pair)
         begin = self.clock.now()
         self.ask(command, "d")
         took = self.clock.now() - begin
         for _ in range(times - 1):
             self.ask(command, "d")
-        return Drive(begin + (took + _longer(command)) / 2, pair, took)
+        return Drive(begin + (took + protocol.longer(command)) / 2, pair, took)
+
+    def _device(self, left: float, right: float) -> tuple[int, int]:
+        """Speeds over the floor [m/s] in device units."""
+        a, b = self.wheels
+        return round(self.units.units(left / a)), round(self.units.units(right / b))
 
     def lead(self, *pair: float) -> float:
         """How long before its moment a set point has to be sent [s].
@@ -165,8 +172,8 @@ class Khepera3:
             pair: left and right [m/s].
         """
         recent = self.round_trips[-20:]
-        command = protocol.speeds(*(round(self.units.units(v)) for v in pair))
-        return (sorted(recent)[len(recent) // 2] + _longer(command)) / 2
+        command = protocol.speeds(*self._device(*pair))
+        return (sorted(recent)[len(recent) // 2] + protocol.longer(command)) / 2
 
     def stop(self) -> None:
         """Stop both wheels and see that they stand.
@@ -256,7 +263,7 @@ class Khepera3:
             if heard is not None:
                 heard.append(data)
             buffer = (buffer + data)[-4096:]
-            while (cut := _ending(buffer)) >= 0:
+            while (cut := protocol.ending(buffer)) >= 0:
                 line, buffer = buffer[:cut].strip(b"\r\n"), buffer[cut + 1 :]
                 if not line:
                     continue
@@ -287,14 +294,3 @@ class Khepera3:
         while self.clock.now() < until and self.line.read(QUIET):
             pass
         self.line.discard()
-
-
-def _longer(command: bytes) -> float:
-    """By how much a set point is longer on the wire than its answer [s]."""
-    return (len(command) - len(b"d\r\n")) * 10 / protocol.BAUD
-
-
-def _ending(buffer: bytes) -> int:
-    """Where the first line ends (LF or CR), -1 if none does."""
-    found = [at for at in (buffer.find(b"\n"), buffer.find(b"\r")) if at >= 0]
-    return min(found) if found else -1

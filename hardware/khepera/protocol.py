@@ -114,3 +114,14 @@ def frame(data: bytes) -> Reading | None:
         positions=(values[24], values[25]),
         stamp=values[26],
     )
+
+
+def longer(command: bytes) -> float:
+    """By how much a command is longer on the wire than the answer `d` [s]."""
+    return (len(command) - len(b"d\r\n")) * 10 / BAUD
+
+
+def ending(buffer: bytes) -> int:
+    """Where the first line ends (LF or CR), -1 if none does."""
+    found = [at for at in (buffer.find(b"\n"), buffer.find(b"\r")) if at >= 0]
+    return min(found) if found else -1

@@ -24,5 +24,6 @@ def stranger(heard: bytes) -> BnsError:
         )
     return BnsError(
         "Nothing answers on this port: switch the Khepera III on, check cable or "
-        f"Bluetooth, and that it talks at {protocol.BAUD} baud."
+        f"Bluetooth, that it talks at {protocol.BAUD} baud, and that it is no hexapod "
+        "(--robot phantomx)."
     )

@@ -165,6 +165,18 @@ def height(
     return Height(float(np.median(heights)), error, marker.height)
 
 
+def askew(sighting: Sighting, camera: Camera) -> float:
+    """How far a tag is turned against the rows and columns of the picture [deg].
+
+    An edge along them is found a share of a pixel off, the same all along.
+    """
+    x, y, yaw = sighting.pose
+    ahead = np.array([[x, y, 0.0], [x + np.cos(yaw) / 10, y + np.sin(yaw) / 10, 0.0]])
+    start, end = camera.project(ahead)
+    angle = np.degrees(np.arctan2(*(end - start)[::-1])) % 90.0
+    return float(min(angle, 90.0 - angle))
+
+
 def _shrunk(image: np.ndarray, camera: Camera, floor: Floor) -> float:
     """By how many pixels a side is seen too short."""
     found = Finder().anywhere(image)

@@ -20,5 +20,6 @@ def cv2() -> Any:
         ) from error
     if not hasattr(module, "aruco"):
         raise MissingDependencyError("tracking", "ArUco in OpenCV", INSTALL)
+    module.utils.logging.setLogLevel(module.utils.logging.LOG_LEVEL_SILENT)
     module.setNumThreads(1)  # its threads would not share this one's precedence
     return module

@@ -1,0 +1,68 @@
+"""Zeros of a hexapod's servos: positions read while its legs are half-way.
+
+Nothing moves: the torque stays off, a person or a jig holds the legs where every joint
+of the model is at 0 (`models/phantomx`: coxae straight, femora and tibiae half-way).
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from bns.errors import BnsError
+from bns.hardware.clock import RealClock
+from bns.hardware.dynamixel import joints
+from bns.hardware.dynamixel.bus import Bus
+from bns.hardware.dynamixel.joints import Joint
+
+READS = 9  # of each servo
+SCATTER = 3  # units between them; more = the leg was moved
+FAR = 60  # units (18 deg) from half-way; farther = the leg is somewhere else
+
+
+def calibrate(port: str, known: str, out: Path) -> Iterator[str]:
+    """Read every servo and write the robot's file; says what was found.
+
+    Args:
+        port: of the robot.
+        known: file with numbers and signs; empty = the one that comes with the driver.
+        out: file to write.
+
+    Raises:
+        BnsError: a servo is missing, holds, moves, or is far from half-way.
+    """
+    bus = Bus(port, joints.read(known or joints.FILE), RealClock())
+    try:
+        bus.identify()
+        holding = [j.name for j in bus.joints if bus.holds(j.id)]
+        if holding:
+            raise BnsError(
+                f"{', '.join(holding[:3])}{' ...' * (len(holding) > 3)} hold their "
+                "place: switch the robot off and on, put its legs half-way by hand."
+            )
+        made = [found(bus, joint) for joint in bus.joints]
+    finally:
+        bus.release()
+    joints.write(out, tuple(made), said="Zeros by `bns hardware calibrate`.")
+    off = [m.zero - 512 for m in made]
+    yield f"zeros   {min(off):+d} to {max(off):+d} units from half-way, 18 servos"
+
+
+def found(bus: Bus, joint: Joint) -> Joint:
+    """A joint with its zero where it stands now; its end stops move along.
+
+    Raises:
+        BnsError: it moves, or is far from half-way.
+    """
+    seen = [bus.read(joint.id).position for _ in range(READS)]
+    zero = round(float(np.median(seen)))
+    if max(seen) - min(seen) > SCATTER:
+        raise BnsError(f"{joint.name} moves while it is read: hold the leg still.")
+    if abs(zero - 512) > FAR:
+        raise BnsError(
+            f"{joint.name} reads {zero}, {abs(zero - 512)} units from half-way: put "
+            "the leg half-way, or mount the horn anew."
+        )
+    moved = zero - joint.zero
+    low, high = (min(max(stop + moved, 0), 1023) for stop in (joint.low, joint.high))
+    return joint._replace(zero=zero, low=low, high=high)

@@ -1,0 +1,161 @@
+"""The hexapod as a hardware world, over emulated servos with a body behind them."""
+
+import threading
+
+import numpy as np
+import pytest
+
+from bns.errors import BnsError
+from bns.hardware import hexapod_world, walked
+from bns.hardware.clock import RealClock
+from bns.hardware.dynamixel import joints, zeros
+from bns.hardware.dynamixel.walker import SPEED, Walked
+from bns.hardware.emulators.hexapod_body import HexapodBody
+from bns.hardware.emulators.pty_host import PtyHost
+from bns.hardware.emulators.run_bus import phantomx
+from bns.hardware.emulators.servo_bank import ServoBank
+from bns.hardware.errors import Void
+from bns.hardware.hexapod_world import HardwareHexapod
+from bns.hardware.tracking.tracker import Sighting
+from bns.models import robot
+from bns.models.phantomx import servos
+from bns.worlds.active import Stages
+from bns.worlds.damage import Damage
+from bns.worlds.trial import POSE_CHANNELS, Channel, Commands
+
+pytest.importorskip("dynamixel_sdk")
+pytest.importorskip("serial")
+
+CHANNELS = tuple(Channel(*channel) for channel in robot("phantomx").channels)
+
+
+def goals(*rows, limit=2.0):
+    values = np.zeros((len(rows), 18))
+    for row, changes in zip(values, rows, strict=True):
+        for name, angle in changes.items():
+            row[servos.JOINTS.index(name)] = angle
+    return Commands(values, np.full(len(rows), limit), CHANNELS)
+
+
+def test_the_drivers_joints_are_those_of_the_model():
+    table = joints.read()
+    assert {joint.name: joint.id for joint in table} == dict(servos.IDS)
+    signs = dict(zip(servos.JOINTS, servos.SIGNS, strict=True))
+    low, high = robot("phantomx").ranges.T
+    for joint in table:
+        at = servos.JOINTS.index(joint.name)
+        assert joint.sign == signs[joint.name]
+        ends = sorted((joint.angle(joint.low), joint.angle(joint.high)))
+        np.testing.assert_allclose(ends, [low[at], high[at]], atol=0.006)
+
+
+def test_a_body_hangs_on_its_stand_until_it_is_powered_and_then_obeys():
+    body = HexapodBody()
+    femur = {joint.name: joint for joint in joints.read()}["left_front_femur"]
+    body.advance(1.0)
+    assert body.stand and body.reading(femur.id).units == 512
+    for number in body.joints:
+        body.tell(number, 512)
+        body.power(number, True)
+    body.tell(femur.id, femur.units(0.3))
+    body.advance(2.5)
+    assert body.reading(femur.id).units == pytest.approx(femur.units(0.3), abs=4)
+    assert body.attitude()[0] > 0.07  # it stands
+    for number in body.joints:
+        body.power(number, False)
+    body.advance(4.5)
+    assert body.attitude()[0] < 0.06  # it lies
+
+
+def test_software_damage_changes_what_is_sent_before_the_first_command_as_well():
+    given = goals({"left_front_femur": -0.2, "right_rear_coxa": 0.1}, {})
+    damage = Damage.parse(["leg_raised:legs=1,blend=1"])
+    stages = Stages.of(Damage.none(), damage, 0, given.duration)
+    sent, before = hexapod_world.told(given, stages, 0, 0)
+    femur = servos.JOINTS.index("left_front_femur")
+    assert sent[:, femur] == pytest.approx([1.3, 1.3]) and before[femur] == 1.3
+    assert sent[0, servos.JOINTS.index("right_rear_coxa")] == 0.1
+    with pytest.raises(BnsError, match="servo_gain"):
+        HardwareHexapod(damage=["servo_gain:joint=all,factor=0.5"])
+
+
+def carried_out(count, late=0.001):
+    done = Walked(late=late, left=True)
+    done.switched = [float(k) for k in range(count + 1)]
+    done.sightings = [
+        Sighting(t, np.array([0.1 * t, 0.0, 0.0]), 0.1)
+        for t in np.arange(-0.2, count + 0.3, 0.1)
+    ]
+    done.readings = {"left_front_coxa": [(0.0, 0.0), (float(count), 0.5)]}
+    return done
+
+
+def made(done, given):
+    channels = (*POSE_CHANNELS, Channel("left_front_coxa_position", "rad"))
+    return walked.trial(
+        done,
+        given,
+        sample_dt=0.1,
+        start_yaw=0.0,
+        robot="phantomx",
+        world="hardware",
+        channels=channels,
+        conditions={},
+    )
+
+
+def test_a_walk_that_was_ended_early_has_no_poses_where_it_did_not_come_to():
+    trial = made(carried_out(2), goals({}, {}, {}, {}))
+    poses = trial.command_poses_world
+    np.testing.assert_allclose(poses[:3, 0], [0.0, 0.1, 0.2], atol=1e-6)
+    assert np.isnan(poses[3:]).all() and trial.outcome.left_arena
+    assert trial.handled.tolist() == [False, False, True, True]
+    assert trial.channel("left_front_coxa_position")[0] == 0.0
+    with pytest.raises(Void, match="late"):
+        made(carried_out(2, late=0.4), goals({}, {}))
+
+
+def test_zeros_are_where_the_servos_stand_and_end_stops_move_along(tmp_path):
+    bank = ServoBank(at=RealClock().now())
+    bank.place[5] = 525.0
+    host, done = PtyHost(bank, tmp_path / "bus"), threading.Event()
+    thread = threading.Thread(target=host.serve, args=(done.is_set,))
+    thread.start()
+    try:
+        list(zeros.calibrate(str(tmp_path / "bus"), "", tmp_path / "own.toml"))
+        bank.place[5] = 640.0
+        with pytest.raises(BnsError, match="left_front_tibia reads 640"):
+            list(zeros.calibrate(str(tmp_path / "bus"), "", tmp_path / "b.toml"))
+    finally:
+        done.set()
+        thread.join()
+        host.unplug()
+    before = {joint.id: joint for joint in joints.read()}
+    after = {joint.id: joint for joint in joints.read(tmp_path / "own.toml")}
+    assert after[5] == before[5]._replace(zero=525, low=292, high=870)
+    assert after[4] == before[4]
+
+
+def test_a_trial_in_real_time(tmp_path):
+    done = threading.Event()
+    words = {"stop": done.is_set, "log": str(tmp_path / "log")}
+    thread = threading.Thread(target=phantomx, args=(tmp_path / "bus",), kwargs=words)
+    thread.start()
+    world = HardwareHexapod(port=str(tmp_path / "bus"))
+    try:
+        while not (tmp_path / "bus").exists():
+            done.wait(0.02)
+        given = goals({"left_middle_femur": 0.5}, {"right_front_coxa": 0.2})
+        (trial,) = world.run([given], trial=3)
+    finally:
+        world.close()
+        done.wait(0.3)
+        done.set()
+        thread.join()
+    read = trial.channel("left_middle_femur_position")[trial.boundaries]
+    assert read == pytest.approx([0.0, 0.5, 0.0], abs=0.08)
+    assert (trial.commands.durations > 0.5 / SPEED).all()
+    assert np.isfinite(trial.poses_world).all() and trial.conditions["frames"] > 20
+    assert np.hypot(*trial.poses_world[-1, :2]) < 0.06
+    last = (tmp_path / "log").read_text().splitlines()[-1]
+    assert '"powered": 0' in last
