@@ -24,8 +24,8 @@ SETS = {
         "pair": 40,
         "none": 60,
         "off-library": 30,
-        "fault": 20,
-        "alias": 24,
+        "fault": 16,
+        "alias": 16,
     },
     "calibrate": {"single": 140, "none": 60, "off-library": 16, "pair": 40},
 }

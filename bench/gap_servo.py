@@ -12,7 +12,7 @@ from bench.servo_cases import KINDS, Case
 DOC = "STS3215 recordings, one setting mis-told: share named right, aliases merged"
 BAR = ">= 0.90"
 BAR_VALUE = 0.90
-SEED, EACH, QUICK = 2026, 32, 6
+SEED, EACH, QUICK = 2027, 32, 6  # 2026 was used while the tool was made
 FITTED, HELD_OUT = (1, 2), (3,)  # repeats that are diagnosed and that are predicted
 SMOOTH = ("sin_sin", "sin_time_square", "up_and_down")
 EDITED = 2  # predictions of another payload per case
@@ -21,7 +21,7 @@ ERROR_BARS = {"payload": 0.08, "lever": 0.03, "gain": 0.04}
 
 
 def run(quick: bool) -> Result:
-    """Four kinds of cases; quick takes 6 of each instead of 32."""
+    """Four kinds of cases; quick takes 6 of each instead of 32 (of none: 9 of 48)."""
     from bns.gap import servo
 
     every = servo_cases.load()

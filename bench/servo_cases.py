@@ -60,13 +60,14 @@ def draw(every: Runs, each: int, rng: np.random.Generator) -> Iterator[Case]:
 
     Args:
         every: all runs.
-        each: cases of each kind.
+        each: cases of each kind; of "none" half as many again.
         rng: draws the cells and the wrong settings.
     """
     known = sorted(set(cells(every)))
     levels = [sorted({cell[i] for cell in known}) for i in range(3)]
     for at, kind in enumerate(KINDS):
-        for index in rng.permutation(len(known))[:each]:
+        count = each if kind != "none" else 3 * each // 2
+        for index in rng.permutation(len(known))[:count]:
             true = known[index]
             told = list(true)
             if kind != "none":

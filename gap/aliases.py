@@ -11,7 +11,8 @@ from bns.gap.signatures import Curves
 # A pair of signatures d noise units apart is confused with probability Phi(-d / 2);
 # 20 % is reached at d = 1.68.
 ALIKE = 1.68
-TRIED = 5  # candidates nearest by their curves that are fitted to be sure
+TRIED = 4  # candidates nearest by their curves that are fitted to be sure
+NEAR = 4.0 * ALIKE, 0.4  # farther than that, and than a share of the effect: not fitted
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,8 @@ def likeness(problem: Problem, curves: Curves, term: fit.Term) -> tuple[Likeness
     """
     (shown,) = problem.signatures([[term.effect()]])
     gaps, nearest = signatures.nearest(curves, shown)
-    order = [c for c in np.argsort(gaps) if np.isfinite(gaps[c])][: TRIED + 1]
+    reach = max(NEAR[0], NEAR[1] * float(np.linalg.norm(shown)))
+    order = [c for c in np.argsort(gaps) if gaps[c] < reach**2][: TRIED + 1]
     levels = [nearest[candidate] for candidate in order]
     starts = [
         fit.Term.at(

@@ -158,7 +158,7 @@ def _noticed(trial: Trial, values: np.ndarray, name: str, label: str) -> list[st
         return []
     steps = np.diff(seen)
     if (steps == 0).mean() > STUCK:
-        return []  # see `stuck`
+        return [f"{label}: {name} is stuck at {np.median(seen):.4g}"]
     notes = []
     moving = np.abs(steps[steps != 0])
     if len(moving) > 20 and len(np.unique(moving.round(12))) < COARSE:

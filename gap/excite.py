@@ -6,7 +6,7 @@ separates what is tied is for `plan` to say.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,10 +21,17 @@ SWEEP = 0.1  # [s] between the values of a sweep
 
 @dataclass(frozen=True, eq=False)
 class Excitation:
-    """Commands with a name in words."""
+    """Commands with a name in words.
+
+    Attributes:
+        name: in words.
+        commands: what is told.
+        conditions: settings of the robot that the command is to be run with.
+    """
 
     name: str
     commands: Commands
+    conditions: Mapping[str, float] = field(default_factory=dict)
 
 
 def wheeled(*, seed: int = 0, fastest: float = FAST) -> tuple[Excitation, ...]:

@@ -11,6 +11,7 @@ from bns.gap.support import Point, Term, evaluate, finite
 from bns.gap.whiten import loss
 
 FINISHES = 3  # rounds in which a rough fit is put right by the true simulation
+FAR = 2.0  # times `HOPELESS`: fits as much worse than the best stay rough
 
 
 def refine(problem: Problem, start: Sequence[Term]) -> Point:
@@ -57,9 +58,14 @@ def refine_all(problem: Problem, starts: Sequence[Sequence[Term]]) -> list[Point
 
 
 def _trued(problem: Problem, points: Sequence[Point]) -> list[Point]:
-    """Points with the rest that the true simulation leaves."""
-    exact = evaluate(problem, [point.terms for point in points])
-    return [replace(t, slopes=p.slopes) for p, t in zip(points, exact, strict=True)]
+    """Points with the rest that the true simulation leaves; far ones as they are."""
+    made = list(points)
+    limit = min((point.loss for point in points), default=np.inf) + FAR * HOPELESS
+    near = [number for number, point in enumerate(points) if point.loss < limit]
+    exact = evaluate(problem, [points[number].terms for number in near])
+    for number, true in zip(near, exact, strict=True):
+        made[number] = replace(true, slopes=points[number].slopes)
+    return made
 
 
 def _side_by_side(

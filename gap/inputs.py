@@ -28,6 +28,8 @@ SAMPLES = 300
 """samples of a trial that are used at most; more of them tell no more of its motion,
 and what has to be kept of their noise grows with their square"""
 
+SHOWN = 12  # values of a condition that an error lists
+
 PART = 20.0  # [s] length of the trials that long recordings are cut into
 
 
@@ -98,7 +100,11 @@ def trials(
         known = sorted({key for trial in found for key in trial.conditions})
         if not value or (known and name not in known):
             raise UnknownNameError("condition (write name=value)", text, known)
-        found = [t for t in found if _same(t.conditions.get(name), value)]
+        kept = [t for t in found if _same(t.conditions.get(name), value)]
+        if found and not kept:
+            there = sorted({str(trial.conditions.get(name)) for trial in found})
+            raise UnknownNameError(f"value of {name}", value, there[:SHOWN])
+        found = kept
     if not found:
         raise BnsError("No trial is left: nothing was recorded, or --only drops all.")
     _of_robot(found, model)
@@ -140,7 +146,8 @@ def _imported(name: str, path: str) -> list[Trial]:
 def _same(given: object, wanted: str) -> bool:
     if isinstance(given, int | float):
         try:
-            return bool(np.isclose(float(wanted), given))
+            near = round(given, len(wanted.partition(".")[2]))  # as it was written
+            return bool(np.isclose(float(wanted), [given, near]).any())
         except ValueError:
             return False
     return str(given) == wanted

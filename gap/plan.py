@@ -7,7 +7,7 @@ magnitude has been allowed to move as far as the recording so far leaves it free
 logarithm of the Bayes factor.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -89,7 +89,8 @@ def plan(
     if len(fits) < 2:
         return Plan(tuple(f.names for f in fits), (), 0, plan_words.nothing(found))
     effects = [[store.parse(text, model) for text in fit.effects] for fit in fits]
-    family = tuple(family) or _family(model, seed)
+    told = found.provenance.get("told", {})
+    family = tuple(family) or _family(model, seed, told)
     family = _safe(family, model, effects, arena)
     made = [_option(item, found, model, fits, effects) for item in family]
     names = tuple(fit.names for fit in fits)
@@ -146,7 +147,12 @@ def repeats(distance: float, *, tie: float | None = None) -> int:
     return 0
 
 
-def blank(commands: Commands, model: GapModel, name: str = "") -> Trial:
+def blank(
+    commands: Commands,
+    model: GapModel,
+    name: str = "",
+    conditions: Mapping[str, float] | None = None,
+) -> Trial:
     """A trial that nobody has run yet: as the nominal model would do it."""
     ends = np.concatenate([[0.0], np.cumsum(commands.durations)])
     grid = np.arange(0.0, ends[-1] + 1e-9, SAMPLE)
@@ -159,14 +165,17 @@ def blank(commands: Commands, model: GapModel, name: str = "") -> Trial:
         channels=tuple(model.channels),
         robot=model.name,
         world=name,
+        conditions=dict(conditions or {}),
     )
     ((seen,),) = model.simulate([trial], [()])
     return trial.replace(observed=seen)
 
 
-def _family(model: GapModel, seed: int) -> tuple[Excitation, ...]:
+def _family(
+    model: GapModel, seed: int, told: Mapping[str, float]
+) -> tuple[Excitation, ...]:
     if hasattr(model, "excitations"):
-        return tuple(model.excitations(seed=seed))
+        return tuple(model.excitations(seed=seed, told=told))
     limits = inputs.limits(model)
     if not limits:
         raise BnsError(
@@ -190,7 +199,7 @@ def _safe(
     if [channel.name for channel in model.channels][:2] != ["x", "y"]:
         return list(family)
     half = np.asarray(arena) / 2 - MARGIN
-    trials = [blank(item.commands, model) for item in family]
+    trials = [blank(item.commands, model, "", item.conditions) for item in family]
     paths = model.simulate(trials, [(), *effects])
     return [
         item
@@ -206,7 +215,7 @@ def _option(
     fits: Sequence[Fit],
     effects: Sequence[Sequence[Effect]],
 ) -> Option:
-    trial = blank(item.commands, model)
+    trial = blank(item.commands, model, "", item.conditions)
     problem = Problem.of(
         [trial], model, candidates=model.candidates(), floor=_floor(found, model)
     )

@@ -108,4 +108,6 @@ def diagnose(
     curves = servo_curves.curves(runs, nominal, list(chosen.values()))
     scores = servo_score.score(residuals, curves, matrices)
     scores = servo_score.refined(runs, nominal, scores, chosen, matrices)
-    return verdict(scores, reference.null.without(without), chosen), scores
+    gain = cells(runs)[0][-1]
+    null = reference.null.without(without)
+    return verdict(scores, null, chosen, gain), scores

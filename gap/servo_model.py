@@ -11,7 +11,8 @@ import numpy as np
 
 from bns import models
 from bns.errors import BnsError
-from bns.gap import servo_candidates
+from bns.gap import servo_candidates, servo_excite
+from bns.gap.excite import Excitation
 from bns.gap.model import Windows
 from bns.gap.records import Candidate
 from bns.gap.servo_nominal import Nominal
@@ -58,6 +59,12 @@ class ServoModel:
     def candidates(self) -> tuple[Candidate, ...]:
         """All servo effects."""
         return servo_candidates.candidates()
+
+    def excitations(
+        self, *, seed: int = 0, told: Mapping[str, float] | None = None
+    ) -> tuple[Excitation, ...]:
+        """Safe commands for the planner, see `gap/servo_excite.py`."""
+        return servo_excite.servo(seed=seed, told=told)
 
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]

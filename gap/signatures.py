@@ -58,7 +58,7 @@ def trace(problem: Problem, candidates: Sequence[Candidate]) -> Curves:
     sets, where = [], []
     for number, item in enumerate(candidates):
         for branch in range(len(item.branches)):
-            for value in item.grid:
+            for value in _magnitudes(problem, item):
                 sets.append([item.make(value, branch)])
                 where.append((number, branch, value))
     found = problem.signatures(sets, rough=True)
@@ -85,8 +85,15 @@ def trace(problem: Problem, candidates: Sequence[Candidate]) -> Curves:
     )
 
 
+def _magnitudes(problem: Problem, candidate: Candidate) -> tuple[float, ...]:
+    """Those to simulate: of a stepped candidate one on each of its steps."""
+    steps = getattr(problem.model, "steps", None)
+    found = steps(candidate, problem.trials) if candidate.stepped and steps else ()
+    return found or candidate.grid
+
+
 def _between(candidate: Candidate, points: list) -> list[tuple[float, np.ndarray]]:
-    if integer(candidate):
+    if integer(candidate) or candidate.stepped:
         return points
     points = [*points, (candidate.nominal, np.zeros_like(points[0][1]))]
     points.sort(key=lambda item: item[0])

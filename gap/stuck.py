@@ -7,6 +7,7 @@ from bns.worlds.trial import Trial
 
 RUN = 8  # equal samples in a row, at least
 MOVED = 20.0  # times the resolution that the model moves meanwhile, at least
+SAME = 0.05  # share of repeated values from which a channel counts as coarse
 STEPS = 3.0  # times the smallest step of a quantised channel, likewise
 
 
@@ -44,10 +45,16 @@ def dropped(trial: Trial, model: GapModel) -> tuple[Trial, list[str]]:
 
 
 def _others_move(values: np.ndarray, column: int, model: GapModel) -> bool:
+    """Whether another channel moves meanwhile and hardly ever repeats a value.
+
+    Where the others repeat theirs, too, encoders are coarse or joints stick: that is
+    no fault of a channel.
+    """
     others = [c for c in range(len(model.channels)) if c != column]
     seen = values[np.isfinite(values).all(axis=1)][:, others]
-    spans = np.ptp(seen, axis=0)
-    return bool((spans > MOVED * model.resolution[others]).any()) or not others
+    moved = np.ptp(seen, axis=0) > MOVED * model.resolution[others]
+    repeated = (np.diff(seen, axis=0) == 0).mean(axis=0) > SAME
+    return bool((moved & ~repeated).any())
 
 
 def _runs(values: np.ndarray) -> list[tuple[int, int]]:

@@ -73,6 +73,11 @@ class WheeledModel:
         """All candidates of a wheeled robot."""
         return wheeled_library.candidates()
 
+    @staticmethod
+    def steps(candidate: Candidate, trials: Sequence[Trial]) -> tuple[float, ...]:
+        """Widths of a dead band, one between each two speeds that were told."""
+        return wheeled_library.steps(candidate, trials)
+
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:

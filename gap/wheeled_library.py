@@ -1,6 +1,6 @@
 """Candidate explanations for a wheeled robot, from the library of effects."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -9,12 +9,14 @@ from bns.gap.reduced import WEAKER, on_lattice
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import BodyEffect
 from bns.worlds.effects.common import TOP_SPEED
+from bns.worlds.trial import Trial
 
 SIDES = ("left", "right", "both")
 HEADINGS = tuple({"direction": k * np.pi / 2} for k in (-1, 0, 1, 2))
 WAYS = tuple({"direction": way} for way in ("forward", "backward", "commanded"))
 FACTORS = (0.75, 0.93, 1.07, 1.25)
 BANDS = (0.003, 0.006, 0.01, 0.015, 0.02, 0.03, 0.04, 0.06, 0.075, 0.09, 0.11, 0.13)
+STEPS = 10  # of a dead band that are told apart; wider ones lie on the grid
 TURNS = "turns in place and arcs"
 
 # effect, parameter, grid, low, high, per wheel?, further settings. Grids span the
@@ -120,6 +122,23 @@ def candidates() -> tuple[Candidate, ...]:
         )
     )
     return tuple(found)
+
+
+def steps(candidate: Candidate, trials: Sequence[Trial]) -> tuple[float, ...]:
+    """Widths of a dead band, one between each two speeds that were told.
+
+    Args:
+        candidate: a dead band.
+        trials: a recording; between two of its speeds a width makes no difference.
+    """
+    columns = {"left": [0], "right": [1]}.get(candidate.fixed.get("wheel"), [0, 1])
+    told = [np.abs(trial.commands.values[:, columns]).ravel() for trial in trials]
+    speeds = np.unique(np.concatenate(told).round(9))
+    speeds = speeds[(speeds > 0) & (speeds < candidate.high)]
+    between = (speeds + np.append(speeds[1:], candidate.high)) / 2
+    few = between[:STEPS]
+    more = [value for value in candidate.grid if value > few.max(initial=0.0)]
+    return (*few.tolist(), *more)
 
 
 def _rows(

@@ -116,7 +116,7 @@ def _diagnose(given: Diagnose) -> int:
         model = nominal(given, given.threads)
         trials = _some(recorded(given, model))
         found = _general(given, model, trials, out)
-    found = replace(found, provenance=_provenance(given, model))
+    found = replace(found, provenance=_provenance(given, model, trials))
     if out:
         store.save(found, out)
     _say(found)
@@ -154,7 +154,7 @@ def _odometry(given: Diagnose) -> Any:
     return odometry_record.record(trials, axle=khepera3_odometry.AXLE)
 
 
-def _provenance(given: Diagnose, model: Any) -> dict[str, Any]:
+def _provenance(given: Diagnose, model: Any, trials: list[Any]) -> dict[str, Any]:
     from bns import versions
 
     named = given.model or (model.name if model else "odometry")
@@ -165,7 +165,21 @@ def _provenance(given: Diagnose, model: Any) -> dict[str, Any]:
         "columns": given.columns,
         "only": list(given.only),
         "reference": list(given.reference),
+        "told": shared(trials),
         "versions": dict(versions.collect()),
+    }
+
+
+def shared(trials: list[Any]) -> dict[str, float]:
+    """Conditions in numbers that all trials share: settings of the robot."""
+    if not trials:
+        return {}
+    first, *others = (trial.conditions for trial in trials)
+    return {
+        name: value
+        for name, value in first.items()
+        if isinstance(value, int | float)
+        and all(other.get(name) == value for other in others)
     }
 
 
