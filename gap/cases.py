@@ -204,9 +204,9 @@ def _hide(
     terms: list[fit.Term] = []
     while len(terms) < count:
         size = float(np.exp(rng.uniform(np.log(low), np.log(high))))
-        term = _draw(
-            rng, curves, size * seen, {t.candidate.effect for t in terms}, wanted
-        )
+        taken = {t.candidate.effect for t in terms}
+        taken |= {name for t in terms for name in t.candidate.aliases}
+        term = _draw(rng, curves, size * seen, taken, wanted)
         reached = _length(problem, term) / seen if term else 0.0
         least = LEAST if count == 1 else 0.9 * low
         if least < reached < 3 * high:
