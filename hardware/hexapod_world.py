@@ -9,6 +9,7 @@ from bns.errors import BnsError
 from bns.hardware import walked
 from bns.hardware.dynamixel import home
 from bns.hardware.dynamixel import rig as rigs
+from bns.hardware.dynamixel.bus import Overload
 from bns.hardware.dynamixel.rig import HexapodRig
 from bns.hardware.dynamixel.walker import SPEED
 from bns.hardware.errors import LinkError, SafetyStop, Void
@@ -183,6 +184,9 @@ class HardwareHexapod:
             walker.go(before, 2.0)
             done = walker.perform(goals, given.durations)
             walker.rest()
+        except Overload as error:  # on the way home; in a trial it ends the trial
+            walker.halt()
+            raise Void(error.reason) from error
         except (SafetyStop, LinkError):
             walker.halt()
             raise

@@ -5,6 +5,7 @@ A frame every 33 ms, as in the maker's firmware: the goals of all servos in one 
 of a few servos in turn.
 """
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -13,6 +14,7 @@ import numpy as np
 from bns.errors import BnsError
 from bns.hardware.clock import Clock
 from bns.hardware.dynamixel.bus import Bus, Overload
+from bns.hardware.dynamixel.rest import Rest
 from bns.hardware.errors import LinkError, SafetyStop
 from bns.hardware.faults import FaultLog
 from bns.hardware.limits import Limits, Operator
@@ -27,7 +29,6 @@ SPEED = round(300 * SPEED_UNIT, 4)  # rad/s; moving speed, as in the world 'hexa
 SLOW = 0.8  # rad/s, for getting up
 SETTLE = 0.1  # s after the servos should be there, until a first look at rest
 STILL = 0.18  # s without a change: every servo was read once
-UNITS, MOVED, TURNED = 2, 0.002, np.deg2rad(0.5)  # changes that count as motion
 LEAN = 0.13  # share by which the tag is smaller than at the stance: it leans by 45 deg
 AFTER = 0.25  # s of looking on after the last command
 FALLEN = 0.5  # s of leaning so far, after which it is taken for fallen
@@ -99,7 +100,7 @@ class Walker:
         self._due = 0.0
         self._side = 0.0  # of the tag as seen at the stance [m]
         self._leans = np.inf  # s, since when it leans too far
-        self._rest = _Rest()
+        self._rest = Rest()
 
     def look(self, done: Walked | None = None) -> list[Sighting]:
         """New sightings; with the safety checks of a frame.
@@ -268,33 +269,6 @@ class Walker:
         now = self.clock.now()
         done.switched.append(now)
         while self.clock.now() < now + AFTER:
-            self.frame()
+            with contextlib.suppress(Overload):
+                self.frame()
             self.look(done)
-
-
-class _Rest:
-    """Since when nothing has moved.
-
-    Attributes:
-        since: time of the newest change [s].
-    """
-
-    def __init__(self):
-        self.since = 0.0
-        self._units: dict[int, int] = {}
-        self._pose = np.full(3, np.inf)
-
-    def again(self, now: float) -> None:
-        """A new goal: motion is to be expected."""
-        self.since = now
-
-    def servo(self, number: int, units: int, now: float) -> None:
-        """A servo's position was read."""
-        if abs(units - self._units.get(number, -9)) > UNITS:
-            self._units[number], self.since = units, now
-
-    def pose(self, pose: np.ndarray, now: float) -> None:
-        """The robot was seen."""
-        off = np.abs(pose - self._pose)
-        if np.hypot(*off[:2]) > MOVED or off[2] > TURNED:
-            self._pose, self.since = pose, now
