@@ -19,7 +19,9 @@ def refine(problem: Problem, start: Sequence[Term]) -> Point:
     return refine_all(problem, [start])[0]
 
 
-def refine_all(problem: Problem, starts: Sequence[Sequence[Term]]) -> list[Point]:
+def refine_all(
+    problem: Problem, starts: Sequence[Sequence[Term]], *, finish: bool = True
+) -> list[Point]:
     """Fit the magnitudes (and extras) of several supports, side by side.
 
     Bounded Gauss-Newton on the simulation itself with secant updates of the slopes;
@@ -32,8 +34,11 @@ def refine_all(problem: Problem, starts: Sequence[Sequence[Term]]) -> list[Point
     Args:
         problem: the recording.
         starts: terms to start from, of each support.
+        finish: False = leave the fits as the rough simulation has them.
     """
     points = _side_by_side(problem, starts)
+    if not finish:
+        return points
     made = _trued(problem, points)
     if not hasattr(problem.model, "sketch"):
         return made

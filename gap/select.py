@@ -16,6 +16,7 @@ SINGLES, NEAR = 10, 5  # single effects fitted in full: at most, and at least
 PAIRS, TRIPLES = 5, 3
 COARSE = 4.0  # loss per residual beyond which a third effect would not save it
 STRUCTURE = 0.03  # p-value below which a rest has structure
+SILENT = 0.3  # p-values above which there is no gap by far: fits stay rough
 CHUNK = 256  # levels whose loss is taken at once
 
 
@@ -58,8 +59,12 @@ def search(
     screened = np.array(
         [min(losses[curves.levels(c)], default=np.inf) for c in range(_count(curves))]
     )
-    singles = _singles(problem, curves, losses, screened)
+    silent = null.p_gain(nothing.loss - losses.min(initial=nothing.loss)) > SILENT
+    silent = silent and null.misfit(problem, nothing.rest)[0] > SILENT
+    singles = _singles(problem, curves, losses, screened, finish=not silent)
     sizes = [singles]
+    if silent:
+        return Search(nothing, tuple(sizes), screened)
     if most > 1 and _unexplained(problem, curves, null, singles[0], worth):
         sizes.append(_pairs(problem, curves, nothing, singles))
         best = sizes[1][0]
@@ -108,7 +113,12 @@ def _starts(curves: Curves, losses: np.ndarray, candidate: int) -> list[Term]:
 
 
 def _singles(
-    problem: Problem, curves: Curves, losses: np.ndarray, screened: np.ndarray
+    problem: Problem,
+    curves: Curves,
+    losses: np.ndarray,
+    screened: np.ndarray,
+    *,
+    finish: bool,
 ) -> tuple[Point, ...]:
     order = np.argsort(screened)
     order = order[np.isfinite(screened[order])]
@@ -119,7 +129,7 @@ def _singles(
         for candidate in chosen[:SINGLES]
         for start in _starts(curves, losses, candidate)
     ]
-    return _unique(fit.refine_all(problem, starts))
+    return _unique(fit.refine_all(problem, starts, finish=finish))
 
 
 def _pairs(
