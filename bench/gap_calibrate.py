@@ -8,12 +8,15 @@ thresholds; with `--write` they go into `gap/calibration.json`.
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from bench.gap_runner import SEALED, rows
-from bns.gap.verdict import quantile
+from bench.gap_runner import SEEN, rows
+from bns.gap import scoring
+from bns.gap.ladder import Rung, climb
+from bns.gap.verdict import calibration, quantile
 
 FILE = Path(__file__).resolve().parent.parent / "gap" / "calibration.json"
 MISSED = 1e3  # score of a true support that was not among the fitted ones
@@ -24,20 +27,34 @@ STRANGE = 0.02  # share of effects of the library that may be called none of it
 
 
 def scores(found: list[dict]) -> list[float]:
-    """Loss of the true support over the best one's, per case in which one was found.
-
-    Raises:
-        ValueError: a row with a seed of the scored cases.
-    """
+    """Loss of the true support over the best one's, per case in which one was found."""
     made = []
     for row in found:
-        if row["seed"] >= SEALED:
-            raise ValueError(f"Seed {row['seed']} is one of the scored cases.")
-        said, truth = row["said"], sorted(row["answer"]["names"])
-        if row["kind"] == "single" and said.get("size") == 1:
-            ranked = {tuple(sorted(r["names"])): r["score"] for r in said["ranked"]}
-            made.append(round(ranked.get(tuple(truth), MISSED), 3))
+        rung = _rung(row)
+        if row["kind"] == "single" and rung.size == 1:
+            ranked = {tuple(sorted(names)): score for names, score in rung.scores}
+            truth = tuple(sorted(row["answer"]["names"]))
+            made.append(round(ranked.get(truth, MISSED), 3))
     return sorted(made)
+
+
+def _rung(row: dict) -> Rung:
+    """What a recording calls for, by the package's rules on further effects."""
+    rungs = [Rung.from_dict(content) for content in row["said"]["rungs"]]
+    return climb(rungs, row["said"]["worth"], calibration())
+
+
+def spurious(found: list[dict]) -> tuple[list[float], list[float]]:
+    """Gains by one effect more than there are, and by the last of two true ones."""
+    extra, true = [], []
+    for row in found:
+        rungs = [Rung.from_dict(content) for content in row["said"]["rungs"]]
+        count = len(row["answer"]["names"])
+        if row["kind"] in ("single", "pair") and len(rungs) > count + 1:
+            extra.append(round(rungs[count].loss - rungs[count + 1].loss, 1))
+        if row["kind"] == "pair" and len(rungs) > 2:
+            true.append(round(rungs[1].loss - rungs[2].loss, 1))
+    return sorted(extra), sorted(true)
 
 
 def alpha_gap(found: list[dict]) -> float:
@@ -45,7 +62,7 @@ def alpha_gap(found: list[dict]) -> float:
     none = sorted(
         row["said"]["p_gap"]
         for row in found
-        if row["kind"] == "none" and row["said"]["size"] < 2
+        if row["kind"] == "none" and _rung(row).size < 2
     )
     place = int(np.floor(ALARMS * (len(none) + 1)))
     lowest = none[place] if none else ALARMS
@@ -54,16 +71,26 @@ def alpha_gap(found: list[dict]) -> float:
 
 def alpha_misfit(found: list[dict], share: float) -> float:
     """p-value that the rest of effects of the library hardly falls below."""
+    known = [row for row in found if row["kind"] in ("single", "pair")]
     rests = sorted(
-        row["said"]["p_misfit"]
-        for row in found
-        if row["kind"] in ("single", "pair")
-        and row["said"]["size"]
-        and row["said"]["excess"] > share * row["said"]["explained"]
+        rung.p_misfit
+        for rung in map(_rung, known)
+        if rung.size and rung.excess > share * rung.explained
     )
-    count = sum(row["kind"] in ("single", "pair") for row in found)
-    place = int(np.floor(STRANGE * (count + 1)))
+    place = int(np.floor(STRANGE * (len(known) + 1)))
     return float(min(0.01, rests[place] * 0.999)) if place < len(rests) else 0.01
+
+
+def widen(found: list[dict], coverage: float) -> float:
+    """Factor on the intervals of magnitudes with which they hold the truth."""
+    rules = replace(calibration(), widen=1.0)
+    made = []
+    for row in found:
+        truth = row["answer"]["magnitudes"]
+        spans = scoring.intervals(row["said"], rules)
+        if row["kind"] == "single" and scoring.size(row) >= 1 and len(spans) == 1:
+            made.append(abs(spans[0][0] - truth[0]) / max(spans[0][1], 1e-12))
+    return quantile(made, coverage)
 
 
 def sure(conformal: list[float]) -> float:
@@ -73,7 +100,10 @@ def sure(conformal: list[float]) -> float:
 
 def main(words: list[str]) -> None:
     """Print the thresholds; write them if asked to."""
-    found = [row for row in rows("calibrate") if "size" in row["said"]]
+    found = [row for row in rows("calibrate") if "rungs" in row["said"]]
+    seen = [row["seed"] for row in found if row["seed"] >= SEEN]
+    if seen:
+        raise ValueError(f"Seed {seen[0]} is one of the scored cases.")
     content = json.loads(FILE.read_text(encoding="utf-8"))
     conformal = scores(found)
     new = {
@@ -81,7 +111,10 @@ def main(words: list[str]) -> None:
         "alpha_gap": alpha_gap(found),
         "sure": sure(conformal),
         "alpha_misfit": alpha_misfit(found, content["misfit_share"]),
+        "widen": widen(found, content["coverage"]),
     }
+    extra, true = spurious(found)
+    print(f"gains by one effect too many: {extra[-5:]}; by a true second: {true[:5]}")
     print(f"{len(found)} cases, {len(conformal)} scores")
     for name, value in new.items():
         print(f"{name} {value:.4g} (was {content.get(name, 0.0):.4g})")

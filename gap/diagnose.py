@@ -232,7 +232,7 @@ def _fit(
     problem: Problem, point: Point, base: np.ndarray, rules: verdict.Calibration
 ) -> Fit:
     held_out, by_trial = select.held_out(problem, point)
-    spans, condition = intervals(point, rules)
+    spans, condition = intervals(problem, point, rules)
     improved = base - by_trial
     return Fit(
         names=point.names,

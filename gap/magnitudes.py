@@ -3,16 +3,18 @@
 import numpy as np
 
 from bns.gap.fit import Point
+from bns.gap.problem import Problem
+from bns.gap.signatures import levels_of
 from bns.gap.verdict import Calibration
 
 LEVEL = 1.6449  # 90 % interval
 
 
 def intervals(
-    point: Point, rules: Calibration
+    problem: Problem, point: Point, rules: Calibration
 ) -> tuple[tuple[tuple[float, float], ...], float]:
     """90 % interval of each magnitude; condition of the fit."""
-    deviations, condition = spreads(point)
+    deviations, condition = spreads(problem, point)
     spans = []
     for term, deviation in zip(point.terms, deviations, strict=True):
         item = term.candidate
@@ -35,8 +37,11 @@ def half_width(deviation: float, departure: float, rules: Calibration) -> float:
     )
 
 
-def spreads(point: Point) -> tuple[tuple[float, ...], float]:
-    """Standard deviation of each magnitude from the slopes; condition of the fit."""
+def spreads(problem: Problem, point: Point) -> tuple[tuple[float, ...], float]:
+    """Standard deviation of each magnitude; condition of the fit.
+
+    From the slopes; where the motion changes in steps, from the step's width.
+    """
     if not point.terms or not len(point.slopes):
         return (0.0,) * len(point.terms), 1.0
     size = np.linalg.norm(point.slopes, axis=1) + 1e-12
@@ -46,4 +51,11 @@ def spreads(point: Point) -> tuple[tuple[float, ...], float]:
     spread = np.sqrt(np.abs(np.diag(np.linalg.pinv(normal)))) / size
     widths = [1 + len(term.extras) for term in point.terms]
     places = np.cumsum([0, *widths[:-1]])
-    return tuple(spread[places].tolist()), condition
+    found = spread[places].tolist()
+    for place, term in enumerate(point.terms):
+        steps = np.array(levels_of(problem, term.candidate))
+        if term.candidate.stepped and len(steps) > 1:
+            at = int(np.abs(steps - term.magnitude).argmin())
+            near = steps[max(at - 1, 0) : at + 2]
+            found[place] = float(np.ptp(near)) / (len(near) - 1) / LEVEL
+    return tuple(found), condition

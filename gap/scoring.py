@@ -105,7 +105,7 @@ def _magnitudes(made: Analysis, names: Sequence[str]) -> list[list[float]]:
                 found = [
                     [term.magnitude, deviation, term.candidate.nominal]
                     for term, deviation in zip(
-                        point.terms, spreads(point)[0], strict=True
+                        point.terms, spreads(made.problem, point)[0], strict=True
                     )
                 ]
                 return [found[point.names.index(name)] for name in names]

@@ -58,7 +58,7 @@ def trace(problem: Problem, candidates: Sequence[Candidate]) -> Curves:
     sets, where = [], []
     for number, item in enumerate(candidates):
         for branch in range(len(item.branches)):
-            for value in _magnitudes(problem, item):
+            for value in levels_of(problem, item):
                 sets.append([item.make(value, branch)])
                 where.append((number, branch, value))
     found = problem.signatures(sets, rough=True)
@@ -85,7 +85,7 @@ def trace(problem: Problem, candidates: Sequence[Candidate]) -> Curves:
     )
 
 
-def _magnitudes(problem: Problem, candidate: Candidate) -> tuple[float, ...]:
+def levels_of(problem: Problem, candidate: Candidate) -> tuple[float, ...]:
     """Those to simulate: of a stepped candidate one on each of its steps."""
     steps = getattr(problem.model, "steps", None)
     found = steps(candidate, problem.trials) if candidate.stepped and steps else ()
