@@ -14,8 +14,8 @@ from bns.record import RunRecord
 DOC = "share of costly damages detected within 2 trials, and false alarms"
 BAR = ">= 95 % detected, <= 1 false alarm per 500 undamaged trials"
 SHARE, ALARMS, COSTLY = 0.95, 1.0, 1.2
-RUNS = 12  # of each damage; 30 are the full bench, which then judges the bar
-AFTER = 4  # trials from the damage on, where no other bench needs more
+RUNS = 6  # of each damage; 30 are the full bench, which then judges the bar
+AFTER = 4  # trials from the damage on
 
 
 def run(quick: bool) -> Result:
@@ -41,9 +41,8 @@ def run(quick: bool) -> Result:
     )
 
 
-def watched(damage: str) -> RunConfig:
+def watched(damage: str, after: int = AFTER) -> RunConfig:
     """The side of a damage whose adaptations follow what is detected."""
-    after = light_runs.AFTER if damage in light_runs.DAMAGES else AFTER
     return light_runs.damaged(
         damage, watch={"detect": True}, ensemble=True, runs=RUNS, after=after
     )

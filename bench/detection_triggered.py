@@ -9,13 +9,13 @@ LIMIT = 1.05
 
 
 def run(quick: bool) -> Result:
-    """Runs of `detect-damage` and as many that are told of four damages (table 6.7).
+    """Four damages (table 6.7), detected as in `detect-damage` and told.
 
     What is triggered is the population reset.
     """
     sides = {
         damage: {
-            "detected": detect_damage.watched(damage),
+            "detected": detect_damage.watched(damage, light_runs.AFTER),
             "told": light_runs.damaged(damage, ensemble=True, runs=detect_damage.RUNS),
         }
         for damage in light_runs.DAMAGES
