@@ -29,9 +29,19 @@ class LightTask:
 
     @classmethod
     def of(cls, config: LightConfig) -> "LightTask":
-        """The task of a configuration; its first lamp is the one to go to."""
+        """The task of a configuration; its first lamp is the one to go to.
+
+        Raises:
+            BnsError: no lamp, one that cannot be read, or the first is off the board.
+        """
         first = lamps(config)[0]
-        return cls((first.get("x", 0.0), first.get("y", 0.0)), config)
+        x, y = first.get("x", 0.0), first.get("y", 0.0)
+        if abs(x) > BOARD[0] / 2 or abs(y) > BOARD[1] / 2:
+            raise BnsError(
+                f"The first lamp, to which robots go, is at ({x:g}, {y:g}), off the "
+                f"board of {BOARD[0]:g} m x {BOARD[1]:g} m around (0, 0): move it."
+            )
+        return cls((x, y), config)
 
     def cost(self, places: np.ndarray, stopped: np.ndarray | None = None) -> np.ndarray:
         """Equation 5.2 with its sign turned, for single executions.

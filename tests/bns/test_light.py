@@ -73,6 +73,11 @@ class TestController:
 
 
 class TestTask:
+    def test_a_lamp_that_no_robot_can_reach_is_refused(self):
+        with pytest.raises(BnsError, match="off the board"):
+            LightTask.of(LightConfig(lamps=("x=1.4,y=0",)))
+        assert LightTask.of(LightConfig(lamps=("x=1.3,y=0", "x=9"))).lamp == (1.3, 0)
+
     def test_cost_of_standing_still_is_the_start_distance_share(self):
         path = np.tile([0.9, 0.0], (11, 1))
         assert TASK.cost(path) == pytest.approx(10 * (0.9 - 0.3) / 0.9)
