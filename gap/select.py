@@ -1,7 +1,7 @@
 """Which effects: single ones, pairs and triples, by signature and then in full."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -147,7 +147,7 @@ def _pairs(
     for a, b in zip(first[order[:PAIRS]], second[order[:PAIRS]], strict=True):
         if np.isfinite(table[a, b]):
             starts.append([_term(curves, level) for level in at[a, b]])
-    return _unique(fit.refine_all(problem, starts))
+    return nested(_unique(fit.refine_all(problem, starts)), singles)
 
 
 def _term(curves: Curves, level: int) -> Term:
@@ -175,7 +175,31 @@ def _triples(
         for pair in pairs[:2]
         for added in _additions(curves, pair)[: TRIPLES // 2]
     ]
-    return _unique(fit.refine_all(problem, starts))
+    return nested(_unique(fit.refine_all(problem, starts)), pairs)
+
+
+def nested(larger: Sequence[Point], smaller: Sequence[Point]) -> tuple[Point, ...]:
+    """Supports none of which fits worse than one that it contains, best first.
+
+    A fit that ended worse gets the magnitudes of the smaller one, what is added at its
+    nominal value.
+    """
+    made = []
+    for point in larger:
+        inside = [s for s in smaller if set(s.names) < set(point.names)]
+        best = min(inside, key=lambda found: found.loss, default=point)
+        if best.loss < point.loss and len(best.slopes):
+            added = [t for t in point.terms if t.candidate.name not in best.names]
+            added = [replace(t, magnitude=t.candidate.nominal) for t in added]
+            rows = sum(1 + len(term.extras) for term in added)
+            empty = np.zeros((rows, len(best.rest)))
+            point = replace(
+                best,
+                terms=(*best.terms, *added),
+                slopes=np.concatenate([best.slopes, empty]),
+            )
+        made.append(point)
+    return tuple(sorted(made, key=lambda found: found.loss))
 
 
 def _unique(points: Sequence[Point]) -> tuple[Point, ...]:

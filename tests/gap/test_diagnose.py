@@ -1,10 +1,21 @@
 """Known answers: planted effects are named, nothing is "no gap", aliases are sets."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bns.errors import BnsError, FormatError
-from bns.gap import check, fit, pieces, signatures, stuck, travel, verdict
+from bns.gap import (
+    check,
+    fit,
+    pieces,
+    select,
+    signatures,
+    stuck,
+    travel,
+    verdict,
+)
 from bns.gap.cases import commands
 from bns.gap.diagnose import diagnose
 from bns.gap.problem import Problem
@@ -279,6 +290,30 @@ def test_faults_are_repaired_and_listed(model, told):
     assert "spikes" in text and "the same samples" in text
     assert np.abs(np.diff(made[0].observed[:, 2])).max() < 3
     assert np.isnan(made[1].observed[20]).all()
+
+
+def test_no_support_fits_worse_than_one_it_contains(model):
+    items = {item.name: item for item in model.candidates()}
+    gain, lag = items["wheel_gain[left]"], items["motor_lag[both]"]
+    one = fit.Point((fit.Term.at(gain, 0, 0.9),), np.ones(3), 3.0, np.ones((1, 3)))
+    worse = (fit.Term.at(lag, 0, 0.3), fit.Term.at(gain, 0, 0.8))
+    two = fit.Point(worse, np.full(3, 2.0), 12.0, np.ones((2, 3)))
+    (made,) = select.nested([two], [one])
+    assert made.loss == 3.0
+    assert set(made.names) == {"wheel_gain[left]", "motor_lag[both]"}
+    assert [term.magnitude for term in made.terms] == [0.9, lag.nominal]
+    assert made.slopes.shape == (2, 3)
+    better = replace(two, loss=2.0)
+    assert select.nested([better], [one]) == (better,)
+
+
+def test_dead_bands_are_tried_between_the_speeds_told(model):
+    items = {item.name: item for item in model.candidates()}
+    there = Commands([[0.02, 0.05], [-0.04, 0.1]], [1.0, 1.0])
+    trials = MujocoWorld(threads=1).run([there])
+    steps = model.steps(items["dead_band[left]"], trials)
+    assert steps[:2] == pytest.approx((0.03, 0.12))
+    assert model.steps(items["dead_band[both]"], trials)[0] == pytest.approx(0.03)
 
 
 def test_a_stuck_channel_and_a_wrong_clock_are_left_out(model, told):
