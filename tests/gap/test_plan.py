@@ -1,11 +1,14 @@
 """The next command: it moves what is tied apart, and says so where nothing can."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bns.errors import FormatError
-from bns.gap import command_file, excite, plan
+from bns.gap import command_file, excite, plan, servo_excite
 from bns.gap.records import Diagnosis, Fit, Verdict
+from bns.gap.servo_model import ServoModel
 from bns.gap.wheeled import WheeledModel
 
 FLOOR = {
@@ -93,6 +96,51 @@ def test_how_often_a_command_has_to_be_run():
     assert plan.repeats(10.0, tie=6.0) == 1
     assert plan.repeats(2.0, tie=6.0) == 5  # 20 - 2 * 1.2816 * sqrt(20) = 8.5 >= 6
     assert plan.repeats(0.1, tie=6.0) == 0
+
+
+TOLD = {"gain": 16.0, "mass": 0.7, "lever": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("fits", "wanted"),
+    [
+        (
+            (("servo_delay", "delay", 0.03), ("servo_lag", "time_constant", 0.03)),
+            "step",
+        ),
+        (
+            (("servo_payload", "mass", 0.03), ("servo_lever", "factor", 1.04)),
+            "let fall",
+        ),
+        (
+            (("servo_gain", "factor", 1.05), ("servo_voltage", "factor", 1.05)),
+            "0.8 rad",
+        ),
+    ],
+)
+def test_a_servo_gets_the_command_that_is_known_to_part(fits, wanted):
+    rows = [(name, f"{name}:{par}={x}", x, 0.02 * x) for name, par, x in fits]
+    found = replace(tied(*rows), model="servo_pendulum", provenance={"told": TOLD})
+    floor = {**FLOOR, "sigma": [1e-3], "process": [5e-3]}
+    found = replace(found, floor=floor)
+    servo = ServoModel()
+    family = [item for item in servo.excitations(told=TOLD) if "gain" not in item.name]
+    made = plan.plan(found, servo, family=family)
+    assert wanted in made.options[0].excitation.name
+    assert made.repeats >= 1
+
+
+def test_commands_for_servos_are_bounded_and_softer_ones_are_offered():
+    family = servo_excite.servo(told=TOLD)
+    assert {item.conditions["gain"] for item in family} == {16.0, 4.0}
+    for item in family:
+        goals = item.commands.values[:, 0]
+        assert np.abs(goals).max() <= servo_excite.REACH + 1e-9
+        assert item.commands.duration == pytest.approx(servo_excite.LENGTH)
+        if "steps" not in item.name and "stairs" not in item.name:
+            fastest = np.abs(np.diff(goals)).max() / servo_excite.HELD
+            assert fastest <= servo_excite.SWIFT
+    assert len(servo_excite.servo()) == len(family) / 2
 
 
 def test_general_commands_keep_to_the_limits():

@@ -8,6 +8,7 @@ from bns.gap import servo, servo_nominal
 from bns.gap.servo_candidates import candidates, columns
 from bns.gap.servo_nominal import Nominal
 from bns.gap.servo_runs import Runs, cells, merged, runs
+from bns.gap.servo_verdict import Null
 from bns.models import servo_pendulum
 from bns.worlds.effects import registry
 from bns.worlds.servo_law import law
@@ -153,3 +154,13 @@ def test_too_little_is_refused(reference):
     odd = Runs(odd.drive, odd.angles, odd.told, {"trajectory": ("sweep", "jump")})
     with pytest.raises(BnsError, match="trajectory 'jump'"):
         servo.diagnose(odd, reference)
+
+
+def test_alarms_are_weighed_by_gain():
+    cells = tuple((0.1 * k, 0.1, gain) for gain in (4.0, 16.0) for k in range(1, 9))
+    statistics = np.array([*np.geomspace(0.02, 0.7, 8), *np.geomspace(0.05, 0.1, 8)])
+    null = Null(cells, statistics, np.ones(16))
+    assert null.chance(0.4, 4.0) > 0.05  # soft control scatters
+    assert null.chance(0.4, 16.0) < 1e-3
+    assert null.chance(0.4, 8.0) < null.chance(0.4, 4.0)
+    assert null.without(cells[:2]).chance(0.07, 16.0) > 0.3
