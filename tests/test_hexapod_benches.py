@@ -1,0 +1,82 @@
+"""What the walking benches count, on records and searches whose answer is known."""
+
+import numpy as np
+import pytest
+
+from bench import hexapod_ceiling, hexapod_gait, hexapod_loads, hexapod_runs
+from bns.record import RunRecord
+from tests.bns.walkers import small
+
+
+def record(ways, *, seconds=10.0, onset=-1):
+    ways = np.array(ways, float)
+    runs, trials = ways.shape
+    zeros = np.zeros((runs, trials, 12, 3))
+    return RunRecord(
+        config=small(replicates=runs, trials=trials),
+        versions={},
+        columns={"distance": ways, "seconds": np.full(ways.shape, seconds)},
+        sent=zeros[:, :, :11],
+        poses=zeros,
+        predicted=zeros,
+        damage_onset=np.full(runs, onset),
+        directory="",
+        conditions={},
+    )
+
+
+def test_a_walk_that_takes_twice_as_long_counts_half_and_a_short_one_as_it_is():
+    slow, fast = record([[1.0]], seconds=16.0), record([[1.0]], seconds=4.0)
+    assert hexapod_runs.in_time(slow, 8.0) == 0.5
+    assert hexapod_runs.in_time(fast, 8.0) == 1.0
+
+
+def test_the_first_trial_that_did_it_is_counted_from_one():
+    hit = np.array([[True, False], [False, True], [False, False]])
+    assert hexapod_gait.first(hit).tolist() == [1.0, 2.0, np.inf]
+
+
+def test_regained_is_nine_tenths_of_the_median_before_the_damage():
+    before = [1.0] * 9 + [9.0]  # one lucky trial does not raise the bar
+    runs = [[*before, 0.89, 0.9, 1.0], [*before, 0.95, 0, 0], [*before, 0, 0, 0.8]]
+    found = hexapod_runs.trials_to_regain(record(runs, onset=10))
+    assert found.tolist() == [2.0, 1.0, np.inf]
+
+
+def test_batches_are_joined_in_order():
+    both = hexapod_runs.joined([record([[1, 2]]), record([[3, 4], [5, 6]])])
+    assert both.replicates == both.config.replicates == 3
+    assert both["distance"].tolist() == [[1, 2], [3, 4], [5, 6]]
+
+
+def test_damaged_runs_continue_the_undamaged_ones():
+    trunk, branch = hexapod_runs.undamaged("a"), hexapod_runs.damaged("type5", "a")
+    assert trunk.seed == branch.seed != hexapod_runs.undamaged("b").seed
+    assert branch.trials == trunk.trials + hexapod_runs.AFTER
+    assert branch.adaptation.window == trunk.adaptation.window == 300
+    assert branch.world.damage == ("leg_raised:legs=type5,blend=1@100",)
+
+
+def test_the_search_climbs_and_stays_within_the_stops(monkeypatch):
+    goal = np.full((2, 18), 0.5)
+    goal[0, 0] = 99.0  # beyond the stop
+
+    def distances(lists, legs):
+        assert legs == "type0"
+        return np.array([10.0 - np.abs(np.clip(goal, -3, 3) - x).mean() for x in lists])
+
+    monkeypatch.setattr(hexapod_ceiling, "distances", distances)
+    start = np.zeros((2, 18))
+    goals, farthest = hexapod_ceiling.search(start, "type0", generations=20)
+    assert farthest > distances([start], "type0")[0] + 0.05
+    assert farthest == pytest.approx(distances([goals], "type0")[0])
+    from bns import models
+
+    low, high = models.robot("phantomx").ranges.T
+    assert (goals >= low).all() and (goals <= high).all()
+
+
+def test_a_robot_that_stands_stands_on_its_feet():
+    feet, *others = hexapod_loads.shares([np.zeros((1, 18))])[0]
+    assert feet == pytest.approx(1.0)
+    assert others == [0.0, 0.0, 0.0]
