@@ -31,7 +31,8 @@ class FaultLog:
 
     Args:
         clock: of the session.
-        path: file to append each fault to, a JSON line each; None keeps them here.
+        path: file to append each fault to, a JSON line each, once its directory is
+            there; None keeps them here.
     """
 
     def __init__(self, clock: Clock, path: Path | str | None = None):
@@ -39,6 +40,7 @@ class FaultLog:
         self.path = Path(path) if path else None
         self.faults: list[Fault] = []
         self.counts: Counter[str] = Counter()
+        self._unwritten: list[Fault] = []
 
     def note(self, kind: str, about: bytes | str = "", seen: bytes | str = "") -> None:
         """Add a fault."""
@@ -47,8 +49,11 @@ class FaultLog:
         if len(self.faults) < KEPT:
             self.faults.append(fault)
         if self.path:
+            self._unwritten.append(fault)
+        if self.path and self.path.parent.is_dir():
             with open(self.path, "a", encoding="utf-8") as file:
-                file.write(json.dumps(fault._asdict()) + "\n")
+                file.writelines(json.dumps(f._asdict()) + "\n" for f in self._unwritten)
+            self._unwritten.clear()
 
     def __len__(self) -> int:
         return sum(self.counts.values())

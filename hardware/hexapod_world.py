@@ -1,6 +1,6 @@
 """The real hexapod as a world: one at a time, in real time."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -49,6 +49,7 @@ class HardwareHexapod:
         calibration: file of the camera's calibration.
         servos: the robot's file of servos.
         log: file for faults.
+        on_void: called with number and reason whenever a trial is void.
 
     Raises:
         BnsError: an effect that cannot be applied in software, a bad setting.
@@ -71,6 +72,7 @@ class HardwareHexapod:
         calibration: str = "",
         servos: str = "",
         log: str = "",
+        on_void: Callable[[int, str], None] = lambda trial, reason: None,
     ):
         del threads
         self.model = models.robot(robot)
@@ -88,7 +90,7 @@ class HardwareHexapod:
         readings = (Channel(f"{c.name}_position", c.unit) for c in self.model.commands)
         self.channels = (*POSE_CHANNELS, *readings)
         self.port, self.camera, self.calibration = port, camera, calibration
-        self.servos, self.log = servos, log
+        self.servos, self.log, self.on_void = servos, log, on_void
         self._rig: HexapodRig | None = None
         self.voids = 0
 
@@ -165,6 +167,7 @@ class HardwareHexapod:
                 self.voids += 1
                 voids.append(void.reason)
                 rig.faults.note("void trial", str(trial), void.reason)
+                self.on_void(trial, void.reason)
                 continue
             more = {"faults": len(rig.faults) - faults, "voids": voids}
             return made.replace(conditions={**made.conditions, **more})

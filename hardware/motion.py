@@ -12,7 +12,7 @@ from bns.hardware.khepera.driver import Drive, Khepera3
 from bns.hardware.limits import Limits, Operator
 from bns.hardware.tracking.eyes import Eyes
 from bns.hardware.tracking.tracker import Sighting
-from bns.hardware.wheels import Wheels
+from bns.hardware.wheels import Following, Wheels
 
 TICK = 0.03  # s between two looks at everything
 ASTRAY = 0.018  # m that a wrong or mistimed set point may lead a wheel astray
@@ -64,11 +64,12 @@ class Mover:
         limits: hold in every tick.
         operator: may stop it at any time.
         faults: where faults are noted.
+        following: what is known of the wheels already.
 
     Attributes:
         last: newest sighting.
         points: set points of late.
-        stubborn: a wheel was seen not to follow its set point.
+        following: how the wheels follow.
     """
 
     def __init__(
@@ -80,12 +81,14 @@ class Mover:
         limits: Limits,
         operator: Operator,
         faults: FaultLog,
+        following: Following | None = None,
     ):
+        self.following = following or Following()
         self.robot, self.eyes, self.clock = robot, eyes, clock
         self.limits, self.operator, self.faults = limits, operator, faults
         self.last: Sighting | None = None
         self.points: list[Drive] = []
-        self._moving = self.stubborn = False
+        self._moving = False
 
     def look(self) -> list[Sighting]:
         """New sightings; with the safety checks of a tick.
@@ -207,7 +210,7 @@ class Mover:
     def _judge(self, done: Performed) -> None:
         if done.late > LATE:
             raise Void(f"a command was {done.late:.2f} s late")
-        if self._wheels.astray > ASTRAY:
-            raise Void(f"a set point led a wheel {self._wheels.astray:.3f} m astray")
-        if self._wheels.stubborn:
+        if (way := self._wheels.end()) > ASTRAY:
+            raise Void(f"a set point led a wheel {way:.3f} m astray")
+        if self._wheels.odd:
             done.notes.append("a wheel does not follow its set point")

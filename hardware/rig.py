@@ -1,6 +1,6 @@
 """A robot, a camera and a watchdog, connected and checked; nothing moves for that."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from bns.errors import BnsError
@@ -15,6 +15,7 @@ from bns.hardware.motion import Mover
 from bns.hardware.odometry import Wheels
 from bns.hardware.priority import urgent
 from bns.hardware.tracking.eyes import Eyes
+from bns.hardware.wheels import Following
 
 EMULATED = "emulated"
 SIZE = (1280, 720)  # px of the emulated camera
@@ -33,6 +34,7 @@ class Rig:
         faults: what went wrong so far.
         line: to the robot.
         leash: to the watchdog; None in virtual time.
+        following: how the wheels follow, as far as was seen.
     """
 
     robot: Khepera3
@@ -43,6 +45,7 @@ class Rig:
     faults: FaultLog
     line: Line
     leash: Leash | None = None
+    following: Following = field(default_factory=Following)
 
     def mover(self) -> Mover:
         """What drives the robot under the limits."""
@@ -53,6 +56,7 @@ class Rig:
             limits=self.limits,
             operator=self.operator,
             faults=self.faults,
+            following=self.following,
         )
 
     def close(self) -> None:

@@ -1,6 +1,6 @@
 """The real robot as a world: one at a time, in real time."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from bns import models
 from bns.errors import BnsError
@@ -39,6 +39,7 @@ class HardwareWorld:
         calibration: file of the camera's calibration.
         wheels: file of the wheels' sizes; empty = nominal.
         log: file for faults.
+        on_void: called with number and reason whenever a trial is void.
         as_told: trials have the durations that were wanted, see `records.trial`; for
             recordings with repeats.
         rig: an open one instead of port and camera (rehearsals in virtual time).
@@ -64,6 +65,7 @@ class HardwareWorld:
         calibration: str = "",
         wheels: str = "",
         log: str = "",
+        on_void: Callable[[int, str], None] = lambda trial, reason: None,
         as_told: bool = False,
         rig: Rig | None = None,
     ):
@@ -85,7 +87,7 @@ class HardwareWorld:
         self.sample_dt = bounded("sample_dt", sample_dt, 0.02, 60.0, "s")
         self.port, self.camera, self.calibration = port, camera, calibration
         self.wheels = wheels
-        self.log, self._rig, self.voids = log, rig, 0
+        self.log, self._rig, self.voids, self.on_void = log, rig, 0, on_void
         self.as_told = as_told
 
     def run(
@@ -161,6 +163,7 @@ class HardwareWorld:
                 self.voids += 1
                 voids.append(void.reason)
                 rig.faults.note("void trial", str(trial), void.reason)
+                self.on_void(trial, void.reason)
         raise BnsError(
             f"Trial {trial} was void {TRIES} times ({voids[-1]}): check the link and "
             "the light, then go on with --resume."

@@ -1,5 +1,6 @@
 """`bns run PRESET --world hardware`: learning on a robot, in real time."""
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -68,6 +69,8 @@ def _world(given: Any, config: Any) -> Any:
         "port": given.port,
         "camera": given.camera,
         "calibration": given.calibration,
+        "log": str(Path(given.out) / "faults.jsonl"),
+        "on_void": _say_void,
         **learners.get(config.learner).surroundings(config),
     }
     if config.world.robot == "phantomx":
@@ -77,3 +80,7 @@ def _world(given: Any, config: Any) -> Any:
     from bns.hardware.world import HardwareWorld
 
     return HardwareWorld(config.world.robot, wheels=given.wheels, **settings)
+
+
+def _say_void(trial: int, reason: str) -> None:
+    print(f"trial {trial + 1} is void ({reason}) and repeated", file=sys.stderr)
