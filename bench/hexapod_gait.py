@@ -16,58 +16,57 @@ LATE = 10  # trials at the end of a run that say how far it has come
 
 
 def run(quick: bool) -> Result:
-    """30 runs of 100 trials; quick: one of 12.
+    """30 runs of up to 100 trials; quick: one of 12.
 
     Adequate is a trial in which the robot gets as far as the tripod gait within the
-    time that the tripod gait takes; one that takes longer counts in proportion. Beside
-    it: as far in as many commands, whatever the time.
+    time that the tripod gait takes; one that takes longer counts in proportion. Ten
+    runs go on to 100 trials and say how far walks get; the others end once all of a
+    group of ten are adequate. Beside it: as far in as many commands, whatever the time.
     """
-    record, hand = hexapod_runs.walking(quick=quick), hexapod_runs.by_hand()
-    timed = first(hexapod_runs.in_time(record, hand.seconds) >= hand.distance)
-    ways = record["distance"]
-    late = np.median(ways[:, -LATE:], axis=1)
+    groups, hand = hexapod_runs.walking(quick=quick), hexapod_runs.by_hand()
+    timed = np.concatenate([first(hexapod_runs.adequate(g, hand)) for g in groups])
+    told = np.concatenate([first(g["distance"] >= hand.distance) for g in groups])
     waits = solving.waits(timed)
     median = waits["median"]
-    ceiling = hexapod_ceiling.known("none")
     return Result(
-        figure=median if median is not None else 10.0 * record.trials,
+        figure=median if median is not None else 10.0 * hexapod_runs.ONSET,
         unit="trials",
         holds=None if quick else median is not None and median <= LIMIT,
-        n=record.replicates,
+        n=len(timed),
         details={
             "tripod by hand": dict(hand._asdict()),
             "trials to its distance in its time": waits,
             "within the stretch": int((timed <= STRETCH).sum()),
-            "trials to its distance in as many commands": solving.waits(
-                first(ways >= hand.distance)
-            ),
-            "distance, farthest of a run [m]": spread(ways.max(1)),
-            "distance in the last ten trials [m]": spread(late),
-            "metres per second in the last ten trials": spread(
-                (ways / record["seconds"])[:, -LATE:].mean(1)
-            ),
-            "ceiling [m]": ceiling,
-            "share of the ceiling in the last ten trials": spread(late / ceiling)
-            if ceiling
-            else None,
-            **on_the_floor(record),
+            "trials to its distance in as many commands": solving.waits(told),
+            "trials of each group": [group.trials for group in groups],
+            f"the {groups[0].replicates} runs of the longest": at_the_end(groups[0]),
         },
     )
+
+
+def at_the_end(record: RunRecord) -> dict[str, object]:
+    """How far, how fast and on what the robot walks in the last ten trials."""
+    ways, late = record["distance"], slice(-LATE, None)
+    far = np.median(ways[:, late], axis=1)
+    share = hexapod_ceiling.share(far, "none")
+    speed = (ways / record["seconds"])[:, late].mean(1)
+    loads = hexapod_loads.shares([run[-1] for run in record.sent]).mean(0)
+    return {
+        "trials": record.trials,
+        "farthest of a run [m]": spread(ways.max(1)),
+        "last ten trials [m]": spread(far),
+        "last ten trials [m/s]": spread(speed),
+        "ceiling [m]": hexapod_ceiling.known("none"),
+        "share of the ceiling": None if share is None else spread(share),
+        "share of the last ten trials with belly or hip on the floor": round(
+            float(record["fell"][:, late].mean()), 3
+        ),
+        "share of the weight on feet, shins, thighs, belly": [
+            round(float(load), 3) for load in loads
+        ],
+    }
 
 
 def first(hit: np.ndarray) -> np.ndarray:
     """Number of the first trial that did it, counted from 1; inf = none, ``(R,)``."""
     return np.where(hit.any(1), hit.argmax(1) + 1.0, np.inf)
-
-
-def on_the_floor(record: RunRecord) -> dict[str, object]:
-    """What touches the floor in the last trial of each run, and how often."""
-    lying = float(record["fell"][:, -LATE:].mean())
-    walks = [run[-1] for run in record.sent]
-    shares = hexapod_loads.shares(walks)
-    return {
-        "last ten trials in which belly or hip touched the floor": round(lying, 3),
-        "share of the weight on feet, shins, thighs, belly": [
-            round(float(share), 3) for share in shares.mean(0)
-        ],
-    }

@@ -1,11 +1,15 @@
 """The walking experiments that several benches share (investigation D).
 
-Undamaged runs are the trunk, in batches of ten; the runs of each damage begin as copies
-of a trunk after its last trial, since up to there nothing differs (`branching`).
+Undamaged runs come in groups of ten; the runs of each damage begin as copies of such a
+group after its last trial, since up to there nothing differs (`branching`).
 """
 
+import os
 from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from multiprocessing import get_context
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +17,7 @@ import numpy as np
 from bench import branching, experiments
 from bns.config import RunConfig
 from bns.record import RunRecord
+from bns.store import RunStore
 from bns.worlds.trial import Trial
 
 ONSET = 100  # trial of the damage (dissertation, table 7.4)
@@ -84,11 +89,40 @@ def records(
     return experiments.records([small(c) if quick else c for c in configs])
 
 
-def walking(*, quick: bool = False) -> RunRecord:
-    """All undamaged runs, trained where they are missing; quick: one small run."""
-    groups = GROUPS[:1] if quick else GROUPS
-    found = records([undamaged(group) for group in groups], quick=quick)
-    return joined(list(found.values()))
+def walking(*, quick: bool = False) -> list[RunRecord]:
+    """All undamaged runs, trained where they are missing; quick: one small run.
+
+    The groups of `RECOVERING` go on to `ONSET`; of the others only the trial counts in
+    which a run first walks well enough, so they end once all of their runs do.
+    """
+    if quick:
+        return list(records([undamaged(GROUPS[0])], quick=True).values())
+    spawn = get_context("spawn")
+    with ProcessPoolExecutor(experiments.WORKERS, mp_context=spawn) as pool:
+        list(pool.map(walk, GROUPS))
+    return [RunStore.open(_place(undamaged(group))).record() for group in GROUPS]
+
+
+def walk(group: str) -> None:
+    """Train a group of undamaged runs as far as it is needed."""
+    from bns.run import train
+
+    os.environ["OMP_NUM_THREADS"] = "1"
+    config, hand = undamaged(group), by_hand()
+    place, whole = _place(config), group in RECOVERING
+
+    def enough() -> bool:
+        if whole or not (place / "run.json").exists():
+            return False
+        record = RunStore.open(place).record()
+        return record.trials > 0 and bool(adequate(record, hand).any(1).all())
+
+    train(config, place, resume=True, stop=enough)
+
+
+def adequate(record: RunRecord, hand: Hand) -> np.ndarray:
+    """Trials that got as far as the tripod gait in the time it takes, ``(R, T)``."""
+    return in_time(record, hand.seconds) >= hand.distance
 
 
 def recovering(*, quick: bool = False) -> Mapping[str, RunRecord]:
@@ -108,13 +142,11 @@ def recovering(*, quick: bool = False) -> Mapping[str, RunRecord]:
 
 def kept(legs: str) -> list[RunRecord]:
     """Finished runs of one damage, or of none (`"none"`); nothing is trained."""
-    from bns.store import RunStore
-
     if legs == "none":
         configs = [undamaged(group) for group in GROUPS]
     else:
         configs = [damaged(legs, group) for group in RECOVERING]
-    places = [experiments.directory(config) for config in configs]
+    places = [_place(config) for config in configs]
     stores = [RunStore.open(place) for place in places if (place / "run.json").exists()]
     return [store.record() for store in stores if store.finished]
 
@@ -219,6 +251,10 @@ def spread(values: np.ndarray) -> dict[str, float]:
         "least": round(float(values.min()), 4),
         "most": round(float(values.max()), 4),
     }
+
+
+def _place(config: RunConfig) -> Path:
+    return experiments.directory(config)
 
 
 def _preset() -> RunConfig:
