@@ -25,7 +25,13 @@ from bns.worlds.trial import POSE_CHANNELS, Channel, Trial
 ROBOT = "khepera3"
 FEWEST = 8  # readings of a trial
 WIDTH = 1.5  # departures beyond some of these look alike to the scatter
+SQUEEZED = 0.915  # standard deviation of `squeezed` of a normal number, not divided
 SCATTER = 0.188  # standard deviation of `unlikely` of a normal number
+
+
+def squeezed(departure: np.ndarray) -> np.ndarray:
+    """Departures of which large ones count less: a noisy sensor has many of them."""
+    return 2 * np.arcsinh(departure / 2) / SQUEEZED
 
 
 def unlikely(departure: np.ndarray) -> np.ndarray:
@@ -130,7 +136,7 @@ class SightModel:
         rng = np.random.default_rng(len(ends))
         read = read + dither * rng.standard_normal(read.shape)
         departure = (read - mean) / spread
-        observed = np.hstack([at, departure, unlikely(departure) / SCATTER])
+        observed = np.hstack([at, squeezed(departure), unlikely(departure) / SCATTER])
         observed[lost, 3:] = np.nan
         made = trial.replace(
             times=ends,
@@ -172,7 +178,8 @@ class SightModel:
         drawn = self.reader.samples(reads, effects) + noise
         departure = (drawn - mean) / spread
         scatter = unlikely(departure).mean(axis=1) / SCATTER
-        return np.hstack([trial.observed[:, :3], departure.mean(axis=1), scatter])
+        mean = squeezed(departure).mean(axis=1)
+        return np.hstack([trial.observed[:, :3], mean, scatter])
 
     def windows(self, trial: Trial) -> Windows:
         """One per reading: from the one before that was not lost."""
