@@ -16,6 +16,8 @@ STUCK = 0.9  # share of equal neighbours, while commands move, that counts as st
 LONG_GAP = 10.0  # times the usual step
 COARSE = 12  # fewer distinct steps than this while moving: quantised
 CLOCK = 0.05  # relative disagreement of recorded and commanded time
+BEYOND = 30.0  # times as far as the model moves: degrees for radians, mm for m
+SHOWS = 30.0  # times the resolution that a channel has to move to be compared
 FAR = 1e3  # [m] beyond it a position is a slip of a unit
 
 
@@ -67,7 +69,26 @@ def check(
             "No trial of the recording is usable: "
             + "; ".join(notes or ["it is empty"])
         )
+    _units(kept, model)
     return tuple(kept), tuple(notes)
+
+
+def _units(trials: Sequence[Trial], model: GapModel) -> None:
+    """Stop at channels that move much farther than their commands can make them."""
+    (predicted,) = model.simulate(trials, [()])
+    for column, channel in enumerate(model.channels):
+        shares = []
+        for trial, path in zip(trials, predicted, strict=True):
+            seen = trial.observed[np.isfinite(trial.observed).all(axis=1), column]
+            told = np.ptp(path[:, column])
+            if told > SHOWS * model.resolution[column]:  # not where it diverged
+                shares.append(np.ptp(seen) / told)
+        if shares and np.median(shares) > BEYOND:
+            raise FormatError(
+                f"{channel.name} moves {np.median(shares):.3g} times as far as its "
+                f"commands make the model move: its unit, {channel.unit}, or that of "
+                "the commands seems wrong."
+            )
 
 
 def _channels(trial: Trial, model: GapModel, number: int) -> None:

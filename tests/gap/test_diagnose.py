@@ -364,6 +364,13 @@ def test_channels_have_to_fit(model, told):
         diagnose([trial], model)
 
 
+def test_a_wrong_unit_is_refused(model, told):
+    trials = MujocoWorld(reality=[NOISE], threads=1).run(told, seeds=range(4))
+    large = [t.replace(observed=t.observed * [1000, 1000, 1]) for t in trials]
+    with pytest.raises(FormatError, match="x moves 1.* times as far"):
+        check.check(large, model)
+
+
 def test_conformal_quantile_covers():
     rng = np.random.default_rng(0)
     scores = rng.exponential(size=199)
