@@ -21,13 +21,15 @@ def trial(
     robot: str,
     world: str,
     conditions: dict,
-    as_told: bool = False,
+    recording: bool = False,
 ) -> Trial:
     """The trial of commands that were carried out.
 
     The samples lie on a regular grid and at the moments at which commands changed;
     between two pictures the pose is interpolated. Commands that were not reached are
-    left out, durations are those that the robot got.
+    left out, durations are those that the robot got. In a recording they are those
+    that were told, so that repeats are alike: by how much each moment was off is then
+    a scatter of the motion.
 
     Args:
         done: what happened.
@@ -35,9 +37,8 @@ def trial(
         sample_dt: time between samples [s].
         start_yaw: heading at the start [rad], for continuous yaws.
         robot, world, conditions: see `Trial`.
-        as_told: with the durations that were wanted, so that repeats are alike: how
-            much each moment was off is then a scatter of the motion. Where a trial
-            was ended early the robot's own durations hold.
+        recording: see above. Where a trial was ended early the robot's own durations
+            hold nevertheless.
 
     Raises:
         Void: too little was seen.
@@ -47,7 +48,7 @@ def trial(
     if count < 1:
         raise BnsError("No command was carried out.")
     moments = switched - switched[0]
-    if as_told and count == len(commands):
+    if recording and count == len(commands):
         moments = np.concatenate([[0.0], np.cumsum(commands.durations)])
     grid = np.arange(0.0, moments[-1], sample_dt)
     apart = np.abs(grid[:, None] - moments).min(1) > 1e-3

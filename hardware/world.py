@@ -40,8 +40,7 @@ class HardwareWorld:
         wheels: file of the wheels' sizes; empty = nominal.
         log: file for faults.
         on_void: called with number and reason whenever a trial is void.
-        as_told: trials have the durations that were wanted, see `records.trial`; for
-            recordings with repeats.
+        recording: trials have the durations that were told, see `records.trial`.
         rig: an open one instead of port and camera (rehearsals in virtual time).
 
     Raises:
@@ -66,7 +65,7 @@ class HardwareWorld:
         wheels: str = "",
         log: str = "",
         on_void: Callable[[int, str], None] = lambda trial, reason: None,
-        as_told: bool = False,
+        recording: bool = False,
         rig: Rig | None = None,
     ):
         del threads
@@ -88,7 +87,7 @@ class HardwareWorld:
         self.port, self.camera, self.calibration = port, camera, calibration
         self.wheels = wheels
         self.log, self._rig, self.voids, self.on_void = log, rig, 0, on_void
-        self.as_told = as_told
+        self.recording = recording
 
     def run(
         self, commands: Sequence[Commands], *, trial: int = 0, seeds: Sequence[int] = ()
@@ -208,5 +207,5 @@ class HardwareWorld:
             robot=self.robot,
             world=self.name,
             conditions=conditions,
-            as_told=self.as_told,
+            recording=self.recording,
         )

@@ -104,7 +104,7 @@ def record(given: Any) -> int:
         wheels=given.wheels,
         damage=given.damage,
         sample_dt=0.05,
-        as_told=True,
+        recording=True,
     )
     trials = []
     try:

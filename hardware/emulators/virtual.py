@@ -48,6 +48,7 @@ def rig(
     corrupted: float = 0.0,
     mute: float = 0.0,
     rate: float = 10.0,
+    size: tuple[int, int] = SIZE,
     seed: int = 0,
     log: str | None = None,
 ) -> VirtualRig:
@@ -61,6 +62,7 @@ def rig(
         corrupted: probability that a packet is corrupted.
         mute: probability that a command is not answered.
         rate: pictures a second.
+        size: of a picture [px].
         seed: of all that is random.
         log: file for faults.
     """
@@ -74,7 +76,7 @@ def rig(
     faults, limits, marker = FaultLog(clock, log), Limits(), Marker()
     robot = Khepera3(line, clock, faults=faults, guard=NoDog(), limit=limits.speed)
     robot.identify()
-    camera = Camera.overhead(SIZE)
+    camera = Camera.overhead(size)
     painter = BodyPainter(body, Painter(camera, marker, rng=rngs[2]))
     eyes = VirtualEyes(painter, Tracker(camera, marker), clock, rate=rate)
     made = VirtualRig(robot, eyes, clock, limits, Operator(), faults, line)
