@@ -32,7 +32,10 @@ def test_recordings_are_pooled_chosen_and_of_one_robot(model, drive, tmp_path):
     assert len(inputs.trials(both, model)) == 2
     (kept,) = inputs.trials(both, model, only=["load=heavy"])
     assert kept.conditions["load"] == "heavy"
-    for only, said in (("load=none", "Available: heavy, light"), ("mass=1", "'mass=1'")):
+    for only, said in (
+        ("load=none", "Available: heavy, light"),
+        ("mass=1", "'mass=1'"),
+    ):
         with pytest.raises(BnsError, match=said):
             inputs.trials(both, model, only=[only])
     dataset.write(tmp_path / "c", [drive.replace(robot="rover")])
