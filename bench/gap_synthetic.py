@@ -5,6 +5,7 @@ from bench.result import Result
 
 DOC = "withheld single effects named, aliases merged, at 3 x their detectability"
 BAR = ">= 0.95"
+ANGLE = 11.48  # [deg] whose cosine is 0.98
 
 
 def run(quick: bool) -> Result:
@@ -26,6 +27,7 @@ def run(quick: bool) -> Result:
         n=len(large),
         details={
             "strict": scoring.share(large, scoring.strict),
+            "merged by angle as well": scoring.share(large, _by_angle),
             "among those named": scoring.share(large, _among),
             "named alone, and wrong": scoring.share(large, scoring.confident_wrong),
             "named as one of several": scoring.share(
@@ -34,10 +36,19 @@ def run(quick: bool) -> Result:
             "baselines": named,
             "by size": scoring.by_size(every),
             "parameter": scoring.parameter(large),
+            "parameter, from 1 x": scoring.parameter(scoring.of(rows, "single", 1.0)),
             "confusion": scoring.confusion(large),
             "failures": scoring.failures(large, scoring.right),
         },
     )
+
+
+def _by_angle(row: dict) -> bool:
+    """With effects merged whose signatures are less than `ANGLE` apart."""
+    from bns.gap import scoring
+
+    named = row["said"]["named"]
+    return bool(named) and scoring.matches(named[0], row["answer"], angle=ANGLE)
 
 
 def _among(row: dict) -> bool:

@@ -128,16 +128,25 @@ def _always() -> dict[str, tuple[str, ...]]:
     return {item.name: item.aliases for item in wheeled_library.candidates()}
 
 
-def matches(names: Sequence[str], answer: dict[str, Any]) -> bool:
+def matches(
+    names: Sequence[str], answer: dict[str, Any], *, angle: float = 0.0
+) -> bool:
     """Whether a support is the true one, effects that look alike merged.
 
     Merged are those that the recording cannot tell apart, and those that none can.
+
+    Args:
+        names: of the support.
+        answer: see `cases.Answer`.
+        angle: between whitened signatures [deg] below which effects are merged, too.
     """
     always = _always()
     classes = [
         {*row, *(other for name in row for other in always.get(name, ()))}
         for row in answer["aliases"]
     ]
+    for near, found in zip(answer.get("near", ()), classes, strict=False):
+        found.update(name for name, _, apart in near if apart < angle)
     if len(names) != len(classes):
         return False
     return any(
