@@ -60,15 +60,23 @@ class KheperaBody(LiveBody):
         )
 
     def _drive(self) -> None:
-        while self._told and self._told[0][0] <= self.now + self.dt / 2:
-            _, *point = self._told.pop(0)
-            self._point = (point[0], point[1])
-        self.history.append((self.now, *self._point))
-        speeds = np.array(self._point)
+        mean = self._mean_point()
+        self.history.append((self.now, float(mean[0]), float(mean[1])))
         if self.signal:
             rows = np.array(self.history)
-            speeds = self._disturbed(rows[:, 0], rows[:, 1:])
-        self.data.ctrl[:] = speeds * self.robot.ctrl_per_command
+            mean = self._disturbed(rows[:, 0], rows[:, 1:])
+        self.data.ctrl[:] = mean * self.robot.ctrl_per_command
+
+    def _mean_point(self) -> np.ndarray:
+        """Mean set point of the coming step [m/s]: they change within steps, too."""
+        at, end = self.now, self.now + self.dt
+        total = np.zeros(2)
+        while self._told and self._told[0][0] < end:
+            moment, *point = self._told.pop(0)
+            moment = max(moment, at)
+            total += (moment - at) * np.array(self._point)
+            at, self._point = moment, (point[0], point[1])
+        return (total + (end - at) * np.array(self._point)) / self.dt
 
     def wheel_angles(self) -> tuple[float, float]:
         """Left and right [rad]."""
