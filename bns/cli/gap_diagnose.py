@@ -116,7 +116,9 @@ def _diagnose(given: Diagnose) -> int:
         model = nominal(given, given.threads)
         trials = _some(recorded(given, model))
         found = _general(given, model, trials, out)
-    found = replace(found, provenance=_provenance(given, model, trials))
+    found = replace(
+        found, provenance={**found.provenance, **_provenance(given, model, trials)}
+    )
     if out:
         store.save(found, out)
     _say(found)
@@ -132,6 +134,8 @@ def _general(given: Diagnose, model: Any, trials: list[Any], out: Path | None) -
     inputs.tellable(trials, model)
     try:
         usable, _ = check.check(trials, model)
+        if given.reference and model.name == inputs.SERVO:
+            return _servo(given, model, usable)
         advice.reproducible(usable, model)
         unchanged = recorded(replace(given, data=given.reference), model)
         found = diagnose(
@@ -144,6 +148,14 @@ def _general(given: Diagnose, model: Any, trials: list[Any], out: Path | None) -
             kept = partial.write(trials, model, error, out)
             raise BnsError(f"{error} What was found until then: {kept}") from error
         raise
+
+
+def _servo(given: Diagnose, model: Any, trials: Any) -> Any:
+    """Beside unchanged runs of the same servo, of which `--only` chooses none."""
+    from bns.gap import servo_record
+
+    unchanged = recorded(replace(given, data=given.reference, only=()), model)
+    return servo_record.record(trials, unchanged, seed=given.seed)
 
 
 def _odometry(given: Diagnose) -> Any:
