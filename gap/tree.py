@@ -122,6 +122,7 @@ def worst(tree: Node) -> tuple[list[str], Sequence[float]]:
 
 
 def _words(name: str, side: str, cut: float) -> str:
+    name, _, unit = name.partition(" [")
     if abs(cut) < 1e-9:
         return f"{name} is {'negative or zero' if side == 'at most' else 'positive'}"
-    return f"{name} is {side} {cut:.3g}"
+    return f"{name} is {side} {cut:.3g} {unit.rstrip(']')}".rstrip()

@@ -270,18 +270,18 @@ class WheeledModel:
         pose = trial.poses_world[windows.first]
         now = told[index]
         return {
-            "speed told to the left wheel": now[:, 0],
-            "speed told to the right wheel": now[:, 1],
-            "change of the left wheel's command": now[:, 0] - before[:, 0],
-            "change of the right wheel's command": now[:, 1] - before[:, 1],
-            "time since the command changed": at
+            "speed told to the left wheel [m/s]": now[:, 0],
+            "speed told to the right wheel [m/s]": now[:, 1],
+            "change of the left wheel's command [m/s]": now[:, 0] - before[:, 0],
+            "change of the right wheel's command [m/s]": now[:, 1] - before[:, 1],
+            "time since the command changed [s]": at
             - (ends - trial.commands.durations)[index],
-            "forward speed told": now.mean(axis=1),
-            "turn told": now[:, 1] - now[:, 0],
+            "forward speed told [m/s]": now.mean(axis=1),
+            "turn told [m/s]": now[:, 1] - now[:, 0],
             "heading": np.angle(np.exp(1j * pose[:, 2])),
-            "x": pose[:, 0],
-            "y": pose[:, 1],
-            "time in the trial": at,
+            "x [m]": pose[:, 0],
+            "y [m]": pose[:, 1],
+            "time in the trial [s]": at,
         }
 
 
