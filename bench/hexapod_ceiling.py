@@ -22,7 +22,7 @@ BAR = "none: printed beside hexapod-gait and recover-hexapod"
 NONE = "none"  # no damage
 WANTED = (NONE, "type0", "type1", "type2", "type3", "type5", "type14")
 OTHERS = tuple(f"type{n}" for n in range(16) if f"type{n}" not in WANTED)
-POPULATION, GENERATIONS = 20, 75
+POPULATION, GENERATIONS = 20, 50
 BUDGET = POPULATION * GENERATIONS  # trials
 STEP = 0.1  # [rad] first standard deviation of a goal
 
