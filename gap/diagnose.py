@@ -54,7 +54,8 @@ def diagnose(
         trials: recorded commands and observations.
         model: nominal model.
         seed: of what is drawn (null distributions, bootstraps).
-        candidates: explanations to consider; None = all of the model's.
+        candidates: explanations to consider; None = all of the model's (or those
+            that it suspects).
         calibration: thresholds; None = those of the package.
         most: largest number of effects at once.
         full: with localisation and closed fractions; False = the verdict alone.
@@ -123,7 +124,10 @@ def analyse(
     clock = _Clock()
     with clock("check"):
         trials, faults = _checked(trials, model)
-    candidates = tuple(model.candidates() if candidates is None else candidates)
+    if candidates is None:  # a model may name those that the recording calls for
+        suspected = getattr(model, "suspected", None)
+        candidates = suspected(trials) if suspected else model.candidates()
+    candidates = tuple(candidates)
     rules = rules or verdict.calibration()
     with clock("signatures"):
         if reference:

@@ -65,6 +65,10 @@ def model(name: str, *, threads: int = 2) -> GapModel:
         from bns.gap.servo_model import ServoModel
 
         return ServoModel()
+    if kind == "legged":
+        from bns.gap.walk_model import WalkModel
+
+        return WalkModel(name)
     raise BnsError(
         f"{name!r} is of kind {kind!r}, which the diagnosis does not know; describe it "
         "in a TOML file (docs/gap_your_robot.md)."

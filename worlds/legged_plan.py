@@ -141,6 +141,7 @@ def job(
     speed: float,
     seed: int,
     trial: int,
+    counts: np.ndarray | None = None,
 ) -> tuple[WalkJob, Servos]:
     """What the physics gets for one robot's trial.
 
@@ -151,12 +152,15 @@ def job(
         start: pose in the world frame [m, m, rad].
         speed: moving speed of the servos [rad/s].
         seed, trial: identity of what is random.
+        counts: physics steps of each command, which then does not wait for the robot
+            to rest; None = as planned.
 
     Raises:
         BnsError: an effect that changes the joints sets in within the trial.
     """
     dt = timestep(robot)
-    counts = legged_goals.planned(commands, speed, dt)
+    limits = legged_goals.limits(commands, dt) if counts is None else counts
+    counts = legged_goals.planned(commands, speed, dt) if counts is None else counts
     values, home = np.repeat(commands.values, counts, axis=0), commands.values[0] * 0
     if stages.control:
         told = control.signal(commands, counts, dt)
@@ -173,7 +177,7 @@ def job(
         before = told[-1]
     ramps = legged_goals.ramps(np.concatenate(goals), home, speed * dt)
     cuts = np.cumsum([len(told) for _, told in segments])
-    pieces = _pieces(segments, cuts, ramps, counts, legged_goals.limits(commands, dt))
+    pieces = _pieces(segments, cuts, ramps, counts, limits)
     begin = stand(first, start, home.tobytes())
     return WalkJob(begin, pieces), servos(segments[-1].compiled)
 

@@ -1,0 +1,152 @@
+"""Withheld single effects of the hexapod named, and their leg, at 3 x detectability.
+
+`python -m bench.gap_hexapod` makes and diagnoses the cases that are missing.
+"""
+
+import json
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from bench.gap_runner import DIRECTORY
+from bench.result import Result
+
+DOC = "withheld effects of the hexapod named, aliases merged, leg right, at 3 x"
+BAR = ">= 0.90, <= 300 s a case"
+SEALED, SPAN = 70_000, 1_000  # first seed of the scored cases; seeds of a kind
+COUNTS = {"single": 40, "none": 8}
+QUICK = {"single": 1, "none": 1}
+LARGE = 3.0  # sizes from which effects have to be named
+SLOWEST = 300.0  # [s] a case on two cores
+
+
+def wanted(counts: dict[str, int], first: int = SEALED) -> list[tuple[str, int]]:
+    """Kinds and seeds, kinds mixed, should it be cut short."""
+    share = {
+        (kind, first + SPAN * list(COUNTS).index(kind) + n): n / count
+        for kind, count in counts.items()
+        for n in range(count)
+    }
+    return sorted(share, key=share.__getitem__)
+
+
+def rows() -> dict[tuple[str, int], dict]:
+    """All results so far, by kind and seed."""
+    path = DIRECTORY / "gap_hexapod.jsonl"
+    lines = path.read_text().splitlines() if path.is_file() else []
+    found = map(json.loads, lines)
+    return {(row["kind"], row["seed"]): row for row in found}
+
+
+def produce(cases: Sequence[tuple[str, int]]) -> None:
+    """Make and diagnose the cases that are missing, appending as they come."""
+    done = rows()
+    DIRECTORY.mkdir(parents=True, exist_ok=True)
+    for kind, seed in cases:
+        if (kind, seed) not in done:
+            row = one(kind, seed)
+            with (DIRECTORY / "gap_hexapod.jsonl").open("a") as out:
+                out.write(json.dumps(row) + "\n")
+
+
+def one(kind: str, seed: int) -> dict[str, Any]:
+    """One case: what is true, what was said, and how long it took."""
+    from bns.gap import walk_cases
+    from bns.gap.diagnose import analyse
+    from bns.gap.records import plain
+    from bns.gap.walk_model import WalkModel
+
+    model = WalkModel()
+    case = walk_cases.build(seed, kind, model)
+    begin, busy = time.perf_counter(), time.process_time()
+    made = analyse(case.trials, model, seed=seed, most=1)
+    row = {
+        "kind": kind,
+        "seed": seed,
+        "seconds": time.perf_counter() - begin,
+        "cpu": time.process_time() - busy,
+        "answer": walk_cases.answer(case, made),
+        "said": {
+            "verdict": made.verdict.kind,
+            "named": made.verdict.named,
+            "p_gap": made.verdict.p_gap,
+            "p_misfit": made.verdict.p_misfit,
+            "candidates": len(made.curves.candidates),
+            "worth": made.choice.worth,
+            "rungs": [rung.as_dict() for rung in made.choice.rungs],
+        },
+    }
+    return plain(row)
+
+
+def run(quick: bool) -> Result:
+    """Score the cases; the missing ones are made and diagnosed first."""
+    from bns.gap import scoring
+
+    cases = wanted(QUICK if quick else COUNTS)
+    produce(cases)
+    found = [row for key, row in rows().items() if key in set(cases)]
+    singles = [row for row in found if row["kind"] == "single"]
+    large = [row for row in singles if row["answer"]["size"] >= LARGE]
+    none = [row for row in found if row["kind"] == "none"]
+    legged = [row for row in large if row["answer"]["leg"]]
+    busy = sorted(row["cpu"] for row in found)
+    figure = scoring.share(large, right)
+    return Result(
+        figure=figure,
+        unit="share",
+        holds=figure >= 0.9 and busy[-1] <= SLOWEST,
+        n=len(large),
+        details={
+            "cases": len(found),
+            "right leg": {"n": len(legged), "share": scoring.share(legged, leg)},
+            "among those named": scoring.share(large, _among),
+            "named as one of several": scoring.share(
+                large, lambda row: row["said"]["verdict"] == "either"
+            ),
+            "false alarms": {"n": len(none), "share": scoring.share(none, _claims)},
+            "smaller effects": {
+                "n": len(singles) - len(large),
+                "named": scoring.share(
+                    [row for row in singles if row not in large], right
+                ),
+            },
+            "seconds of processor time": {
+                "median": round(busy[len(busy) // 2], 1),
+                "largest": round(busy[-1], 1),
+            },
+            "failures": [_line(row) for row in large if not right(row)],
+        },
+    )
+
+
+def right(row: dict) -> bool:
+    """Whether what was named first is the hidden effect, or looks just like it."""
+    named = row["said"]["named"]
+    return bool(named) and named[0][0] in row["answer"]["aliases"]
+
+
+def leg(row: dict) -> bool:
+    """Whether what was named first acts on the hidden effect's leg."""
+    named = row["said"]["named"]
+    return bool(named) and row["answer"]["leg"] in named[0][0]
+
+
+def _among(row: dict) -> bool:
+    return any(names[0] in row["answer"]["aliases"] for names in row["said"]["named"])
+
+
+def _claims(row: dict) -> bool:
+    return row["said"]["verdict"] != "no gap"
+
+
+def _line(row: dict) -> str:
+    answer, said = row["answer"], row["said"]
+    return (
+        f"{row['seed']}: {answer['effect']} (size {answer['size']:.1f}) -> "
+        f"{said['verdict']} {[names[0] for names in said['named'][:4]]}"
+    )
+
+
+if __name__ == "__main__":
+    produce(wanted(COUNTS))

@@ -1,0 +1,86 @@
+"""Recordings of walking: the leg is found before a fit, a planted effect is named."""
+
+import numpy as np
+import pytest
+
+from bns.gap import diagnose, walk_cases, walk_library, walk_where
+from bns.gap.walk_model import READING, WalkModel
+from bns.gap.walk_where import Suspects
+from bns.worlds import legged_plan
+from bns.worlds.active import Stages
+from bns.worlds.damage import Damage
+from bns.worlds.effects import registry
+
+KEPT = ("servo_gain[right_front]", "servo_delay[right_front]", "payload")
+
+
+@pytest.fixture(scope="module")
+def model():
+    return WalkModel()
+
+
+@pytest.fixture(scope="module")
+def told(model):
+    return walk_cases.commands(np.random.default_rng(2), model)
+
+
+def test_what_was_recorded_is_executed_again(model, told):
+    trials = walk_cases.record(told, [], 1)
+    (predicted,) = model.simulate(trials, [()])
+    for trial, made in zip(trials, predicted, strict=True):
+        assert np.abs(made[:, 3:] - trial.observed[:, 3:]).max() < 2 * READING
+        assert np.abs(made[:, :2] - trial.observed[:, :2]).max() < 6e-3
+
+
+def test_commands_can_be_given_their_steps(model, told):
+    stages = Stages.of(Damage.none(), Damage.none(), 0, 9.0)
+    given = {"start": (0.0, 0.0, 0.0), "speed": 3.0, "seed": 0, "trial": 0}
+    job, _ = legged_plan.job(
+        "phantomx", told[0], stages, counts=np.array([40, 50]), **given
+    )
+    assert [len(piece.control) for piece in job.pieces] == [40, 50]
+    assert [piece.limit for piece in job.pieces] == [40, 50]
+
+
+def test_the_leg_is_found_before_anything_is_fitted(model, told):
+    weak = registry.make("servo_gain", servo="right_front", factor=0.5)
+    trials = walk_cases.record(told, [weak], 1)
+    (predicted,) = model.simulate(trials, [()])
+    rests = [
+        t.observed[:, 3:] - p[:, 3:] for t, p in zip(trials, predicted, strict=True)
+    ]
+    found = walk_where.suspects(rests, model.joints, READING)
+    assert found.legs == ("right_front",)
+    share = walk_where.shares(rests, model.joints, READING)
+    assert sum(share.values()) == pytest.approx(1.0)
+
+
+def test_one_leg_alone_leaves_out_effects_on_all():
+    names = ("left_front_coxa", "right_front_coxa")
+    rests = [np.column_stack([np.full(50, 0.1), np.zeros(50)])]
+    found = walk_where.suspects(rests, names, READING)
+    assert found == Suspects(("left_front_coxa",), ("left_front",), False)
+    listed = [item.name for item in walk_library.candidates(found)]
+    assert "servo_delay[all]" not in listed
+    assert "servo_gain[all]" in listed  # as what the model is uncertain of
+    assert "servo_delay[left_front_coxa]" in listed
+
+
+def test_a_planted_effect_is_named_with_its_leg(model, told):
+    weak = registry.make("servo_gain", servo="right_front", factor=0.5)
+    trials = walk_cases.record(told, [weak], 1)
+    kept = [item for item in model.suspected(trials) if item.name in KEPT]
+    made = diagnose.analyse(trials, model, candidates=kept, most=1)
+    assert made.verdict.named == (("servo_gain[right_front]",),)
+    assert made.choice.best.terms[0].magnitude == pytest.approx(0.5, abs=0.03)
+
+
+def test_cases_hide_an_effect_and_say_which(model):
+    case = walk_cases.build(3, "single", model)
+    again = walk_cases.build(3, "single", model)
+    assert case.term == again.term
+    assert case.term is not None
+    assert all(
+        np.array_equal(a.observed, b.observed)
+        for a, b in zip(case.trials, again.trials, strict=True)
+    )
