@@ -21,12 +21,12 @@ def run(quick: bool) -> Result:
     from bns.gap.diagnose import diagnose
     from bns.gap.wheeled import WheeledModel
     from bns.hardware.emulators import virtual
-    from bns.hardware.excitation import commands
+    from bns.hardware.excitation import START, commands
     from bns.hardware.world import HardwareWorld
 
     count = 4 if quick else TRIALS
     rig = virtual.rig([HIDDEN], rate=RATE, size=SIZE, seed=2)
-    world = HardwareWorld(rig=rig, sample_dt=0.05, recording=True)
+    world = HardwareWorld(rig=rig, sample_dt=0.05, start=START, recording=True)
     trials = []
     for number in range(count):
         told = commands(COMMANDS, seed=1, number=number // 2)

@@ -25,14 +25,15 @@ OPEN_LOOP = ("navigation", "walk")
 
 CHUNK = 5  # generations between two looks whether the trial is over
 LEAST = 20  # generations in a trial, even where it takes no time
-LONGEST = 2000  # generations in a trial: beyond, the population has long converged
 
 
 class Background:
     """A learner whose generations run between proposal and observation.
 
-    How many there are is what the robot's time allows, and is recorded ("generations");
-    so results are not reproducible bit for bit. Where its process fails it rings the
+    How many there are is what the robot's time allows, at most those that the
+    configuration says, and is recorded ("generations"); so results are not reproducible
+    bit for bit. (Without a limit a trial has time for two thousand: they find what the
+    SNN gets wrong, and the robot walks half as far.) Where its process fails it rings the
     alarm, which stops the robot.
 
     Args:
@@ -137,6 +138,7 @@ class Worker:
         chunk = replace(configs[0].evolution, generations=CHUNK)
         self._inner.config = replace(configs[0], evolution=chunk)
         self._first = configs[0].evolve_from
+        self._longest = configs[0].evolution.generations
         self._trial, self.generations, self.busy = 0, 0, False
 
     def breed(self) -> None:
@@ -149,7 +151,7 @@ class Worker:
             learner._rates(self._trial),
         )
         self.generations += CHUNK
-        self.busy = self.generations < LONGEST
+        self.busy = self.generations < self._longest
 
     def propose(self, trial: int) -> Any:
         """What to try."""

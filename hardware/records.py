@@ -9,6 +9,7 @@ from bns.hardware.motion import Performed
 from bns.hardware.tracking.tracker import Sighting
 from bns.worlds.trial import Commands, Outcome, Trial
 
+CLOSE = 1.2  # pictures: nearer to a change of command, recordings have no pose
 GAP = 0.3  # s between two sightings beyond which nothing is filled in
 
 
@@ -29,7 +30,8 @@ def trial(
     between two pictures the pose is interpolated. Commands that were not reached are
     left out, durations are those that the robot got. In a recording they are those
     that were told, so that repeats are alike: by how much each moment was off is then
-    a scatter of the motion.
+    a scatter of the motion. And within a picture of a change of command there is no
+    pose in it but the first: what is filled in there is wrong by some mrad.
 
     Args:
         done: what happened.
@@ -61,6 +63,8 @@ def trial(
     lost = np.isnan(poses[:, 0])
     if lost.mean() > 0.3 or lost[boundaries].mean() > 0.3:
         raise Void(f"the robot was seen in {1 - lost.mean():.0%} of the samples")
+    if recording:
+        poses[_near(times, moments, done.sightings)] = np.nan
     return Trial(
         commands=Commands(commands.values[:count], np.diff(moments), commands.channels),
         times=times,
@@ -71,6 +75,16 @@ def trial(
         world=world,
         conditions=conditions,
     )
+
+
+def _near(
+    times: np.ndarray, moments: np.ndarray, sightings: list[Sighting]
+) -> np.ndarray:
+    """Which samples lie within a picture of a change of command, the first not."""
+    apart = float(np.median(np.diff([sighting.time for sighting in sightings])))
+    close = np.abs(times[:, None] - moments).min(1) < CLOSE * apart
+    close[0] = False
+    return close
 
 
 def interpolated(sightings: list[Sighting], times: np.ndarray) -> np.ndarray:

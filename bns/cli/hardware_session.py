@@ -104,6 +104,7 @@ def record(given: Any) -> int:
         wheels=given.wheels,
         damage=given.damage,
         sample_dt=0.05,
+        start=excitation.START,
         recording=True,
     )
     trials = []
