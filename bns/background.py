@@ -24,17 +24,17 @@ OPEN_LOOP = ("navigation", "walk")
 """learners that can: what they try is known before it is tried"""
 
 CHUNK = 5  # generations between two looks whether the trial is over
-LEAST = 20  # generations in a trial, even where it takes no time
+LEAST = 20  # generations after a trial, with what was learned from it
 
 
 class Background:
     """A learner whose generations run between proposal and observation.
 
     How many there are is what the robot's time allows, at most those that the
-    configuration says, and is recorded ("generations"); so results are not reproducible
-    bit for bit. (Without a limit a trial has time for two thousand: they find what the
-    SNN gets wrong, and the robot walks half as far.) Where its process fails it rings the
-    alarm, which stops the robot.
+    configuration says and `LEAST` after the trial, and is recorded ("generations"); so
+    results are not reproducible bit for bit. (Without a limit a trial has time for two
+    thousand: they find what the SNN gets wrong, and a hexapod walks half as far.) Where
+    its process fails it rings the alarm, which stops the robot.
 
     Args:
         configs, replicates, onsets: see `bns.learner.Learner`.
@@ -163,15 +163,15 @@ class Worker:
     def observe(
         self, trial: int, tried: Sequence[Trial], best: Sequence[Trial] | None
     ) -> dict[str, np.ndarray]:
-        """Learn; where time was short, breed the least number of generations."""
+        """Learn, and breed on with what was learned."""
         evolving, during = self.busy or self.generations > 0, self.generations
         self.busy = False
         row = self.learner.observe(trial, tried, best)
         self.learner.cost = self.learner.inner.cost(
             self.learner.theta, self.learner.population
         )
-        while evolving and self.generations < max(LEAST, during + CHUNK):
-            self.breed()  # with what was learned from this trial
+        while evolving and self.generations < during + LEAST:
+            self.breed()
         self.busy = False
         row["generations"] = np.full(self.learner.runs, float(self.generations))
         return row

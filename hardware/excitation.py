@@ -9,8 +9,8 @@ SPEED = 0.12  # m/s, the laboratory's controllers go up to 0.1215
 AXLE = 0.0874  # m, nominal
 ROOM = 0.55  # m from the start in any direction
 START = (0.0, 0.0, 0.4)
-"""m, m, rad: askew to the camera's rows. Where the tag's edges lie along them, its place
-is found up to 0.3 mm off at 1080p, the same from picture to picture"""
+"""m, m, rad: askew to the camera's rows. Where the tag's edges lie along them, its
+place is found up to 0.3 mm off at 1080p, the same from picture to picture"""
 
 
 def commands(count: int, *, seed: int, number: int) -> Commands:
