@@ -91,7 +91,9 @@ def _plan(given: Planned) -> int:
     if found.model == odometry_record.MODEL:
         made = odometry_record.planned(found)
     else:
-        made = plan.plan(found, _model(found), arena=given.arena, seed=given.seed)
+        model = _model(found)
+        _plannable(found, model)
+        made = plan.plan(found, model, arena=given.arena, seed=given.seed)
     print(made.sentence)
     if not made.options or not made.repeats:
         return 0
@@ -102,6 +104,17 @@ def _plan(given: Planned) -> int:
     print(f"commands:  {path}")
     print("Record them, then: bns gap diagnose DATA NEW_DATA --out ANOTHER_DIR")
     return 0
+
+
+def _plannable(found: Any, model: Any) -> None:
+    known = {item.name for item in model.candidates()}
+    tied = {name for names in found.verdict.named for name in names}
+    unknown = sorted(tied - known) if len(found.verdict.named) > 1 else []
+    if unknown:
+        raise BnsError(
+            f"No safe commands are known that part {', '.join(unknown)}. "
+            f"{found.verdict.change}"
+        )
 
 
 def _edit(given: Edit) -> int:
@@ -155,11 +168,21 @@ def _apply(given: Apply) -> int:
     if found.model == "servo_pendulum":
         raise UnknownNameError("robot of a world", found.model, ("khepera3",))
     note = f"diagnosis of {', '.join(found.provenance.get('data', ()))}"
-    world = corrected.Corrected(
-        given.world, "mujoco", found.model, fit.effects, note=note
-    )
+    base, preset = _base(found)
+    world = corrected.Corrected(given.world, base, found.model, fit.effects, note=note)
     path = corrected.keep(world, user=given.user, replace=given.replace)
     print(f"World {given.world!r}: {', '.join(fit.effects)}")
     print(f"kept in:   {path}")
-    print(f"Train in it: bns run demo --world {given.world}")
+    print(f"Train in it: bns run {preset} --world {given.world}")
     return 0
+
+
+def _base(found: Any) -> tuple[str, str]:
+    """The world that a diagnosis corrects, and a preset that runs in it."""
+    from bns import models
+
+    if models.robot(found.model).kind == "legged":
+        return "hexapod", "hexapod-walk"
+    if "light" in found.floor:
+        return "light", "khepera-light"
+    return "mujoco", "demo"

@@ -2,10 +2,13 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from bns.cli import gap_after
+from bns.errors import BnsError
 from bns.gap import diagnose, light_cases, light_diagnosis, light_library
 from bns.gap.light_model import SightModel, sees, unlikely
 from bns.gap.light_reader import _clipped
@@ -159,3 +162,23 @@ def test_a_recording_with_light_is_diagnosed_whole():
     assert found.verdict.named == (("wheel_gain[left]", "sensor_gain[right]"),)
     assert found.best.magnitudes == pytest.approx((0.9, 0.9), abs=0.01)
     assert json.loads(found.to_json())["verdict"]["kind"] == "together"
+
+
+def test_ties_on_light_have_no_plan():
+    tied = SimpleNamespace(
+        verdict=verdict("either", "sensor_gain[left]", "sensor_stuck_min[left]")
+    )
+    with pytest.raises(BnsError, match=r"part sensor_gain\[left\], sensor_stuck_min"):
+        gap_after._plannable(tied, WheeledModel(threads=1))
+
+
+@pytest.mark.parametrize(
+    ("model", "floor", "base"),
+    [
+        ("khepera3", {}, "mujoco"),
+        ("khepera3", {"light": {}}, "light"),
+        ("phantomx", {}, "hexapod"),
+    ],
+)
+def test_a_corrected_world_is_of_the_recording_s_kind(model, floor, base):
+    assert gap_after._base(SimpleNamespace(model=model, floor=floor))[0] == base
