@@ -97,11 +97,21 @@ def _check(given: Check) -> int:
     model = nominal(given)
     trials = _some(recorded(given, model))
     inputs.tellable(trials, model)
-    usable, notes = check.check(trials, model)
+    moving = _motion(trials, model)
+    usable, notes = check.check(moving, model)
     for note in notes:
         print(note)
-    print(f"{len(usable)} of {len(trials)} trials can be used.")
+    print(f"{len(usable)} of {len(moving)} trials can be used.")
     return 0
+
+
+def _motion(trials: list[Any], model: Any) -> list[Any]:
+    """What of recordings is motion: without light, and where nobody held the robot."""
+    from bns.gap import light_diagnosis, light_model
+
+    if model.name == light_model.ROBOT and light_model.sees(trials):
+        return light_diagnosis.unhandled(trials, model)
+    return trials
 
 
 def _diagnose(given: Diagnose) -> int:
@@ -133,7 +143,7 @@ def _general(given: Diagnose, model: Any, trials: list[Any], out: Path | None) -
 
     inputs.tellable(trials, model)
     try:
-        usable, _ = check.check(trials, model)
+        usable, _ = check.check(_motion(trials, model), model)
         if given.reference and model.name == inputs.SERVO:
             return _servo(given, model, usable)
         advice.reproducible(usable, model)
