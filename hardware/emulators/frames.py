@@ -27,6 +27,7 @@ class Painter:
         floor: tags on the board.
         noise: standard deviation of grey values.
         blur: standard deviation of the lens's blur [px].
+        shake: standard deviation of where the camera's tremble puts the robot [px].
         rng: for the noise.
         radius: of the robot's body [m].
         base: height of the robot's frame above the board, as it stands [m]; the tag
@@ -41,12 +42,14 @@ class Painter:
         floor: Floor | None = None,
         noise: float = 2.0,
         blur: float = 0.6,
+        shake: float = 0.0,
         rng: np.random.Generator | None = None,
         radius: float = RADIUS,
         base: float | None = None,
     ):
         self.camera, self.marker, self.blur = camera, marker, blur
-        self.radius, self.base = radius, base
+        self.radius, self.base, self.shake = radius, base, shake
+        self._moved = np.zeros(2)
         rng = rng or np.random.default_rng(0)
         width, height = camera.size
         self._empty = np.full((height, width), BOARD, np.uint8)
@@ -72,6 +75,8 @@ class Painter:
             attitude: height of its frame [m] and its quaternion.
         """
         image = self._empty.copy()
+        if self.shake:
+            self._moved = self._rng.normal(0, self.shake, 2)
         if pose is not None:
             marker = self.marker
             around = np.linspace(0, 2 * np.pi, 32, endpoint=False)
@@ -120,7 +125,7 @@ class Painter:
             corners: of the square in the world, ``(4, 3)`` [m], in OpenCV's order.
             texture: what is on it.
         """
-        module, pixels = cv2(), self.camera.project(corners)
+        module, pixels = cv2(), self.camera.project(corners) + self._moved
         low = np.maximum(np.floor(pixels.min(0)).astype(int) - 4, 0)
         high = np.minimum(np.ceil(pixels.max(0)).astype(int) + 5, self.camera.size)
         width, tall = (int(v) for v in high - low)

@@ -49,6 +49,8 @@ def rig(
     mute: float = 0.0,
     rate: float = 10.0,
     size: tuple[int, int] = SIZE,
+    noise: float = 2.0,
+    shake: float = 0.0,
     seed: int = 0,
     log: str | None = None,
 ) -> VirtualRig:
@@ -63,6 +65,7 @@ def rig(
         mute: probability that a command is not answered.
         rate: pictures a second.
         size: of a picture [px].
+        noise, shake: of the camera, see `Painter`.
         seed: of all that is random.
         log: file for faults.
     """
@@ -77,7 +80,9 @@ def rig(
     robot = Khepera3(line, clock, faults=faults, guard=NoDog(), limit=limits.speed)
     robot.identify()
     camera = Camera.overhead(size)
-    painter = BodyPainter(body, Painter(camera, marker, rng=rngs[2]))
+    painter = BodyPainter(
+        body, Painter(camera, marker, noise=noise, shake=shake, rng=rngs[2])
+    )
     eyes = VirtualEyes(painter, Tracker(camera, marker), clock, rate=rate)
     made = VirtualRig(robot, eyes, clock, limits, Operator(), faults, line)
     made.device, made.body = device, body
