@@ -67,7 +67,10 @@ def test_the_search_climbs_and_stays_within_the_stops(monkeypatch):
 
     monkeypatch.setattr(hexapod_ceiling, "distances", distances)
     start = np.zeros((2, 18))
-    goals, farthest = hexapod_ceiling.search(start, "type0", generations=20)
+    goals, farthest, step = hexapod_ceiling.search(
+        start, "type0", step=0.1, seed=1, generations=20
+    )
+    assert 0 < step < 1
     assert farthest > distances([start], "type0")[0] + 0.05
     assert farthest == pytest.approx(distances([goals], "type0")[0])
     from bns import models
