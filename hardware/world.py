@@ -207,5 +207,5 @@ class HardwareWorld:
             robot=self.robot,
             world=self.name,
             conditions=conditions,
-            recording=self.recording,
+            recording=rig.eyes.tracker.camera if self.recording else None,
         )

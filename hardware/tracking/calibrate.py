@@ -172,6 +172,8 @@ def askew(sighting: Sighting, camera: Camera) -> float:
     """
     x, y, yaw = sighting.pose
     ahead = np.array([[x, y, 0.0], [x + np.cos(yaw) / 10, y + np.sin(yaw) / 10, 0.0]])
+    if not np.isfinite(ahead).all():
+        return 45.0
     start, end = camera.project(ahead)
     angle = np.degrees(np.arctan2(*(end - start)[::-1])) % 90.0
     return float(min(angle, 90.0 - angle))
