@@ -8,7 +8,6 @@ import numpy as np
 from bns.worlds.effects.legs import LEGS
 
 MOST, LEAST = 0.6, 0.3  # share of the worst leg: beyond it alone, below it all alike
-JOINTS = 2  # joints of the worst leg that are suspected
 
 
 @dataclass(frozen=True)
@@ -54,5 +53,4 @@ def suspects(
     own = [name for name in share if name.startswith(legs[0])]
     joints = sorted(own, key=share.__getitem__, reverse=True)
     worst = by_leg[legs[0]]
-    few = JOINTS if worst > MOST else int(worst > LEAST)
-    return Suspects(tuple(joints[:few]), (legs[0],), worst < MOST)
+    return Suspects(tuple(joints) if worst > LEAST else (), (legs[0],), worst < MOST)
