@@ -11,6 +11,7 @@ from bns.gap.signatures import Curves
 
 DRAWS = 1000
 LARGEST = 25.0  # square of a residual that counts in full
+QUIET = 0.5  # share of the assumed noise below which a rest counts as that much
 LAGS = 10  # windows over which a rest may be correlated with itself
 
 
@@ -72,8 +73,12 @@ class Null:
 
 
 def spread(z: np.ndarray) -> float:
-    """Robust standard deviation."""
-    return max(float(np.median(np.abs(z))) / 0.6745, 1e-3)
+    """Robust standard deviation, at least `QUIET`.
+
+    What a simulated recording without noise leaves is pure structure, however small it
+    is; far below the noise it says nothing of the robot.
+    """
+    return max(float(np.median(np.abs(z))) / 0.6745, QUIET)
 
 
 def rough(z: np.ndarray) -> float:

@@ -40,17 +40,7 @@ def record(
     Raises:
         BnsError: conditions are missing, or runs of several settings or too few.
     """
-    given = {trial.observed.tobytes() for trial in trials}
-    unchanged = [t for t in reference if t.observed.tobytes() not in given]
-    for trial in (*trials, *unchanged):
-        missing = [name for name in NEEDED if name not in trial.conditions]
-        if missing:
-            raise BnsError(
-                f"A servo's run does not say its {', '.join(missing)}; conditions "
-                f"{', '.join(NEEDED)} are needed beside unchanged recordings."
-            )
-    if not unchanged:
-        raise BnsError("No unchanged recording is left beside the ones to diagnose.")
+    unchanged = _unchanged(trials, reference)
     every = [seen(trial) for trial in (*trials, *unchanged)]
     seconds = np.floor(min(trial.times[-1] for trial in every) * 10) / 10
     mine = runs(every[: len(trials)], seconds=seconds)
@@ -87,6 +77,26 @@ def record(
         partial={"where, closed": "not made beside unchanged recordings of a servo"},
         provenance={"law": dict(law.values)},
     )
+
+
+def _unchanged(trials: Sequence[Trial], reference: Sequence[Trial]) -> list[Trial]:
+    """Reference runs that are not among the trials.
+
+    Raises:
+        BnsError: conditions are missing, or nothing is left.
+    """
+    given = {trial.observed.tobytes() for trial in trials}
+    unchanged = [t for t in reference if t.observed.tobytes() not in given]
+    for trial in (*trials, *unchanged):
+        missing = [name for name in NEEDED if name not in trial.conditions]
+        if missing:
+            raise BnsError(
+                f"A servo's run does not say its {', '.join(missing)}; conditions "
+                f"{', '.join(NEEDED)} are needed beside unchanged recordings."
+            )
+    if not unchanged:
+        raise BnsError("No unchanged recording is left beside the ones to diagnose.")
+    return unchanged
 
 
 def _spread(others: Runs) -> np.ndarray:

@@ -1,0 +1,87 @@
+"""Faults of recordings are repaired, left out or refused, and listed."""
+
+import numpy as np
+import pytest
+
+from bns.errors import FormatError
+from bns.gap import check, stuck
+from bns.gap.cases import commands
+from bns.gap.wheeled import WheeledModel
+from bns.worlds.mujoco_world import MujocoWorld
+from bns.worlds.trial import Commands
+
+NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.01"
+
+
+@pytest.fixture(scope="module")
+def model():
+    return WheeledModel(threads=1)
+
+
+@pytest.fixture(scope="module")
+def told():
+    return commands(np.random.default_rng(3), 4)
+
+
+def test_faults_are_repaired_and_listed(model, told):
+    trials = MujocoWorld(reality=[NOISE], threads=1).run(told, seeds=range(4))
+    broken = list(trials)
+    wrapped = trials[0].observed.copy()
+    wrapped[:, 2] = np.angle(np.exp(1j * (wrapped[:, 2] + 3.0)))
+    broken[0] = trials[0].replace(observed=wrapped)
+    spiked = trials[1].observed.copy()
+    spiked[20, 0] += 0.5
+    broken[1] = trials[1].replace(observed=spiked)
+    broken.append(trials[2])
+    made, notes = check.check(broken, model)
+    assert len(made) == 4
+    text = " ".join(notes)
+    assert "spikes" in text and "the same samples" in text
+    assert np.abs(np.diff(made[0].observed[:, 2])).max() < 3
+    assert np.isnan(made[1].observed[20]).all()
+
+
+def test_a_stuck_channel_and_a_wrong_clock_are_left_out(model, told):
+    trials = MujocoWorld(reality=[NOISE], threads=1).run(told, seeds=range(4))
+    stuck = trials[1].observed.copy()
+    stuck[:, 1] = stuck[0, 1]
+    half = trials[2].observed.copy()
+    half[30:50, 2] = half[30, 2]
+    broken = [
+        trials[0].replace(times=trials[0].times * 1.2),
+        trials[1].replace(observed=stuck),
+        trials[2].replace(observed=half),
+        trials[3],
+        MujocoWorld(reality=[NOISE], threads=1).run(told[:1], seeds=[9])[0],
+    ]
+    made, notes = check.check(broken, model)
+    text = "\n".join(notes)
+    assert len(made) == 3
+    assert "trial 0: its clock runs 1.2 times as fast" in text
+    assert "trial 1: y is stuck" in text and "seen, left out" in text
+    assert np.isnan(made[0].observed[30:50]).all()
+    assert np.isfinite(made[0].observed[:30]).all()
+    # all clocks alike: a drift, which is for the diagnosis to find
+    slow = [trial.replace(times=trial.times * 1.2) for trial in trials]
+    assert len(check.check(slow, model)[0]) == 4
+
+
+def test_a_robot_that_stands_still_is_no_stuck_channel(model):
+    there = Commands([[0.1, 0.1], [0.0, 0.0]], [1.0, 1.0])
+    dead = "wheel_gain:wheel=both,factor=0"
+    trials = MujocoWorld(reality=[dead], threads=1).run([there])
+    assert not stuck.dropped(trials[0], model)[1]
+
+
+def test_a_motion_that_turns_back_is_no_spike(model):
+    there = Commands([[-0.1, 0.1], [0.1, -0.1]], [1.0, 1.0])
+    trials = MujocoWorld(threads=1).run([there, there])
+    _, notes = check.check(trials[:1], model)
+    assert "spikes" not in " ".join(notes)
+
+
+def test_a_wrong_unit_is_refused(model, told):
+    trials = MujocoWorld(reality=[NOISE], threads=1).run(told, seeds=range(4))
+    large = [t.replace(observed=t.observed * [1000, 1000, 1]) for t in trials]
+    with pytest.raises(FormatError, match=r"x moves 1.* times as far"):
+        check.check(large, model)
