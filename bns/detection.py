@@ -69,6 +69,28 @@ class Detector:
         self.past[on] = np.nan
         return Alarms(on, np.where(on, suspect, -1), np.where(known, worst, np.nan))
 
+    def figures(
+        self, trial: int, innovations: np.ndarray, onsets: np.ndarray
+    ) -> dict[str, np.ndarray]:
+        """Judge a trial as `update` does, and say so in a learner's figures.
+
+        Args:
+            trial: its number.
+            innovations: see `update`.
+            onsets: first damaged trial of each run, ``(R,)``; set where there is an
+                alarm.
+
+        Returns:
+            detected, suspect and alarm_score (see `Alarms`), each ``(R,)``.
+        """
+        alarms = self.update(innovations)
+        onsets[alarms.on] = trial
+        return {
+            "detected": alarms.on.astype(np.float64),
+            "suspect": alarms.suspect.astype(np.float64),
+            "alarm_score": alarms.score,
+        }
+
     def _score(self, now: np.ndarray) -> np.ndarray:
         """Spreads above the median of the history, ``(R, C)``."""
         seen = np.isfinite(self.past)

@@ -56,11 +56,8 @@ class WatchedLearner(Learner):
         row = super().observe(trial, tried, best)
         watch = self.config.watch
         if watch.detect:
-            alarms = self.detector.update(innovations)
-            self.adaptations.onsets[alarms.on] = trial
-            row["detected"] = alarms.on.astype(np.float64)
-            row["suspect"] = alarms.suspect.astype(np.float64)
-            row["alarm_score"] = alarms.score
+            onsets = self.adaptations.onsets
+            row.update(self.detector.figures(trial, innovations, onsets))
         if watch.forget:
             row["forgotten"] = self._forgotten
         return row

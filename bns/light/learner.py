@@ -251,11 +251,8 @@ class LightLearner:
         """Look for damage, and forget what is contradicted, where that is asked for."""
         watch, row = self.config.watch, {}
         if watch.detect:
-            alarms = self.detector.update(innovations)
-            self.adaptations.onsets[alarms.on] = trial
-            row["detected"] = alarms.on.astype(np.float64)
-            row["suspect"] = alarms.suspect.astype(np.float64)
-            row["alarm_score"] = alarms.score
+            onsets = self.adaptations.onsets
+            row.update(self.detector.figures(trial, innovations, onsets))
         if watch.forget:
             gone = [
                 sum(part.forget(run, watch) for part in (self.motion, self.sensors))
