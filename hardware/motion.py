@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from bns.errors import BnsError
 from bns.hardware.clock import Clock
-from bns.hardware.errors import LinkError, SafetyStop, Void
+from bns.hardware.errors import LinkError, Void
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera.driver import Drive, Khepera3
 from bns.hardware.limits import Limits, Operator
+from bns.hardware.lookout import Lookout
 from bns.hardware.tracking.eyes import Eyes
 from bns.hardware.tracking.tracker import Sighting
 from bns.hardware.wheels import Following, Wheels
@@ -54,7 +54,7 @@ class Performed:
     notes: list[str] = field(default_factory=list)
 
 
-class Mover:
+class Mover(Lookout):
     """Drives a robot under the limits.
 
     Args:
@@ -83,53 +83,21 @@ class Mover:
         faults: FaultLog,
         following: Following | None = None,
     ):
-        self.following = following or Following()
-        self.robot, self.eyes, self.clock = robot, eyes, clock
-        self.limits, self.operator, self.faults = limits, operator, faults
-        self.last: Sighting | None = None
+        super().__init__(eyes, clock, limits=limits, operator=operator, faults=faults)
+        self.robot, self.following = robot, following or Following()
         self.points: list[Drive] = []
         self._moving = False
 
     def look(self) -> list[Sighting]:
-        """New sightings; with the safety checks of a tick.
-
-        Raises:
-            SafetyStop: the operator, the camera or the tracker.
-        """
-        self.operator.check()
-        try:
-            seen = self.eyes.poll()
-        except BnsError as error:
-            raise SafetyStop(f"the camera is lost ({error})", "check it") from error
-        if seen:
-            self.last = seen[-1]
-        now = self.clock.now()
-        if self._moving and (
-            self.last is None
-            or now - self.last.time
-            > self.limits.blind + self.eyes.tracker.camera.latency
-        ):
-            raise SafetyStop("the tracker has lost it", "free the view of its tag")
+        """New sightings, see `Lookout.look`; tells the watchdog that all is well."""
+        seen = self._seen(moving=self._moving)
         if self._moving and self.robot.guard is not None:
             self.robot.guard.feed(moving=True)
         return seen
 
-    def wait_for_sight(self, seconds: float = 3.0) -> Sighting:
-        """A fresh sighting of the standing robot.
-
-        Raises:
-            BnsError: the tag is not in view.
-        """
-        begin = self.clock.now()
-        while self.clock.now() - begin < seconds:
-            for sighting in self.look():
-                if sighting.time >= begin:
-                    return sighting
-            self.clock.sleep(TICK)
-        raise BnsError(
-            "The robot's tag is not in view: put the robot on the board, free the "
-            "camera's view, light it evenly."
-        )
+    def tick(self) -> None:
+        """Let the time between two looks pass."""
+        self.clock.sleep(TICK)
 
     def drive(self, left: float, right: float, *, times: int = 2) -> Drive:
         """Set the speeds [m/s] and remember them."""
@@ -205,7 +173,7 @@ class Mover:
         until = self.clock.now() + AFTER
         while self.clock.now() < until:
             done.sightings += self.look()
-            self.clock.sleep(TICK)
+            self.tick()
 
     def _judge(self, done: Performed) -> None:
         if done.late > LATE:

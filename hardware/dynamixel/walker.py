@@ -18,6 +18,7 @@ from bns.hardware.dynamixel.rest import Rest
 from bns.hardware.errors import LinkError, SafetyStop
 from bns.hardware.faults import FaultLog
 from bns.hardware.limits import Limits, Operator
+from bns.hardware.lookout import Lookout
 from bns.hardware.tracking.eyes import Eyes
 from bns.hardware.tracking.tracker import Sighting
 from bns.models.ax12a import SPEED_UNIT
@@ -63,7 +64,7 @@ class Walked:
     unrested: bool = False
 
 
-class Walker:
+class Walker(Lookout):
     """Moves a hexapod under the limits.
 
     Args:
@@ -91,10 +92,8 @@ class Walker:
         faults: FaultLog,
         names: Sequence[str],
     ):
-        self.bus, self.eyes, self.clock = bus, eyes, clock
-        self.limits, self.operator, self.faults = limits, operator, faults
-        self.names = tuple(names)
-        self.last: Sighting | None = None
+        super().__init__(eyes, clock, limits=limits, operator=operator, faults=faults)
+        self.bus, self.names = bus, tuple(names)
         self.goals = np.zeros(len(self.names))
         self.up = False
         self._due = 0.0
@@ -103,23 +102,10 @@ class Walker:
         self._rest = Rest()
 
     def look(self, done: Walked | None = None) -> list[Sighting]:
-        """New sightings; with the safety checks of a frame.
-
-        Raises:
-            SafetyStop: the operator, the camera or the tracker.
-        """
-        self.operator.check()
-        try:
-            seen = self.eyes.poll()
-        except BnsError as error:
-            raise SafetyStop(f"the camera is lost ({error})", "check it") from error
+        """New sightings, see `Lookout.look`."""
+        seen = self._seen(moving=self.up)
         if seen:
-            self.last = seen[-1]
             self._rest.pose(seen[-1].pose, self.clock.now())
-        late = self.limits.blind + self.eyes.tracker.camera.latency
-        since = self.clock.now() - (self.last.time if self.last else -np.inf)
-        if self.up and since > late:
-            raise SafetyStop("the tracker has lost it", "free the view of its tag")
         if done is not None:
             done.sightings += seen
             self._watch_leaning(seen, done)
@@ -131,25 +117,12 @@ class Walker:
             self._leans = np.inf if upright else min(self._leans, sighting.time)
             done.fell |= sighting.time - self._leans > FALLEN
 
-    def wait_for_sight(self, seconds: float = 3.0) -> Sighting:
-        """A fresh sighting.
-
-        Raises:
-            BnsError: the tag is not in view.
-        """
-        begin = self.clock.now()
-        while self.clock.now() - begin < seconds:
-            for sighting in self.look():
-                if sighting.time >= begin:
-                    return sighting
-            if self.up:
-                self.frame()
-            else:
-                self.clock.sleep(PERIOD)
-        raise BnsError(
-            "The robot's tag is not in view: put the robot on the board, free the "
-            "camera's view, light it evenly."
-        )
+    def tick(self) -> None:
+        """Let the time between two looks pass; a robot on its legs goes on standing."""
+        if self.up:
+            self.frame()
+        else:
+            self.clock.sleep(PERIOD)
 
     def frame(self, done: Walked | None = None) -> None:
         """Wait for the next frame, send the goals, read some servos."""

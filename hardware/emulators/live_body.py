@@ -1,6 +1,7 @@
 """A robot's body in MuJoCo, stepped as time goes by."""
 
 import copy
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
 
@@ -17,7 +18,7 @@ KEPT = 30.0  # s of poses remembered
 FALL_BEHIND = 0.5  # s; a host that slept longer lets the time of a robot at rest skip
 
 
-class LiveBody:
+class LiveBody(ABC):
     """A robot that lives with the clock; `_begin` and `_drive` are the kinds' own.
 
     Args:
@@ -62,14 +63,14 @@ class LiveBody:
         """Full physics state at the start."""
         return compile.start_state(scene, start)
 
+    @abstractmethod
     def _drive(self) -> None:
         """Write what is in force now into `data.ctrl`."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def moving(self) -> bool:
         """Whether it is told to move, or still does."""
-        raise NotImplementedError
 
     @property
     def now(self) -> float:

@@ -7,8 +7,8 @@ from bns.worlds.trial import Commands
 
 pytest.importorskip("cv2")
 
-from bns.hardware import world as worlds
 from bns.hardware.emulators import virtual
+from bns.hardware.real_robot import TRIES
 from bns.hardware.world import HardwareWorld
 
 LONG = Commands([[0.12, 0.11], [-0.10, -0.12]], [2.4, 2.2])
@@ -61,7 +61,7 @@ def test_a_damaged_wheel_is_learned_and_not_taken_for_the_line(suspected):
     world = HardwareWorld(rig=rig)
     (trial,) = world.run([LONG])
     assert trial.conditions["notes"] == ["a wheel does not follow its set point"]
-    assert world.voids <= 1 < worlds.TRIES
+    assert world.voids <= 1 < TRIES
     if suspected:
         assert rig.following.shares == pytest.approx([0.6, 1.0], abs=0.06)
     before = rig.faults.counts["wheels not as told"]

@@ -1,0 +1,91 @@
+"""Looking at a robot between two orders, with an eye on what can go wrong."""
+
+from abc import ABC, abstractmethod
+
+from bns.errors import BnsError
+from bns.hardware.clock import Clock
+from bns.hardware.errors import SafetyStop
+from bns.hardware.faults import FaultLog
+from bns.hardware.limits import Limits, Operator
+from bns.hardware.tracking.eyes import Eyes
+from bns.hardware.tracking.tracker import Sighting
+
+SIGHT = 3.0  # s to wait for the standing robot to be seen
+
+
+class Lookout(ABC):
+    """Who moves a robot under the limits, as far as seeing it goes.
+
+    Args:
+        eyes: that see it.
+        clock: of the session.
+        limits: hold at every look.
+        operator: may stop it at any time.
+        faults: where faults are noted.
+
+    Attributes:
+        last: newest sighting.
+    """
+
+    def __init__(
+        self,
+        eyes: Eyes,
+        clock: Clock,
+        *,
+        limits: Limits,
+        operator: Operator,
+        faults: FaultLog,
+    ):
+        self.eyes, self.clock = eyes, clock
+        self.limits, self.operator, self.faults = limits, operator, faults
+        self.last: Sighting | None = None
+
+    @abstractmethod
+    def look(self) -> list[Sighting]:
+        """New sightings; with the safety checks of a tick.
+
+        Raises:
+            SafetyStop: the operator, the camera or the tracker.
+        """
+
+    @abstractmethod
+    def tick(self) -> None:
+        """Let the time between two looks pass."""
+
+    def wait_for_sight(self, seconds: float = SIGHT) -> Sighting:
+        """A fresh sighting.
+
+        Raises:
+            BnsError: the tag is not in view.
+        """
+        begin = self.clock.now()
+        while self.clock.now() - begin < seconds:
+            for sighting in self.look():
+                if sighting.time >= begin:
+                    return sighting
+            self.tick()
+        raise BnsError(
+            "The robot's tag is not in view: put the robot on the board, free the "
+            "camera's view, light it evenly."
+        )
+
+    def _seen(self, *, moving: bool) -> list[Sighting]:
+        """New sightings; a robot that moves must have been seen of late."""
+        self.operator.check()
+        try:
+            seen = self.eyes.poll()
+        except BnsError as error:
+            raise SafetyStop(f"the camera is lost ({error})", "check it") from error
+        if seen:
+            self.last = seen[-1]
+        if moving and (self.last is None or self._since(self.last) > self._blind):
+            raise SafetyStop("the tracker has lost it", "free the view of its tag")
+        return seen
+
+    def _since(self, sighting: Sighting) -> float:
+        return self.clock.now() - sighting.time
+
+    @property
+    def _blind(self) -> float:
+        """How long a moving robot may be out of sight [s]."""
+        return self.limits.blind + self.eyes.tracker.camera.latency
