@@ -1,5 +1,7 @@
 """Effects on the commands and readings of any model, by channel."""
 
+from abc import abstractmethod
+
 import numpy as np
 from scipy.signal import lfilter
 
@@ -23,9 +25,9 @@ class _Command(CommandEffect):
                 values[active, column] = made[active]
         return values
 
+    @abstractmethod
     def change(self, told: np.ndarray, dt: float) -> np.ndarray:
         """One channel of the signal, ``(S,)``, after the effect."""
-        raise NotImplementedError
 
 
 class CommandDelay(_Command):
@@ -107,9 +109,9 @@ class _Sensor(SensorEffect):
                 made[active, column] = changed[active]
         return made
 
+    @abstractmethod
     def change(self, times: np.ndarray, readings: np.ndarray) -> np.ndarray:
         """One channel, ``(T,)``, after the effect."""
-        raise NotImplementedError
 
 
 class SensorGain(_Sensor):
