@@ -1,14 +1,73 @@
 """What one robot of a closed loop does in a cycle: controls and models for physics."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from bns.worlds import compile
-from bns.worlds.active import Stages
+from bns.worlds.active import Placed, Stages
 from bns.worlds.effects.base import ControlSignal
 from bns.worlds.physics import Compiled, Segment
+
+
+class LoopSignal:
+    """The commands of one robot, as they come, after the effects on them.
+
+    Args:
+        effects: of the command and actuator stages, with when they hold.
+        steps: of a cycle.
+        cycles: of the trial.
+        dt: step [s].
+        channels: what the robot is told.
+        seed, trial: of what is random.
+    """
+
+    def __init__(
+        self,
+        effects: Sequence[Placed],
+        *,
+        steps: int,
+        cycles: int,
+        dt: float,
+        channels: tuple[str, ...],
+        seed: int,
+        trial: int,
+    ):
+        self._steps, self._dt, self._channels = steps, dt, channels
+        self._effects = [
+            (item, rng, rng.bit_generator.state)
+            for item in effects
+            for rng in [item.generator(seed, trial)]
+        ]
+        self._told, self._count = np.empty((cycles, len(channels))), 0
+        self._memoryless = all(
+            getattr(item.effect, "memoryless", False) for item in effects
+        )
+
+    def __bool__(self) -> bool:
+        return bool(self._effects)
+
+    def cycle(self, told: np.ndarray) -> np.ndarray:
+        """The next command, ``(C,)``, at each step of its cycle, ``(steps, C)``."""
+        self._told[self._count] = told
+        self._count += 1
+        count = self._count
+        first = count - 1 if self._memoryless else 0
+        command = np.repeat(np.arange(first, count), self._steps)
+        given = ControlSignal(
+            times=np.arange(first * self._steps, count * self._steps) * self._dt,
+            values=self._told[command],
+            command=command,
+            channels=self._channels,
+            dt=self._dt,
+        )
+        for item, rng, begin in self._effects:
+            rng.bit_generator.state = begin
+            values = item.effect.apply(given, item.active(given.times), rng)
+            given = replace(given, values=values)
+        return given.values[-self._steps :]
 
 
 class LoopControl:
@@ -38,16 +97,15 @@ class LoopControl:
         seed: int,
         trial: int,
     ):
-        self.stages, self.dt = stages, dt
-        self._steps, self._channels, self._scale = steps, channels, ctrl_per_command
-        self._effects = [
-            (item, rng, rng.bit_generator.state)
-            for item in stages.control
-            for rng in [item.generator(seed, trial)]
-        ]
-        self._told, self._count = np.empty((cycles, len(channels))), 0
-        self._memoryless = all(
-            getattr(item.effect, "memoryless", False) for item in stages.control
+        self._steps, self._scale, self._count = steps, ctrl_per_command, 0
+        self._signal = LoopSignal(
+            stages.control,
+            steps=steps,
+            cycles=cycles,
+            dt=dt,
+            channels=channels,
+            seed=seed,
+            trial=trial,
         )
         blank = np.zeros((steps * cycles, 0))
         pieces = compile.segments(robot, stages.body, blank, dt)
@@ -71,9 +129,8 @@ class LoopControl:
         """
         begin = self._count * self._steps
         self._count += 1
-        if self.stages.control:
-            self._told[self._count - 1] = held[0]
-            controls = self._values() * self._scale
+        if self._signal:
+            controls = self._signal.cycle(held[0]) * self._scale
         if len(self._pieces) == 1:
             return (Segment(self._pieces[0][2], controls),)
         end = begin + self._steps
@@ -82,21 +139,3 @@ class LoopControl:
             for a, b, model in self._pieces
             if a < end and b > begin
         )
-
-    def _values(self) -> np.ndarray:
-        """The last command after all effects on the physics grid, ``(steps, C)``."""
-        count = self._count
-        first = count - 1 if self._memoryless else 0
-        command = np.repeat(np.arange(first, count), self._steps)
-        given = ControlSignal(
-            times=np.arange(first * self._steps, count * self._steps) * self.dt,
-            values=self._told[command],
-            command=command,
-            channels=self._channels,
-            dt=self.dt,
-        )
-        for item, rng, begin in self._effects:
-            rng.bit_generator.state = begin
-            values = item.effect.apply(given, item.active(given.times), rng)
-            given = replace(given, values=values)
-        return given.values[-self._steps :]

@@ -50,7 +50,7 @@ class Sensing:
         self._optics = optics if any(optics) else []
         self._current: tuple | None = None  # which of those are on, and their law
         self._changes = [
-            _Changes(_of(item, SensorEffect), seed, trial)
+            Changes(_of(item, SensorEffect), seed, trial)
             for item, seed in zip(stages, seeds, strict=True)
         ]
         shape = (len(stages), reads, len(sensors.names))
@@ -138,8 +138,13 @@ def _changed(law: dict, effects: Sequence, names: tuple[str, ...]) -> dict:
     return law
 
 
-class _Changes:
-    """The effects on one robot's readings, each with its own random stream."""
+class Changes:
+    """The effects on one robot's readings, each with its own random stream.
+
+    Args:
+        effects: on sensors, with when they hold.
+        seed, trial: of what is random.
+    """
 
     def __init__(self, effects: Sequence[Placed], seed: int, trial: int):
         self._effects = [
@@ -155,6 +160,11 @@ class _Changes:
         self, times: np.ndarray, readings: np.ndarray, names: tuple[str, ...]
     ) -> np.ndarray:
         """The last of the readings after all effects, ``(S,)``.
+
+        Args:
+            times: of all readings so far [s], ``(N,)``.
+            readings: of each sensor, ``(N, S)`` [counts].
+            names: of the sensors.
 
         Effects see all that was read so far: what they make of a reading depends on
         that one and those before it.
