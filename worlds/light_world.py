@@ -1,15 +1,15 @@
 """The physics world with lamps: robots that see light and steer themselves."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from functools import cached_property
 from math import inf
 
 import numpy as np
 
 from bns import seeding
-from bns.errors import BnsError, UnknownNameError
-from bns.worlds import light_sensors, objects, observe
+from bns.errors import BnsError
+from bns.worlds import given, light_sensors, light_starts, objects, observe
 from bns.worlds.active import Placed, Stages
 from bns.worlds.damage import Damage
 from bns.worlds.light_field import Lamp, LightField
@@ -22,9 +22,6 @@ from bns.worlds.trial import Trial
 
 ROBOT_RADIUS = 0.067
 """m; from the axle's middle to the outermost sensor (Webots' Khepera III)"""
-
-NEAREST = 0.5
-"""m; trials start no nearer to a lamp than this; assumed"""
 
 
 class LightWorld(MujocoWorld):
@@ -85,14 +82,14 @@ class LightWorld(MujocoWorld):
                 f"Robot {robot!r} has no light sensors; the world {name!r} takes "
                 "'khepera3'."
             )
-        self.field = LightField(_made(Lamp, "lamp", lights), ambient)
-        self.posts = _made(Post, "object", posts)
+        self.field = LightField(given.several(Lamp, "lamp", lights), ambient)
+        self.posts = given.several(Post, "object", posts)
         objects.checked(self.posts, self._places, np.zeros((0, 2)), ROBOT_RADIUS)
         self._screen = RayScreen(self.posts) if self.posts else None
         self.sensors = light_sensors.khepera3(sensors)
         self.singles = singles
-        given = {} if supervisor is None else supervisor
-        self.supervisor = _one(Supervisor, "supervisor", given)
+        told = {} if supervisor is None else supervisor
+        self.supervisor = given.one(Supervisor, "supervisor", told)
 
     def _supervisor(self) -> Supervisor:
         return self.supervisor
@@ -153,17 +150,9 @@ class LightWorld(MujocoWorld):
     def _start(self, seed: int, trial: int) -> tuple[float, float, float]:
         """Anywhere on the board, but not near a lamp, an object or the edge."""
         rng = seeding.generator(seed, "world", trial, "start")
-        half = np.asarray(self.arena) / 2 - max(self.supervisor.edge, 0.0)
-        taken = [(*place, NEAREST) for place in self._places]
-        taken += [(p.x, p.y, p.radius + ROBOT_RADIUS) for p in self.posts]
-        x, y, room = np.array(taken).T
-        for _ in range(10_000):
-            place = rng.uniform(-half, half)
-            if (np.hypot(x - place[0], y - place[1]) > room).all():
-                return (*place.tolist(), float(rng.uniform(-np.pi, np.pi)))
-        raise BnsError(
-            f"There is no place on the board {NEAREST} m away from every lamp; give "
-            "starts, or fewer lamps."
+        taken = [(p.x, p.y, p.radius + ROBOT_RADIUS) for p in self.posts]
+        return light_starts.anywhere(
+            rng, self.arena, self._places, edge=self.supervisor.edge, taken=taken
         )
 
     def _checked_starts(self, starts: object, n: int) -> np.ndarray:
@@ -187,27 +176,3 @@ class LightWorld(MujocoWorld):
                     f"{self.supervisor.safety:g} m; start further away."
                 )
         return poses
-
-
-def _made(kind: type, name: str, given: object) -> tuple:
-    """Lamps or objects from what a user may give: one or several, or tables."""
-    alone = isinstance(given, kind | Mapping) or not isinstance(given, Sequence)
-    return tuple(_one(kind, name, item) for item in ((given,) if alone else given))
-
-
-def _one(kind: type, name: str, given: object):
-    if isinstance(given, kind):
-        return given
-    known = [field.name for field in fields(kind)]
-    if not isinstance(given, Mapping):
-        raise BnsError(
-            f"{given!r} is no {name}: give a {kind.__name__} or a table with "
-            f"{', '.join(known)}."
-        )
-    for key in given:
-        if key not in known:
-            raise UnknownNameError(f"field of a {name}", str(key), known)
-    try:
-        return kind(**given)
-    except TypeError as error:
-        raise BnsError(f"{dict(given)!r} is no {name}: {error}.") from error
