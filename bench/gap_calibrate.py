@@ -3,18 +3,17 @@
     python -m bench.gap_calibrate [--write]
 
 reads the calibration cases (`python -m bench.gap_runner calibrate`) and finds the
-thresholds; with `--write` they go into `gap/calibration.json`.
+thresholds; with `--write` they go into `gap/calibration.json`. Those of the 90 % sets
+and intervals are found by `bench.gap_conformal`.
 """
 
 import json
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from bench.gap_runner import SEEN, rows
-from bns.gap import scoring
 from bns.gap.ladder import Rung, climb
 from bns.gap.verdict import calibration, quantile
 
@@ -81,18 +80,6 @@ def alpha_misfit(found: list[dict], share: float) -> float:
     return float(min(0.01, rests[place] * 0.999)) if place < len(rests) else 0.01
 
 
-def widen(found: list[dict], coverage: float) -> float:
-    """Factor on the intervals of magnitudes with which they hold the truth."""
-    rules = replace(calibration(), widen=1.0)
-    made = []
-    for row in found:
-        truth = row["answer"]["magnitudes"]
-        spans = scoring.intervals(row["said"], rules)
-        if row["kind"] == "single" and scoring.size(row) >= 1 and len(spans) == 1:
-            made.append(abs(spans[0][0] - truth[0]) / max(spans[0][1], 1e-12))
-    return quantile(made, coverage)
-
-
 def sure(conformal: list[float]) -> float:
     """Difference of losses beyond which the best support may be named alone."""
     return float(np.clip(quantile(conformal, SURE), LEAST, MOST))
@@ -107,11 +94,9 @@ def main(words: list[str]) -> None:
     content = json.loads(FILE.read_text(encoding="utf-8"))
     conformal = scores(found)
     new = {
-        "tie": quantile(conformal, content["coverage"]),
         "alpha_gap": alpha_gap(found),
         "sure": sure(conformal),
         "alpha_misfit": alpha_misfit(found, content["misfit_share"]),
-        "widen": widen(found, content["coverage"]),
     }
     extra, true = spurious(found)
     print(f"gains by one effect too many: {extra[-5:]}; by a true second: {true[:5]}")
@@ -119,7 +104,7 @@ def main(words: list[str]) -> None:
     for name, value in new.items():
         print(f"{name} {value:.4g} (was {content.get(name, 0.0):.4g})")
     if "--write" in words:
-        content.update(new, scores=conformal)
+        content.update(new)
         FILE.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from bns.gap import conformal
 from bns.gap.fit import Point
 from bns.gap.problem import Problem
 from bns.gap.signatures import levels_of
@@ -18,23 +19,34 @@ def intervals(
     spans = []
     for term, deviation in zip(point.terms, deviations, strict=True):
         item = term.candidate
-        half = half_width(deviation, term.magnitude - item.nominal, rules)
+        error = standard_error(deviation, term.magnitude - item.nominal, rules)
+        half = half_width(error, item.effect, item.unit, rules)
         low = max(term.magnitude - half, item.low)
         spans.append((low, min(term.magnitude + half, item.high)))
     return tuple(spans), condition
 
 
-def half_width(deviation: float, departure: float, rules: Calibration) -> float:
-    """Half the 90 % interval of a magnitude.
+def standard_error(deviation: float, departure: float, rules: Calibration) -> float:
+    """Of a magnitude, with what the nominal model alone puts it off.
 
     Args:
         deviation: of it by the noise of the recording.
         departure: of it from the nominal value.
-        rules: how far off the nominal model is, and the conformal factor.
+        rules: how far off the nominal model is.
     """
-    return (
-        LEVEL * rules.widen * float(np.hypot(deviation, rules.model_error * departure))
-    )
+    return float(np.hypot(deviation, rules.model_error * departure))
+
+
+def half_width(error: float, effect: str, unit: str, rules: Calibration) -> float:
+    """Half the interval of a magnitude that holds as often as the rules say.
+
+    Args:
+        error: standard error.
+        effect: name in the registry.
+        unit: of the magnitude.
+        rules: the coverage, and a further factor on all intervals.
+    """
+    return rules.widen * conformal.reach(effect, unit, rules.coverage) * error
 
 
 def spreads(problem: Problem, point: Point) -> tuple[tuple[float, ...], float]:

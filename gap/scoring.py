@@ -12,7 +12,7 @@ import numpy as np
 from bns.gap import baselines, fit, ladder, select, verdict, wheeled_library
 from bns.gap.cases import Case, record
 from bns.gap.diagnose import Analysis, report
-from bns.gap.magnitudes import half_width, spreads
+from bns.gap.magnitudes import half_width, spreads, standard_error
 from bns.gap.model import GapModel
 from bns.gap.problem import Problem
 from bns.gap.quantify import edit_error
@@ -85,16 +85,38 @@ def judged(row: dict[str, Any], rules: verdict.Calibration) -> dict[str, Any]:
     rungs = [ladder.Rung.from_dict(content) for content in said["rungs"]]
     rung = ladder.climb(rungs, said["worth"], rules)
     kind, named, sets = verdict.judge(rung, said["p_gap"], rules)
+    spans = intervals(said, row["answer"]["names"], rules)
     changed = {"verdict": kind, "named": named, "sets": sets, "size": rung.size}
-    return {**row, "said": {**said, **changed, "intervals": intervals(said, rules)}}
+    return {**row, "said": {**said, **changed, "intervals": spans}}
 
 
-def intervals(said: dict[str, Any], rules: verdict.Calibration) -> list[list[float]]:
+def intervals(
+    said: dict[str, Any], names: Sequence[str], rules: verdict.Calibration
+) -> list[list[float]]:
     """Value, half interval and nominal value of each true effect that was fitted."""
+    made = []
+    for name, found in zip(names, errors(said, rules), strict=False):
+        value, error, nominal = found
+        half = half_width(error, *described(name), rules)
+        made.append([value, half, nominal])
+    return made
+
+
+def errors(
+    said: dict[str, Any], rules: verdict.Calibration
+) -> list[tuple[float, float, float]]:
+    """Value, standard error and nominal value of each true effect that was fitted."""
     return [
-        [value, half_width(spread, value - nominal, rules), nominal]
-        for value, spread, nominal in said["magnitudes"]
+        (value, standard_error(deviation, value - nominal, rules), nominal)
+        for value, deviation, nominal in said["magnitudes"]
     ]
+
+
+@cache
+def described(name: str) -> tuple[str, str]:
+    """Effect and unit of a wheeled candidate; of another one the effect alone."""
+    units = {item.name: item.unit for item in wheeled_library.candidates()}
+    return name.split("[")[0].split(".")[0], units.get(name, "")
 
 
 def _magnitudes(made: Analysis, names: Sequence[str]) -> list[list[float]]:
