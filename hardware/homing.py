@@ -5,18 +5,27 @@ from collections.abc import Sequence
 import numpy as np
 
 from bns.errors import BnsError
+from bns.hardware import route
 from bns.hardware.motion import TICK, Mover
 from bns.hardware.tracking.tracker import Sighting
 
 CLOSE = 0.008  # m from the start that will do
 TURNED = np.deg2rad(1.0)  # off the start's heading that will do
+FACED = np.deg2rad(5.0)  # off a heading at the edge that will do; assumed
 SLOW = 0.025  # m/s; below it the robot's speed control does not regulate well
 TIME = 60.0  # s to get there
 PULSE = 0.12  # s of lag of the wheels: what a short turn loses at each end
 AXLE = 0.0874  # m, nominal
 
 
-def go(mover: Mover, target: Sequence[float], *, speed: float = 0.10) -> Sighting:
+def go(
+    mover: Mover,
+    target: Sequence[float],
+    *,
+    speed: float = 0.10,
+    lamps: np.ndarray | None = None,
+    keep: float = 0.0,
+) -> Sighting:
     """Drive to a pose and stop there.
 
     Closed loop: turn to the place, drive to it, then short turns with a look between
@@ -26,6 +35,8 @@ def go(mover: Mover, target: Sequence[float], *, speed: float = 0.10) -> Sightin
         mover: of the robot.
         target: (x, y, yaw) in the world frame [m, m, rad].
         speed: largest [m/s].
+        lamps: where lamps stand, ``(L, 2)`` [m]; None = nowhere.
+        keep: distance to keep from them on the way [m].
 
     Returns:
         where it stands.
@@ -37,6 +48,9 @@ def go(mover: Mover, target: Sequence[float], *, speed: float = 0.10) -> Sightin
     begin = mover.clock.now()
     try:
         seen = mover.wait_for_sight()
+        if lamps is not None:
+            for place in route.around(seen.pose[:2], target[:2], lamps, keep=keep):
+                _approach(mover, place, speed, begin)
         while not _there(seen, target):
             if mover.clock.now() - begin > TIME:
                 raise BnsError(
@@ -53,6 +67,31 @@ def go(mover: Mover, target: Sequence[float], *, speed: float = 0.10) -> Sightin
                 seen = settled(mover)
     finally:
         mover.halt()
+    return seen
+
+
+def face(mover: Mover, heading: float, *, turned: float = FACED) -> Sighting:
+    """Turn on the spot to a heading [rad] and stop there.
+
+    Args:
+        mover: of the robot.
+        heading: in the world frame [rad].
+        turned: off the heading that will do [rad].
+
+    Raises:
+        SafetyStop: it was stopped.
+        BnsError: it does not turn.
+    """
+    begin = mover.clock.now()
+    seen = settled(mover)
+    while abs(off := _wrapped(heading - seen.pose[2])) > turned:
+        if mover.clock.now() - begin > TIME:
+            raise BnsError(
+                "The robot does not turn: see that nothing is in its way, or turn it "
+                "by hand."
+            )
+        _turn(mover, off)
+        seen = settled(mover)
     return seen
 
 

@@ -1,6 +1,7 @@
 """What a robot on the board may do, and who may stop it."""
 
 import contextlib
+import math
 import select
 import signal
 import sys
@@ -24,6 +25,9 @@ class Limits:
         rim: kept free along its edge while a trial goes on [m].
         blind: longest time without a sighting while the robot moves [s].
         battery: lowest voltage to start a trial with [V] (two LiPo cells; assumed).
+        lamps: where lamps stand on the board [m].
+        lamp: a moving robot whose centre is nearer to a lamp is stopped, whatever it
+            does [m]: its radius is 0.067; the margin is assumed.
     """
 
     speed: float = 0.15
@@ -31,12 +35,19 @@ class Limits:
     rim: float = 0.10
     blind: float = 0.3
     battery: float = 7.0
+    lamps: tuple[tuple[float, float], ...] = ()
+    lamp: float = 0.08
 
     def outside(self, sighting: Sighting, rim: float) -> bool:
         """Whether the robot is nearer to the edge than `rim` [m]."""
         x, y = sighting.pose[:2]
         half = self.arena[0] / 2 - rim, self.arena[1] / 2 - rim
         return bool(abs(x) > half[0] or abs(y) > half[1])
+
+    def at_lamp(self, sighting: Sighting) -> bool:
+        """Whether the robot is nearer to a lamp than it may be."""
+        x, y = sighting.pose[:2]
+        return any(math.hypot(x - u, y - v) < self.lamp for u, v in self.lamps)
 
 
 class Operator:

@@ -80,6 +80,11 @@ class Lookout(ABC):
             self.last = seen[-1]
         if moving and (self.last is None or self._since(self.last) > self._blind):
             raise SafetyStop("the tracker has lost it", "free the view of its tag")
+        if moving and any(map(self.limits.at_lamp, seen)):
+            raise SafetyStop(
+                f"it came within {self.limits.lamp:g} m of a lamp",
+                "see that the lamps stand where the configuration says",
+            )
         return seen
 
     def _since(self, sighting: Sighting) -> float:

@@ -1,6 +1,6 @@
 """Carrying out commands on a robot, with an eye on all that can go wrong."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -130,17 +130,17 @@ class Mover(Lookout):
             Void: it was not carried out as told.
             LinkError: the line died.
         """
-        stand = self.wait_for_sight()
+        stand = self.begin()
         done = Performed(sightings=[stand])
-        self._wheels = Wheels(self)
         try:
             begin = None
             for point in schedule:
                 lead = self.robot.lead(point.left, point.right)
-                if begin is not None and not self._until(begin + point.at - lead, done):
+                if begin is not None and not self._inside(
+                    begin + point.at - lead, done
+                ):
                     break
-                drive = self.drive(point.left, point.right)
-                self._wheels.switched(drive)
+                drive = self.switch(point.left, point.right)
                 if begin is None:  # it still stands where it stood
                     begin = drive.at
                     done.sightings.append(stand._replace(time=begin))
@@ -148,35 +148,69 @@ class Mover(Lookout):
                 if point.command >= 0:
                     done.switched.append(drive.at)
             else:
-                self._until(begin + total - self.robot.lead(0.0, 0.0), done)
+                self._inside(begin + total - self.robot.lead(0.0, 0.0), done)
             done.switched.append(self.drive(0.0, 0.0).at)
         finally:
             self.halt()
-        self._look_on(done)
-        self._judge(done)
+        self.look_on(done)
+        self.judge(done)
         return done
 
-    def _until(self, moment: float, done: Performed) -> bool:
-        """Tick until a moment; whether the robot is still inside the rim."""
+    def begin(self) -> Sighting:
+        """See the standing robot before it carries something out.
+
+        Raises:
+            BnsError: the tag is not in view.
+        """
+        stand = self.wait_for_sight()
+        self._wheels = Wheels(self)
+        return stand
+
+    def switch(self, left: float, right: float) -> Drive:
+        """As `drive`, within what is carried out: the wheels are then watched."""
+        drive = self.drive(left, right)
+        self._wheels.switched(drive)
+        return drive
+
+    def until(
+        self, moment: float, done: Performed, ends: Callable[[Sighting], bool]
+    ) -> bool:
+        """Tick until a moment [s], or a sighting that ends it; whether none did."""
         while (left := moment - self.clock.now()) > 0.0005:
             for sighting in self.look():
                 done.sightings.append(sighting)
-                if self.limits.outside(sighting, self.limits.rim):
-                    done.left = True
+                if ends(sighting):
                     return False
             self._wheels.look(left)
             left = moment - self.clock.now()
             self.clock.sleep(min(TICK, max(left, 0.0)))
         return True
 
-    def _look_on(self, done: Performed) -> None:
+    def _inside(self, moment: float, done: Performed) -> bool:
+        """Tick until a moment; whether the robot is still inside the rim."""
+        done.left = not self.until(
+            moment, done, lambda seen: self.limits.outside(seen, self.limits.rim)
+        )
+        return not done.left
+
+    def look_on(self, done: Performed) -> None:
+        """See where the robot comes to rest."""
         until = self.clock.now() + AFTER
         while self.clock.now() < until:
             done.sightings += self.look()
             self.tick()
 
-    def _judge(self, done: Performed) -> None:
-        if done.late > LATE:
+    def judge(self, done: Performed, late: float = LATE) -> None:
+        """Refuse what was not carried out as told.
+
+        Args:
+            done: what was carried out.
+            late: by which a command may be late [s].
+
+        Raises:
+            Void: it was not carried out as told.
+        """
+        if done.late > late:
             raise Void(f"a command was {done.late:.2f} s late")
         if (way := self._wheels.end()) > ASTRAY:
             raise Void(f"a set point led a wheel {way:.3f} m astray")

@@ -106,19 +106,33 @@ class RealRobot(ABC, Generic[RigT]):
                 robot there.
             SafetyStop: the robot was stopped.
         """
-        damages, seeds = shared(self.damage, seeds, len(commands))
-        if not commands:
+        if not self._one(len(commands)):
             return []
-        if len(commands) > 1:
-            raise BnsError(
-                f"There is one robot, not {len(commands)}: give --replicates 1."
-            )
         (given,) = commands
         control.check(given, self.model.channels, self.model.ranges, self.robot)
-        rig = self.connected()
-        stages = Stages.of(self.reality, damages[0], trial, given.duration)
-        with rig.operator:
-            return [self._tried(rig, given, stages, trial, seeds[0])]
+        stages, seed = self._stages(given.duration, trial, seeds)
+
+        def once(rig: RigT) -> Trial:
+            return self._once(rig, given, stages, trial, seed)
+
+        return [self._tried(once, trial)]
+
+    def _one(self, robots: int) -> bool:
+        """Whether there is anything to do, for one robot.
+
+        Raises:
+            BnsError: for more than one.
+        """
+        if robots > 1:
+            raise BnsError(f"There is one robot, not {robots}: give --replicates 1.")
+        return robots == 1
+
+    def _stages(
+        self, duration: float, trial: int, seeds: Sequence[int]
+    ) -> tuple[Stages, int]:
+        """What holds in a trial, and its seed."""
+        damages, (seed,) = shared(self.damage, seeds, 1)
+        return Stages.of(self.reality, damages[0], trial, duration), seed
 
     def connected(self) -> RigT:
         """The rig; opens it where that has not happened yet.
@@ -141,22 +155,27 @@ class RealRobot(ABC, Generic[RigT]):
             rig, self._rig = self._rig, None
             rig.close()
 
-    def _tried(
-        self, rig: RigT, given: Commands, stages: Stages, trial: int, seed: int
-    ) -> Trial:
-        """A trial that went well; void ones are repeated."""
-        faults, voids = len(rig.faults), []
-        for _ in range(TRIES):
-            try:
-                made = self._once(rig, given, stages, trial, seed)
-            except Void as void:
-                self.voids += 1
-                voids.append(void.reason)
-                rig.faults.note("void trial", str(trial), void.reason)
-                self.on_void(trial, void.reason)
-                continue
-            more = {"faults": len(rig.faults) - faults, "voids": voids}
-            return made.replace(conditions={**made.conditions, **more})
+    def _tried(self, once: Callable[[RigT], Trial], trial: int) -> Trial:
+        """A trial that went well; void ones are repeated.
+
+        Args:
+            once: carries it out, once.
+            trial: its number.
+        """
+        rig, voids = self.connected(), []
+        faults = len(rig.faults)
+        with rig.operator:
+            for _ in range(TRIES):
+                try:
+                    made = once(rig)
+                except Void as void:
+                    self.voids += 1
+                    voids.append(void.reason)
+                    rig.faults.note("void trial", str(trial), void.reason)
+                    self.on_void(trial, void.reason)
+                    continue
+                more = {"faults": len(rig.faults) - faults, "voids": voids}
+                return made.replace(conditions={**made.conditions, **more})
         raise BnsError(
             f"Trial {trial} was void {TRIES} times ({voids[-1]}): check the link and "
             "the light, then go on with --resume."

@@ -24,17 +24,29 @@ def points(commands: Commands, stages: Stages, seed: int, trial: int) -> list[Po
     signal = control.signal(commands, counts, GRID)
     values = control.disturbed(signal, stages.control, seed, trial)
     begins = np.concatenate([[0.0], np.cumsum(commands.durations)])
-    made: list[Point] = []
-    at = 0
-    for index, count in enumerate(counts):
-        part = values[at : at + count]
-        made.append(Point(begins[index], *map(float, part[0]), index))
-        for step in range(1, count):
-            moment = begins[index] + step * GRID
-            before, new = made[-1], part[step]
-            far = max(abs(new[0] - before.left), abs(new[1] - before.right)) > STEP
-            near_end = moment > begins[index + 1] - SPACING
-            if far and moment - before.at >= SPACING - 1e-9 and not near_end:
-                made.append(Point(float(moment), float(new[0]), float(new[1]), -1))
-        at += count
+    parts = np.split(values, np.cumsum(counts)[:-1])
+    spans = zip(parts, begins, begins[1:], strict=False)
+    return [
+        point
+        for index, (part, begin, end) in enumerate(spans)
+        for point in within(part, begin, end, index)
+    ]
+
+
+def within(values: np.ndarray, begin: float, end: float, command: int) -> list[Point]:
+    """Set points of one command.
+
+    Args:
+        values: left and right on the grid, ``(S, 2)`` [m/s].
+        begin, end: of the command [s].
+        command: its index.
+    """
+    made = [Point(float(begin), float(values[0, 0]), float(values[0, 1]), command)]
+    for step in range(1, len(values)):
+        moment, new = begin + step * GRID, values[step]
+        before = made[-1]
+        far = max(abs(new[0] - before.left), abs(new[1] - before.right)) > STEP
+        near_end = moment > end - SPACING
+        if far and moment - before.at >= SPACING - 1e-9 and not near_end:
+            made.append(Point(float(moment), float(new[0]), float(new[1]), -1))
     return made

@@ -1,19 +1,20 @@
 """The real Khepera III as a world: one at a time, in real time."""
 
 from dataclasses import KW_ONLY, dataclass
+from typing import ClassVar
 
 from bns.errors import BnsError
 from bns.hardware import homing, records, schedule
 from bns.hardware.errors import LinkError
 from bns.hardware.limits import Limits
+from bns.hardware.motion import Performed
 from bns.hardware.real_robot import RealRobot
 from bns.hardware.rig import Rig, battery, connect
+from bns.hardware.tracking.tracker import Sighting
 from bns.worlds import active
 from bns.worlds.active import Stages
 from bns.worlds.damage import Damage
 from bns.worlds.trial import Commands, Trial
-
-STAGES = ("command", "actuator")
 
 
 @dataclass(eq=False)
@@ -34,6 +35,8 @@ class HardwareWorld(RealRobot[Rig]):
     wheels: str = ""
     recording: bool = False
 
+    stages: ClassVar[tuple[str, ...]] = ("command", "actuator")
+
     def ready(self) -> None:
         """See that a trial could begin, see `RealRobot.ready`."""
         self.connected().mover().wait_for_sight()
@@ -46,7 +49,11 @@ class HardwareWorld(RealRobot[Rig]):
             )
 
     def _refuse_damage(self, damage: Damage) -> None:
-        active.refuse(damage, stages=STAGES, kind=self.model.kind, world=self.name)
+        active.refuse(damage, stages=self.stages, kind=self.model.kind, world=self.name)
+
+    def _limits(self) -> Limits:
+        """Bounds of the session."""
+        return Limits(arena=self.arena)
 
     def _connect(self) -> Rig:
         return connect(
@@ -54,7 +61,7 @@ class HardwareWorld(RealRobot[Rig]):
             self.camera,
             calibration=self.calibration,
             wheels=self.wheels,
-            limits=Limits(arena=self.arena),
+            limits=self._limits(),
             log=self.log or None,
         )
 
@@ -71,15 +78,9 @@ class HardwareWorld(RealRobot[Rig]):
         except LinkError:
             self._rig = None if rig.leash is not None else rig
             raise
-        conditions = stages.conditions(trial, seed) | {
-            "battery": volts,
-            "began": round(float(begin), 3),
-            "first": round(float(done.switched[0]), 4),
-            "start": [round(float(v), 5) for v in stand.pose],
-            "late": round(float(done.late), 4),
-            "notes": done.notes,
-            "firmware": list(rig.robot.version),
-        }
+        conditions = stages.conditions(trial, seed) | self._about(
+            rig, volts, float(begin), stand, done
+        )
         return records.trial(
             done,
             given,
@@ -90,3 +91,17 @@ class HardwareWorld(RealRobot[Rig]):
             conditions=conditions,
             recording=rig.eyes.tracker.camera if self.recording else None,
         )
+
+    def _about(
+        self, rig: Rig, volts: float, begin: float, stand: Sighting, done: Performed
+    ) -> dict[str, object]:
+        """What a trial's record says of the session."""
+        return {
+            "battery": volts,
+            "began": round(begin, 3),
+            "first": round(float(done.switched[0]), 4),
+            "start": [round(float(v), 5) for v in stand.pose],
+            "late": round(float(done.late), 4),
+            "notes": done.notes,
+            "firmware": list(rig.robot.version),
+        }

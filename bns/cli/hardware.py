@@ -2,12 +2,15 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
 from bns.cli.parse import parse
 from bns.errors import BnsError, UnknownNameError
+
+if TYPE_CHECKING:
+    from bns.worlds.light_field import Lamp
 
 VERBS = ("emulate", "check", "calibrate", "record")
 MANUAL = """usage: bns hardware {emulate,check,calibrate,record} [...]
@@ -63,6 +66,8 @@ class Emulate:
     """hexapod: numbers that two servos have"""
     upset: float = 0.0
     """hexapod: probability that a status carries a random error bit"""
+    lamp: tuple[float, ...] = ()
+    """Khepera: a lamp on the board: x, y, and if not as usual height [m], power [W]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,6 +158,7 @@ def _emulate(given: Emulate) -> int:
     for name in ("lost", "corrupted", "upset"):
         if not 0 <= getattr(given, name) <= 0.5:
             raise BnsError(f"--{name} = {getattr(given, name)}: give 0 to 0.5.")
+    lights = _lamps(given)
     print(f"{given.robot} on {given.port}; Ctrl-C ends it.", flush=True)
     from bns.hardware.priority import urgent
 
@@ -186,5 +192,32 @@ def _emulate(given: Emulate) -> int:
         return 0
     from bns.hardware.emulators.run import khepera3
 
-    khepera3(given.port, version=(given.firmware, 0), latency=given.latency, **shared)
+    khepera3(
+        given.port,
+        version=(given.firmware, 0),
+        latency=given.latency,
+        lights=lights,
+        **shared,
+    )
     return 0
+
+
+def _lamps(given: Emulate) -> "tuple[Lamp, ...]":
+    """The lamp of an emulated board, if there is one.
+
+    Raises:
+        BnsError: no place, or a robot that sees no light.
+    """
+    if not given.lamp:
+        return ()
+    if given.robot != "khepera3":
+        raise BnsError(f"--lamp: {given.robot} has no light sensors; leave it out.")
+    if not 2 <= len(given.lamp) <= 4:
+        raise BnsError(
+            f"--lamp has {len(given.lamp)} numbers: give x, y, and if you like height "
+            "[m] and power [W], such as --lamp 0 0."
+        )
+    from bns.worlds.light_field import Lamp
+
+    names = ("x", "y", "height", "power")
+    return (Lamp(**dict(zip(names, given.lamp, strict=False))),)

@@ -21,11 +21,6 @@ def execute(given: Any) -> int:
     from bns.hardware.line import check_port
     from bns.hardware.priority import urgent
 
-    if given.config.learner not in OPEN_LOOP:
-        raise BnsError(
-            f"Learner {given.config.learner!r} cannot drive a real robot yet: take a "
-            f"preset whose learner is {' or '.join(map(repr, OPEN_LOOP))}."
-        )
     check_port(given.port)
     urgent()
     from bns.cli import outputs
@@ -45,7 +40,7 @@ def execute(given: Any) -> int:
                 resume=given.resume,
                 progress=True,
                 on_trial=on_trial,
-                background=True,
+                background=config.learner in OPEN_LOOP,
             )
     except (SafetyStop, LinkError) as error:
         if not (out / "run.json").exists():
@@ -77,6 +72,10 @@ def _world(given: Any, config: Any) -> Any:
         from bns.hardware.hexapod_world import HardwareHexapod
 
         return HardwareHexapod(servos=given.servos, **settings)
+    if config.learner == "light":
+        from bns.hardware.light_world import HardwareLight
+
+        return HardwareLight(config.world.robot, wheels=given.wheels, **settings)
     from bns.hardware.world import HardwareWorld
 
     return HardwareWorld(config.world.robot, wheels=given.wheels, **settings)

@@ -7,7 +7,9 @@ import numpy as np
 
 from bns.hardware.emulators.live_body import LiveBody
 from bns.models.arena import SIZE
+from bns.worlds import light_sensors
 from bns.worlds.effects.base import Effect
+from bns.worlds.light_field import Lamp, LightField
 
 HISTORY = 3.0  # s of set points that effects see again; longer memories fade out
 
@@ -29,6 +31,8 @@ class KheperaBody(LiveBody):
         effects: what is wrong with it, as text or objects; hold from the start.
         start: pose (x, y, yaw) in the world frame [m, m, rad].
         at: time of the start [s].
+        lights: lamps on the board; none = an unlit room.
+        rng: of the sensors' noise.
 
     Raises:
         BnsError: an effect that a live robot cannot have.
@@ -40,8 +44,12 @@ class KheperaBody(LiveBody):
         *,
         start: Sequence[float] = (0.0, 0.0, 0.0),
         at: float = 0.0,
+        lights: Sequence[Lamp] = (),
+        rng: np.random.Generator | None = None,
     ):
         super().__init__("khepera3", effects, start=start, at=at)
+        self._light = LightField(tuple(lights)) if lights else None
+        self._rng = rng or np.random.default_rng(0)
         self._told: list[tuple[float, float, float]] = []  # not in force yet
         self._point = (0.0, 0.0)
         self.history: deque[tuple[float, float, float]] = deque(
@@ -105,8 +113,14 @@ class KheperaBody(LiveBody):
         return (*[far] * 9, ground, ground)
 
     def ambient(self) -> tuple[int, ...]:
-        """11 ambient values of an unlit room."""
-        return (DARK,) * 11
+        """11 ambient values: the nine around it by the lamps, the two below dark."""
+        if self._light is None:
+            return (DARK,) * 11
+        pose = np.array([self.pose()])
+        seen = light_sensors.khepera3().counts(
+            self._light, pose, self.now, rng=self._rng
+        )
+        return (*map(int, seen[0]), DARK, DARK)
 
     def outside(self) -> bool:
         """Whether it has left the board."""

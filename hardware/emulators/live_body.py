@@ -122,10 +122,18 @@ class LiveBody(ABC):
         return self._kept(at)[3:].copy()
 
     def _kept(self, at: float | None) -> np.ndarray:
-        if at is None or len(self.poses) < 2:
+        """Between two physics steps; a step ahead of the newest by going straight on.
+
+        A picture that showed the nearest step would be off by as much as 2.5 ms.
+        """
+        newest = len(self.poses) - 1
+        if at is None or not newest:
             return self.poses[-1]
-        back = round((self.now - at) / self.dt)
-        return self.poses[min(max(len(self.poses) - 1 - back, 0), len(self.poses) - 1)]
+        place = newest - (self.now - at) / self.dt
+        place = min(max(place, 0.0), newest + 1.0)
+        before = min(int(place), newest - 1)
+        one, other = self.poses[before], self.poses[before + 1]
+        return one + (place - before) * (other - one)
 
 
 def _edits(effect: Effect) -> bool:

@@ -16,6 +16,7 @@ from bns.hardware.emulators.khepera_device import KheperaDevice
 from bns.hardware.emulators.pty_host import PtyHost
 from bns.hardware.khepera import protocol
 from bns.hardware.priority import urgent
+from bns.worlds.light_field import Lamp
 
 
 def khepera3(
@@ -32,6 +33,7 @@ def khepera3(
     seed: int = 0,
     log: str = "",
     baud: int = protocol.BAUD,
+    lights: Sequence[Lamp] = (),
     stop: Callable[[], bool] | None = None,
 ) -> None:
     """Emulate a Khepera III until SIGINT or SIGTERM.
@@ -52,11 +54,18 @@ def khepera3(
         seed: of what is random.
         log: file for a line whenever the set point or the wheels' motion changes.
         baud: rate that it talks at.
+        lights: lamps on the board; none = an unlit room.
         stop: asked all the time; None = signals decide.
     """
     urgent()
     now = time.monotonic()
-    body = KheperaBody(effects, start=start, at=now)
+    body = KheperaBody(
+        effects,
+        start=start,
+        at=now,
+        lights=lights,
+        rng=np.random.default_rng([seed, 2]),
+    )
     device = KheperaDevice(
         body,
         version=version,

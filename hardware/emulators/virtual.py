@@ -18,6 +18,7 @@ from bns.hardware.tracking.camera import Camera
 from bns.hardware.tracking.eyes import VirtualEyes
 from bns.hardware.tracking.marker import Marker
 from bns.hardware.tracking.tracker import Tracker
+from bns.worlds.light_field import Lamp
 
 
 class NoDog:
@@ -53,6 +54,7 @@ def rig(
     shake: float = 0.0,
     seed: int = 0,
     log: str | None = None,
+    lights: Sequence[Lamp] = (),
 ) -> VirtualRig:
     """A rehearsal.
 
@@ -68,10 +70,11 @@ def rig(
         noise, shake: of the camera, see `Painter`.
         seed: of all that is random.
         log: file for faults.
+        lights: lamps on the board; none = an unlit room.
     """
     clock = VirtualClock()
-    rngs = [np.random.default_rng([seed, index]) for index in range(3)]
-    body = KheperaBody(effects, start=start)
+    rngs = [np.random.default_rng([seed, index]) for index in range(4)]
+    body = KheperaBody(effects, start=start, lights=lights, rng=rngs[3])
     device = KheperaDevice(body, version=version, mute=mute, rng=rngs[0])
     line = VirtualLine(
         Noise(device, lost=lost, corrupted=corrupted, rng=rngs[1]), clock
