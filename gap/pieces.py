@@ -10,6 +10,9 @@ from bns.gap.travel import EVERY
 from bns.worlds.trial import Trial
 
 LENGTH = 2.5  # [s] of a piece; a heading drifts little in it
+# Place and heading in a regime are told this coarsely [m, m, rad]: finer, they would
+# hold the tracker's noise, which is in the residuals of the same samples as well.
+COARSE = 0.03, 0.03, 0.1
 LEAD = 1.0  # [s] simulated before each, eight time constants of the drive
 
 
@@ -110,3 +113,10 @@ def thinned(poses: np.ndarray) -> np.ndarray:
         )
         poses = np.concatenate([poses, beyond])
     return poses[::EVERY].copy()
+
+
+def coarse(poses: np.ndarray) -> np.ndarray:
+    """Poses in steps of `COARSE` around their mean, headings going on beyond pi."""
+    poses = np.column_stack([poses[:, :2], np.unwrap(poses[:, 2])])
+    mean, step = poses.mean(axis=0), np.array(COARSE)
+    return mean + step * np.round((poses - mean) / step)

@@ -9,9 +9,9 @@ import numpy as np
 
 from bns import models
 from bns.errors import BnsError
-from bns.gap import travel, wheeled_library
+from bns.gap import pieces, travel, wheeled_library
 from bns.gap.model import Windows
-from bns.gap.pieces import WHOLE, Piece, moved, pieces_of, stitched, thinned, windows
+from bns.gap.pieces import WHOLE, Piece, moved, pieces_of, stitched, windows
 from bns.gap.records import Candidate
 from bns.gap.reduced import STEEPEST, Reduced, between, reduced
 from bns.gap.travel import EVERY
@@ -135,11 +135,9 @@ class WheeledModel:
             if learnt is not None:
                 quick.append((key, learnt, told, self._pull(trial, body, len(told))))
                 continue
-            pieces = (
-                pieces_of(trial, len(told), self.dt) if _absolute(items) else [WHOLE]
-            )
-            slow[key] = [(len(jobs) + n, piece) for n, piece in enumerate(pieces)]
-            jobs += [self._job(told, body, piece) for piece in pieces]
+            cut = pieces_of(trial, len(told), self.dt) if _absolute(items) else [WHOLE]
+            slow[key] = [(len(jobs) + n, piece) for n, piece in enumerate(cut)]
+            jobs += [self._job(told, body, piece) for piece in cut]
         made = {}
         for at in range(0, len(quick), AT_ONCE):
             keys, maps, told, pulls = zip(*quick[at : at + AT_ONCE], strict=True)
@@ -153,7 +151,7 @@ class WheeledModel:
                 observe.planar(rolled[number], piece.yaw)[piece.lead :]
                 for number, piece in parts
             ]
-            made[key] = thinned(stitched(poses))
+            made[key] = pieces.thinned(stitched(poses))
         self._cache.update(made)
         while len(self._cache) > KEPT:
             self._cache.popitem(last=False)
@@ -267,7 +265,7 @@ class WheeledModel:
         index = np.minimum(np.searchsorted(ends, at), len(ends) - 1)
         told = trial.commands.values
         before = np.vstack([np.zeros(2), told])[index]
-        pose = trial.poses_world[windows.first]
+        pose = pieces.coarse(trial.poses_world[windows.first])
         now = told[index]
         return {
             "speed told to the left wheel [m/s]": now[:, 0],
