@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bns.gap import repeats
 from bns.gap.model import GapModel, Windows
 from bns.worlds.trial import Trial
 
@@ -12,6 +13,7 @@ from bns.worlds.trial import Trial
 THIRD = np.sqrt(20.0)
 QUANTILE, NORMAL = 0.5, 0.67449  # share, and the median of |N(0, 1)|
 REPEATS = 2  # trials with the same commands that make a floor
+MANY = 150  # windows of a trial whose scatter is looked at together
 MOTION = 1e-6  # step of numerical derivatives, in the channel's unit
 
 
@@ -91,18 +93,21 @@ def _repeats(trials: Sequence[Trial]) -> list[list[Trial]]:
 def _between(
     model: GapModel, groups: Sequence[Sequence[Trial]], sigma: np.ndarray
 ) -> np.ndarray:
-    """Scatter between repeats beyond the measurement's, over windows of a second."""
-    squares, spans, noise = [], [], []
+    """Scatter between repeats beyond the measurement's, see `repeats.scatter`."""
+    values, noise, spans = [], [], []
     for group in groups:
-        windows = coarser(model.windows(group[0]), 1.0)
-        values = [model.compare(trial, trial.observed, windows) for trial in group]
-        motion = np.stack(values)
-        squares.append(np.nanvar(motion, axis=0, ddof=1))
-        spans.append(windows.durations)
-        jacobian = derivative(model, group[0], windows)
-        noise.append(_variance(jacobian, sigma).reshape(len(windows), -1))
-    extra = np.concatenate(squares) - np.concatenate(noise)
-    return np.sqrt(np.maximum(np.nanmean(extra, axis=0), 0) / np.mean(np.hstack(spans)))
+        windows = model.windows(group[0])
+        length = windows.durations.sum() / MANY
+        if len(windows) > MANY:
+            windows = coarser(windows, length)
+        values.append(
+            np.stack([model.compare(trial, trial.observed, windows) for trial in group])
+        )
+        jacobian = derivative(model, group[0], windows) * sigma
+        flat = jacobian.reshape(len(jacobian), -1)
+        noise.append(flat @ flat.T)
+        spans.append(windows)
+    return repeats.scatter(values, noise, spans, np.asarray(model.process, dtype=float))
 
 
 def coarser(windows: Windows, length: float) -> Windows:
@@ -134,7 +139,3 @@ def derivative(model: GapModel, trial: Trial, windows: Windows) -> np.ndarray:
     base = model.compare(trial, seen, windows)
     change = (model.compare(trial, moved, windows) - base) / MOTION
     return change.reshape(count * channels, -1).T.reshape(-1, count, channels)
-
-
-def _variance(jacobian: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-    return ((jacobian * sigma) ** 2).sum(axis=(1, 2))
