@@ -13,9 +13,11 @@ import time
 from pathlib import Path
 
 DIRECTORY = Path(__file__).resolve().parent.parent / "runs" / "bench"
-ROUND = 2  # of scoring; each has cases of its own, see docs/decisions.md
-SEEN = 1_000_000  # seeds from here on were scored once; development uses lower ones
-SEALED = 2_000_000  # seeds of the scored cases begin here
+ROUND = 2  # of the plans
+ROUNDS = {"scored": 3, "calibrate": 3}
+"""of diagnoses; each round has scored cases of its own, see docs/decisions.md"""
+SEEN = 1_000_000  # seeds from here on were scored once, calibration uses lower ones
+SEALED = 3_000_000  # seeds of the scored cases begin here
 CALIBRATION = 400_000  # seeds of the calibration cases begin here
 SPAN = 10_000  # seeds between the scored kinds
 SETS = {
@@ -54,7 +56,7 @@ def wanted(name: str, counts: dict[str, int] | None = None) -> list[tuple[str, i
 def rows(name: str = "scored") -> list[dict]:
     """All results of a set so far, by kind and seed."""
     found = {}
-    for file in sorted(DIRECTORY.glob(f"gap{ROUND}_{name}_*.jsonl")):
+    for file in sorted(DIRECTORY.glob(f"gap{ROUNDS[name]}_{name}_*.jsonl")):
         for line in file.read_text().splitlines():
             row = json.loads(line)
             found[row["kind"], row["seed"]] = row
@@ -83,7 +85,9 @@ def produce(cases: list[tuple[str, int]], name: str, part: int = 0) -> None:
     for kind, seed in cases:
         if (kind, seed) not in done:
             row = one(kind, seed)
-            with (DIRECTORY / f"gap{ROUND}_{name}_{part}.jsonl").open("a") as out:
+            with (DIRECTORY / f"gap{ROUNDS[name]}_{name}_{part}.jsonl").open(
+                "a"
+            ) as out:
                 out.write(json.dumps(row) + "\n")
 
 

@@ -1,18 +1,23 @@
 """How large an improvement chance alone gives: calibrated p-values."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import chi2
+from scipy.stats import f as fisher
 
 from bns import seeding
 from bns.gap.problem import Problem
 from bns.gap.signatures import Curves
+from bns.gap.whiten import terms
 
 DRAWS = 1000
 LARGEST = 25.0  # square of a residual that counts in full
 QUIET = 0.5  # share of the assumed noise below which a rest counts as that much
 LAGS = 10  # windows over which a rest may be correlated with itself
+TAIL = 0.05  # share of the draws beyond which chance is taken to fall exponentially
+CLEAR = 3.0  # standard errors from which a correlation is counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,34 +47,50 @@ class Null:
         return cls(np.sort(gain.max(axis=1)), flexible(problem))
 
     def p_gain(self, gain: float) -> float:
-        """Probability of so large an improvement by one effect if there is none."""
-        above = len(self.gains) - np.searchsorted(self.gains, gain)
-        return float((1 + above) / (1 + len(self.gains)))
+        """Probability of so large an improvement by one effect if there is none.
+
+        Of the draws where there are enough as large ones; beyond, chance falls
+        exponentially, as the squares of normal numbers do, at the draws' own rate.
+        """
+        begin = self.threshold(TAIL)
+        if gain <= begin:
+            above = len(self.gains) - np.searchsorted(self.gains, gain)
+            return float((1 + above) / (1 + len(self.gains)))
+        fall = float((self.gains[self.gains > begin] - begin).mean())
+        return float(TAIL * np.exp(-(gain - begin) / max(fall, 1e-9)))
 
     def threshold(self, alpha: float) -> float:
         """Improvement that chance exceeds with probability `alpha`."""
         return float(np.quantile(self.gains, 1 - alpha))
 
     def misfit(self, problem: Problem, z: np.ndarray) -> tuple[float, float]:
-        """Whether a whitened rest still has structure.
+        """Whether a whitened rest still has structure, and how much.
 
         Two tests: what the flexible model explains of it, and its correlation with
-        itself in time; the smaller p-value counts twice.
+        itself in time; the smaller p-value counts twice. Both take how far the rest
+        scatters from the rest itself. How much it is comes in units of the loss, so
+        that it compares with what effects explain.
 
         Returns:
-            p-value; what the flexible model would improve beyond chance.
+            p-value; loss of what has structure, beyond chance.
         """
         by_channel = z.reshape(-1, len(problem.model.features))
-        known = problem.floor.source == "model"  # noise that is no more to be found
-        size = rough if known else spread
-        scale = np.array([size(column) for column in by_channel.T])
-        z = np.clip(by_channel / scale, -5, 5).ravel()
-        explained = float(((z @ self.basis) ** 2).sum())
+        limited = np.sqrt(np.minimum(by_channel**2, LARGEST).mean(axis=0))
+        # where the noise is known, a rest is never less than that
+        known = problem.floor.source == "model"
+        scale = np.maximum(limited, 1.0 if known else QUIET)
+        bounded = np.clip(by_channel / scale, -5, 5)
+        explained = float(((bounded.ravel() @ self.basis) ** 2).sum())
         degrees = self.basis.shape[1]
-        p_flexible = chi2.sf(explained, degrees)
-        correlated, lags = _correlation(problem, z)
-        p = min(1.0, 2 * min(p_flexible, chi2.sf(correlated, lags)))
-        return float(p), max(explained - degrees, correlated - lags, 0.0)
+        free = len(z) - degrees
+        p = fisher.sf(explained / max(degrees, 1), degrees, free) if free > 0 else 1.0
+        found = correlation(problem, bounded)
+        p = min(1.0, 2 * min(p, chi2.sf((found.size**2).sum(), found.size.size)))
+        clear = np.where(np.abs(found.size) > CLEAR, np.abs(found.share), 0.0)
+        smooth = float((clear.max(axis=0) * terms(by_channel).sum(axis=0)).sum())
+        along = (bounded * scale).ravel() @ self.basis
+        beyond = float((along**2).sum()) - degrees * float((scale**2).mean())
+        return float(p), max(smooth, beyond, 0.0)
 
 
 def spread(z: np.ndarray) -> float:
@@ -81,23 +102,38 @@ def spread(z: np.ndarray) -> float:
     return max(float(np.median(np.abs(z))) / 0.6745, QUIET)
 
 
-def rough(z: np.ndarray) -> float:
-    """Root mean square of residuals, the largest limited, but not below the noise."""
-    return max(float(np.sqrt(np.minimum(z**2, LARGEST).mean())), 1.0)
+class Correlation(NamedTuple):
+    """Correlation of a rest with itself, by lag and channel, ``(LAGS, C)``.
+
+    Attributes:
+        size: in standard errors.
+        share: of the rest's variance.
+    """
+
+    size: np.ndarray
+    share: np.ndarray
 
 
-def _correlation(problem: Problem, z: np.ndarray) -> tuple[float, int]:
-    channels = len(problem.model.features)
-    sums, count = np.zeros((LAGS, channels)), np.zeros(LAGS)
+def correlation(problem: Problem, z: np.ndarray) -> Correlation:
+    """How windows of a rest go with those that follow.
+
+    Args:
+        problem: the recording.
+        z: whitened rest, about one in size, ``(W, C)``.
+    """
+    shape = min(LAGS, max(map(len, problem.windows)) - 1), z.shape[1]
+    sums, squares, count = np.zeros(shape), np.zeros(shape), np.zeros((shape[0], 1))
     for rows in problem.whiten.rows:
-        piece = z[rows].reshape(-1, channels)
-        for lag in range(1, min(LAGS, len(piece) - 1) + 1):
-            sums[lag - 1] += (piece[lag:] * piece[:-lag]).sum(axis=0)
-            count[lag - 1] += len(piece) - lag
-    used = count > 0
-    return float((sums[used] ** 2 / count[used, None]).sum()), int(
-        used.sum()
-    ) * channels
+        piece = z[rows.start // shape[1] : rows.stop // shape[1]]
+        for lag in range(1, min(shape[0], len(piece) - 1) + 1):
+            products = piece[lag:] * piece[:-lag]
+            sums[lag - 1] += products.sum(axis=0)
+            squares[lag - 1] += (products**2).sum(axis=0)
+            count[lag - 1] += len(products)
+    variance = np.maximum((z**2).mean(axis=0), 1e-12)
+    return Correlation(
+        sums / np.sqrt(np.maximum(squares, count)), sums / count / variance
+    )
 
 
 def flexible(problem: Problem) -> np.ndarray:
@@ -106,11 +142,11 @@ def flexible(problem: Problem) -> np.ndarray:
     Each feature channel is a linear function of what went on in the window: commands,
     their sizes, signs and recent changes, products, heading, position and time.
     """
-    columns = [
-        terms(problem.model.regime(trial, windows))
+    made = [
+        columns(problem.model.regime(trial, windows))
         for trial, windows in zip(problem.trials, problem.windows, strict=True)
     ]
-    pooled = np.concatenate(columns)
+    pooled = np.concatenate(made)
     scale = pooled.std(axis=0)
     keep = scale > 1e-9 * (1 + np.abs(pooled).max(axis=0))
     keep[0] = True  # the constant
@@ -120,7 +156,7 @@ def flexible(problem: Problem) -> np.ndarray:
     for channel in range(channels):
         for column in np.flatnonzero(keep):
             values = []
-            for piece, windows in zip(columns, problem.windows, strict=True):
+            for piece, windows in zip(made, problem.windows, strict=True):
                 feature = np.zeros((len(piece), channels))
                 feature[:, channel] = piece[:, column] / scale[column]
                 feature[:, channel] *= windows.durations
@@ -132,7 +168,7 @@ def flexible(problem: Problem) -> np.ndarray:
     return left[:, size > 1e-6 * size[0]]
 
 
-def terms(regime) -> np.ndarray:
+def columns(regime) -> np.ndarray:
     """Columns of the flexible model in each window, ``(W, k)``; the first constant."""
     values = list(regime.values())
     width = len(values[0])

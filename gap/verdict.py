@@ -10,7 +10,7 @@ import numpy as np
 
 from bns.gap.fit import Point
 from bns.gap.ladder import Rung, climb, rungs
-from bns.gap.null import Null
+from bns.gap.null import Null, spread
 from bns.gap.problem import Problem
 from bns.gap.quantify import flexible
 from bns.gap.records import Verdict
@@ -107,8 +107,9 @@ def choose(
         worth: improvement by one effect that chance hardly exceeds.
         rules: thresholds.
     """
-    nothing = search.nothing
-    gain = nothing.loss - min(search.best(1).loss, nothing.loss)
+    nothing, single = search.nothing, search.best(1)
+    gain = nothing.loss - min(single.loss, nothing.loss)
+    gain /= max(1.0, spread(single.rest)) ** 2  # noise that is larger than was thought
     p_gap = min(1.0, 2 * min(null.p_gain(gain), null.misfit(problem, nothing.rest)[0]))
     found = rungs(problem, search, null)
     rung = climb(found, worth, rules)
