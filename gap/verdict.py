@@ -8,6 +8,7 @@ from importlib.resources import files
 
 import numpy as np
 
+from bns.gap import remains
 from bns.gap.fit import Point
 from bns.gap.ladder import Rung, climb, rungs
 from bns.gap.null import Null, spread
@@ -143,6 +144,9 @@ def decide(
     second, margin = (rivals[0][0].names, rivals[0][1]) if rivals else ((), np.inf)
     between = _angle(problem, tied) if kind == "either" else 90.0
     p_gap, p_misfit = choice.p_gap, choice.rung.p_misfit
+    words = sentence(kind, choice.best, tied, between, p_gap, p_misfit)
+    if kind != "no gap" and choice.rung.size and p_misfit < calibration.alpha_misfit:
+        words += " " + remains.text(problem, choice.best, choice.rung)
     return Verdict(
         kind=kind,
         named=named,
@@ -152,7 +156,7 @@ def decide(
         p_misfit=p_misfit,
         second=second,
         margin=float(margin),
-        sentence=sentence(kind, choice.best, tied, between, p_gap, p_misfit),
+        sentence=words,
         change=change(kind, tied, second, float(margin), excite),
     )
 

@@ -272,3 +272,11 @@ def test_conformal_quantile_covers():
     assert (rng.exponential(size=20_000) <= threshold).mean() == pytest.approx(
         0.9, abs=0.06
     )
+
+
+def test_a_small_rest_beside_a_large_effect_takes_no_name_away(find):
+    found = find("wheel_gain:wheel=left,factor=0.6", Ripple({"size": 0.06}))
+    assert found.verdict.named == (("wheel_gain[left]",),)
+    assert found.verdict.p_misfit < 1e-4
+    assert "What is left has structure" in found.verdict.sentence
+    assert "mm forward" in found.verdict.sentence
