@@ -23,7 +23,7 @@ def shares(lists: Sequence[np.ndarray]) -> np.ndarray:
 def _shares(world, plan) -> np.ndarray:
     import mujoco
 
-    (done,) = world.walks([plan])
+    (done,) = world.motions([plan])
     model = plan.job.pieces[0].compiled.model
     data, total = mujoco.MjData(model), np.zeros(len(PARTS))
     whole = mujoco.mjtState.mjSTATE_FULLPHYSICS

@@ -62,7 +62,7 @@ def _measured(damage: list, repeats: int) -> dict[str, float]:
     world: Any = registry.make("hexapod", damage=damage, threads=THREADS)
     commands = _commands(world)
     plans = world.plan(commands)
-    walks = world.walks(plans)
+    walks = world.motions(plans)
     bare = _bare(plans, walks)
     seen: dict[str, list[float]] = {"wall": [], "processor": [], "rate": []}
     steps = sum(len(walk.control) for walk in walks)

@@ -4,18 +4,18 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 
 from bns import models
 from bns.models.ax12a import SPEED_UNIT
-from bns.worlds import active, control, legged_flags, legged_plan, observe
+from bns.worlds import control, legged_flags, legged_plan, observe
 from bns.worlds.active import Stages
-from bns.worlds.checks import bounded, checked_start, shared
+from bns.worlds.checks import bounded
 from bns.worlds.damage import Damage
 from bns.worlds.legged_goals import in_units
 from bns.worlds.legged_physics import Walk, WalkJob, walk
 from bns.worlds.legged_plan import Servos
+from bns.worlds.physics_world import PhysicsWorld
 from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Trial
 
 STAGES = ("command", "actuator", "body", "sensor", "tracking")
@@ -33,7 +33,7 @@ class Plan(NamedTuple):
     job: WalkJob
 
 
-class HexapodWorld:
+class HexapodWorld(PhysicsWorld[Plan]):
     """Walking robots in MuJoCo: a command is a goal for every servo, until they rest.
 
     Each command lasts until servos and body are at rest, at most as long as it is told
@@ -47,16 +47,9 @@ class HexapodWorld:
 
     Args:
         robot: name of the robot model, see `bns robots`.
-        damage: what is wrong with the robots, by trial, as in `MujocoWorld`.
-        reality: effects that always hold (unless they have a schedule).
         speed: moving speed of the servos [rad/s].
-        sample_dt: time between two samples [s]; the end of each command is sampled as
-            well.
         threads: of the physics.
-        start: pose at the start of each trial in the world frame [m, m, rad].
-        arena: size of the board along x and y [m], its centre the world's origin.
-        name: name of the world in the trials.
-        truth: whether trials carry hidden states (`qpos`, `qvel` at the samples).
+        damage, reality, sample_dt, start, arena, name, truth: see `PhysicsWorld`.
 
     Raises:
         UnknownNameError: no such robot or effect.
@@ -64,6 +57,8 @@ class HexapodWorld:
         BnsError: an effect that this robot or world cannot have, effects that take all
             legs away or let the robot start fallen.
     """
+
+    stages = STAGES
 
     def __init__(
         self,
@@ -79,58 +74,42 @@ class HexapodWorld:
         name: str = "hexapod",
         truth: bool = False,
     ):
-        self.model = legged_plan.legged(models.robot(robot))
-        self.robot, self.name, self.truth = robot, name, truth
-        self._channels, self._ranges = self.model.channels, self.model.ranges
+        super().__init__(
+            robot,
+            legged_plan.legged(models.robot(robot)),
+            damage=damage,
+            reality=reality,
+            sample_dt=sample_dt,
+            start=start,
+            arena=arena,
+            name=name,
+            truth=truth,
+        )
+        self._ranges = self.model.ranges
         readings = (Channel(f"{c.name}_position", c.unit) for c in self.model.commands)
         self.channels = (*POSE_CHANNELS, *readings)
-        self.damage = active.per_robot(damage)
-        self.reality = active.as_damage(reality)
-        given = self.damage if isinstance(self.damage, tuple) else (self.damage,)
-        for item in (*given, self.reality):
-            active.refuse(item, stages=STAGES, kind=self.model.kind, world=name)
-            legged_plan.refuse_legless(self.reality + item)
-        self.arena = (float(arena[0]), float(arena[1]))
-        self.start = checked_start(start, self.arena)
         self.speed = bounded("speed", speed, 0.01, 100.0, "rad/s")
-        self.dt = legged_plan.timestep(robot)
-        self.sample_dt = bounded("sample_dt", sample_dt, self.dt, 60.0, "s")
         threads = int(bounded("threads", threads, 1, 1024, "1"))
         self._threads = ThreadPoolExecutor(threads) if threads > 1 else None
         legged_plan.refuse_fallen(robot, self.reality, self.start, self._channels)
 
-    def run(
-        self, commands: Sequence[Commands], *, trial: int = 0, seeds: Sequence[int] = ()
-    ) -> list[Trial]:
-        """Execute one list of commands on each of N robots, see `World.run`.
+    @property
+    def dt(self) -> float:
+        """Physics step [s]."""
+        return legged_plan.timestep(self.robot)
 
-        Raises:
-            BnsError: numbers of commands, seeds and damages disagree; commands that
-                the robot cannot be told.
-        """
-        plans = self.plan(commands, trial=trial, seeds=seeds)
-        walks = self.walks(plans)
-        return [
-            self._observe(plan, done, trial)
-            for plan, done in zip(plans, walks, strict=True)
-        ]
-
-    def plan(
-        self, commands: Sequence[Commands], *, trial: int = 0, seeds: Sequence[int] = ()
-    ) -> list[Plan]:
-        """What `run` hands to the physics, for benches and tests; arguments alike."""
-        damages, seeds = shared(self.damage, seeds, len(commands))
-        return [
-            self._plan(item, damage, trial, seed)
-            for item, damage, seed in zip(commands, damages, seeds, strict=True)
-        ]
-
-    def walks(self, plans: Sequence[Plan]) -> list[Walk]:
-        """What the physics makes of plans, for benches and tests."""
+    def motions(self, plans: Sequence[Plan]) -> list[Walk]:
+        """What the physics makes of plans, see `PhysicsWorld.motions`."""
         jobs = [plan.job for plan in plans]
         if self._threads is None or len(jobs) == 1:
             return [walk(job) for job in jobs]
         return list(self._threads.map(walk, jobs))
+
+    def _refuse(self, damage: Damage) -> None:
+        legged_plan.refuse_legless(self.reality + damage)
+
+    def _about(self) -> dict[str, object]:
+        return {"speed": self.speed} | super()._about()
 
     def _plan(self, commands: Commands, damage: Damage, trial: int, seed: int) -> Plan:
         control.check(commands, self._channels, self._ranges, self.robot)
@@ -152,15 +131,13 @@ class HexapodWorld:
         every = max(self.sample_dt / self.dt, 1.0)
         sampled, boundaries = observe.sample_steps(done.counts, every)
         poses = observe.planar(free, self.start[2])
-        grid = np.arange(len(poses)) * self.dt
-        times, seen = observe.tracked(
-            poses[sampled],
-            grid[sampled],
+        times, seen = observe.watched(
             poses,
-            grid,
-            plan.stages.tracking,
-            plan.seed,
-            trial,
+            sampled,
+            dt=self.dt,
+            effects=plan.stages.tracking,
+            seed=plan.seed,
+            trial=trial,
         )
         readings = states[np.ix_(sampled, servos.angles)] + servos.laws["offset"]
         readings = in_units(readings, servos.laws["quantisation"])
@@ -187,7 +164,6 @@ class HexapodWorld:
             outcome=outcome,
             robot=self.robot,
             world=self.name,
-            conditions=plan.stages.conditions(trial, plan.seed)
-            | {"speed": self.speed, "mujoco": mujoco.__version__},
+            conditions=plan.stages.conditions(trial, plan.seed) | self._about(),
             truth=servos.hidden(states[sampled]) if self.truth else {},
         )

@@ -156,16 +156,14 @@ class Loops:
         states = session.states[robot, : session.cycle * setting.steps + 1]
         free = session.free(states)
         poses = observe.planar(free, session.starts[robot, 2])
-        grid = np.arange(len(poses)) * setting.dt
         seed = session.seeds[robot]
-        times, seen = observe.tracked(
-            poses[sampled],
-            grid[sampled],
+        times, seen = observe.watched(
             poses,
-            grid,
-            stages.tracking,
-            seed,
-            setting.trial,
+            sampled,
+            dt=setting.dt,
+            effects=stages.tracking,
+            seed=seed,
+            trial=setting.trial,
         )
         channels = POSE_CHANNELS
         if session.sensing is not None:

@@ -71,6 +71,31 @@ def outcome(free: np.ndarray, arena: tuple[float, float], diverged: bool) -> Out
     )
 
 
+def watched(
+    poses: np.ndarray,
+    sampled: np.ndarray,
+    *,
+    dt: float,
+    effects: Sequence[Placed],
+    seed: int,
+    trial: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    """What the tracker reports of a robot's way on the physics grid.
+
+    Args:
+        poses: true ones at each step, shape ``(S, 3)``.
+        sampled: steps that are samples, shape ``(T,)``.
+        dt: physics step [s].
+        effects: tracking effects, in the order in which they act.
+        seed, trial: of their generators.
+
+    Returns:
+        time stamps ``(T,)`` and poses ``(T, 3)``.
+    """
+    grid = np.arange(len(poses)) * dt
+    return tracked(poses[sampled], grid[sampled], poses, grid, effects, seed, trial)
+
+
 def tracked(
     poses: np.ndarray,
     times: np.ndarray,

@@ -32,7 +32,7 @@ def world():
 def walked(world):
     """A walk of the tripod gait: the trial, and what the physics did."""
     plans = world.plan([TRIPOD])
-    return world.run([TRIPOD])[0], world.walks(plans)[0], plans[0].servos
+    return world.run([TRIPOD])[0], world.motions(plans)[0], plans[0].servos
 
 
 def test_tripod_walks_straight_and_upright(walked):

@@ -1,0 +1,118 @@
+"""What all physics worlds share: settings, and trials planned, moved, observed."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any, ClassVar, Generic, TypeVar
+
+import mujoco
+
+from bns.models.robot_model import RobotModel
+from bns.worlds import active
+from bns.worlds.checks import bounded, checked_start, shared
+from bns.worlds.damage import Damage
+from bns.worlds.trial import Commands, Trial
+
+PlanT = TypeVar("PlanT")
+
+
+class PhysicsWorld(ABC, Generic[PlanT]):
+    """Robots that execute commands in MuJoCo, N at a time.
+
+    A trial depends on its commands, damage, trial number and seed alone: not on the
+    other robots of the batch, their order, the number of threads, or what ran before.
+
+    Args:
+        robot: name of the robot model, as it was given.
+        model: of the robot.
+        damage: what is wrong with the robots, by trial: one `Damage` (or effects as
+            text or objects) for all, or a sequence of such with one per robot.
+        reality: effects that always hold (unless they have a schedule): how this
+            world departs from the nominal model, which is no damage.
+        sample_dt: time between two samples of the tracker [s]; the end of each
+            command is sampled as well.
+        start: pose at the start of each trial in the world frame [m, m, rad].
+        arena: size of the board along x and y [m], its centre the world's origin.
+        name: name of the world in the trials.
+        truth: whether trials carry hidden states (`qpos`, `qvel` at the samples).
+
+    Raises:
+        UnknownNameError: no such effect.
+        OutOfBoundsError: a number outside its bounds, a start outside the arena.
+        BnsError: an effect that this robot or world cannot have.
+    """
+
+    stages: ClassVar[tuple[str, ...]]
+
+    def __init__(
+        self,
+        robot: str,
+        model: RobotModel,
+        *,
+        damage: Damage | Sequence,
+        reality: Damage | Sequence,
+        sample_dt: float,
+        start: Sequence[float],
+        arena: Sequence[float],
+        name: str,
+        truth: bool,
+    ):
+        self.robot, self.model, self._channels = robot, model, model.channels
+        self.name, self.truth = name, truth
+        self.damage = active.per_robot(damage)
+        self.reality = active.as_damage(reality)
+        given = self.damage if isinstance(self.damage, tuple) else (self.damage,)
+        for item in (*given, self.reality):
+            active.refuse(item, stages=self.stages, kind=model.kind, world=name)
+            self._refuse(item)
+        self.arena = (float(arena[0]), float(arena[1]))
+        self.start = checked_start(start, self.arena)
+        self.sample_dt = bounded("sample_dt", sample_dt, self.dt, 60.0, "s")
+
+    @property
+    @abstractmethod
+    def dt(self) -> float:
+        """Physics step [s]."""
+
+    def run(
+        self, commands: Sequence[Commands], *, trial: int = 0, seeds: Sequence[int] = ()
+    ) -> list[Trial]:
+        """Execute one list of commands on each of N robots, see `World.run`.
+
+        Raises:
+            BnsError: numbers of commands, seeds and damages disagree; commands that
+                the robot cannot be told.
+        """
+        plans = self.plan(commands, trial=trial, seeds=seeds)
+        return [
+            self._observe(plan, motion, trial)
+            for plan, motion in zip(plans, self.motions(plans), strict=True)
+        ]
+
+    def plan(
+        self, commands: Sequence[Commands], *, trial: int = 0, seeds: Sequence[int] = ()
+    ) -> list[PlanT]:
+        """What `run` hands to the physics, for benches and tests; arguments alike."""
+        damages, seeds = shared(self.damage, seeds, len(commands))
+        return [
+            self._plan(item, damage, trial, seed)
+            for item, damage, seed in zip(commands, damages, seeds, strict=True)
+        ]
+
+    @abstractmethod
+    def motions(self, plans: Sequence[PlanT]) -> list[Any]:
+        """What the physics makes of plans, for benches and tests."""
+
+    @abstractmethod
+    def _plan(self, commands: Commands, damage: Damage, trial: int, seed: int) -> PlanT:
+        """What the physics is to do in a trial of one robot."""
+
+    @abstractmethod
+    def _observe(self, plan: PlanT, motion: Any, trial: int) -> Trial:
+        """The trial of what the physics did."""
+
+    def _refuse(self, damage: Damage) -> None:
+        """Raise `BnsError` for damage that makes no sense on this robot."""
+
+    def _about(self) -> dict[str, object]:
+        """What is true of every trial, for its record."""
+        return {"mujoco": mujoco.__version__}
