@@ -61,7 +61,7 @@ def test_structure_is_counted_in_units_of_the_loss(size):
     rest = rng.standard_normal(COUNT) + slow.ravel()
     p, excess = null(rng).misfit(problem(), rest)
     assert p < 1e-3
-    assert excess == pytest.approx(COUNT / 3 * size**2, rel=0.35)
+    assert excess == pytest.approx(COUNT / 3 * size**2, rel=0.5)
 
 
 def test_far_below_the_noise_structure_is_none():
