@@ -8,16 +8,18 @@ true one; or what is left besides it is what the plan said no command can part f
 
 import json
 
-from bench.gap_runner import DIRECTORY, ROUND
+from bench.gap_runner import DIRECTORY
 from bench.result import Result
 
 DOC = "ties that the planned command resolves"
 BAR = ">= 0.8 of ties"
-SEED = 4_000_000  # from 3,000,000 on were the cases of the first round
+SEED = 6_000_000  # from 4,000,000 on were the cases of the round before
 TIES, MOST = 20, 100  # ties to judge; cases to look for them in
 SIZES = (3.0, 8.0)  # of the effects over what the poor recording shows
 POOR = ("straight drive", "turn in place", "arcs, left", "wheel alone")
 NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.008"
+SIGMA = (0.001, 0.001, 0.008)  # of it by channel
+FILE = DIRECTORY / "gap3_plan.jsonl"
 
 
 def run(quick: bool) -> Result:
@@ -56,15 +58,11 @@ def run(quick: bool) -> Result:
     )
 
 
-def _file():
-    return DIRECTORY / f"gap{ROUND}_plan.jsonl"
-
-
 def _done() -> dict[str, dict | None]:
     """Cases that were judged, by seed; None = no tie."""
-    if not _file().is_file():
+    if not FILE.is_file():
         return {}
-    lines = map(json.loads, _file().read_text().splitlines())
+    lines = map(json.loads, FILE.read_text().splitlines())
     return {str(line["seed"]): line["row"] for line in lines}
 
 
@@ -72,14 +70,12 @@ def _keep(seed: int, row: dict | None) -> None:
     from bns.gap.records import plain
 
     DIRECTORY.mkdir(parents=True, exist_ok=True)
-    with _file().open("a") as out:
+    with FILE.open("a") as out:
         out.write(json.dumps({"seed": seed, "row": plain(row)}) + "\n")
 
 
 def _case(seed: int, model) -> dict | None:
     """One case; None where the poor recording left no tie that holds the truth."""
-    import numpy as np
-
     from bns import seeding
     from bns.gap import excite, plan
     from bns.gap.diagnose import diagnose
@@ -102,14 +98,13 @@ def _case(seed: int, model) -> dict | None:
         "first": picked.name,
         "tied": named,
         "offered": bool(made.repeats),
-        "plan": made.options[0].excitation.name if made.repeats else made.sentence,
-        "repeats": made.repeats,
+        "plan": made.sentence,
+        "runs": [[option.excitation.name, count] for option, count in made.steps],
     }
     if not made.repeats:
         return {**row, "resolved": False, "alone": False}
-    more = _record(
-        [made.options[0].excitation.commands] * made.repeats, effect, seed + 1
-    )
+    asked = [option.excitation.commands for option, n in made.steps for _ in range(n)]
+    more = _record(asked, effect, seed + 1)
     again = diagnose([*trials, *more], model, seed=seed, full=False, most=1)
     left = [names[0] for names in again.verdict.named if len(names) == 1]
     allowed = {name, *_alike(name, made)}
@@ -119,7 +114,8 @@ def _case(seed: int, model) -> dict | None:
         "left": left,
         "resolved": name in left and set(left) <= allowed,
         "alone": left == [name],
-        "distance": float(np.max(made.options[0].distances)),
+        "p_gap": again.verdict.p_gap,
+        "p_misfit": again.verdict.p_misfit,
     }
 
 
@@ -134,12 +130,14 @@ def _hidden(rng, told, model):
     import numpy as np
 
     from bns.gap import plan, signatures
+    from bns.gap.floor import Floor
     from bns.gap.problem import Problem
 
     items = [c for c in model.candidates() if not c.whole]
     item = items[int(rng.integers(len(items)))]
     blank = [plan.blank(commands, model) for commands in told]
-    problem = Problem.of(blank, model, candidates=model.candidates())
+    floor = Floor(np.array(SIGMA), model.process, "known", 0)
+    problem = Problem.of(blank, model, candidates=model.candidates(), floor=floor)
     curves = signatures.trace(problem, [item])
     length = signatures.strength(curves)
     size = 4.5 * float(np.exp(rng.uniform(*np.log(SIZES))))

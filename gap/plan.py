@@ -4,7 +4,8 @@ Each excitation of a bounded family is simulated under the tied explanations. Ho
 two of them part there is the whitened distance of their predictions, after each
 magnitude has been allowed to move as far as the recording so far leaves it free
 (T-optimal discrimination, Atkinson and Fedorov 1975). Half its square is the expected
-logarithm of the Bayes factor.
+logarithm of the Bayes factor. Squares of distances add up over runs; where one command
+leaves a pair, a second one is asked for besides.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,10 +16,11 @@ import numpy as np
 from scipy.stats import norm
 
 from bns.errors import BnsError
-from bns.gap import excite, inputs, plan_words, store, verdict
+from bns.gap import excite, inputs, plan_words, store
 from bns.gap.excite import Excitation
 from bns.gap.floor import Floor
 from bns.gap.model import GapModel
+from bns.gap.plan_runs import repeats, runs
 from bns.gap.problem import Problem
 from bns.gap.records import Diagnosis, Fit
 from bns.worlds.effects.base import Effect
@@ -27,8 +29,7 @@ from bns.worlds.trial import Commands, Trial
 SAMPLE = 0.1  # [s] between the samples that a recording is assumed to have
 MARGIN = 0.12  # [m] that a robot keeps from the edge of its arena
 ARENA = (2.7, 1.8)  # [m] the board (thesis); its centre is where drives start
-MOST, POWER = 10, 1.2816  # repeats that may be asked for; 90 % power
-TIED = 4  # explanations that are compared, at most
+TIED = 8  # explanations that are compared, at most
 LEVEL = 1.6449  # 90 % interval
 FREE = 0.05  # share by which a magnitude without an interval may move
 
@@ -59,6 +60,8 @@ class Plan:
             that it parts at all; 0 = no command of the family parts any.
         sentence: in words.
         alike: pairs of `tied`, by number, that no command of the family parts.
+        steps: what to run and how often, the best option first; together they part
+            all pairs that some command parts.
     """
 
     tied: tuple[tuple[str, ...], ...]
@@ -66,6 +69,7 @@ class Plan:
     repeats: int
     sentence: str
     alike: tuple[tuple[int, int], ...] = ()
+    steps: tuple[tuple[Option, int], ...] = ()
 
 
 def plan(
@@ -100,21 +104,25 @@ def plan(
 
 
 def _ranked(names: tuple[tuple[str, ...], ...], made: Sequence[Option]) -> Plan:
-    """The options in order, and which pairs none of them parts."""
+    """The options in order, what to run, and which pairs none of them parts."""
     pairs = list(combinations(range(len(names)), 2))
     table = np.array([option.distances for option in made])
     open_ = np.array([repeats(float(best)) > 0 for best in table.max(axis=0)])
     counted = open_ if open_.any() else np.ones(len(pairs), bool)
     wrong = norm.sf(table[:, counted] / 2).mean(axis=1)
-    options = tuple(
-        Option(made[at].excitation, made[at].distances, float(wrong[at]))
-        for at in np.argsort(wrong, kind="stable")
-    )
+    options = [
+        Option(option.excitation, option.distances, float(chance))
+        for option, chance in zip(made, wrong, strict=True)
+    ]
+    counts = runs(table[:, open_]) if open_.any() else {}
+    first = list(counts)
+    order = first + [at for at in np.argsort(wrong, kind="stable") if at not in first]
+    steps = tuple((options[at], count) for at, count in counts.items())
     alike = tuple(p for p, parted in zip(pairs, open_, strict=True) if not parted)
-    counts = [repeats(float(d)) for d in options[0].distances[open_]]
-    count = max(counts, default=0)
-    said = plan_words.sentence(names, options[0], open_, count, alike)
-    return Plan(names, options, count, said, alike)
+    ranked = tuple(options[at] for at in order)
+    said = plan_words.sentence(names, steps or ((ranked[0], 0),), open_, alike)
+    count = steps[0][1] if steps else 0
+    return Plan(names, ranked, count, said, alike, steps)
 
 
 def tied(found: Diagnosis) -> list[Fit]:
@@ -127,24 +135,6 @@ def tied(found: Diagnosis) -> list[Fit]:
         for names in found.verdict.named[:TIED]
         if frozenset(names) in by_names
     ]
-
-
-def repeats(distance: float, *, tie: float | None = None) -> int:
-    """How often a command has to be run to part two explanations in 9 of 10 cases.
-
-    Args:
-        distance: whitened, of one run.
-        tie: difference of losses up to which two explanations count as tied.
-
-    Returns:
-        from 1 on; 0 if `MOST` runs are not enough.
-    """
-    tie = verdict.calibration().sure if tie is None else tie
-    for count in range(1, MOST + 1):
-        whole = distance * np.sqrt(count)
-        if whole**2 - 2 * POWER * whole >= tie:
-            return count
-    return 0
 
 
 def blank(

@@ -1,5 +1,8 @@
 """A plan in words."""
 
+import numpy as np
+from scipy.stats import norm
+
 from bns.gap.records import Diagnosis
 
 
@@ -13,32 +16,41 @@ def nothing(found: Diagnosis) -> str:
     return f"Nothing is tied: {reason}."
 
 
-def sentence(names, best, open_, count: int, alike) -> str:
+def sentence(names, steps, open_, alike) -> str:
     """What to run, and what it will tell.
 
     Args:
         names: of the tied explanations.
-        best: the option that was chosen.
+        steps: options and how often to run each; 0 = it is no use.
         open_: which pairs some command parts, ``(pairs,)``.
-        count: how often to run it; 0 = it is no use.
         alike: pairs that no command parts.
     """
     words = [" + ".join(name) for name in names]
     tied_ = " or ".join(words)
+    best, count = steps[0]
     if not count:
         return (
             f"Tied: {tied_}. No safe command of the family tells them apart (the best, "
             f"{best.excitation.name}, by {best.distances.max():.2g} deviations): they "
             "do the same whatever is commanded. Observe another quantity."
         )
-    often = "once" if count == 1 else f"{count} times"
-    parted = best.distances[open_]
+    runs = ", and ".join(
+        f"{_often(count)}: {option.excitation.name} "
+        f"({option.excitation.commands.duration:.0f} s)"
+        for option, count in steps
+    )
+    squares = sum(count * option.distances[open_] ** 2 for option, count in steps)
+    parted = np.sqrt(squares)
+    wrong = norm.sf(parted / 2).mean()
     text = (
-        f"Tied: {tied_}. Run {often}: {best.excitation.name} "
-        f"({best.excitation.commands.duration:.0f} s); it parts them by "
-        f"{parted.min():.2g} deviations (expected log Bayes factor "
-        f"{parted.min() ** 2 / 2:.3g}, wrong one named {100 * best.wrong:.2g} %)."
+        f"Tied: {tied_}. Run {runs}; {'that' if len(steps) > 1 else 'it'} parts them "
+        f"by {parted.min():.2g} deviations (expected log Bayes factor "
+        f"{parted.min() ** 2 / 2:.3g}, wrong one named {100 * wrong:.2g} %)."
     )
     for first, second in alike:
         text += f" No command parts {words[first]} from {words[second]}."
     return text
+
+
+def _often(count: int) -> str:
+    return {1: "once", 2: "twice"}.get(count, f"{count} times")

@@ -97,11 +97,13 @@ def _plan(given: Planned) -> int:
     print(made.sentence)
     if not made.options or not made.repeats:
         return 0
-    for option in made.options[1:4]:
+    for option in made.options[max(1, len(made.steps)) :][:3]:
         print(f"  next: {option.excitation.name} ({option.distances.min():.2g})")
     path = Path(given.to or Path(given.directory) / "next_command.csv")
-    command_file.write(made.options[0].excitation.commands, path)
-    print(f"commands:  {path}")
+    for number, (option, _) in enumerate(made.steps or ((made.options[0], 1),), 1):
+        name = path if number == 1 else path.with_stem(f"{path.stem}_{number}")
+        command_file.write(option.excitation.commands, name)
+        print(f"commands:  {name}")
     print("Record them, then: bns gap diagnose DATA NEW_DATA --out ANOTHER_DIR")
     return 0
 

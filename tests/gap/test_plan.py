@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bns.errors import FormatError
-from bns.gap import command_file, excite, plan, servo_excite
+from bns.gap import command_file, excite, plan, plan_runs, servo_excite
 from bns.gap.records import Diagnosis, Fit, Verdict
 from bns.gap.servo_model import ServoModel
 from bns.gap.wheeled import WheeledModel
@@ -160,3 +160,14 @@ def test_commands_survive_their_file(tmp_path):
     (tmp_path / "bad.csv").write_text("left,right\n1,2\n")
     with pytest.raises(FormatError, match="left_speed"):
         command_file.read(tmp_path / "bad.csv")
+
+
+def test_two_commands_are_asked_for_where_one_leaves_a_pair():
+    def runs(*rows):
+        return plan_runs.runs(np.array(rows))
+
+    assert runs([9.0, 0.1], [0.1, 9.0], [3.0, 0.5]) == {0: 1, 1: 1}
+    assert runs([9.0, 3.0], [0.1, 9.0]) == {0: 1, 1: 1}
+    assert runs([9.0, 7.0], [7.0, 8.0]) == {0: 1}
+    assert runs([9.0, 4.0], [0.0, 4.5]) == {0: 2}  # one command, if that does
+    assert sum(runs([9.0, 4.0, 0.0], [0.0, 4.5, 0.1]).values()) == 2  # the last never
