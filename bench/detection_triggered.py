@@ -6,6 +6,8 @@ from bench.result import Result
 DOC = "cost after damage (O), detected over told, worst of four damages"
 BAR = "<= 1.05"
 LIMIT = 1.05
+RUNS = 6  # a side; 30 are the full bench, which then judges the bar
+AFTER = 10  # trials from the damage on; 20 are the full bench
 
 
 def run(quick: bool) -> Result:
@@ -15,8 +17,8 @@ def run(quick: bool) -> Result:
     """
     sides = {
         damage: {
-            "detected": detect_damage.watched(damage, light_runs.AFTER),
-            "told": light_runs.damaged(damage, ensemble=True, runs=detect_damage.RUNS),
+            "detected": detect_damage.watched(damage, after=AFTER, runs=RUNS),
+            "told": light_runs.damaged(damage, ensemble=True, runs=RUNS, after=AFTER),
         }
         for damage in light_runs.DAMAGES
     }
@@ -30,7 +32,7 @@ def run(quick: bool) -> Result:
         ratio = compared["medians"][0] / compared["medians"][1]
         worst = max(worst, ratio)
         found[damage] = {"ratio of medians": round(ratio, 4), **compared}
-    few = quick or detect_damage.RUNS < experiments.REPLICATES
+    few = quick or RUNS < experiments.REPLICATES
     return Result(
         figure=worst,
         unit="x",

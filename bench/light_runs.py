@@ -29,6 +29,7 @@ OTHERS = {  # the rest of 6.2.1; every fifth command or reading (silent)
     "sensor-intermittent": "sensor_intermittent:sensor=left,every=5",
 }
 ALL = DAMAGES | OTHERS
+UNHARMED = {"unharmed": "wheel_gain:wheel=left,factor=1"}  # what would have been
 AFFECTED = {  # which of `bns.light.watching.CHANNELS` a damage touches
     "slow-wheel": ("left wheel",),
     "noisy": ("left sensor", "right sensor"),
@@ -64,10 +65,10 @@ def damaged(
     after: int = AFTER,
     **adaptation: object,
 ) -> RunConfig:
-    """Table 6.7 over table 6.1, one of `ALL` from trial `ONSET` on.
+    """Table 6.7 over table 6.1, damaged from trial `ONSET` on.
 
     Args:
-        damage: key of `ALL`; empty = none.
+        damage: key of `ALL` or `UNHARMED`; empty = none.
         light: settings of the section `light` that differ.
         watch: settings of the section `watch`.
         ensemble: five networks with all outputs instead of one an output.
@@ -79,7 +80,7 @@ def damaged(
     snn = replace(config.snn, kind="ensemble", hidden=15) if ensemble else config.snn
     settings = {"window": 600, "population_reset": True} | adaptation
     own = {"hidden": 5, "weights": 5.0, "mirror": False} | light
-    texts = (f"{ALL[damage]}@{ONSET}",) if damage else ()
+    texts = (f"{(ALL | UNHARMED)[damage]}@{ONSET}",) if damage else ()
     config = replace(
         config,
         trials=ONSET + after,

@@ -10,12 +10,20 @@ class WatchConfig:
     detect: bool = False
     """watch for damage; the adaptations to damage then follow what is detected
     instead of being told"""
-    threshold: float = 6.0
-    """an alarm is an innovation so many spreads above those before"""
+    threshold: float = 3.0
+    """an alarm is an innovation so many times as large as it ought to be"""
     warmup: int = 6
     """trials that are seen before the first alarm, and after each one"""
     history: int = 12
     """trials before this one that an innovation is compared with"""
+    floor: float = 0.03
+    """an SNN is believed no better than this share of the largest motion or reading;
+    what a damage changes less is not looked for"""
+    reach: float = 0.4
+    """a pattern is on known ground where `near` learned ones lie no further away
+    (scaled inputs)"""
+    near: int = 5
+    """see `reach`; a trial with fewer patterns on known ground is not judged"""
     forget: bool = False
     """drop old trials whose patterns the newest trial contradicts"""
     forget_factor: float = 3.0

@@ -1,10 +1,13 @@
 """Damage detection without extra sensors (thesis 8.5), from one-step innovations.
 
 After each trial, before training on it, the SNNs' misses are divided by what they
-ought to err by: the disagreement of the ensemble's members and the error on their own
-training patterns. That *innovation* is near one while the robot is the one that was
-learned, on known ground and, thanks to the disagreement, on new ground too. Each
-channel (a wheel, a sensor) has its own; the one that rises most names what is damaged.
+ought to err by: the disagreement of the ensemble's members, the error on their own
+training patterns, and a floor. The mean square of that is the normalised innovation
+squared of filtering (Bar-Shalom, Li and Kirubarajan 2001, section 5.4), 1 while the
+robot is the one that was learned. SNNs are sure of themselves where they have never
+been, members of an ensemble alike, so only patterns on known ground count: those with
+several learned ones nearby. Each channel (a wheel, a sensor) has its own innovation;
+the one that rises most names what is damaged.
 """
 
 from dataclasses import dataclass
@@ -14,8 +17,7 @@ import numpy as np
 
 from bns.config_watch import WatchConfig
 
-FLOOR = 0.15  # smallest spread of log innovations that is believed; assumed
-NORMAL = 1.4826  # median absolute deviation of a normal distribution to its spread
+USUAL = 0.75  # quantile of its history that an innovation is compared with; assumed
 
 
 class Alarms(NamedTuple):
@@ -24,8 +26,8 @@ class Alarms(NamedTuple):
     Attributes:
         on: runs with an alarm, ``(R,)`` bool.
         suspect: channel that rose most, ``(R,)``; -1 without an alarm.
-        score: spreads by which that channel lies above its history, ``(R,)``; NaN
-            while there is too little of it.
+        score: that channel's innovation over what it ought to be, ``(R,)``; NaN while
+            there is too little history.
     """
 
     on: np.ndarray
@@ -39,8 +41,8 @@ class Detector:
 
     Attributes:
         config: thresholds.
-        past: log innovations of the last trials, newest last, ``(R, H, C)``; NaN
-            where there is none.
+        past: innovations of the last trials, newest last, ``(R, H, C)``; NaN where
+            there is none.
     """
 
     config: WatchConfig
@@ -59,13 +61,12 @@ class Detector:
         Args:
             innovations: ``(R, C)``, positive; NaN where nothing was seen.
         """
-        now = np.log(np.maximum(innovations, 1e-12))
-        score = self._score(now)
+        score = self._score(innovations)
         known = np.isfinite(score).any(1)
         filled = np.where(np.isfinite(score), score, -np.inf)
         suspect, worst = filled.argmax(1), filled.max(1)
         on = known & (worst >= self.config.threshold)
-        self.past = np.concatenate([self.past[:, 1:], now[:, None]], axis=1)
+        self.past = np.concatenate([self.past[:, 1:], innovations[:, None]], axis=1)
         self.past[on] = np.nan
         return Alarms(on, np.where(on, suspect, -1), np.where(known, worst, np.nan))
 
@@ -92,30 +93,55 @@ class Detector:
         }
 
     def _score(self, now: np.ndarray) -> np.ndarray:
-        """Spreads above the median of the history, ``(R, C)``."""
-        seen = np.isfinite(self.past)
-        enough = seen.sum(1) >= self.config.warmup
+        """Times what it ought to be: 1, or what it was of late, ``(R, C)``."""
+        enough = np.isfinite(self.past).sum(1) >= self.config.warmup
         ordered = np.where(enough[:, None], self.past, 0.0)
-        middle = np.nanmedian(ordered, axis=1)
-        away = np.nanmedian(np.abs(ordered - middle[:, None]), axis=1)
-        spread = np.maximum(NORMAL * away, FLOOR)
-        return np.where(enough, (now - middle) / spread, np.nan)
+        usual = np.maximum(np.nanquantile(ordered, USUAL, axis=1), 1.0)
+        return np.where(enough, now / usual, np.nan)
+
+
+def familiar(
+    inputs: np.ndarray, learned: np.ndarray, config: WatchConfig
+) -> np.ndarray:
+    """Which patterns are on known ground: `near` learned ones are within `reach`.
+
+    Args:
+        inputs: of the patterns, scaled, ``(N, I)``.
+        learned: inputs of the patterns that were trained on, ``(M, I)``.
+        config: thresholds.
+
+    Returns:
+        ``(N,)`` bool.
+    """
+    if len(learned) < config.near:
+        return np.zeros(len(inputs), bool)
+    square = (inputs**2).sum(1)[:, None] + (learned**2).sum(1) - 2 * inputs @ learned.T
+    last = np.partition(square, config.near - 1, axis=1)[:, config.near - 1]
+    return last <= config.reach**2
 
 
 def innovation(
-    miss: np.ndarray, disagreement: np.ndarray, usual: np.ndarray
+    miss: np.ndarray,
+    disagreement: np.ndarray,
+    usual: np.ndarray,
+    known: np.ndarray,
+    config: WatchConfig,
+    unit: float = 1.0,
 ) -> np.ndarray:
-    """Misses over what is to be expected, RMS over a trial's patterns.
+    """Misses over what is to be expected, RMS over a trial's patterns on known ground.
 
     Args:
         miss: of each pattern and channel, ``(N, C)``.
         disagreement: variance of the ensemble's members, ``(N, C)``; 0 without one.
         usual: RMS error on the patterns trained on, ``(C,)``.
+        known: see `familiar`, ``(N,)`` bool.
+        config: thresholds.
+        unit: the largest motion or reading, in units of `miss`.
 
     Returns:
-        ``(C,)``; NaN without patterns.
+        ``(C,)``; NaN with too few patterns.
     """
-    if not len(miss):
+    if known.sum() < config.near:
         return np.full(miss.shape[1], np.nan)
-    expected = disagreement + np.maximum(usual, 1e-6) ** 2
-    return np.sqrt(np.mean(miss**2 / expected, axis=0))
+    expected = disagreement + usual**2 + (config.floor * unit) ** 2
+    return np.sqrt(np.mean((miss**2 / expected)[known], axis=0))

@@ -69,8 +69,11 @@ class WatchedLearner(Learner):
         output = self.scaling.output.cpu().numpy()
         mild = np.abs(moved[:, 2]) < SHARP
         said = ways(self._said(run, inputs)[:, mild] * output)
-        miss = said.mean(0) - ways(moved[mild])
-        return detection.innovation(miss, said.var(0), self.rolled[run])
+        miss, watch = said.mean(0) - ways(moved[mild]), self.config.watch
+        known = detection.familiar(inputs[mild], self.buffer.inputs[run], watch)
+        return detection.innovation(
+            miss, said.var(0), self.rolled[run], known, watch, unit=float(output[0])
+        )
 
     def _said(self, run: int, inputs: np.ndarray) -> np.ndarray:
         """Scaled outputs of each network with all of them, ``(G, N, 3)``."""

@@ -224,7 +224,7 @@ class LightLearner:
                 self.simulator.scales,
             )
             innovations[run] = watching.innovations(
-                self.motion, moved, self.sensors, views, run
+                self.motion, moved, self.sensors, views, run, self.config.watch
             )
             self._keep(run, number, moved, light)
             if self.configs[run].light.mirror:

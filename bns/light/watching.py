@@ -7,6 +7,7 @@ A wheel's miss is that of the way it rolled: half the turn's share less (left) o
 import numpy as np
 
 from bns import detection
+from bns.config_watch import WatchConfig
 from bns.light.memory import Learned
 from bns.light.patterns import Patterns
 
@@ -14,7 +15,12 @@ CHANNELS = ("left wheel", "right wheel", "left sensor", "right sensor")
 
 
 def innovations(
-    motion: Learned, moved: Patterns, sensors: Learned, light: Patterns, run: int
+    motion: Learned,
+    moved: Patterns,
+    sensors: Learned,
+    light: Patterns,
+    run: int,
+    config: WatchConfig,
 ) -> np.ndarray:
     """Innovation of each of `CHANNELS` in one trial of a run, ``(4,)``.
 
@@ -22,19 +28,26 @@ def innovations(
         motion, sensors: before they are trained on the trial.
         moved, light: the trial's patterns.
         run: which.
+        config: thresholds.
     """
     miss, doubt = motion.miss(run, moved), motion.doubt(run, moved)
     usual = motion.spread[run].cpu().numpy()
     ways = np.stack([miss[:, 0] - miss[:, 2], miss[:, 0] + miss[:, 2]], axis=1)
     both = (doubt[:, 0] + doubt[:, 2])[:, None].repeat(2, axis=1)
     rolled = np.full(2, np.hypot(usual[0], usual[2]))
-    return np.concatenate(
-        [
-            detection.innovation(ways, both, rolled),
-            detection.innovation(
-                sensors.miss(run, light),
-                sensors.doubt(run, light),
-                sensors.spread[run].cpu().numpy(),
-            ),
-        ]
+    parts = (
+        (motion, moved, ways, both, rolled),
+        (
+            sensors,
+            light,
+            sensors.miss(run, light),
+            sensors.doubt(run, light),
+            sensors.spread[run].cpu().numpy(),
+        ),
     )
+    found = []
+    for part, patterns, *expected in parts:
+        learned = part.buffer.inputs[run]
+        known = detection.familiar(patterns.inputs, learned, config)
+        found.append(detection.innovation(*expected, known, config))
+    return np.concatenate(found)

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bns import detection
 from bns.config_watch import WatchConfig
-from bns.detection import Detector
+from bns.detection import Detector, familiar, innovation
 from bns.forgetting import contradicted
 from bns.light.learner import LightLearner
 from bns.light.policy import GenomePolicy
@@ -18,44 +17,76 @@ WATCH = WatchConfig()
 
 
 class TestInnovation:
+    known = np.ones(6, bool)
+
     def test_misses_as_large_as_expected_give_one(self):
-        miss = np.array([[0.3, -0.5], [-0.3, 0.5]])
-        got = detection.innovation(miss, np.zeros((2, 2)), np.array([0.3, 0.5]))
-        np.testing.assert_allclose(got, [1.0, 1.0])
+        miss = np.array([[0.3, -0.5], [-0.3, 0.5]] * 3)
+        usual = np.array([0.3, 0.5])
+        got = innovation(miss, np.zeros((6, 2)), usual, self.known, WATCH)
+        np.testing.assert_allclose(got, [1.0, 1.0], rtol=0.01)
 
     def test_disagreement_excuses_a_miss(self):
-        miss, usual = np.full((4, 1), 0.5), np.array([0.3])
-        got = detection.innovation(miss, np.full((4, 1), 0.16), usual)
+        miss, usual = np.full((6, 1), 0.5), np.array([0.3])
+        got = innovation(miss, np.full((6, 1), 0.16), usual, self.known, WATCH)
+        np.testing.assert_allclose(got, 1.0, rtol=0.01)
+
+    def test_what_the_floor_is_hides_smaller_misses(self):
+        miss, none = np.full((6, 1), 0.06), np.zeros((6, 1))
+        got = innovation(miss, none, np.zeros(1), self.known, WATCH, unit=2.0)
         np.testing.assert_allclose(got, 1.0)
 
-    def test_without_patterns_nothing_is_said(self):
-        got = detection.innovation(np.zeros((0, 2)), np.zeros((0, 2)), np.ones(2))
+    def test_patterns_on_new_ground_do_not_count(self):
+        known = np.array([True] * 5 + [False])
+        miss = np.array([[0.3]] * 5 + [[9.0]])
+        got = innovation(miss, np.zeros((6, 1)), np.array([0.3]), known, WATCH)
+        np.testing.assert_allclose(got, 1.0, rtol=0.01)
+
+    def test_with_too_few_patterns_nothing_is_said(self):
+        known = np.array([True] * (WATCH.near - 1) + [False] * 3)
+        count = (len(known), 1)
+        got = innovation(np.ones(count), np.zeros(count), np.ones(1), known, WATCH)
         assert np.isnan(got).all()
+
+    def test_known_ground_has_enough_learned_patterns_within_reach(self):
+        here = np.zeros((WATCH.near, 2))
+        there = np.full((WATCH.near - 1, 2), 5.0)
+        near = 0.9 * WATCH.reach
+        asked = np.array([[near, 0.0], [1.2 * WATCH.reach, 0.0], [5.0, 5.0]])
+        got = familiar(asked, np.vstack([here, there]), WATCH)
+        assert got.tolist() == [True, False, False]
+        assert not familiar(asked, there, WATCH).any()
 
 
 class TestDetector:
     def noise(self, trials, runs=20, seed=1):
         rng = np.random.default_rng(seed)
-        return np.exp(0.15 * rng.normal(size=(trials, runs, 4)))
+        return np.exp(0.2 * rng.normal(size=(trials, runs, 4)))
 
     def test_undamaged_robots_raise_hardly_an_alarm(self):
         detector = Detector.fresh(WATCH, 20, 4)
         alarms = sum(detector.update(row).on.sum() for row in self.noise(500))
         assert alarms <= 20  # of 10 000 trials: 1 in 500
 
-    def test_a_channel_that_trebles_is_named_at_once(self):
+    def test_a_channel_that_grows_fivefold_is_named_at_once(self):
         detector, rows = Detector.fresh(WATCH, 20, 4), self.noise(30)
         for row in rows[:-1]:
             assert not detector.update(row).on.any()
-        rows[-1, :, 2] *= 5.0
+        rows[-1, :, 2] = 5.0
         found = detector.update(rows[-1])
         assert found.on.all()
         assert (found.suspect == 2).all()
+        assert (found.score > WATCH.threshold).all()
 
     def test_learning_and_the_first_trials_raise_none(self):
         detector = Detector.fresh(WATCH, 1, 4)
         for trial in range(30):
-            level = max(0.02, np.exp(-0.3 * trial))
+            level = max(0.02, 20 * np.exp(-0.3 * trial))
+            assert not detector.update(np.full((1, 4), level)).on.any()
+
+    def test_less_than_expected_is_no_damage_however_much_it_grew(self):
+        detector = Detector.fresh(WATCH, 1, 4)
+        for trial in range(30):
+            level = 0.9 if trial == 20 else 0.01
             assert not detector.update(np.full((1, 4), level)).on.any()
 
     def test_after_an_alarm_the_new_robot_is_learned(self):
@@ -124,7 +155,7 @@ class TestInTheLearner:
     def test_a_dead_sensor_is_named_and_reacted_to(self, broken, name):
         config = small()
         config = replace(config, snn=replace(config.snn, epochs=60))
-        watch = WatchConfig(detect=True, threshold=4.0, warmup=4, history=6)
+        watch = WatchConfig(detect=True, warmup=4, history=6)
         reset = replace(config.adaptation, population_reset=True)
         config = replace(config, watch=watch, adaptation=reset)
         learner = LightLearner([config], replicates=[0], onsets=[10])

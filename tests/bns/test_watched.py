@@ -12,7 +12,7 @@ from bns.snn.scaling import AXLE
 from bns.watched import CHANNELS, ways
 from tests.bns.test_learner import SMALL, batch, play
 
-WATCH = WatchConfig(detect=True, forget=True, threshold=5.0, warmup=4, history=8)
+WATCH = WatchConfig(detect=True, forget=True, warmup=4, history=8)
 
 
 def broken(wheel, onset=10):
