@@ -7,6 +7,7 @@ import numpy as np
 from bns.errors import BnsError, FormatError
 from bns.gap import stuck
 from bns.gap.model import GapModel
+from bns.worlds.importing import MOMENTS
 from bns.worlds.trial import Trial
 
 SPIKE = 8.0  # robust standard deviations from both neighbours
@@ -193,6 +194,11 @@ def _noticed(trial: Trial, values: np.ndarray, name: str, label: str) -> list[st
 def _timing(trial: Trial, label: str) -> list[str]:
     notes = []
     steps = np.diff(trial.times)
+    if trial.conditions.get(MOMENTS) == "sampled" and len(steps):
+        notes.append(
+            f"{label}: when a command began is known to a sample only "
+            f"({np.median(steps):.3g} s), which can pass for a gap; give command_time"
+        )
     usual = float(np.median(steps)) if len(steps) else 0.0
     if usual > 0 and (steps > LONG_GAP * usual).any():
         notes.append(f"{label}: a gap of {steps.max():.3g} s in the samples")

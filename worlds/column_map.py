@@ -12,8 +12,11 @@ In a TOML file:
     left_speed = "vl"          # SI units need not be said
     right_speed = "vr"
     trial = "run"              # optional: a new value begins a new trial
+    command_time = "sent"      # optional: when the speeds in the row were sent
 
-Needed are time, x, y and yaw. Other names become further observed channels; give
+Needed are time, x, y and yaw. Without `command_time` speeds are taken to change with
+the first sample that has the new ones: at 20 samples a second that is up to 50 ms late,
+which a diagnosis takes for a gap. Other names become further observed channels; give
 their unit.
 """
 
@@ -36,7 +39,8 @@ FACTORS = {
     "rad": {"rad": 1.0, "deg": np.pi / 180, "turn": 2 * np.pi},
     "m/s": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "khepera-speed": SPEED_UNIT},
 }
-UNITS = {"time": "s", **checks.UNITS}
+TIMES = ("time", "command_time")
+UNITS = {**dict.fromkeys(TIMES, "s"), **checks.UNITS}
 SPEEDS = tuple(channel.name for channel in WHEEL_CHANNELS)
 
 
@@ -52,8 +56,8 @@ class ColumnMap:
     """Which column holds which channel.
 
     Attributes:
-        columns: by channel; beside observed ones `time`, `left_speed`, `right_speed`
-            and `trial`.
+        columns: by channel; beside observed ones `time`, `left_speed`, `right_speed`,
+            `command_time` and `trial`.
         robot: name of the robot model.
     """
 
@@ -127,7 +131,8 @@ class ColumnMap:
     @property
     def observed(self) -> tuple[Channel, ...]:
         """The observed channels in SI, the pose first."""
-        other = [n for n in self.columns if n not in (*POSE, *SPEEDS, "time", "trial")]
+        known = (*POSE, *SPEEDS, *TIMES, "trial")
+        other = [name for name in self.columns if name not in known]
         return tuple(
             Channel(name, UNITS.get(name, self.columns[name].unit))
             for name in (*POSE, *other)

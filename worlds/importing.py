@@ -7,14 +7,21 @@ written with `bns.worlds.dataset.write`.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from bns.errors import FormatError
 from bns.worlds import dataset_checks as checks
-from bns.worlds.column_map import SPEEDS, ColumnMap, factor
+from bns.worlds.column_map import SPEEDS, ColumnMap, Source, factor
+from bns.worlds.mcap_log import STAMPS
 from bns.worlds.trial import POSE, Commands, Trial
+
+MOMENTS = "command_moments"
+"""condition of a trial: "sampled" where commands are only known to begin by a sample"""
+
+CLOCK = 1e-6  # s; nearer to a sample a command begins with it
 
 
 def from_csv(
@@ -59,7 +66,8 @@ def from_mcap(
 
     A column is written ``/topic:field``, with dots for fields in fields. The topic of
     `x` gives the samples; of other topics the last message before each holds. The
-    column of `time` may be ``log_time`` or ``publish_time`` (unit ns).
+    column of `time` may be ``log_time`` or ``publish_time`` (unit ns); the stamps of
+    the speeds' messages then say when they were sent.
 
     Args:
         path: of the MCAP file.
@@ -75,8 +83,20 @@ def from_mcap(
 
     found = _map(columns, units, robot)
     sources = {name: source.column for name, source in found.columns.items()}
-    named = mcap_log.samples(Path(path), sources, clock="x")
+    stamped = SPEEDS[0] if _told_apart(found) else ""
+    named = mcap_log.samples(Path(path), sources, clock="x", stamped=stamped)
+    if stamped:
+        clock = Source(sources["time"], found.columns["time"].unit)
+        found = replace(found, columns={**found.columns, "command_time": clock})
     return trials(named, found, where=str(path))
+
+
+def _told_apart(columns: ColumnMap) -> bool:
+    """Whether a log's own stamps say when the speeds were sent."""
+    own = columns.columns["time"].column in STAMPS
+    return (
+        own and SPEEDS[0] in columns.columns and "command_time" not in columns.columns
+    )
 
 
 def _map(
@@ -164,14 +184,21 @@ def _trial(si: Mapping[str, np.ndarray], columns: ColumnMap, where: str) -> Tria
     pose[seen, 2] = np.unwrap(pose[seen, 2])
     other = [si[channel.name] for channel in columns.observed[len(POSE) :]]
     commands, boundaries = _commands(si, times)
+    observed = np.column_stack([pose, *other])
+    exact = "command_time" in si or not len(commands)
+    if "command_time" in si and len(commands):
+        sent = si["command_time"] - si["time"][0]
+        times, observed, boundaries = _sent(times, observed, boundaries, sent, where)
+        commands = replace(commands, durations=np.diff(times[boundaries]))
     trial = Trial(
         commands=commands,
         times=times,
-        observed=np.column_stack([pose, *other]),
+        observed=observed,
         boundaries=boundaries,
         channels=columns.observed,
         robot=columns.robot,
         world="imported",
+        conditions={} if exact else {MOMENTS: "sampled"},
     )
     checks.valid(trial, where)
     return trial
@@ -193,6 +220,44 @@ def _commands(
         return none
     bounds = np.append(begins, len(times) - 1)
     return Commands(speeds[begins], np.diff(times[bounds])), bounds
+
+
+def _sent(
+    times: np.ndarray,
+    observed: np.ndarray,
+    boundaries: np.ndarray,
+    sent: np.ndarray,
+    where: str,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Samples with those added, without a pose, at which commands began.
+
+    Raises:
+        FormatError: a command sent after the sample that has it, or before the one
+            before.
+    """
+    rows = boundaries[1:-1]
+    begins, first = sent[rows], times[rows - 1]
+    wrong = np.flatnonzero(
+        ~((begins > first - CLOCK) & (begins <= times[rows] + CLOCK))
+    )
+    if len(wrong):
+        row = rows[wrong[0]]
+        raise FormatError(
+            f"{where}: command_time is {sent[row]:.4g} s where the sample of "
+            f"{times[row]:.4g} s is the first with the command and the one before is "
+            f"of {times[row - 1]:.4g} s; it has to lie between them."
+        )
+    late = times[rows] - begins > CLOCK
+    begins = np.maximum(begins, first + CLOCK)
+    at = rows[late]
+    new = observed[at - 1]  # a copy
+    new[:, : len(POSE)] = np.nan
+    grown = np.insert(times, at, begins[late])
+    held = np.insert(observed, at, new, axis=0)
+    before = np.concatenate([[0], np.cumsum(late)])
+    inner = rows + before[:-1]
+    ends = [[0], inner, [len(grown) - 1]]
+    return grown, held, np.concatenate(ends)
 
 
 def _held(speeds: np.ndarray) -> np.ndarray:

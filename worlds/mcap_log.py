@@ -15,7 +15,7 @@ STAMPS = ("log_time", "publish_time")  # [ns], of the message itself
 
 
 def samples(
-    path: Path, columns: Mapping[str, str], *, clock: str
+    path: Path, columns: Mapping[str, str], *, clock: str, stamped: str = ""
 ) -> dict[str, np.ndarray]:
     """Fields at the moments of one topic's messages.
 
@@ -57,6 +57,11 @@ def samples(
         arrays[name] = np.where(last >= 0, values[last], np.nan)
         if topic == places[clock][0]:
             arrays[name] = values
+        if name == stamped:
+            index = STAMPS.index(columns["time"])
+            zero = logs[places[clock][0]][0][0][index]
+            own = np.array([stamps[index] - zero for stamps, _ in log], float)
+            arrays["command_time"] = np.where(last >= 0, own[last], np.nan)
     return arrays
 
 

@@ -219,11 +219,44 @@ MCAP_MAP = {
 
 def test_an_mcap_log_becomes_a_trial(mcap_log):
     (trial,) = from_mcap(mcap_log, MCAP_MAP, units={"time": "ns", "x": "mm"})
-    assert trial.times == pytest.approx(np.arange(6) / 10, abs=1e-12)
-    assert trial.channel("x") == pytest.approx(np.arange(6) / 1000)
-    assert trial.channel("y") == pytest.approx(2 * np.arange(6))
+    times = [0.0, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5]
+    assert trial.times == pytest.approx(times, abs=1e-9)
+    seen = np.isfinite(trial.channel("x"))
+    assert seen.tolist() == [time != 0.15 for time in times]
+    assert trial.channel("x")[seen] == pytest.approx(np.arange(6) / 1000)
+    assert trial.channel("y")[seen] == pytest.approx(2 * np.arange(6))
     assert trial.commands.values.tolist() == [[0, 0], [0.1, 0.05], [0.2, 0.05]]
-    assert trial.boundaries.tolist() == [0, 2, 3, 5]
+    assert trial.boundaries.tolist() == [0, 2, 4, 6]
+    assert trial.commands.durations == pytest.approx([0.15, 0.15, 0.2])
+
+
+SENT = """\
+stamp,px,py,heading,vl,vr,sent
+0,0,0,0,0.1,0.1,0
+100,10,0,0,0.1,0.1,0
+200,20,0,0,0.2,0.1,140
+300,30,0,0,0.2,0.1,140
+400,40,0,0,0.0,0.0,400
+500,40,0,0,0.0,0.0,400
+"""
+
+
+def test_commands_begin_when_they_were_sent(tmp_path):
+    file = tmp_path / "sent.csv"
+    file.write_text(SENT)
+    columns = PLAIN | {"left_speed": "vl", "right_speed": "vr"}
+    units = UNITS | {"command_time": "ms"}
+    (exact,) = from_csv(file, columns | {"command_time": "sent"}, units=units)
+    assert exact.commands.durations == pytest.approx([0.14, 0.26, 0.1])
+    assert exact.times[exact.boundaries] == pytest.approx([0, 0.14, 0.4, 0.5])
+    assert np.flatnonzero(np.isnan(exact.channel("x"))).tolist() == [2]
+    assert "command_moments" not in exact.conditions
+    (by_sample,) = from_csv(file, columns, units=UNITS)
+    assert by_sample.commands.durations == pytest.approx([0.2, 0.2, 0.1])
+    assert by_sample.conditions["command_moments"] == "sampled"
+    file.write_text(SENT.replace(",140\n", ",50\n"))
+    with pytest.raises(FormatError, match=r"command_time is 0\.05 s"):
+        from_csv(file, columns | {"command_time": "sent"}, units=units)
 
 
 def test_bad_mcap_logs_are_refused(mcap_log, tmp_path):
