@@ -71,7 +71,19 @@ def check(
             + "; ".join(notes or ["it is empty"])
         )
     _units(kept, model)
-    return tuple(kept), tuple(notes)
+    return tuple(kept), (*_moments(kept), *notes)
+
+
+def _moments(trials: Sequence[Trial]) -> list[str]:
+    """Whether it is known when commands began."""
+    sampled = [t for t in trials if t.conditions.get(MOMENTS) == "sampled"]
+    if not sampled:
+        return []
+    step = np.median(np.concatenate([np.diff(trial.times) for trial in sampled]))
+    return [
+        f"{len(sampled)} trials: when a command began is known to a sample only "
+        f"({step:.3g} s), which can pass for a gap; give command_time"
+    ]
 
 
 def _units(trials: Sequence[Trial], model: GapModel) -> None:
@@ -194,11 +206,6 @@ def _noticed(trial: Trial, values: np.ndarray, name: str, label: str) -> list[st
 def _timing(trial: Trial, label: str) -> list[str]:
     notes = []
     steps = np.diff(trial.times)
-    if trial.conditions.get(MOMENTS) == "sampled" and len(steps):
-        notes.append(
-            f"{label}: when a command began is known to a sample only "
-            f"({np.median(steps):.3g} s), which can pass for a gap; give command_time"
-        )
     usual = float(np.median(steps)) if len(steps) else 0.0
     if usual > 0 and (steps > LONG_GAP * usual).any():
         notes.append(f"{label}: a gap of {steps.max():.3g} s in the samples")
