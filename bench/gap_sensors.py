@@ -21,11 +21,12 @@ DOC = (
     "withheld effects on sensors and lamps named, aliases merged, at 3 x detectability"
 )
 BAR = ">= 0.95"
-SEALED, SPAN = 60_000, 1_000  # first seed of the scored cases; seeds of a kind
+SEALED, SPAN = 160_000, 1_000  # first seed of the scored cases; seeds of a kind
+# Seeds from 60 000 on were scored once; the false alarms found there are mended since.
 COUNTS = {"single": 112, "none": 30, "motion": 6, "off-library": 8}
 WHOLE = 16  # single and no-effect cases of which one is diagnosed with motion
 QUICK = {"single": 2, "none": 1}
-FILE = "gap_sensors"
+FILE = "gap_sensors2"
 
 
 def wanted(counts: dict[str, int], first: int = SEALED) -> list[tuple[str, int]]:
@@ -62,8 +63,6 @@ def produce(cases: Sequence[tuple[str, int]], part: int = 0, file: str = FILE) -
 def one(kind: str, seed: int) -> dict[str, Any]:
     """One case: what is true, what was said, and how long it took."""
     from bns.gap import light_cases, light_diagnosis
-    from bns.gap.diagnose import analyse
-    from bns.gap.light_diagnosis import light_rules
     from bns.gap.light_model import SightModel
     from bns.gap.records import plain
     from bns.gap.wheeled import WheeledModel
@@ -78,7 +77,7 @@ def one(kind: str, seed: int) -> dict[str, Any]:
         parts = light_diagnosis.analyse(case.trials, model, seed=seed)
     else:
         sight = SightModel(case.trials, pose_sd=light_cases.pose_sd(case.reality))
-        parts = (analyse(case.trials, sight, seed=seed, rules=light_rules()),)
+        parts = (light_diagnosis.look(case.trials, sight, seed=seed),)
     answer = parts[0].verdict
     if whole:
         answer = light_diagnosis.merged(*(part.verdict for part in parts))

@@ -9,10 +9,12 @@ together: losses add, supports join.
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
 from bns.gap import diagnose as single
+from bns.gap.confirmed import confirmed
 from bns.gap.diagnose import Analysis
 from bns.gap.light_model import SightModel
 from bns.gap.model import GapModel
@@ -51,15 +53,26 @@ def analyse(
         **given,
     )
     sight = SightModel(trials, pose_sd=motion.problem.floor.sigma)
-    seen = single.analyse(
+    seen = look(
         trials,
         sight,
         candidates=split[1],
         reference=reference,
-        rules=light_rules(rules),
+        rules=rules,
         **given,
     )
     return motion, seen
+
+
+def look(
+    trials: Sequence[Trial],
+    sight: SightModel,
+    *,
+    rules: Calibration | None = None,
+    **given: Any,
+) -> Analysis:
+    """What readings say by themselves; arguments as `diagnose.analyse`."""
+    return confirmed(single.analyse(trials, sight, rules=light_rules(rules), **given))
 
 
 def light_rules(rules: Calibration | None = None) -> Calibration:

@@ -16,7 +16,7 @@ BOTH_WAYS = np.array([0.02, 0.07, 0.25, 0.6])
 SHARES = (0.05, 0.2, 0.5, 1.0)
 HEADING = 0.005  # [rad] how well the tracker's zero of a heading is known; assumed
 HERTZ = 0.05  # [Hz] in one step of the flicker that a fit adjusts
-RHYTHMS = tuple({"beat": float(k)} for k in np.arange(1, 25.5, 0.75))
+RHYTHMS = tuple({"beat": float(k)} for k in np.arange(1, 25.5, 0.25))
 HEADINGS = tuple({"heading": k * np.pi / 4} for k in range(-3, 5))
 SECTORS = tuple(
     {"azimuth": k * np.pi / 4, "width": width}

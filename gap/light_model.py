@@ -13,7 +13,9 @@ from bns.gap import light_library
 from bns.gap.floor import Floor
 from bns.gap.light_reader import Reader, Reads, extra
 from bns.gap.model import Windows
+from bns.gap.problem import Problem
 from bns.gap.records import Candidate
+from bns.gap.whiten import Whitener
 from bns.worlds import light_sensors
 from bns.worlds.effects.base import Effect
 from bns.worlds.light_field import Lamp, LightField
@@ -25,6 +27,7 @@ from bns.worlds.trial import POSE_CHANNELS, Channel, Trial
 ROBOT = "khepera3"
 FEWEST = 8  # readings of a trial
 WIDTH = 1.5  # departures beyond some of these look alike to the scatter
+FAR = 3.0  # standard deviations at which what sensors differ by is looked at
 SQUEEZED = 0.915  # standard deviation of `squeezed` of a normal number, not divided
 SCATTER = 0.188  # standard deviation of `unlikely` of a normal number
 
@@ -97,6 +100,19 @@ class SightModel:
     def candidates(self) -> tuple[Candidate, ...]:
         """All effects on sensors and lamps."""
         return light_library.candidates(singles=self.singles)
+
+    def unsure(self, problem: Problem, uncertain: Sequence[Candidate]) -> Whitener:
+        """The whitener that knows how sensors may differ, see `problem.Problem`.
+
+        Both ways and far out: what a sensor that looks askew does to a reading that
+        hardly sees the lamp grows faster than the angle.
+        """
+        sets = [
+            [item.make(item.nominal + way * item.slack)]
+            for item in uncertain
+            for way in (FAR, -FAR)
+        ]
+        return problem.whiten.uncertain(problem.signatures(sets) / (FAR * np.sqrt(2)))
 
     def check(
         self, trials: Sequence[Trial]

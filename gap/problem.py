@@ -71,10 +71,8 @@ class Problem:
         uncertain = [item for item in candidates if item.slack > 0]
         if not uncertain:
             return made
-        sets = [[item.make(item.nominal + item.slack)] for item in uncertain]
-        return replace(
-            made, whiten=made.whiten.uncertain(made.signatures(sets, rough=True))
-        )
+        unsure = getattr(model, "unsure", _linear)
+        return replace(made, whiten=unsure(made, uncertain))
 
     @cached_property
     def rest(self) -> np.ndarray:
@@ -119,6 +117,15 @@ class Problem:
 
     def _whitened(self, left: Sequence, right: Sequence) -> np.ndarray:
         return self.whiten([a - b for a, b in zip(left, right, strict=True)])
+
+
+def _linear(problem: Problem, uncertain: Sequence[Candidate]) -> Whitener:
+    """A whitener that knows how the nominal model may be off, in proportion to it.
+
+    A model's own `unsure` does the same where proportion does not hold.
+    """
+    sets = [[item.make(item.nominal + item.slack)] for item in uncertain]
+    return problem.whiten.uncertain(problem.signatures(sets, rough=True))
 
 
 def narrowed(trial: Trial, model: GapModel) -> Trial:

@@ -10,8 +10,10 @@ import pytest
 from bns.cli import gap_after
 from bns.errors import BnsError
 from bns.gap import diagnose, light_cases, light_diagnosis, light_library
+from bns.gap.confirmed import confirmed
 from bns.gap.light_model import SightModel, sees, unlikely
 from bns.gap.light_reader import _clipped
+from bns.gap.problem import Problem
 from bns.gap.records import Verdict
 from bns.gap.wheeled import WheeledModel
 from bns.worlds.effects import registry
@@ -41,6 +43,30 @@ def find():
         return diagnose.analyse(trials, sight, candidates=few).verdict
 
     return run
+
+
+def test_a_sensor_may_look_a_little_askew_either_way():
+    """Three standard deviations show hardly more than three times the noise does."""
+    trials = recorded()
+    sight = SightModel(trials, pose_sd=(1e-3, 1e-3, 8e-3))
+    few = [item for item in sight.candidates() if item.effect == "sensor_misaligned"]
+    problem = Problem.of(sight.check(trials)[0], sight, candidates=few)
+    one = next(item for item in few if item.name.endswith("[right_90]"))
+    shown = problem.signatures([[one.make(angle)] for angle in (-0.03, 0.03)])
+    assert np.linalg.norm(shown, axis=1) == pytest.approx([3.8, 3.8], abs=0.4)
+
+
+def test_a_gap_that_other_recordings_do_not_confirm_is_none():
+    trials = recorded(singles=False)
+    sight = SightModel(trials, pose_sd=(1e-3, 1e-3, 8e-3))
+    few = [item for item in sight.candidates() if item.name in KEPT]
+    made = diagnose.analyse(trials, sight, candidates=few)
+    claimed = replace(made.verdict, kind="none of the library", p_gap=1e-4)
+    bare = replace(made.choice, rung=made.choice.rungs[0])
+    made = replace(made, verdict=claimed, choice=bare)
+    assert confirmed(made).verdict.kind == "no gap"
+    torn = replace(made, choice=replace(bare, rung=replace(bare.rung, p_misfit=1e-6)))
+    assert confirmed(torn) is torn
 
 
 @pytest.mark.parametrize(
