@@ -19,7 +19,7 @@ from bns.gap.verdict import calibration, quantile
 
 FILE = Path(__file__).resolve().parent.parent / "gap" / "calibration.json"
 MISSED = 1e3  # score of a true support that was not among the fitted ones
-ALARMS = 0.01  # share of recordings without an effect in which a gap may be claimed
+ALARMS = 0.005  # share of recordings without an effect in which a gap may be claimed
 SURE = 0.98  # coverage of what is named, at least
 LEAST, MOST = 6.0, 12.0  # for it; likelihood ratios of 20 and 400
 STRANGE = 0.01  # share of effects of the library that may be called none of it

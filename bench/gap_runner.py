@@ -14,8 +14,9 @@ from pathlib import Path
 
 DIRECTORY = Path(__file__).resolve().parent.parent / "runs" / "bench"
 ROUND = 2  # of the plans
-ROUNDS = {"scored": 3, "calibrate": 3}
-"""of diagnoses; each round has scored cases of its own, see docs/decisions.md"""
+ROUNDS = {"scored": (3,), "calibrate": (2, 3)}
+"""of diagnoses, those of a later one count; each has scored cases of its own, see
+docs/decisions.md"""
 SEEN = 1_000_000  # seeds from here on were scored once, calibration uses lower ones
 SEALED = 3_000_000  # seeds of the scored cases begin here
 CALIBRATION = 400_000  # seeds of the calibration cases begin here
@@ -56,11 +57,19 @@ def wanted(name: str, counts: dict[str, int] | None = None) -> list[tuple[str, i
 def rows(name: str = "scored") -> list[dict]:
     """All results of a set so far, by kind and seed."""
     found = {}
-    for file in sorted(DIRECTORY.glob(f"gap{ROUNDS[name]}_{name}_*.jsonl")):
+    for number in ROUNDS[name]:
+        found.update(_kept(name, number))
+    return [found[key] for key in sorted(found)]
+
+
+def _kept(name: str, number: int) -> dict[tuple[str, int], dict]:
+    """Results of a round by kind and seed."""
+    found = {}
+    for file in sorted(DIRECTORY.glob(f"gap{number}_{name}_*.jsonl")):
         for line in file.read_text().splitlines():
             row = json.loads(line)
             found[row["kind"], row["seed"]] = row
-    return [found[key] for key in sorted(found)]
+    return found
 
 
 def ensure(quick: bool = False) -> list[dict]:
@@ -80,14 +89,14 @@ def judged(found: list[dict]) -> list[dict]:
 
 def produce(cases: list[tuple[str, int]], name: str, part: int = 0) -> None:
     """Make and diagnose the cases that are missing, appending as they come."""
-    done = {(row["kind"], row["seed"]) for row in rows(name)}
+    number = ROUNDS[name][-1]
+    done = _kept(name, number)
     DIRECTORY.mkdir(parents=True, exist_ok=True)
+    file = DIRECTORY / f"gap{number}_{name}_{part}.jsonl"
     for kind, seed in cases:
         if (kind, seed) not in done:
             row = one(kind, seed)
-            with (DIRECTORY / f"gap{ROUNDS[name]}_{name}_{part}.jsonl").open(
-                "a"
-            ) as out:
+            with file.open("a") as out:
                 out.write(json.dumps(row) + "\n")
 
 

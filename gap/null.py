@@ -17,6 +17,7 @@ LARGEST = 25.0  # square of a residual that counts in full
 QUIET = 0.5  # share of the assumed noise below which a rest counts as that much
 LAGS = 10  # windows over which a rest may be correlated with itself
 TAIL = 0.05  # share of the draws beyond which chance is taken to fall exponentially
+EXACT = 1.001  # times the resolution up to which noise counts as raised to it
 CLEAR = 3.0  # standard errors from which a correlation is counted
 
 
@@ -69,7 +70,8 @@ class Null:
         Two tests: what the flexible model explains of it, and its correlation with
         itself in time; the smaller p-value counts twice. Both take how far the rest
         scatters from the rest itself. How much it is comes in units of the loss, so
-        that it compares with what effects explain.
+        that it compares with what effects explain. A rest within the accuracy of a
+        tracker that scatters less than it is exact is the tracker's own.
 
         Returns:
             p-value; loss of what has structure, beyond chance.
@@ -80,6 +82,7 @@ class Null:
         known = problem.floor.source == "model"
         scale = np.maximum(limited, 1.0 if known else QUIET)
         bounded = np.clip(by_channel / scale, -5, 5)
+        bounded[:, quiet(problem) & (limited < 1)] = 0.0
         explained = float(((bounded.ravel() @ self.basis) ** 2).sum())
         degrees = self.basis.shape[1]
         free = len(z) - degrees
@@ -91,6 +94,44 @@ class Null:
         along = (bounded * scale).ravel() @ self.basis
         beyond = float((along**2).sum()) - degrees * float((scale**2).mean())
         return float(p), max(smooth, beyond, 0.0)
+
+
+def quiet(problem: Problem) -> np.ndarray:
+    """Features whose noise is below what the instrument is exact to, ``(C,)``.
+
+    Such noise was raised to the model's `resolution`. What it hides are errors that
+    come again at the same pose, and so neither scatter nor average out.
+    """
+    model, sigma = problem.model, problem.floor.sigma
+    if problem.floor.source == "model":
+        return np.zeros(len(model.features), dtype=bool)
+    raised = [
+        (channel.unit, value <= EXACT * least)
+        for channel, value, least in zip(
+            model.channels, sigma, model.resolution, strict=True
+        )
+    ]
+    units = {unit for unit, _ in raised}
+    low = {
+        unit for unit in units if all(is_low for own, is_low in raised if own == unit)
+    }
+    return np.array([feature.unit in low for feature in model.features])
+
+
+def lasting(problem: Problem, z: np.ndarray) -> float:
+    """Variance of a rest's sums over that of independent residuals, at least 1.
+
+    Taken of `quiet` features alone: their errors last over windows, and an effect that
+    goes with them improves the loss by as much more.
+    """
+    own = quiet(problem)
+    if not own.any():
+        return 1.0
+    by_channel = z.reshape(-1, len(own))
+    scale = np.sqrt((by_channel**2).mean(axis=0)) + 1e-12
+    found = correlation(problem, np.clip(by_channel / scale, -5, 5))
+    clear = np.where(found.size > CLEAR, found.share, 0.0)[:, own]
+    return 1.0 + 2.0 * float(clear.sum(axis=0).max())
 
 
 def spread(z: np.ndarray) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from bns.gap import remains
 from bns.gap.fit import Point
 from bns.gap.ladder import Rung, climb, rungs
-from bns.gap.null import Null, spread
+from bns.gap.null import Null, lasting, spread
 from bns.gap.problem import Problem
 from bns.gap.quantify import flexible
 from bns.gap.records import Verdict
@@ -111,6 +111,7 @@ def choose(
     nothing, single = search.nothing, search.best(1)
     gain = nothing.loss - min(single.loss, nothing.loss)
     gain /= max(1.0, spread(single.rest)) ** 2  # noise that is larger than was thought
+    gain /= lasting(problem, single.rest)
     p_gap = min(1.0, 2 * min(null.p_gain(gain), null.misfit(problem, nothing.rest)[0]))
     found = rungs(problem, search, null)
     rung = climb(found, worth, rules)

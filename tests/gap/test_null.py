@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from bns.gap.null import Null, correlation
+from bns.gap.null import Null, correlation, lasting, quiet
+from bns.worlds.trial import POSE_CHANNELS, Channel
 
 TRIALS, WINDOWS = 5, 80
 ROWS = [
@@ -15,11 +16,17 @@ ROWS = [
 COUNT = 3 * WINDOWS * TRIALS
 
 
-def problem(source="state reset"):
+FEATURES = (Channel("forward", "m"), Channel("left", "m"), Channel("turn", "rad"))
+EXACT = np.array([1e-4, 1e-4, 1e-3])  # m, m, rad
+
+
+def problem(sigma=10 * EXACT):
     """As much of one as a test of a rest looks at."""
     return SimpleNamespace(
-        model=SimpleNamespace(features=("forward", "left", "turn")),
-        floor=SimpleNamespace(source=source),
+        model=SimpleNamespace(
+            features=FEATURES, channels=POSE_CHANNELS, resolution=EXACT
+        ),
+        floor=SimpleNamespace(source="state reset", sigma=np.asarray(sigma)),
         whiten=SimpleNamespace(rows=ROWS),
         windows=[range(WINDOWS)] * TRIALS,
     )
@@ -87,3 +94,20 @@ def test_chance_goes_on_beyond_the_draws():
         surer = np.log10(chance.p_gain(gain) / chi2.sf(gain, 6))
         assert -0.3 < surer < 1.5  # rather too careful
     assert chance.p_gain(40.0) < 1e-4
+
+
+def test_a_quiet_tracker_repeats_errors_within_its_accuracy():
+    rng = np.random.default_rng(7)
+    slow = np.zeros((TRIALS, WINDOWS, 3))
+    slow[:, :, 2] = 0.7 * np.sqrt(2) * np.sin(np.arange(WINDOWS) / 4)
+    rest = 0.3 * rng.standard_normal(COUNT) + slow.ravel()
+    chance, still = null(rng), problem(EXACT)
+    assert quiet(still).all()
+    assert not quiet(problem()).any()
+    assert quiet(problem([2e-4, 1e-4, 1e-3])).tolist() == [False, False, True]
+    assert chance.misfit(problem(), rest)[0] < 1e-6
+    assert chance.misfit(still, rest)[0] > 0.5  # within the accuracy
+    assert chance.misfit(still, 3 * rest)[0] < 1e-6  # beyond it
+    assert lasting(problem(), rest) == 1.0
+    assert lasting(still, rest) > 3
+    assert lasting(still, rng.standard_normal(COUNT)) < 1.4
