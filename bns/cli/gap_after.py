@@ -98,7 +98,9 @@ def _plan(given: Planned) -> int:
     if not made.options or not made.repeats:
         return 0
     for option in made.options[max(1, len(made.steps)) :][:3]:
-        print(f"  next: {option.excitation.name} ({option.distances.min():.2g})")
+        print(
+            f"  or: {option.excitation.name} (once: {100 * option.wrong:.2g} % wrong)"
+        )
     path = Path(given.to or Path(given.directory) / "next_command.csv")
     for number, (option, _) in enumerate(made.steps or ((made.options[0], 1),), 1):
         name = path if number == 1 else path.with_stem(f"{path.stem}_{number}")

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bns.cli import gap_after
 from bns.errors import FormatError
-from bns.gap import command_file, excite, plan, plan_runs, servo_excite
+from bns.gap import command_file, excite, plan, plan_runs, servo_excite, store
 from bns.gap.records import Diagnosis, Fit, Verdict
 from bns.gap.servo_model import ServoModel
 from bns.gap.wheeled import WheeledModel
@@ -171,3 +172,19 @@ def test_two_commands_are_asked_for_where_one_leaves_a_pair():
     assert runs([9.0, 7.0], [7.0, 8.0]) == {0: 1}
     assert runs([9.0, 4.0], [0.0, 4.5]) == {0: 2}  # one command, if that does
     assert sum(runs([9.0, 4.0, 0.0], [0.0, 4.5, 0.1]).values()) == 2  # the last never
+
+
+def test_each_command_of_a_plan_gets_a_file(tmp_path, monkeypatch, capsys):
+    family = plan._family
+    monkeypatch.setattr(plan, "_family", lambda *given: family(*given)[:4])
+    monkeypatch.setattr(plan, "runs", lambda table: {0: 1, 3: 2})
+    store.save(tied(AXLE, WHEELS), tmp_path)
+    assert gap_after.main("plan", [str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert "Run once: " in said and ", and twice: " in said
+    first, second = (
+        command_file.read(tmp_path / f"next_command{more}.csv") for more in ("", "_2")
+    )
+    wanted = excite.wheeled()
+    assert np.allclose(first.values, wanted[0].commands.values)
+    assert np.allclose(second.values, wanted[3].commands.values)
