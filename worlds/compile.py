@@ -12,6 +12,10 @@ from bns.worlds.active import Placed
 from bns.worlds.effects.base import BodyEffect
 from bns.worlds.physics import STATE, Compiled, Job, Segment, run
 
+ARENA = 2**22
+"""bytes of work space of a robot; a hexapod that falls over uses 0.13 MB. MuJoCo's own
+choice is 14 MB, and a diagnosis keeps hundreds of them"""
+
 SETTLE = 0.5  # [s] at rest before a trial, so that it starts without a bounce; assumed
 
 
@@ -26,6 +30,8 @@ def compiled(robot: str, effects: tuple[BodyEffect, ...] = ()) -> Compiled:
     spec = models.spec(robot, visuals=False)
     for effect in effects:
         effect.edit(spec)
+    if spec.memory < 0:  # not said in the model
+        spec.memory = ARENA
     return Compiled(spec.compile())
 
 
