@@ -84,6 +84,20 @@ class Adaptations:
             for part in registry.PARTS
         }
 
+    def magnitudes(self, trial: int, usual: Sequence[float]) -> list[float]:
+        """Size of a mutation of each run at a trial, in the learner's own unit.
+
+        Args:
+            trial: its number.
+            usual: before damage is known, of each run.
+        """
+        known = self.damage_known(trial)
+        after = [c.adaptation.mutation_magnitude_after for c in self.configs]
+        return [
+            new if damaged and new > 0 else size
+            for new, damaged, size in zip(after, known, usual, strict=True)
+        ]
+
     def mutation(self, trial: int) -> tuple[np.ndarray, np.ndarray]:
         """Mutation rate ``(R,)`` and magnitude ``(R, 3)`` [m/s, m/s, s] at a trial."""
         known = self.damage_known(trial)

@@ -147,13 +147,8 @@ class LightLearner:
 
     def _rates(self, trial: int) -> Rates:
         rate, _ = self.adaptations.mutation(trial)
-        known = self.adaptations.damage_known(trial)
-        size = [
-            config.adaptation.mutation_magnitude_after
-            if damaged and config.adaptation.mutation_magnitude_after > 0
-            else config.light.mutation_magnitude
-            for config, damaged in zip(self.configs, known, strict=True)
-        ]
+        usual = [config.light.mutation_magnitude for config in self.configs]
+        size = self.adaptations.magnitudes(trial, usual)
         chicken = [config.evolution.headless_chicken for config in self.configs]
         return Rates(
             self._rows(rate), self._rows(size).unsqueeze(1), self._rows(chicken)

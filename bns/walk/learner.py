@@ -95,13 +95,8 @@ class WalkLearner(Learner):
 
     def _rates(self, trial: int) -> Rates:
         rate, _ = self.adaptations.mutation(trial)
-        known = self.adaptations.damage_known(trial)
-        size = [
-            config.adaptation.mutation_magnitude_after
-            if damaged and config.adaptation.mutation_magnitude_after > 0
-            else config.walk.mutation_magnitude
-            for config, damaged in zip(self.configs, known, strict=True)
-        ]
+        usual = [config.walk.mutation_magnitude for config in self.configs]
+        size = self.adaptations.magnitudes(trial, usual)
         each = torch.tensor(size, dtype=torch.float32)[:, None] * TICK
         device, servos = self.config.device, len(self.encoding.channels)
         return Rates(
