@@ -10,8 +10,8 @@ class WatchConfig:
     detect: bool = False
     """watch for damage; the adaptations to damage then follow what is detected
     instead of being told"""
-    threshold: float = 3.0
-    """an alarm is an innovation so many times as large as it ought to be"""
+    threshold: float = 6.0
+    """an alarm is an innovation (a mean square) so many times what it ought to be"""
     warmup: int = 6
     """trials that are seen before the first alarm, and after each one"""
     history: int = 12

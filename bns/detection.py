@@ -17,7 +17,7 @@ import numpy as np
 
 from bns.config_watch import WatchConfig
 
-USUAL = 0.75  # quantile of its history that an innovation is compared with; assumed
+USUAL = 0.9  # quantile of its history that an innovation is compared with; assumed
 
 
 class Alarms(NamedTuple):
@@ -128,7 +128,7 @@ def innovation(
     config: WatchConfig,
     unit: float = 1.0,
 ) -> np.ndarray:
-    """Misses over what is to be expected, RMS over a trial's patterns on known ground.
+    """Misses over what is to be expected, squared, mean of a trial on known ground.
 
     Args:
         miss: of each pattern and channel, ``(N, C)``.
@@ -144,4 +144,4 @@ def innovation(
     if known.sum() < config.near:
         return np.full(miss.shape[1], np.nan)
     expected = disagreement + usual**2 + (config.floor * unit) ** 2
-    return np.sqrt(np.mean((miss**2 / expected)[known], axis=0))
+    return np.mean((miss**2 / expected)[known], axis=0)
