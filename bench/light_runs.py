@@ -29,7 +29,8 @@ OTHERS = {  # the rest of 6.2.1; every fifth command or reading (silent)
     "sensor-intermittent": "sensor_intermittent:sensor=left,every=5",
 }
 ALL = DAMAGES | OTHERS
-UNHARMED = {"unharmed": "wheel_gain:wheel=left,factor=1"}  # what would have been
+UNHARMED = {"unharmed": "wheel_intermittent:wheel=left,every=1000"}
+"""what would have been: no trial has that many commands"""
 AFFECTED = {  # which of `bns.light.watching.CHANNELS` a damage touches
     "slow-wheel": ("left wheel",),
     "noisy": ("left sensor", "right sensor"),
