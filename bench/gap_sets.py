@@ -26,6 +26,7 @@ def run(quick: bool) -> Result:
         holds=0.87 <= figure <= 0.93 and mean <= 1.6,
         n=len(said),
         details={
+            "interval, 90 %": _interval(said),
             "mean size": mean,
             "mean size, aliases apart": _mean(len(r["said"]["sets"]) for r in said),
             "best alone": scoring.share(said, _first),
@@ -53,6 +54,19 @@ def _part(said: list[dict], low: float, high: float) -> dict[str, float | None]:
         "covered": scoring.share(part, scoring.covered),
         "mean size": _mean(scoring.merged(row) for row in part),
     }
+
+
+def _interval(said: list[dict]) -> list[float]:
+    """In which the rate lies that this many cases show (Clopper and Pearson 1934)."""
+    from scipy.stats import binomtest
+
+    from bns.gap import scoring
+
+    held = sum(scoring.covered(row) for row in said)
+    if not said:
+        return []
+    found = binomtest(held, len(said)).proportion_ci(0.9, method="exact")
+    return [float(found.low), float(found.high)]
 
 
 def _first(row: dict) -> bool:
