@@ -7,57 +7,23 @@ rest the readings alone, since motion does not see what sensors do.
 one, to share the work.
 """
 
-import json
 import sys
 import time
-from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from bench.gap_runner import DIRECTORY
+from bench._gap_cases import Cases
 from bench.result import Result
 
 DOC = (
     "withheld effects on sensors and lamps named, aliases merged, at 3 x detectability"
 )
 BAR = ">= 0.95"
-SEALED, SPAN = 160_000, 1_000  # first seed of the scored cases; seeds of a kind
-# Seeds from 60 000 on were scored once; the false alarms found there are mended since.
 COUNTS = {"single": 112, "none": 30, "motion": 6, "off-library": 8}
+# Seeds from 60 000 on were scored once; the false alarms found there are mended since.
+CASES = Cases("gap_sensors2", COUNTS, first=160_000)
 WHOLE = 16  # single and no-effect cases of which one is diagnosed with motion
 QUICK = {"single": 2, "none": 1}
-FILE = "gap_sensors2"
-
-
-def wanted(counts: dict[str, int], first: int = SEALED) -> list[tuple[str, int]]:
-    """Kinds and seeds, kinds mixed, should it be cut short."""
-    share = {
-        (kind, first + SPAN * list(COUNTS).index(kind) + n): n / count
-        for kind, count in counts.items()
-        for n in range(count)
-    }
-    return sorted(share, key=share.__getitem__)
-
-
-def rows(file: str = FILE) -> dict[tuple[str, int], dict]:
-    """All results so far, by kind and seed."""
-    found = {}
-    for path in sorted(DIRECTORY.glob(f"{file}_*.jsonl")):
-        for line in path.read_text().splitlines():
-            row = json.loads(line)
-            found[row["kind"], row["seed"]] = row
-    return found
-
-
-def produce(cases: Sequence[tuple[str, int]], part: int = 0, file: str = FILE) -> None:
-    """Make and diagnose the cases that are missing, appending as they come."""
-    done = rows(file)
-    DIRECTORY.mkdir(parents=True, exist_ok=True)
-    for kind, seed in cases:
-        if (kind, seed) not in done:
-            row = one(kind, seed)
-            with (DIRECTORY / f"{file}_{part}.jsonl").open("a") as out:
-                out.write(json.dumps(row) + "\n")
 
 
 def one(kind: str, seed: int) -> dict[str, Any]:
@@ -108,9 +74,9 @@ def run(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
     from bns.gap import scoring
 
-    cases = wanted(QUICK if quick else COUNTS)
-    produce(cases)
-    found = [row for key, row in rows().items() if key in set(cases)]
+    found = list(
+        map(_twinned, CASES.produce(one, CASES.wanted(QUICK if quick else None)))
+    )
     every = scoring.of(found, "single")
     large = scoring.of(found, "single", scoring.LARGE)
     none, off = scoring.of(found, "none"), scoring.of(found, "off-library")
@@ -148,6 +114,21 @@ def run(quick: bool) -> Result:
     )
 
 
+def _twinned(row: dict) -> dict:
+    """A row whose aliases hold what always looks alike as well."""
+    from bns.gap import light_library
+
+    always = {
+        item.name: item.aliases for item in light_library.candidates(singles=True)
+    }
+    answer = row["answer"]
+    aliases = [
+        sorted({*names, *(twin for name in names for twin in always.get(name, ()))})
+        for names in answer["aliases"]
+    ]
+    return {**row, "answer": {**answer, "aliases": aliases}}
+
+
 def _of_recording(found: list[dict], singles: bool) -> dict[str, float]:
     from bns.gap import scoring
 
@@ -178,4 +159,4 @@ def _middle(values: list[float]) -> float:
 
 if __name__ == "__main__":
     part, parts = (int(word) for word in sys.argv[1:3] or ("0", "1"))
-    produce(wanted(COUNTS)[part::parts], part)
+    CASES.produce(one, CASES.wanted()[part::parts], part)

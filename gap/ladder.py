@@ -12,6 +12,7 @@ from bns.gap.problem import Problem
 from bns.gap.select import Search, held_out
 
 Names = tuple[str, ...]
+BEYOND = 4.0  # times what chance hardly exceeds: beyond that nothing is left to confirm
 
 
 class Rules(Protocol):
@@ -90,7 +91,8 @@ def climb(found: Sequence[Rung], worth: float, rules: Rules) -> Rung:
     to improve it by more than `Rules.more` and by more than the share `Rules.minor` of
     all that is explained then: a nominal model that is a little wrong always leaves
     something. Both have to improve the loss on trials that they were not fitted to by
-    more than one standard error.
+    more than one standard error; a first effect that explains `BEYOND` times what
+    chance does need not, since it may be felt in one trial alone.
 
     Args:
         found: rungs, nothing first.
@@ -105,6 +107,8 @@ def climb(found: Sequence[Rung], worth: float, rules: Rules) -> Rung:
             least = worth
         gains = np.subtract(now.held_out, new.held_out)
         error = float(gains.std(ddof=1) * np.sqrt(len(gains)))
-        if now.loss - new.loss > least and gains.sum() > min(error, least):
+        clear = new.size == 1 and now.loss - new.loss > BEYOND * worth
+        confirmed = clear or gains.sum() > min(error, least)
+        if now.loss - new.loss > least and confirmed:
             now = new
     return now

@@ -82,6 +82,8 @@ _LIGHT = (
     ("light_flicker", "depth", (0.15, 0.5, 1.0), 0, 1, RHYTHMS, ("beat",), 0.0),
     ("light_shadow", "loss", (0.3, 1.0), 0, 1, SECTORS, ("azimuth", "width"), 0.0),
 )
+TWINS = {"sensor_gain": "sensor_stuck_min", "sensor_stuck_min": "sensor_gain"}
+"""A reading partly stuck at zero is one with a gain below one, whatever is driven."""
 EXCITE = {
     "sensor_drift": "longer drives",
     "sensor_response_time": "quick turns near the lamp",
@@ -149,6 +151,7 @@ def _sensors(names: tuple[str, ...]) -> Iterable[Candidate]:
                 grid=tuple(map(float, grid)),
                 fixed={"sensor": sensor},
                 slack=_slack(effect, sensor, slack),
+                aliases=(f"{TWINS[effect]}[{sensor}]",) if effect in TWINS else (),
                 excite=EXCITE.get(effect, "drives in which these sensors see the lamp"),
             )
 

@@ -107,7 +107,7 @@ def build(seed: int, kind: str, model: WalkModel) -> WalkCase:
     if kind == "none":
         return WalkCase(record(told, reality, seed), None, tuple(reality))
     plain = record(told, reality, seed)
-    problem = Problem.of(plain, model)
+    problem = Problem.of(plain, model, candidates=model.candidates())
     for _ in range(TRIES):
         term = _drawn(rng, problem)
         if term is None:

@@ -9,11 +9,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from bns.gap import pieces, walk_library, walk_where
+from bns.gap import pieces, walk_floor, walk_library, walk_where
 from bns.gap.floor import Floor
 from bns.gap.model import Windows
+from bns.gap.problem import Problem
 from bns.gap.records import Candidate
 from bns.gap.walk_where import Suspects
+from bns.gap.whiten import Whitener
 from bns.worlds import legged_plan, observe
 from bns.worlds.active import Stages, as_damage
 from bns.worlds.damage import Damage
@@ -25,8 +27,8 @@ from bns.worlds.trial import Channel, Trial, body_displacements
 WINDOW = 0.12  # [s] over which the body's motion is compared
 TRACKER = (1e-3, 1e-3, 1e-2)  # [m, m, rad] noise of the tracker; assumed
 READING = 2e-3  # [rad] of a servo's reading, which comes in steps of 5.1 mrad
-SCATTER = (6e-3, 6e-3, 0.03)  # [m, m, rad per root second] of a walking body; assumed
-WOBBLE = 0.01  # [rad per root second] of a joint; assumed
+SCATTER = (2e-3, 2e-3, 0.01)  # [m, m, rad per root second] of a walking body; assumed
+WOBBLE = 3e-3  # [rad per root second] of a joint; assumed
 
 
 class WalkModel:
@@ -61,6 +63,7 @@ class WalkModel:
         self.process = np.array([*SCATTER, *[WOBBLE] * len(joints)])
         self.resolution = np.array([*pose_sd, *[READING] * len(joints)])
         self.floor = Floor(self.resolution, self.process, "model", 0)
+        self._walks: tuple[bytes, list[list[np.ndarray]]] = b"", []
 
     def candidates(self) -> tuple[Candidate, ...]:
         """Effects on all legs together; `suspected` has those of single ones."""
@@ -69,15 +72,30 @@ class WalkModel:
     def suspected(self, trials: Sequence[Trial]) -> tuple[Candidate, ...]:
         """Candidates on the joints and legs in which recordings depart, and on all."""
         (predicted,) = self.simulate(trials, [()])
-        found = walk_where.suspects(
-            [
-                t.observed[:, 3:] - p[:, 3:]
-                for t, p in zip(trials, predicted, strict=True)
-            ],
-            self.joints,
-            READING,
-        )
+        walks = self._robots(trials)
+        rests = []
+        for number, (trial, path) in enumerate(zip(trials, predicted, strict=True)):
+            scatter = np.mean([(w[number] - path)[:, 3:] ** 2 for w in walks], axis=0)
+            rest = trial.observed[:, 3:] - path[:, 3:]
+            rests.append(rest / np.sqrt(1 + np.nan_to_num(scatter) / READING**2))
+        found = walk_where.suspects(rests, self.joints, READING)
         return walk_library.candidates(found)
+
+    def unsure(self, problem: Problem, uncertain: Sequence[Candidate]) -> Whitener:
+        """The whitener that knows what walking scatters, see `walk_floor`."""
+        return walk_floor.whitener(problem, self._robots(problem.trials))
+
+    def _robots(self, trials: Sequence[Trial]) -> list[list[np.ndarray]]:
+        """What would have been observed of each of the robots this one may be."""
+        key = b"".join(
+            t.commands.values.tobytes() + t.times.tobytes() + t.boundaries.tobytes()
+            for t in trials
+        )
+        if key != self._walks[0]:
+            uncertain = [item for item in self.candidates() if item.slack > 0]
+            made = self.simulate(trials, walk_floor.robots(uncertain))
+            self._walks = key, made
+        return self._walks[1]
 
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]

@@ -8,6 +8,7 @@ import numpy as np
 from bns.worlds.effects.legs import LEGS
 
 MOST, LEAST = 0.6, 0.3  # share of the worst leg: beyond it alone, below it all alike
+NEARLY = 0.6  # of the worst leg's share: the second is suspected as well
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,8 @@ def suspects(
         for leg in LEGS
     }
     legs = sorted(by_leg, key=by_leg.__getitem__, reverse=True)
-    own = [name for name in share if name.startswith(legs[0])]
-    joints = sorted(own, key=share.__getitem__, reverse=True)
     worst = by_leg[legs[0]]
-    return Suspects(tuple(joints) if worst > LEAST else (), (legs[0],), worst < MOST)
+    near = tuple(leg for leg in legs[:2] if by_leg[leg] >= NEARLY * worst)
+    own = [name for name in share if name.startswith(near)]
+    joints = sorted(own, key=share.__getitem__, reverse=True)
+    return Suspects(tuple(joints) if worst > LEAST else (), near, worst < MOST)

@@ -45,6 +45,22 @@ def find():
     return run
 
 
+def test_a_reading_stuck_at_zero_in_part_is_a_gain():
+    readings = np.linspace(0, 4095, 22).reshape(2, 11)
+    names = tuple(f"ir_{name}" for name in light_library.SINGLE) + tuple("abcde")
+    on, rng = np.ones(2, dtype=bool), np.random.default_rng(0)
+    gain = registry.parse("sensor_gain:sensor=left_45,factor=0.8")
+    stuck = registry.parse("sensor_stuck_min:sensor=left_45,blend=0.2")
+    one, other = (
+        effect.apply(np.arange(2.0), readings, names, on, rng)
+        for effect in (gain, stuck)
+    )
+    assert one == pytest.approx(other, abs=0.51)
+    assert not np.allclose(one, readings)
+    found = {item.name: item.aliases for item in light_library.candidates(singles=True)}
+    assert found["sensor_gain[left_45]"] == ("sensor_stuck_min[left_45]",)
+
+
 def test_a_sensor_may_look_a_little_askew_either_way():
     """Three standard deviations show hardly more than three times the noise does."""
     trials = recorded()

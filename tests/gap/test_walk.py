@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bns.gap import diagnose, walk_cases, walk_library, walk_where
+from bns.gap.problem import Problem
 from bns.gap.walk_model import READING, WalkModel
 from bns.gap.walk_where import Suspects
 from bns.worlds import legged_plan
@@ -64,6 +65,27 @@ def test_one_leg_alone_leaves_out_effects_on_all():
     assert "servo_delay[all]" not in listed
     assert "servo_gain[all]" in listed  # as what the model is uncertain of
     assert "servo_delay[left_front_coxa]" in listed
+
+
+def test_what_walking_scatters_is_found_by_walking(model, told):
+    """A robot that is a little off, as it may be, leaves hardly more than the noise."""
+    trials = walk_cases.record(
+        told, walk_cases.imperfection(np.random.default_rng(4)), 1
+    )
+    kept = [item for item in model.candidates() if item.slack > 0]
+    plain = Problem.of(trials, model)
+    known = Problem.of(trials, model, candidates=kept)
+    assert (plain.rest**2).mean() > 2.0
+    assert (known.rest**2).mean() < 1.2
+    heavy = known.signatures([[registry.make("payload", mass=1.0)]])
+    assert np.linalg.norm(heavy) > 20
+
+
+def test_two_legs_that_depart_alike_are_both_suspected():
+    names = ("left_front_coxa", "right_front_coxa", "left_rear_coxa")
+    rests = [np.column_stack([np.full(50, v) for v in (0.1, 0.09, 0.01)])]
+    found = walk_where.suspects(rests, names, READING)
+    assert found.legs == ("left_front", "right_front")
 
 
 def test_a_planted_effect_is_named_with_its_leg(model, told):
