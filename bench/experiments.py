@@ -12,6 +12,7 @@ from dataclasses import asdict, replace
 from hashlib import sha256
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 from bench.versions import ROOT
 from bns.config import AdaptationConfig, RunConfig, WorldConfig
@@ -79,7 +80,7 @@ def named(config: RunConfig, name: str) -> RunConfig:
 
 def directory(config: RunConfig) -> Path:
     """Where a configuration's run is kept."""
-    settings, plain = asdict(config), asdict(RunConfig())
+    settings, plain = known(config), known(RunConfig())
     for name in LATER:  # unchanged, they are as good as not there
         if settings[name] == plain[name]:
             del settings[name]
@@ -87,6 +88,17 @@ def directory(config: RunConfig) -> Path:
         del settings["adaptation"]["extra"]
     text = json.dumps(settings, sort_keys=True)
     return RUNS / f"{config.preset}-{sha256(text.encode()).hexdigest()[:8]}"
+
+
+def known(config: RunConfig) -> dict[str, Any]:
+    """A configuration as plain values, without newer settings that change nothing."""
+    settings, plain = asdict(config), RunConfig()
+    if config.light.readings == plain.light.readings:
+        del settings["light"]["readings"]
+    if not config.watch.detect:
+        for name in ("floor", "reach", "near"):
+            del settings["watch"][name]
+    return settings
 
 
 def records(

@@ -7,7 +7,7 @@ first trial on, since all sides of a trunk have its seed.
 
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, replace
+from dataclasses import replace
 from hashlib import sha256
 from itertools import count
 from multiprocessing import get_context
@@ -47,7 +47,7 @@ def trunk(config: RunConfig) -> RunConfig:
 
 def seed(config: RunConfig) -> int:
     """The seed of all sides of a trunk."""
-    settings = asdict(replace(trunk(config), seed=0, replicates=0))
+    settings = experiments.known(replace(trunk(config), seed=0, replicates=0))
     return int.from_bytes(sha256(repr(settings).encode()).digest()[:4], "little")
 
 

@@ -22,9 +22,10 @@ class LightConfig:
     """nearer to a lamp than this the robot is stopped [m] (silent)"""
     at_lamp: Literal["stop", "turn"] = "stop"
     """a robot at the safety boundary stays, or is turned away and goes on"""
-    charge_stopped: Literal["start", "stand"] = "start"
+    charge_stopped: Literal["start", "stand", "far"] = "start"
     """a stopped robot's lost cycles cost as if it were back at its start, or as where
-    it stands; the latter (the printed sum) rewards running into the boundary"""
+    it stands; the latter (the printed sum) rewards running into the boundary, and so
+    does the former from near starts; far: as much as its whole way to the lamp"""
     start_nearest: float = 0.5
     """simulated trials start no nearer to the lamp than this [m]; as in the world"""
     starts: int = 10
@@ -39,6 +40,8 @@ class LightConfig:
     """mean distance from the goal radius allowed in these cycles [m]"""
     circle_sweep: float = 180.0
     """how far the robot has to get round the lamp in these cycles [deg]"""
+    readings: Literal["brightness", "balanced"] = "brightness"
+    """controllers see 0 in the dark to 1 in full light, or -1 to 1 (silent)"""
     recurrent: bool = True
     """the outputs are fed back as inputs of the next cycle (table 5.1)"""
     hidden: int = 5

@@ -7,7 +7,9 @@ layers are tanh (silent); an output of -1 is the lowest speed, 1 the highest.
 """
 
 from dataclasses import dataclass
+from typing import TypeVar
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -20,6 +22,8 @@ from bns.units import metres_per_second
 READINGS = 2
 OUTPUTS = 2
 
+Numbers = TypeVar("Numbers", np.ndarray, Tensor)
+
 
 @dataclass(frozen=True)
 class Controllers:
@@ -30,6 +34,7 @@ class Controllers:
         recurrent: whether outputs are fed back.
         slowest, fastest: speeds of the outputs -1 and 1 [m/s].
         dead_band: speeds of a smaller magnitude mean stop [m/s].
+        balanced: whether a reading is seen as -1 to 1 instead of 0 to 1.
     """
 
     hidden: int
@@ -37,6 +42,7 @@ class Controllers:
     slowest: float
     fastest: float
     dead_band: float
+    balanced: bool = False
 
     @classmethod
     def of(cls, config: RunConfig) -> "Controllers":
@@ -47,6 +53,7 @@ class Controllers:
             slowest=metres_per_second(config.controller.speed_low),
             fastest=metres_per_second(config.controller.speed_high),
             dead_band=metres_per_second(config.controller.dead_band),
+            balanced=config.light.readings == "balanced",
         )
 
     @property
@@ -63,6 +70,10 @@ class Controllers:
     def genes(self) -> int:
         """Weights of a controller."""
         return self.hidden * (self.inputs + 1) + OUTPUTS * (self.hidden + 1)
+
+    def see(self, bright: Numbers) -> Numbers:
+        """A brightness, 0 to 1, as the networks take it."""
+        return 2 * bright - 1 if self.balanced else bright
 
     def layers(self, genomes: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """The weights of genomes, the individual as the last axis.

@@ -81,7 +81,9 @@ class GenomePolicy:
                 f"Readings of shape {np.shape(readings)} for {len(self)} controllers: "
                 f"they need ({len(self)}, 2), the left and the right light sensor."
             )
-        seen = np.concatenate([brightness(readings), memory], axis=1)
+        seen = np.concatenate(
+            [self.controllers.see(brightness(readings)), memory], axis=1
+        )
         inputs = torch.from_numpy(seen.astype(np.float32)).T[..., None, None]
         outputs = self.controllers.act(self._layers(), list(inputs))
         speeds = torch.cat([self.controllers.speed(o)[:, 0] for o in outputs], dim=1)

@@ -6,20 +6,14 @@ brightness left and right. A cycle has always the same duration, so it is no inp
 """
 
 from dataclasses import dataclass
-from typing import TypeVar
 
-import numpy as np
-from torch import Tensor
-
-from bns.light.controller import Controllers
+from bns.light.controller import Controllers, Numbers
 
 DARK = 4095.0  # [counts] reading in the dark, 12 bits (Khepera III test program)
 AXLE = 0.0884  # [m] Khepera III axle, only to scale the turn (not fitted)
 FAR = 1.0  # [m] distance of the lamp that is scaled to 1; assumed
 MOTION_INPUTS, MOTION_OUTPUTS = 4, 3
 SENSORS = 2
-
-Numbers = TypeVar("Numbers", np.ndarray, Tensor)
 
 
 def brightness(counts: Numbers) -> Numbers:

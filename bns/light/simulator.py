@@ -82,6 +82,7 @@ class Simulator:
         goal: radius to stay at [m].
         safety: nearer to the lamp than this a robot is stopped [m].
         back: whether a stopped robot costs as if it were back at its start.
+        beyond: or that much farther away [m].
     """
 
     controllers: Controllers
@@ -92,6 +93,7 @@ class Simulator:
     goal: float
     safety: float
     back: bool
+    beyond: float = 0.0
 
     @classmethod
     def of(cls, config: RunConfig) -> "Simulator":
@@ -106,7 +108,8 @@ class Simulator:
             sine=sine,
             goal=light.goal,
             safety=light.safety,
-            back=light.charge_stopped == "start",
+            back=light.charge_stopped != "stand",
+            beyond=light.goal if light.charge_stopped == "far" else 0.0,
         )
 
     def views(self, ahead: Tensor, left: Tensor) -> Tensor:
@@ -142,7 +145,8 @@ class Simulator:
         """
         runs, starts, count = state.ahead.shape
         bright = self.look(thetas, state, noise)
-        inputs = [bright[:, 0], bright[:, 1]]
+        seen = self.controllers.see(bright)
+        inputs = [seen[:, 0], seen[:, 1]]
         if self.controllers.recurrent:
             inputs += [state.memory[:, 0], state.memory[:, 1]]
         outputs = self.controllers.act(layers, inputs)
@@ -163,7 +167,7 @@ class Simulator:
         ahead, left_of = cos * x + sin * y, cos * y - sin * x
         distance = (x.square() + y.square()).sqrt()
         if self.back:
-            distance = torch.where(near, state.begun, distance)
+            distance = torch.where(near, state.begun + self.beyond, distance)
         error = state.error + (distance - self.goal).abs()
         memory = torch.stack(outputs, dim=1)
         after = State(ahead, left_of, told, memory, state.begun, error)

@@ -54,7 +54,8 @@ class LightTask:
             places: after the start and after each cycle, ``(..., K + 1, 2)`` [m].
             stopped: cycles lost since somebody stopped the robot for good,
                 ``(..., K)``; with `charge_stopped` = "start" they cost as the start
-                would. None = those that begin inside the safety boundary.
+                would, with "far" as being the start's way beyond the goal. None =
+                those that begin inside the safety boundary.
 
         Returns:
             ``(...)``: sum over the cycles of the distance from the goal radius, over
@@ -64,8 +65,9 @@ class LightTask:
         if stopped is None:
             stopped = away[..., :-1] < self.config.safety
         begun, after = away[..., :1], away[..., 1:]
-        if self.config.charge_stopped == "start":
-            after = np.where(stopped, begun, after)
+        if self.config.charge_stopped != "stand":
+            beyond = self.config.goal if self.config.charge_stopped == "far" else 0.0
+            after = np.where(stopped, begun + beyond, after)
         return np.abs(after - self.config.goal).sum(-1) / begun[..., 0]
 
     def distances(self, places: np.ndarray) -> np.ndarray:

@@ -65,6 +65,20 @@ class TestController:
             one, _ = alone.act(readings[robot : robot + 1], alone.memory(1))
             np.testing.assert_allclose(one[0], together[robot], rtol=1e-6)
 
+    def test_balanced_readings_are_what_other_weights_would_make_of_them(self):
+        draws, plain = Draws(5), self.kind()
+        genomes = draws.uniform(4, plain.genes) * 2 - 1
+        hidden = plain.hidden
+        weights = genomes[:, : 2 * hidden].view(4, hidden, 2)
+        other = genomes.clone()
+        other[:, : 2 * hidden] = 2 * weights.flatten(1)
+        other[:, 2 * hidden : 3 * hidden] -= weights.sum(2)
+        readings = np.linspace(0, 4095, 8).reshape(4, 2)
+        balanced = replace(plain, balanced=True)
+        one, _ = GenomePolicy(balanced, genomes).act(readings, np.zeros((4, 0)))
+        two, _ = GenomePolicy(plain, other).act(readings, np.zeros((4, 0)))
+        np.testing.assert_allclose(one, two, atol=1e-6)
+
     def test_wrong_length_and_nan_are_refused(self):
         with pytest.raises(BnsError, match=r"has 6 weights.*has 7"):
             GenomePolicy(self.kind(), torch.zeros(1, 6))
@@ -93,6 +107,9 @@ class TestTask:
         assert charged == pytest.approx(0.2 + 0.2 + 2 * 0.7)
         stand = LightTask(TASK.lamp, replace(TASK.config, charge_stopped="stand"))
         assert stand.cost(path) == pytest.approx(0.2 + 0.2 + 2 * 0.2)
+        far = LightTask(TASK.lamp, replace(TASK.config, charge_stopped="far"))
+        lost = np.array([False, False, True, True])
+        assert far.cost(path, lost) == pytest.approx(0.2 + 0.2 + 2 * 1.0)
 
     def circle(self, radius=0.3, turns=1.2, cycles=40):
         angle = np.linspace(0, 2 * np.pi * turns, cycles + 1)
@@ -169,6 +186,23 @@ class TestSimulator:
         state, seen = simulator.step(thetas, layers, state)
         assert state.ahead.item() == pytest.approx(0.1)
         assert not seen.moved.any()
+
+    @pytest.mark.parametrize(
+        ("charge", "expected"), [("stand", 0.3), ("start", 0.6), ("far", 1.0)]
+    )
+    def test_what_a_stopped_robots_cycle_costs(self, charge, expected):
+        light = replace(small().light, goal=0.4, charge_stopped=charge)
+        simulator, draws = Simulator.of(replace(small(), light=light)), Draws(1)
+        thetas = Thetas(
+            simulator.motion.random(1, draws), simulator.sensors.random(1, draws)
+        )
+        layers = simulator.controllers.layers(
+            draws.uniform(1, 1, simulator.controllers.genes)
+        )
+        state = simulator.begin(torch.full((1, 1, 1), 0.1), torch.zeros(1, 1, 1))
+        begun = torch.ones(1, 1, 1)
+        state, _ = simulator.step(thetas, layers, state._replace(begun=begun))
+        assert state.error.item() == pytest.approx(expected)
 
 
 class TestPatterns:
