@@ -19,7 +19,7 @@ from bns.gap.ladder import Rung, climb
 from bns.gap.verdict import calibration, quantile
 
 GAP = Path(__file__).resolve().parent.parent / "gap"
-FILES = ("gap2_calibrate_*.jsonl", "gap2_scored_*.jsonl")
+FILES = ("gap2_calibrate_*.jsonl", "gap2_scored_*.jsonl")  # in the order of rounds
 FRESH = 3_000_000  # seeds from here on are of cases that are still to be scored
 MISSED = 1e3  # score of a true support that was not among the fitted ones
 

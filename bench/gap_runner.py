@@ -14,7 +14,7 @@ from pathlib import Path
 
 DIRECTORY = Path(__file__).resolve().parent.parent / "runs" / "bench"
 ROUND = 2  # of the plans
-ROUNDS = {"scored": (3,), "calibrate": (2, 3)}
+ROUNDS = {"scored": (3,), "calibrate": (2, 3), "sets": (4,)}
 """of diagnoses, those of a later one count; each has scored cases of its own, see
 docs/decisions.md"""
 SEEN = 1_000_000  # seeds from here on were scored once, calibration uses lower ones
