@@ -1,10 +1,12 @@
 """90 % sets of single effects: coverage, mean size with aliases merged.
 
 Scored is what the sets are calibrated on and what a user sees: single effects of any
-size that were named. The details have the rates by size, and those of pairs.
+size that were named. They have seeds of their own, not looked at before the threshold
+was last found (`bench.gap_conformal`). The details have the rates by size, and those of
+the pairs of the other benches.
 """
 
-from bench.gap_runner import ensure
+from bench.gap_runner import ensure, judged, produce, rows
 from bench.result import Result
 
 DOC = "90 % sets of single effects: coverage, mean size with aliases merged"
