@@ -13,7 +13,7 @@ class WatchConfig:
     threshold: float = 6.0
     """an alarm is an innovation (a mean square) so many times what it ought to be"""
     warmup: int = 6
-    """trials that are seen before the first alarm, and after each one"""
+    """trials that are seen before the first alarm"""
     history: int = 12
     """trials before this one that an innovation is compared with"""
     floor: float = 0.03

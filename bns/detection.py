@@ -56,18 +56,22 @@ class Detector:
     def update(self, innovations: np.ndarray) -> Alarms:
         """Judge a trial, and remember it.
 
-        After an alarm a run begins anew: its robot is another one.
+        An alarm is a rise: none follows while the trial before stood out as well, and
+        what stood out twice is history that later trials are compared with. So a
+        robot that is still being learned raises no second alarm, while one false
+        alarm leaves nobody blind.
 
         Args:
             innovations: ``(R, C)``, positive; NaN where nothing was seen.
         """
-        score = self._score(innovations)
+        score = self._score(innovations, self.past)
+        before = self._score(self.past[:, -1], self.past[:, :-1])
+        risen = ~(before >= self.config.threshold).any(1)
         known = np.isfinite(score).any(1)
         filled = np.where(np.isfinite(score), score, -np.inf)
         suspect, worst = filled.argmax(1), filled.max(1)
-        on = known & (worst >= self.config.threshold)
+        on = known & risen & (worst >= self.config.threshold)
         self.past = np.concatenate([self.past[:, 1:], innovations[:, None]], axis=1)
-        self.past[on] = np.nan
         return Alarms(on, np.where(on, suspect, -1), np.where(known, worst, np.nan))
 
     def figures(
@@ -92,10 +96,10 @@ class Detector:
             "alarm_score": alarms.score,
         }
 
-    def _score(self, now: np.ndarray) -> np.ndarray:
+    def _score(self, now: np.ndarray, past: np.ndarray) -> np.ndarray:
         """Times what it ought to be: 1, or what it was of late, ``(R, C)``."""
-        enough = np.isfinite(self.past).sum(1) >= self.config.warmup
-        ordered = np.where(enough[:, None], self.past, 0.0)
+        enough = np.isfinite(past).sum(1) >= self.config.warmup
+        ordered = np.where(enough[:, None], past, 0.0)
         usual = np.maximum(np.nanquantile(ordered, USUAL, axis=1), 1.0)
         return np.where(enough, now / usual, np.nan)
 

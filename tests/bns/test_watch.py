@@ -96,6 +96,13 @@ class TestDetector:
         on = [bool(detector.update(row).on[0]) for row in rows]
         assert np.flatnonzero(on).tolist() == [20]
 
+    def test_a_single_false_alarm_leaves_nobody_blind(self):
+        detector = Detector.fresh(WATCH, 1, 4)
+        rows = np.ones((24, 1, 4))
+        rows[18], rows[20:] = 17.0, 100.0
+        on = [bool(detector.update(row).on[0]) for row in rows]
+        assert np.flatnonzero(on).tolist() == [18, 20]
+
     def test_lost_trials_are_no_news(self):
         detector = Detector.fresh(WATCH, 1, 4)
         for trial in range(30):
