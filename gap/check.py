@@ -44,7 +44,8 @@ def check(
     notes: list[str] = []
     kept: list[Trial] = []
     seen: dict[bytes, int] = {}
-    odd = _odd_clocks(trials)
+    timed = getattr(model, "timed", True)  # else commands end by themselves
+    odd = _odd_clocks(trials) if timed else {}
     for number, trial in enumerate(trials):
         _channels(trial, model, number)
         label = f"trial {number}"
@@ -56,7 +57,7 @@ def check(
             notes.append(f"{label}: the same samples as trial {seen[same]}, left out")
             continue
         seen[same] = number
-        trial, found = _repaired(trial, label)
+        trial, found = _repaired(trial, label, timed)
         notes += found
         trial, found = stuck.dropped(trial, model)
         notes += [f"{label}: {note}" for note in found]
@@ -123,7 +124,7 @@ def _channels(trial: Trial, model: GapModel, number: int) -> None:
         raise BnsError("Observed channels have to begin with those of the model.")
 
 
-def _repaired(trial: Trial, label: str) -> tuple[Trial, list[str]]:
+def _repaired(trial: Trial, label: str, timed: bool) -> tuple[Trial, list[str]]:
     notes: list[str] = []
     observed = trial.observed.copy()
     for column, channel in enumerate(trial.channels):
@@ -150,7 +151,7 @@ def _repaired(trial: Trial, label: str) -> tuple[Trial, list[str]]:
     if repeated.any():
         observed[repeated] = np.nan
         notes.append(f"{label}: {repeated.sum()} samples with a repeated time, dropped")
-    notes += _timing(trial, label)
+    notes += _timing(trial, label, timed)
     changed = not np.array_equal(observed, trial.observed, equal_nan=True)
     return (trial.replace(observed=observed) if changed else trial), notes
 
@@ -203,7 +204,7 @@ def _noticed(trial: Trial, values: np.ndarray, name: str, label: str) -> list[st
     return notes
 
 
-def _timing(trial: Trial, label: str) -> list[str]:
+def _timing(trial: Trial, label: str, timed: bool) -> list[str]:
     notes = []
     steps = np.diff(trial.times)
     usual = float(np.median(steps)) if len(steps) else 0.0
@@ -211,7 +212,7 @@ def _timing(trial: Trial, label: str) -> list[str]:
         notes.append(f"{label}: a gap of {steps.max():.3g} s in the samples")
     told = trial.commands.duration
     recorded = _span(trial)
-    if abs(recorded - told) > CLOCK * told + usual:
+    if timed and abs(recorded - told) > CLOCK * told + usual:
         notes.append(
             f"{label}: commands last {told:.3g} s, the samples between their start and "
             f"end {recorded:.3g} s; clocks disagree or samples were lost"

@@ -42,6 +42,9 @@ class WalkModel:
         BnsError: the robot does not walk.
     """
 
+    timed = False
+    """commands last until the robot rests, not as long as they are told"""
+
     def __init__(self, robot: str = "phantomx", *, pose_sd: Sequence[float] = TRACKER):
         world = HexapodWorld(robot, threads=1)
         self.name, self.dt = robot, world.dt
