@@ -11,7 +11,9 @@ from bns.gap.support import Point, Term, evaluate, finite
 from bns.gap.whiten import loss
 
 FINISHES = 3  # rounds in which a rough fit is put right by the true simulation
-FAR = 2.0  # times `HOPELESS`: fits as much worse than the best stay rough
+# Fits that are worse than the best by so many `HOPELESS` and by this share of what it
+# explains stay rough; the rough simulation may misjudge a strong effect by as much.
+FAR, SHARE = 2.0, 0.2
 
 
 def refine(problem: Problem, start: Sequence[Term]) -> Point:
@@ -65,7 +67,9 @@ def refine_all(
 def _trued(problem: Problem, points: Sequence[Point]) -> list[Point]:
     """Points with the rest that the true simulation leaves; far ones as they are."""
     made = list(points)
-    limit = min((point.loss for point in points), default=np.inf) + FAR * HOPELESS
+    best = min((point.loss for point in points), default=np.inf)
+    explained = max(float(loss(problem.rest)) - best, 0.0)
+    limit = best + FAR * HOPELESS + SHARE * explained
     near = [number for number, point in enumerate(points) if point.loss < limit]
     exact = evaluate(problem, [points[number].terms for number in near])
     for number, true in zip(near, exact, strict=True):

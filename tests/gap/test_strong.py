@@ -1,0 +1,23 @@
+"""Strong effects are fitted although the learnt map of the robot misjudges them."""
+
+from bns.gap import excite
+from bns.gap.diagnose import diagnose
+from bns.gap.wheeled import WheeledModel
+from bns.worlds.mujoco_world import MujocoWorld
+
+NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.008"
+DRAG = "rolling_drag:wheel=both,torque=1e-4,viscous=0"
+NAMES = "rolling_drag.torque[both]", "rolling_drag.viscous[both]"
+
+
+def test_dry_friction_is_told_from_viscous():
+    model = WheeledModel("khepera3", threads=1)
+    family = {item.name: item.commands for item in excite.wheeled()}
+    slow = family["medium turn in place, both ways, each for 5 s"]
+    fast = family["fast turn in place, both ways, each for 1.5 s"]
+    world = MujocoWorld("khepera3", reality=[DRAG, NOISE], threads=1)
+    trials = world.run([slow] * 2 + [fast] * 5, seeds=range(7))
+    few = [item for item in model.candidates() if item.name in NAMES]
+    found = diagnose(trials, model, candidates=few, full=False, most=1)
+    assert found.verdict.named == (("rolling_drag.torque[both]",),)
+    assert abs(found.best.magnitudes[0] - 1e-4) < 1e-5
