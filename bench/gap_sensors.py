@@ -74,9 +74,8 @@ def run(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
     from bns.gap import scoring
 
-    found = list(
-        map(_twinned, CASES.produce(one, CASES.wanted(QUICK if quick else None)))
-    )
+    kept = CASES.produce(one, CASES.wanted(QUICK if quick else None))
+    found = list(map(_twinned, kept))
     every = scoring.of(found, "single")
     large = scoring.of(found, "single", scoring.LARGE)
     none, off = scoring.of(found, "none"), scoring.of(found, "off-library")
@@ -91,6 +90,10 @@ def run(quick: bool) -> Result:
             "diagnosed with motion": sum(row["said"]["whole"] for row in found),
             "single sensors recorded": _of_recording(large, True),
             "virtual sensors alone": _of_recording(large, False),
+            "merged only as each case lists": scoring.share(
+                scoring.of(kept, "single", scoring.LARGE), scoring.right
+            ),
+            "among those named": scoring.share(large, _among),
             "strict": scoring.share(large, scoring.strict),
             "named as one of several": scoring.share(
                 large, lambda row: row["said"]["verdict"] == "either"
@@ -144,6 +147,12 @@ def _wheels(found: list[dict]) -> dict[str, float]:
 
 def _claims(row: dict) -> bool:
     return row["said"]["verdict"] != "no gap"
+
+
+def _among(row: dict) -> bool:
+    from bns.gap import scoring
+
+    return any(scoring.matches(names, row["answer"]) for names in row["said"]["named"])
 
 
 def _alone_wrong(row: dict) -> bool:
