@@ -48,16 +48,8 @@ def commands(rng: np.random.Generator, model: WalkModel) -> list[Commands]:
     """Tripod gaits of other strides, lifts and heights, forward and backward."""
     channels = tuple(Channel(name, row[2]) for name, row in model.limits.items())
     made: list[Commands] = []
-    while len(made) < TRIALS:
-        stride, lift = rng.uniform(0.08, 0.17), rng.uniform(0.03, 0.06)
-        reach, height = rng.uniform(0.12, 0.15), rng.uniform(0.12, 0.14)
-        way = 1 if len(made) % 2 == 0 else -1
-        try:
-            goals = gait.tripod(
-                gait.Tripod(stride, lift, reach, height), commands=COMMANDS, heading=way
-            )
-        except BnsError:
-            continue
+    for number in range(TRIALS):
+        goals = gait.drawn(rng, commands=COMMANDS, heading=1 if number % 2 == 0 else -1)
         made.append(Commands(goals, np.full(COMMANDS, LIMIT), channels))
     return made
 

@@ -7,6 +7,7 @@ from bns.worlds.trial import Commands
 
 SPEED = 0.12  # m/s, the laboratory's controllers go up to 0.1215
 AXLE = 0.0874  # m, nominal
+LONGEST = 1.5  # s of a hexapod's command, which ends as it rests
 ROOM = 0.55  # m from the start in any direction
 START = (0.0, 0.0, 0.4)
 """m, m, rad: askew to the camera's rows. Where the tag's edges lie along them, its
@@ -34,6 +35,26 @@ def commands(count: int, *, seed: int, number: int) -> Commands:
         durations = rng.uniform(0.6, 2.4, count).round(2)
         if _reach(values, durations) < ROOM:
             return Commands(values, durations)
+
+
+def steps(count: int, *, seed: int, number: int) -> Commands:
+    """A list of commands for the hexapod: a tripod gait of its own stride and height.
+
+    Lists go forward and backward in turn.
+
+    Args:
+        count: commands.
+        seed: of the draw.
+        number: of the list.
+    """
+    from bns import models
+    from bns.models.phantomx import gait
+
+    rng = seeding.generator(seed, "excitation of legs", number)
+    goals = gait.drawn(rng, commands=count, heading=1 if number % 2 == 0 else -1)
+    return Commands(
+        goals, np.full(count, LONGEST), tuple(models.robot("phantomx").channels)
+    )
 
 
 def _reach(values: np.ndarray, durations: np.ndarray) -> float:

@@ -1,12 +1,14 @@
 """The verbs of `bns hardware` that talk to a robot."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bns.errors import BnsError
+
+AT_REST = 60.0  # s between samples: none but those at which commands begin and end
 
 
 def check(given: Any) -> int:
@@ -83,12 +85,8 @@ def _wheels(given: Any, out: Path) -> Iterator[str]:
 
 def record(given: Any) -> int:
     """`bns hardware record`."""
-    from bns.gap import command_file
-    from bns.hardware import excitation
-    from bns.hardware.world import HardwareWorld
     from bns.worlds import dataset
 
-    planned = command_file.read(given.plan) if given.plan else None
     if not given.move:
         raise BnsError(
             "The robot drives for a recording: clear the board, give --move."
@@ -96,32 +94,63 @@ def record(given: Any) -> int:
     out = Path(given.out)
     if out.exists():
         raise BnsError(f"{out} exists and is not overwritten; give another --out.")
-    world = HardwareWorld(
-        given.robot,
-        port=given.port,
-        camera=given.camera,
-        calibration=given.calibration,
-        wheels=given.wheels,
-        damage=given.damage,
-        sample_dt=0.05,
-        start=excitation.START,
-        recording=True,
-    )
+    world, told = _recorded(given)
     trials = []
     try:
         for number in range(given.trials):
-            told = planned or excitation.commands(
-                given.commands, seed=given.seed, number=number // 2
-            )
-            (trial,) = world.run([told], trial=number)
+            (trial,) = world.run([told(number)], trial=number)
             trials.append(trial)
             end = np.round(trial.poses_world[-1], 3)
             print(f"trial {number + 1} of {given.trials}: ends at {end}", flush=True)
     finally:
         world.close()
     dataset.write(out, trials, provenance={"by": "bns hardware record"})
-    print(f"dataset: {out}; bns gap diagnose {out}")
+    print(f"dataset: {out}; bns gap diagnose {out} --model {given.robot}")
     return 0
+
+
+def _recorded(given: Any) -> tuple[Any, Callable[[int], Any]]:
+    """The robot that is recorded, and what it is told in each trial.
+
+    A hexapod is sampled where it rests, between two commands: its servos are read one
+    after the other, so that no sample between is of one moment.
+    """
+    from bns.gap import command_file
+    from bns.hardware import excitation
+
+    shared: dict[str, Any] = {
+        "port": given.port,
+        "camera": given.camera,
+        "calibration": given.calibration,
+        "damage": given.damage,
+    }
+    if given.robot == "phantomx":
+        from bns.hardware.hexapod_world import HardwareHexapod
+
+        if given.plan:
+            raise BnsError("--plan: plans are for wheeled robots; leave it out.")
+        world = HardwareHexapod(servos=given.servos, sample_dt=AT_REST, **shared)
+        return world, lambda number: excitation.steps(
+            given.commands, seed=given.seed, number=number // 2
+        )
+    from bns.hardware.world import HardwareWorld
+
+    planned = command_file.read(given.plan) if given.plan else None
+    wheeled = HardwareWorld(
+        given.robot,
+        wheels=given.wheels,
+        sample_dt=0.05,
+        start=excitation.START,
+        recording=True,
+        **shared,
+    )
+    return (
+        wheeled,
+        lambda number: (
+            planned
+            or excitation.commands(given.commands, seed=given.seed, number=number // 2)
+        ),
+    )
 
 
 class _rig:

@@ -5,11 +5,12 @@ down; every second command is a step. Feet move along x on straight lines, compu
 inverse kinematics, so that standing feet do not slip against each other.
 """
 
+import contextlib
 from typing import NamedTuple
 
 import numpy as np
 
-from bns.errors import OutOfBoundsError
+from bns.errors import BnsError, OutOfBoundsError
 from bns.models.phantomx import kinematics
 from bns.models.phantomx.servos import JOINTS
 
@@ -65,6 +66,26 @@ def tripod(gait: Tripod = BEST, *, commands: int = 11, heading: int = 1) -> np.n
         feet = stance + np.column_stack([ahead, np.zeros(6), raised])
         goals.append(kinematics.goals(feet))
     return _within_stops(np.array(goals))
+
+
+def drawn(
+    rng: np.random.Generator, *, commands: int = 11, heading: int = 1
+) -> np.ndarray:
+    """Servo goals of a gait with another stride, lift, reach and height.
+
+    Args:
+        rng: the only source of randomness.
+        commands, heading: as for `tripod`.
+
+    Returns:
+        Shape ``(commands, 18)`` [rad], within the end stops.
+    """
+    while True:
+        stride, lift = rng.uniform(0.08, 0.17), rng.uniform(0.03, 0.06)
+        reach, height = rng.uniform(0.12, 0.15), rng.uniform(0.12, 0.14)
+        with contextlib.suppress(BnsError):  # out of reach: another one
+            gait = Tripod(stride, lift, reach, height)
+            return tripod(gait, commands=commands, heading=heading)
 
 
 def _within_stops(goals: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.hardware import hexapod_world, walked
+from bns.hardware import excitation, hexapod_world, walked
 from bns.hardware.clock import RealClock
 from bns.hardware.dynamixel import joints, zeros
 from bns.hardware.dynamixel.walker import SPEED, Walked
@@ -136,12 +136,25 @@ def test_zeros_are_where_the_servos_stand_and_end_stops_move_along(tmp_path):
     assert after[4] == before[4]
 
 
+def test_recorded_gaits_differ_and_take_turns_in_direction():
+    from bns.worlds import registry
+
+    ahead, back = (excitation.steps(6, seed=1, number=number) for number in (0, 1))
+    world = registry.make("hexapod", threads=1)
+    ends = [trial.poses_world[-1, 0] for trial in world.run([ahead, back])]
+    assert ends[0] > 0.1 and ends[1] < -0.1
+    again = excitation.steps(6, seed=1, number=0)
+    assert np.array_equal(ahead.values, again.values)
+    other = excitation.steps(6, seed=2, number=0)
+    assert not np.array_equal(ahead.values, other.values)
+
+
 def test_a_trial_in_real_time(tmp_path):
     done = threading.Event()
     words = {"stop": done.is_set, "log": str(tmp_path / "log")}
     thread = threading.Thread(target=phantomx, args=(tmp_path / "bus",), kwargs=words)
     thread.start()
-    world = HardwareHexapod(port=str(tmp_path / "bus"))
+    world = HardwareHexapod(port=str(tmp_path / "bus"), sample_dt=60.0)
     try:
         while not (tmp_path / "bus").exists():
             done.wait(0.02)
@@ -154,6 +167,7 @@ def test_a_trial_in_real_time(tmp_path):
         thread.join()
     read = trial.channel("left_middle_femur_position")[trial.boundaries]
     assert read == pytest.approx([0.0, 0.5, 0.0], abs=0.08)
+    assert len(trial.times) == 3  # where it rests, as recordings are
     assert (trial.commands.durations > 0.5 / SPEED).all()
     assert np.isfinite(trial.poses_world).all() and trial.conditions["frames"] > 20
     assert np.hypot(*trial.poses_world[-1, :2]) < 0.06
