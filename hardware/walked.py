@@ -5,7 +5,7 @@ import numpy as np
 from bns.errors import BnsError
 from bns.hardware.dynamixel.walker import Walked
 from bns.hardware.errors import Void
-from bns.hardware.records import interpolated
+from bns.hardware.records import GAP, interpolated
 from bns.worlds.trial import Channel, Commands, Outcome, Trial
 
 LATE = 0.25  # s by which a frame may be late before the trial is void
@@ -26,8 +26,10 @@ def trial(
     """The trial of commands that were carried out.
 
     The samples lie on a regular grid and at the moments at which commands changed;
-    what lies between pictures and between readings is interpolated. Commands that were
-    not reached are there, with NaN as poses.
+    what lies between pictures and between readings is interpolated. Where a command
+    changes the robot rests: there the last picture and the last readings hold, as the
+    next ones already show it moving. Commands that were not reached are there, with NaN
+    as poses.
 
     Args:
         done: what happened.
@@ -47,8 +49,11 @@ def trial(
     grid = np.arange(0.0, moments[-1], sample_dt)
     apart = np.abs(grid[:, None] - moments).min(1) > 1e-3
     times = np.union1d(grid[apart], moments)
-    observed = _observed(done, times + done.switched[0], channels, start_yaw)
     boundaries = np.searchsorted(times, moments - 1e-9)
+    observed = _observed(done, times + done.switched[0], boundaries, channels)
+    turns = np.rint((observed[0, 2] - start_yaw) / (2 * np.pi))
+    if np.isfinite(turns):
+        observed[:, 2] -= turns * 2 * np.pi
     lost = np.isnan(observed[:, 0])
     if lost.mean() > 0.3 or lost[boundaries].mean() > 0.3:
         raise Void(f"the robot was seen in {1 - lost.mean():.0%} of the samples")
@@ -79,19 +84,39 @@ def trial(
 
 
 def _observed(
-    done: Walked, times: np.ndarray, channels: tuple[Channel, ...], start_yaw: float
+    done: Walked,
+    times: np.ndarray,
+    resting: np.ndarray,
+    channels: tuple[Channel, ...],
 ) -> np.ndarray:
-    """Poses and joint angles at some times [s], ``(T, n_channels)``."""
+    """Poses and joint angles at some times [s], ``(T, n_channels)``.
+
+    Args:
+        done: what happened.
+        times: of the samples [s].
+        resting: samples at which the robot rests.
+        channels: of the samples.
+    """
     poses = interpolated(done.sightings, times)
-    turns = np.rint((poses[0, 2] - start_yaw) / (2 * np.pi))
-    if np.isfinite(turns):
-        poses[:, 2] -= turns * 2 * np.pi
+    seen = np.array([sighting.time for sighting in done.sightings])
+    last = np.array([sighting.pose for sighting in done.sightings])
+    poses[resting] = _held(seen, last, times[resting])
     columns = [poses]
     for channel in channels[3:]:
         read = done.readings.get(channel.name.removesuffix("_position"), [])
         if read:
             at, angle = np.array(read).T
-            columns.append(np.interp(times, at, angle)[:, None])
+            angles = np.interp(times, at, angle)
+            angles[resting] = _held(at, angle[:, None], times[resting])[:, 0]
+            columns.append(angles[:, None])
         else:
             columns.append(np.full((len(times), 1), np.nan))
     return np.hstack(columns)
+
+
+def _held(at: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """The last of some rows at each time, the first before any; NaN where it is old."""
+    last = np.maximum(np.searchsorted(at, times + 1e-6, side="right") - 1, 0)
+    made = values[last].copy()
+    made[times - at[last] > GAP] = np.nan
+    return made

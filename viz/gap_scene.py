@@ -54,7 +54,7 @@ def _robots(seen: View) -> dict[str, tuple]:
 def _driven(seen: View) -> np.ndarray:
     """Lowest and highest place along x and y on all paths, ``(2, 2)`` [m]."""
     paths = [*(trial.poses_world for trial in seen.trials), *seen.nominal]
-    places = np.concatenate(paths)[:, :2]
+    places = np.concatenate([path[:, :2] for path in paths])
     places = places[np.isfinite(places).all(axis=1)]
     return np.array([places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN])
 

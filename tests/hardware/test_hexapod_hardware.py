@@ -136,6 +136,19 @@ def test_zeros_are_where_the_servos_stand_and_end_stops_move_along(tmp_path):
     assert after[4] == before[4]
 
 
+def test_where_it_rests_the_last_reading_and_picture_hold():
+    """The next ones already show it moving."""
+    done = carried_out(2)
+    moving = [(0.95, 0.1), (1.05, 0.3), (1.95, 0.4)]
+    done.readings = {"left_front_coxa": [(0.0, 0.1), *moving, (2.05, 0.4)]}
+    done.sightings = [s for s in done.sightings if abs(s.time - 1.0) > 0.01]
+    trial = made(done, goals({}, {}))
+    read = trial.channel("left_front_coxa_position")
+    assert read[trial.boundaries] == pytest.approx([0.1, 0.1, 0.4])
+    assert trial.command_poses_world[1, 0] == pytest.approx(0.09)
+    assert read[11] == pytest.approx(0.3 + 0.1 * 0.05 / 0.9)  # at 1.1 s, between two
+
+
 def test_recorded_gaits_differ_and_take_turns_in_direction():
     from bns.worlds import registry
 
