@@ -11,6 +11,8 @@ LISTED = 7  # single effects in the figure of what closes the gap
 ROUND = {"m": ("mm", 1e3), "rad": ("mrad", 1e3)}
 """units in which small residuals are read"""
 
+SIDE = 4  # features that fit side by side
+
 
 def closing(found: Diagnosis):
     """How far the gap shrinks: nominal, each effect alone, the chosen set, floor."""
@@ -54,11 +56,12 @@ def horizons(found: Diagnosis, view: View):
     low, high = (np.array(found.where[k], dtype=float) for k in ("rms_low", "rms_high"))
     labels = [_horizon(value) for value in found.where["horizons"]]
     place = np.arange(len(labels))
-    features = view.problem.model.features
+    features, columns = view.problem.model.features, view.largest(SIDE)
     with style.plotting() as figure_class:
         figure = figure_class(figsize=(7.0, 2.7), layout="constrained")
-        panels = figure.subplots(1, len(features), squeeze=False)[0]
-        for column, (axes, feature) in enumerate(zip(panels, features, strict=True)):
+        panels = figure.subplots(1, len(columns), squeeze=False)[0]
+        for axes, column in zip(panels, columns, strict=True):
+            feature = features[column]
             unit, factor = ROUND.get(feature.unit, (feature.unit, 1.0))
             before = factor * rms[0][:, column]
             spread = factor * np.array([low[:, column], high[:, column]])
@@ -119,11 +122,13 @@ def over_time(view: View):
     times = view.problem.windows[trial].times
     gap, left, scatter = view.gap(trial), view.left[trial], view.scatter(trial)
     features = view.problem.model.features
-    size = (7.0, 0.8 + 1.35 * len(features))
+    columns = view.largest()
+    size = (7.0, 0.8 + 1.35 * len(columns))
     with style.plotting() as figure_class:
         figure = figure_class(figsize=size, layout="constrained")
-        panels = figure.subplots(len(features), 1, squeeze=False, sharex=True)[:, 0]
-        for column, (axes, feature) in enumerate(zip(panels, features, strict=True)):
+        panels = figure.subplots(len(columns), 1, squeeze=False, sharex=True)[:, 0]
+        for axes, column in zip(panels, columns, strict=True):
+            feature = features[column]
             unit, factor = ROUND.get(feature.unit, (feature.unit, 1.0))
             band = 2 * factor * scatter[:, column]
             axes.fill_between(

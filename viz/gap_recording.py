@@ -11,13 +11,13 @@ from bns.gap.records import Diagnosis
 from bns.viz import gap_scene, style
 from bns.viz.blueprint import BACKGROUND, LIVE_TIMELINE
 from bns.viz.gap_figures import CORRECTED, NOMINAL
-from bns.viz.gap_view import View, view
-from bns.worlds.trial import Trial
+from bns.viz.gap_view import MOST, View, view
+from bns.worlds.trial import POSE, Channel, Trial
 
 GAP = 1.0
 """s of pause between two trials"""
 
-MOST = 6
+TRIALS = 6
 """trials that are shown at most, those with the largest gap"""
 
 
@@ -36,7 +36,7 @@ def write(
 
     seen = view(found, trials, model)
     losses = [seen.energy(number).mean() for number in range(len(seen.trials))]
-    chosen = sorted(np.argsort(losses)[::-1][:MOST].tolist())
+    chosen = sorted(np.argsort(losses)[::-1][:TRIALS].tolist())
     starts = _starts(seen, chosen)
     identity = sha256(found.to_json().encode()).hexdigest()[:12]
     stream = rr.RecordingStream("bns", recording_id=identity, send_properties=False)
@@ -132,6 +132,19 @@ def _observed(stream, seen: View, number: int, start: float) -> None:
             )
 
 
+def _features(seen: View) -> list[Channel]:
+    """The features that are shown."""
+    return [seen.problem.model.features[column] for column in seen.largest()]
+
+
+def _channels(seen: View) -> list[Channel]:
+    """The channels that are shown: the pose, and those whose feature is."""
+    channels = list(seen.trials[0].channels)
+    named = {feature.name for feature in _features(seen)}
+    few = [c for c in channels if c.name in named or c.name in POSE]
+    return channels if len(channels) <= MOST else few
+
+
 def _layout(seen: View, planar: bool, length: float):
     import rerun.blueprint as rrb
 
@@ -154,10 +167,8 @@ def _layout(seen: View, planar: bool, length: float):
             name="Residuals" if root == "residuals" else "Observed",
         )
 
-    residuals = plots(
-        "residuals", ": recorded minus predicted", seen.problem.model.features
-    )
-    observed = plots("observed", "", seen.trials[0].channels)
+    residuals = plots("residuals", ": recorded minus predicted", _features(seen))
+    observed = plots("observed", "", _channels(seen))
     about = rrb.TextDocumentView(origin="/about", name="How to read this")
     if planar:
         parts = rrb.Horizontal(

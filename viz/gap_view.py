@@ -14,6 +14,9 @@ from bns.gap.whiten import terms
 from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Trial
 
+MOST = 6
+"""features that a figure has room for"""
+
 
 @dataclass(frozen=True, eq=False)
 class View:
@@ -52,6 +55,16 @@ class View:
         jacobian = derivative(model, self.trials[trial], windows) * floor.sigma
         own = (jacobian**2).sum(axis=(1, 2)).reshape(len(windows), -1)
         return np.sqrt(own + np.outer(windows.durations, floor.process**2))
+
+    def largest(self, most: int = MOST) -> list[int]:
+        """The features with the largest gaps, by the floor; all where there are few.
+
+        Returns:
+            Their numbers, in order.
+        """
+        sizes = [(self.gap(n) / self.scatter(n)) ** 2 for n in range(len(self.trials))]
+        size = np.nanmean(np.concatenate(sizes), axis=0)
+        return sorted(np.argsort(-size, kind="stable")[:most].tolist())
 
     def energy(self, trial: int) -> np.ndarray:
         """Loss of the nominal model in each window of a trial; 1 = the floor."""

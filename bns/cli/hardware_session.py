@@ -102,6 +102,11 @@ def record(given: Any) -> int:
             trials.append(trial)
             end = np.round(trial.poses_world[-1], 3)
             print(f"trial {number + 1} of {given.trials}: ends at {end}", flush=True)
+    except BnsError as error:
+        if not trials:
+            raise
+        dataset.write(out, trials, provenance={"by": "bns hardware record"})
+        raise BnsError(f"{error} The {len(trials)} trials so far: {out}.") from error
     finally:
         world.close()
     dataset.write(out, trials, provenance={"by": "bns hardware record"})
