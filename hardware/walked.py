@@ -58,10 +58,9 @@ def trial(
     if lost.mean() > 0.3 or lost[boundaries].mean() > 0.3:
         raise Void(f"the robot was seen in {1 - lost.mean():.0%} of the samples")
     short = len(commands) - (len(moments) - 1)
-    if short:
-        times = np.append(times, times[-1] + BEHIND * np.arange(1, short + 1))
-        observed = np.vstack([observed, np.full((short, len(channels)), np.nan)])
-        boundaries = np.append(boundaries, len(times) - short + np.arange(short))
+    times = np.append(times, times[-1] + BEHIND * np.arange(1, short + 1))
+    observed = np.vstack([observed, np.full((short, len(channels)), np.nan)])
+    boundaries = np.append(boundaries, len(times) - short + np.arange(short))
     spans = np.diff(times[boundaries])
     return Trial(
         commands=Commands(commands.values, spans, commands.channels),
