@@ -10,11 +10,6 @@ from bns.gap import casebook, cases, check, ladder, scoring, verdict
 from bns.gap.wheeled import WheeledModel
 
 
-@pytest.fixture(scope="module")
-def model():
-    return WheeledModel(threads=1)
-
-
 def row(named, names=("a",), aliases=(("a", "b"),), verdict="effect", sets=None):
     answer = {"names": list(names), "aliases": [list(x) for x in aliases]}
     answer |= {"sizes": [4.0], "effects": list(names)}

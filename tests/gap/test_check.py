@@ -5,22 +5,10 @@ import pytest
 
 from bns.errors import FormatError
 from bns.gap import check, stuck
-from bns.gap.cases import commands
-from bns.gap.wheeled import WheeledModel
 from bns.worlds.mujoco_world import MujocoWorld
 from bns.worlds.trial import Commands
 
 NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.01"
-
-
-@pytest.fixture(scope="module")
-def model():
-    return WheeledModel(threads=1)
-
-
-@pytest.fixture(scope="module")
-def told():
-    return commands(np.random.default_rng(3), 4)
 
 
 def test_faults_are_repaired_and_listed(model, told):

@@ -14,12 +14,10 @@ from bns.gap import (
     signatures,
     verdict,
 )
-from bns.gap.cases import commands
 from bns.gap.diagnose import diagnose
 from bns.gap.problem import Problem
 from bns.gap.records import Candidate, Diagnosis
 from bns.gap.reference import Reference
-from bns.gap.wheeled import WheeledModel
 from bns.worlds.effects.base import CommandEffect, Parameter
 from bns.worlds.mujoco_world import MujocoWorld
 from bns.worlds.trial import Channel, Commands
@@ -35,16 +33,6 @@ KEPT = (
     "wheel_gain[left]",
     "wheel_gain[both]",
 )
-
-
-@pytest.fixture(scope="module")
-def model():
-    return WheeledModel(threads=1)
-
-
-@pytest.fixture(scope="module")
-def told():
-    return commands(np.random.default_rng(3), 4)
 
 
 @pytest.fixture(scope="module")

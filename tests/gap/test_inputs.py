@@ -7,15 +7,9 @@ from bns.errors import BnsError
 from bns.gap import advice, inputs, store
 from bns.gap.diagnose import diagnose
 from bns.gap.unicycle import UnicycleModel
-from bns.gap.wheeled import WheeledModel
 from bns.worlds import dataset, registry
 from bns.worlds.mujoco_world import MujocoWorld
 from bns.worlds.trial import Channel, Commands, Trial
-
-
-@pytest.fixture(scope="module")
-def model():
-    return WheeledModel(threads=1)
 
 
 @pytest.fixture(scope="module")

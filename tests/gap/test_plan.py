@@ -10,7 +10,6 @@ from bns.errors import FormatError
 from bns.gap import command_file, excite, plan, plan_runs, servo_excite, store
 from bns.gap.records import Diagnosis, Fit, Verdict
 from bns.gap.servo_model import ServoModel
-from bns.gap.wheeled import WheeledModel
 
 FLOOR = {
     "sigma": [1e-3, 1e-3, 1e-2],
@@ -18,11 +17,6 @@ FLOOR = {
     "source": "state reset",
     "repeats": 0,
 }
-
-
-@pytest.fixture(scope="module")
-def model():
-    return WheeledModel(threads=1)
 
 
 def tied(*fits, kind="either"):

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from bns.gap import travel
-from bns.gap.cases import commands
 from bns.gap.reduced import between, reduced
 from bns.gap.wheeled import WheeledModel
 from bns.worlds.effects import registry
@@ -12,16 +11,6 @@ from bns.worlds.mujoco_world import MujocoWorld
 from bns.worlds.trial import body_displacements
 
 NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.01"
-
-
-@pytest.fixture(scope="module")
-def model():
-    return WheeledModel(threads=1)
-
-
-@pytest.fixture(scope="module")
-def told():
-    return commands(np.random.default_rng(3), 4)
 
 
 @pytest.mark.parametrize("effects", [(), ("axle_length:factor=0.9",)])
