@@ -3,12 +3,65 @@
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-from bench.gap_runner import DIRECTORY
+DIRECTORY = Path(__file__).resolve().parent.parent / "runs" / "bench"
 
 Case = tuple[str, int]
 """kind and seed"""
+
+
+def mixed(counts: Mapping[str, int], seed: Callable[[str, int], int]) -> list[Case]:
+    """Kinds and seeds, kinds mixed, should the work be cut short.
+
+    Args:
+        counts: how many of each kind.
+        seed: of a kind's case, by its number.
+    """
+    share = {
+        (kind, seed(kind, n)): n / count
+        for kind, count in counts.items()
+        for n in range(count)
+    }
+    return sorted(share, key=share.__getitem__)
+
+
+def kept(file: str) -> dict[Case, dict[str, Any]]:
+    """All results so far in `runs/bench/<file>_<part>.jsonl`."""
+    found = {}
+    for path in sorted(DIRECTORY.glob(f"{file}_*.jsonl")):
+        for line in path.read_text().splitlines():
+            row = json.loads(line)
+            found[row["kind"], row["seed"]] = row
+    return found
+
+
+def produce(
+    file: str,
+    one: Callable[[str, int], dict[str, Any]],
+    cases: Sequence[Case],
+    part: int = 0,
+) -> list[dict[str, Any]]:
+    """Diagnose the cases that are missing, appending as they come.
+
+    Args:
+        file: where results are kept, see `kept`.
+        one: makes and diagnoses a case.
+        cases: that are wanted.
+        part: of the work, where it is shared.
+
+    Returns:
+        results of the cases.
+    """
+    done = kept(file)
+    DIRECTORY.mkdir(parents=True, exist_ok=True)
+    for case in cases:
+        if case not in done:
+            done[case] = one(*case)
+            with (DIRECTORY / f"{file}_{part}.jsonl").open("a") as out:
+                out.write(json.dumps(done[case]) + "\n")
+    return [done[case] for case in cases]
 
 
 @dataclass(frozen=True)
@@ -28,23 +81,16 @@ class Cases:
     span: int = 1_000
 
     def wanted(self, counts: Mapping[str, int] | None = None) -> list[Case]:
-        """Kinds and seeds, kinds mixed, should it be cut short."""
+        """Kinds and seeds, kinds mixed, see `mixed`."""
         kinds = list(self.counts)
-        share = {
-            (kind, self.first + self.span * kinds.index(kind) + n): n / count
-            for kind, count in (counts or self.counts).items()
-            for n in range(count)
-        }
-        return sorted(share, key=share.__getitem__)
+        return mixed(
+            counts or self.counts,
+            lambda kind, n: self.first + self.span * kinds.index(kind) + n,
+        )
 
     def rows(self) -> dict[Case, dict[str, Any]]:
         """All results so far."""
-        found = {}
-        for path in sorted(DIRECTORY.glob(f"{self.file}_*.jsonl")):
-            for line in path.read_text().splitlines():
-                row = json.loads(line)
-                found[row["kind"], row["seed"]] = row
-        return found
+        return kept(self.file)
 
     def produce(
         self,
@@ -52,21 +98,5 @@ class Cases:
         cases: Sequence[Case],
         part: int = 0,
     ) -> list[dict[str, Any]]:
-        """Diagnose the cases that are missing, appending as they come.
-
-        Args:
-            one: makes and diagnoses a case.
-            cases: that are wanted.
-            part: of the work, where it is shared.
-
-        Returns:
-            results of the cases.
-        """
-        done = self.rows()
-        DIRECTORY.mkdir(parents=True, exist_ok=True)
-        for case in cases:
-            if case not in done:
-                done[case] = one(*case)
-                with (DIRECTORY / f"{self.file}_{part}.jsonl").open("a") as out:
-                    out.write(json.dumps(done[case]) + "\n")
-        return [done[case] for case in cases]
+        """Diagnose the cases that are missing, see `produce`."""
+        return produce(self.file, one, cases, part)

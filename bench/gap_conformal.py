@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from bench.gap_runner import DIRECTORY
+from bench._gap_cases import DIRECTORY
 from bns.gap import conformal, scoring
 from bns.gap.ladder import Rung, climb
 from bns.gap.verdict import calibration, quantile

@@ -8,7 +8,7 @@ true one; or what is left besides it is what the plan said no command can part f
 
 import json
 
-from bench.gap_runner import DIRECTORY
+from bench._gap_cases import DIRECTORY
 from bench.result import Result
 
 DOC = "ties that the planned command resolves"

@@ -7,12 +7,11 @@ results in `runs/bench/`, one file per part. Thresholds play no role in that: ve
 are taken from what was kept, with the package's calibration, when it is read.
 """
 
-import json
 import sys
 import time
-from pathlib import Path
 
-DIRECTORY = Path(__file__).resolve().parent.parent / "runs" / "bench"
+from bench import _gap_cases
+
 ROUND = 2  # of the plans
 ROUNDS = {"scored": (3,), "calibrate": (2, 3), "sets": (4,)}
 """of diagnoses, those of a later one count; each has scored cases of its own, see
@@ -46,30 +45,22 @@ def seed_of(name: str, kind: str, number: int) -> int:
 
 def wanted(name: str, counts: dict[str, int] | None = None) -> list[tuple[str, int]]:
     """Kinds and seeds of a set, kinds mixed, should it be cut short."""
-    share = {
-        (kind, seed_of(name, kind, n)): n / count
-        for kind, count in (counts or SETS[name]).items()
-        for n in range(count)
-    }
-    return sorted(share, key=share.__getitem__)
+    return _gap_cases.mixed(
+        counts or SETS[name], lambda kind, n: seed_of(name, kind, n)
+    )
 
 
 def rows(name: str = "scored") -> list[dict]:
     """All results of a set so far, by kind and seed."""
     found = {}
     for number in ROUNDS[name]:
-        found.update(_kept(name, number))
+        found.update(_gap_cases.kept(_file(name, number)))
     return [found[key] for key in sorted(found)]
 
 
-def _kept(name: str, number: int) -> dict[tuple[str, int], dict]:
-    """Results of a round by kind and seed."""
-    found = {}
-    for file in sorted(DIRECTORY.glob(f"gap{number}_{name}_*.jsonl")):
-        for line in file.read_text().splitlines():
-            row = json.loads(line)
-            found[row["kind"], row["seed"]] = row
-    return found
+def _file(name: str, number: int) -> str:
+    """Where the results of a round of a set are kept."""
+    return f"gap{number}_{name}"
 
 
 def ensure(quick: bool = False) -> list[dict]:
@@ -89,15 +80,7 @@ def judged(found: list[dict]) -> list[dict]:
 
 def produce(cases: list[tuple[str, int]], name: str, part: int = 0) -> None:
     """Make and diagnose the cases that are missing, appending as they come."""
-    number = ROUNDS[name][-1]
-    done = _kept(name, number)
-    DIRECTORY.mkdir(parents=True, exist_ok=True)
-    file = DIRECTORY / f"gap{number}_{name}_{part}.jsonl"
-    for kind, seed in cases:
-        if (kind, seed) not in done:
-            row = one(kind, seed)
-            with file.open("a") as out:
-                out.write(json.dumps(row) + "\n")
+    _gap_cases.produce(_file(name, ROUNDS[name][-1]), one, cases, part)
 
 
 def one(kind: str, seed: int) -> dict:
