@@ -1,8 +1,8 @@
 """Curves that wind: signatures simulated where a recording calls for them.
 
-Contact makes a walking robot's signature turn as an effect grows, so that a line between
-two simulated magnitudes may pass far from it. What explains a recording moves it about
-as far as it departs. So each candidate is simulated from the nominal value outward until
+Contact makes a walking robot's signature turn as an effect grows: a line between two
+simulated magnitudes may pass far from it. What explains a recording moves it about as
+far as it departs. So each candidate is simulated from the nominal value outward until
 it does more than that, and then at a magnitude that does about as much.
 """
 
