@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.gap import signatures, winding
+from bns.gap import fit, signatures, winding
 from bns.gap.walk_library import candidates
 from bns.gap.walk_where import Suspects
 
@@ -61,3 +61,11 @@ def test_what_diverges_is_told_and_does_not_count():
     assert [value for value, _ in found[0, 0] if value < 0.2] == []
     assert len(diverged) == 1
     assert "foot_slippery" in diverged[0]
+
+
+def test_a_fit_looks_beyond_the_minimum_it_ends_in():
+    problem = Turning(1.3)
+    start = [fit.Term.at(GRIP, 0, 0.9)]
+    found = fit.refine(problem, start)
+    problem.model = SimpleNamespace(winding=False)
+    assert found.loss < 0.5 * fit.refine(problem, start).loss
