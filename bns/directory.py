@@ -39,24 +39,32 @@ def _harmless(name: str) -> bool:
     return name.startswith(files.TEMPORARY) or name == "config.toml"
 
 
-def read_head(directory: Path) -> dict[str, Any]:
-    """The content of a run directory's run.json.
+def read_head(
+    path: Path, *, kind: str = "run", format: str = FORMAT, schema: int = SCHEMA
+) -> dict[str, Any]:
+    """The content of the file that says what a directory holds.
+
+    Args:
+        path: of the file.
+        kind: of directory, "run" or "campaign".
+        format: name that the file must state.
+        schema: newest that can be read.
 
     Raises:
-        FormatError: not a run directory, damaged, or written by a newer version.
+        FormatError: no such directory, damaged, or written by a newer version.
     """
-    path = directory / "run.json"
+    made = {"run": "bns run", "campaign": "bns campaign run"}[kind]
     if not path.exists():
         raise FormatError(
-            f"{directory} is not a run directory (it has no run.json): give one that "
-            "`bns run` made. Nothing was changed."
+            f"{path.parent} is not a {kind} directory (it has no {path.name}): "
+            f"give one that `{made}` made. Nothing was changed."
         )
     head = files.read_json(path)
-    if head.get("format") != FORMAT or type(head.get("schema")) is not int:
-        raise FormatError(f"{path} is not a run of bns. Nothing was changed.")
-    if head["schema"] > SCHEMA:
+    if head.get("format") != format or type(head.get("schema")) is not int:
+        raise FormatError(f"{path} is not a {kind} of bns. Nothing was changed.")
+    if head["schema"] > schema:
         raise FormatError(
-            f"{path} has schema {head['schema']}, this version reads up to {SCHEMA}: "
+            f"{path} has schema {head['schema']}, this version reads up to {schema}: "
             "install a newer bns. Nothing was changed."
         )
     return head

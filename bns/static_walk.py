@@ -13,13 +13,13 @@ import torch
 from bns import seeding
 from bns.config import RunConfig
 from bns.draws import Draws
+from bns.models.legs import PARTS
 from bns.snn.fitting import Patterns
 from bns.snn.network import Shape, forward
 from bns.snn.scaling import OUTPUTS
 from bns.walk import scaling, training
 from bns.walk.goals import Goals
 from bns.worlds.effects.leg_raised import RAISED
-from bns.worlds.effects.legs import PARTS
 from bns.worlds.static_nets import StaticNets
 from bns.worlds.trial import Commands
 from bns.worlds.world import World

@@ -17,8 +17,6 @@ machine, versions and mode). When the run is finished `steps/` is removed: recor
 arrays and dataset hold all that was in it.
 """
 
-import json
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from bns import files, loading
+from bns import files, journal, loading
 from bns.config import RunConfig
 from bns.directory import FORMAT, SCHEMA, Lock, check_free, read_head
 from bns.errors import BnsError, FormatError
@@ -89,7 +87,7 @@ class RunStore:
             FormatError: it is none, it is damaged, or a newer version wrote it.
         """
         directory = Path(directory)
-        head = read_head(directory)
+        head = read_head(directory / "run.json")
         try:
             return cls(
                 directory,
@@ -189,13 +187,7 @@ class RunStore:
 
     def note(self, **entry: Any) -> None:
         """Append a line to timing.jsonl."""
-        path = self.directory / "timing.jsonl"
-        line = json.dumps({"at": round(time.time(), 3), **entry}) + "\n"
-        try:
-            with open(path, "a", encoding="utf-8") as file:
-                file.write(line)
-        except OSError as error:
-            raise files.storage_error(path, error) from error
+        journal.note(self.directory / "timing.jsonl", **entry)
 
     def _step_path(self, trial: int) -> Path:
         return self.directory / "steps" / f"{trial:05d}.npz"

@@ -3,16 +3,18 @@
 `bns models check ROBOT` prints it; the tests hold every robot of the project to it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from bns.errors import BnsError
-from bns.models import drive, edits, numbers
+from bns.models import drive, edits, legs, numbers
 from bns.models.robot_model import RobotModel
 
 KINDS = ("wheeled", "legged", "servo")
+HIT = ("femur", "tibia", "foot")
+"""geoms of a leg, after what they belong to"""
 SPEED_TOLERANCE = 0.05
 """share by which steady speed and spin may differ from what was told; assumed"""
 
@@ -72,6 +74,10 @@ def _names(robot: RobotModel, model: Any) -> list[str]:
     if robot.caster_geom:
         wanted.append(("geom", robot.caster_geom))
     wanted += [("geom", "floor"), ("camera", robot.picture), ("key", "home")]
+    return _absent(model, wanted)
+
+
+def _absent(model: Any, wanted: Iterable[tuple[str, str]]) -> list[str]:
     faults = []
     for kind, name in wanted:
         try:
@@ -98,6 +104,22 @@ def _base(robot: RobotModel, model: Any) -> list[str]:
         if not (geom.conaffinity or geom.contype):
             faults.append(f"the {side} wheel's geom {wheel.geom} touches nothing")
     return faults
+
+
+def _legs(robot: RobotModel, model: Any) -> list[str]:
+    """A walking robot has what effects and the world look for by name."""
+    if robot.kind != "legged":
+        return []
+    names = {command.name for command in robot.commands}
+    own = [legs.LEGS[number - 1] for number in legs.present(names)]
+    if not own:
+        return [f"no command is called after a leg and a part, as {legs.JOINTS[0]}"]
+    joints = [f"{leg}_{part}" for leg in own for part in legs.PARTS]
+    faults = [f"no command is called {name!r}" for name in joints if name not in names]
+    faults += [f"command {name!r} is no joint of a leg" for name in names - {*joints}]
+    wanted = [(kind, joint) for joint in joints for kind in ("body", "joint")]
+    wanted += [("geom", f"{leg}_{part}") for leg in own for part in HIT]
+    return faults + _absent(model, [*wanted, ("geom", "belly"), ("sensor", "own")])
 
 
 def _controls(robot: RobotModel, model: Any) -> list[str]:
@@ -208,6 +230,7 @@ POINTS: dict[str, Callable[[RobotModel, Any], list[str]]] = {
     "what robot.toml names is in the model": _names,
     "its base floats (or stands), its wheels touch": _base,
     "commands are the actuators, in order, with their ranges": _controls,
+    "a walking robot's legs and joints have the names that effects know": _legs,
     "numbers.toml agrees with the model, each number with unit and source": _numbers,
     "at home it rests": _rests,
     "it is driven without warnings": _drives,

@@ -7,7 +7,7 @@ from bns import files
 from bns.gap.model import GapModel
 from bns.gap.records import Diagnosis
 from bns.viz import gap_figures, gap_view, gap_words
-from bns.viz.report import picture
+from bns.viz.page import picture, render
 from bns.worlds.trial import Trial
 
 CAPTIONS = {
@@ -49,8 +49,8 @@ def write(
             motion).
         path: file to write; no other is needed to read it.
     """
-    page = _template().render(_context(found, trials, model))
-    files.write_bytes(Path(path), page.encode())
+    page = render("gap_report.html", _context(found, trials, model))
+    files.write_bytes(Path(path), page)
     return Path(path)
 
 
@@ -104,16 +104,3 @@ def _figures(
         }
         for name, figure in made.items()
     ]
-
-
-def _template():
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("bns.viz", "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("gap_report.html")

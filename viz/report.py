@@ -1,15 +1,14 @@
 """One self-contained HTML page about one batch of runs, or about several."""
 
-import base64
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from bns import files, loading
 from bns.errors import BnsError
 from bns.record import RunRecord
-from bns.viz import comparison, facts, figures, scene, style
+from bns.viz import comparison, facts, figures, scene
 from bns.viz.captions import CAPTIONS, LIGHT, TITLES, WALK
+from bns.viz.page import picture, render
 
 ALL_RUNS = ("fitness", "solved", "waits", "snn_error", "diversity")
 """Figures that lay several batches over one another."""
@@ -47,8 +46,7 @@ def write(
     runs = _runs(sources)
     if not runs:
         raise BnsError("A report needs at least one run: give its directory.")
-    page = _template().render(_context(runs))
-    files.write_bytes(Path(out_html), page.encode())
+    files.write_bytes(Path(out_html), render("report.html", _context(runs)))
     return Path(out_html)
 
 
@@ -176,24 +174,3 @@ def _caption(name: str, record: RunRecord) -> str:
         penalty=record.config.task.penalty,
         adequate=record.config.walk.adequate,
     )
-
-
-def picture(figure) -> str:
-    """A figure as a `data:` address of an SVG, the same bytes every time."""
-    buffer = io.BytesIO()
-    with style.plotting():
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
-
-
-def _template():
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("bns.viz", "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("report.html")

@@ -106,7 +106,7 @@ class HexapodWorld(PhysicsWorld[Plan]):
         return list(self._threads.map(walk, jobs))
 
     def _refuse(self, damage: Damage) -> None:
-        legged_plan.refuse_legless(self.reality + damage)
+        legged_plan.refuse_legless(self.reality + damage, self.model)
 
     def _about(self) -> dict[str, object]:
         return {"speed": self.speed} | super()._about()

@@ -9,6 +9,7 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.models import RobotModel
+from bns.models.legs import LEGS, present
 from bns.worlds import (
     compile,
     control,
@@ -20,7 +21,7 @@ from bns.worlds import (
 from bns.worlds.active import Stages
 from bns.worlds.damage import Damage
 from bns.worlds.effects.base import ControlSignal
-from bns.worlds.effects.legs import LEGS
+from bns.worlds.effects.legs import named
 from bns.worlds.legged_physics import Piece, WalkJob
 from bns.worlds.physics import STATE, Compiled, Job, Segment, run
 from bns.worlds.trial import Commands
@@ -70,9 +71,14 @@ def _carried(model: mujoco.MjModel) -> np.ndarray:
     mujoco.mj_kinematics(model, data)
     hips = [
         [*data.body(f"{leg}_femur").xpos, model.geom(f"{leg}_femur").size[0]]
-        for leg in LEGS
+        for leg in _legs(model)
     ]
     return np.vstack([corners, hips])
+
+
+def _legs(model: mujoco.MjModel) -> list[str]:
+    joints = (model.joint(at).name for at in model.actuator_trnid[:, 0])
+    return [LEGS[number - 1] for number in present(joints)]
 
 
 def legged(robot: RobotModel) -> RobotModel:
@@ -84,7 +90,7 @@ def legged(robot: RobotModel) -> RobotModel:
     if robot.kind != "legged":
         raise BnsError(
             f"Robot {robot.name!r} is {robot.kind}, this world is for legged ones: "
-            "take 'phantomx', or the world 'mujoco'."
+            "take 'phantomx', the directory of one of your own, or the world 'mujoco'."
         )
     return robot
 
@@ -94,18 +100,27 @@ def timestep(robot: str) -> float:
     return float(compile.compiled(robot).model.opt.timestep)
 
 
-def refuse_legless(damage: Damage) -> None:
+def refuse_legless(damage: Damage, robot: RobotModel) -> None:
     """Stop if at some time no leg is left.
 
     Raises:
-        BnsError: all legs are raised, limp or missing together.
+        BnsError: all legs are raised, limp or missing together, or one that the robot
+            does not have.
     """
+    own = frozenset(present(command.name for command in robot.commands))
+    for effect in (event.effect for event in damage.events):
+        absent = named(effect) - own
+        if absent:
+            raise BnsError(
+                f"{effect}: {robot.name!r} has no leg {min(absent)}; it has "
+                f"{', '.join(LEGS[leg - 1] for leg in sorted(own))}."
+            )
     for onset in {event.onset_trial for event in damage.events}:
         held = [item.effect for item in damage.at(onset)]
         lost = frozenset().union(*(effect.lost() for effect in held))
-        if len(lost) == len(LEGS):
+        if lost == own:
             raise BnsError(
-                f"{' and '.join(map(str, held))} take all {len(LEGS)} legs away in "
+                f"{' and '.join(map(str, held))} take all {len(own)} legs away in "
                 f"trial {onset}: leave the robot one at least."
             )
 

@@ -14,18 +14,16 @@ order of their keys, so that an undisturbed and a disturbed campaign end with th
 bytes in everything but `log.jsonl`.
 """
 
-import json
-import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from bns import files
+from bns import files, journal
 from bns.campaign.compact import FORMAT, SCHEMA, Compact, write
 from bns.campaign.part import Part, decode
 from bns.campaign.work import packages
-from bns.directory import Lock
+from bns.directory import Lock, read_head
 from bns.errors import BnsError, FormatError
 
 HEAD, FILE = "campaign.json", "campaign.toml"
@@ -93,19 +91,7 @@ class CampaignStore:
         """
         directory = Path(directory)
         path = directory / HEAD
-        if not path.exists():
-            raise FormatError(
-                f"{directory} is not a campaign's directory (it has no {HEAD}): give "
-                "one that `bns campaign run` made."
-            )
-        head = files.read_json(path)
-        if head.get("format") != FORMAT or type(head.get("schema")) is not int:
-            raise FormatError(f"{path} is no campaign of bns. Nothing was changed.")
-        if head["schema"] > SCHEMA:
-            raise FormatError(
-                f"{path} has schema {head['schema']}, this version reads up to "
-                f"{SCHEMA}: install a newer bns. Nothing was changed."
-            )
+        head = read_head(path, kind="campaign", format=FORMAT, schema=SCHEMA)
         try:
             return cls(directory, head["name"], int(head["seed"]), head["versions"])
         except (KeyError, TypeError, ValueError) as error:
@@ -209,23 +195,8 @@ class CampaignStore:
 
     def note(self, **entry: Any) -> None:
         """Append a line to log.jsonl."""
-        path = self.directory / "log.jsonl"
-        line = json.dumps({"at": round(time.time(), 3), **entry}) + "\n"
-        try:
-            with open(path, "a", encoding="utf-8") as file:
-                file.write(line)
-        except OSError as error:
-            raise files.storage_error(path, error) from error
+        journal.note(self.directory / "log.jsonl", **entry)
 
     def log(self) -> list[dict[str, Any]]:
         """The lines of log.jsonl; a torn last line is left out."""
-        path = self.directory / "log.jsonl"
-        if not path.exists():
-            return []
-        entries = []
-        for line in path.read_text(encoding="utf-8").splitlines():
-            try:
-                entries.append(json.loads(line))
-            except ValueError:
-                continue
-        return entries
+        return journal.entries(self.directory / "log.jsonl")

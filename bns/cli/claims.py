@@ -208,7 +208,8 @@ def _table(given: Table) -> int:
     _show(rows, json=given.json, brief=not given.ids)
     if not given.json:
         said = ", ".join(f"{n} {name}" for name, n in report.counts(rows).items() if n)
-        print(f"{len(rows)} claims in {given.world}: {said}")
+        what = "claim" if len(rows) == 1 else "claims"
+        print(f"{len(rows)} {what} in {given.world}: {said}")
         print("* fewer runs than the rule asks for. The rule: docs/claims.md")
     return 0
 

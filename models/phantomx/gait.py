@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bns.errors import BnsError, OutOfBoundsError
+from bns.models.legs import JOINTS
 from bns.models.phantomx import kinematics
-from bns.models.phantomx.servos import JOINTS
 
 ONE_SET = np.array([True, False, True, False, False, True])
 """the legs that swing first: 1, 3 and 6"""

@@ -12,7 +12,7 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.models import numbers
-from bns.models.phantomx.servos import LEGS
+from bns.models.legs import LEGS
 
 
 class Shape(NamedTuple):

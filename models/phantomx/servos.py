@@ -1,7 +1,7 @@
 """The hexapod's servos: names, identities on the bus, and goals as registers.
 
-Legs are numbered as in the dissertation (figure 7.2), and so are the columns of goals:
-coxa, femur, tibia of leg 1, then of leg 2 and so on. Goals are angles from half-way
+Columns of goals go by the numbers of legs (`bns.models.legs`): coxa, femur, tibia of
+leg 1, then of leg 2 and so on. Goals are angles from half-way
 [rad] with signs alike for all legs: coxa forward, femur up, tibia outward.
 """
 
@@ -10,17 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from bns.models import ax12a
-
-LEGS = (
-    "left_front",
-    "right_front",
-    "left_rear",
-    "right_rear",
-    "left_middle",
-    "right_middle",
-)
-PARTS = ("coxa", "femur", "tibia")
-JOINTS = tuple(f"{leg}_{part}" for leg in LEGS for part in PARTS)
+from bns.models.legs import JOINTS
 
 IDS = MappingProxyType(
     dict(

@@ -81,8 +81,8 @@ def test_a_wrong_file_is_one_line(capsys, tiny, text, words):
     [
         (["campaign", "rum"], "Did you mean 'run'"),
         (["campaign", "run", "none.toml"], "no campaign file"),
-        (["campaign", "status", "."], "not a campaign's directory"),
-        (["campaign", "table", "nowhere"], "not a campaign's directory"),
+        (["campaign", "status", "."], "not a campaign directory"),
+        (["campaign", "table", "nowhere"], "not a campaign directory"),
         (["campaign", "run", "tiny.toml", "--ray-address", "a:1"], "--engine ray"),
         (
             ["campaign", "run", "tiny.toml", "--engine", "ray", "--ray-address", "x"],

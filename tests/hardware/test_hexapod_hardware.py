@@ -18,6 +18,7 @@ from bns.hardware.errors import Void
 from bns.hardware.hexapod_world import HardwareHexapod
 from bns.hardware.tracking.tracker import Sighting
 from bns.models import robot
+from bns.models.legs import JOINTS
 from bns.models.phantomx import servos
 from bns.worlds.active import Stages
 from bns.worlds.damage import Damage
@@ -33,17 +34,17 @@ def goals(*rows, limit=2.0):
     values = np.zeros((len(rows), 18))
     for row, changes in zip(values, rows, strict=True):
         for name, angle in changes.items():
-            row[servos.JOINTS.index(name)] = angle
+            row[JOINTS.index(name)] = angle
     return Commands(values, np.full(len(rows), limit), CHANNELS)
 
 
 def test_the_drivers_joints_are_those_of_the_model():
     table = joints.read()
     assert {joint.name: joint.id for joint in table} == dict(servos.IDS)
-    signs = dict(zip(servos.JOINTS, servos.SIGNS, strict=True))
+    signs = dict(zip(JOINTS, servos.SIGNS, strict=True))
     low, high = robot("phantomx").ranges.T
     for joint in table:
-        at = servos.JOINTS.index(joint.name)
+        at = JOINTS.index(joint.name)
         assert joint.sign == signs[joint.name]
         ends = sorted((joint.angle(joint.low), joint.angle(joint.high)))
         np.testing.assert_allclose(ends, [low[at], high[at]], atol=0.006)
@@ -72,9 +73,9 @@ def test_software_damage_changes_what_is_sent_before_the_first_command_as_well()
     damage = Damage.parse(["leg_raised:legs=1,blend=1"])
     stages = Stages.of(Damage.none(), damage, 0, given.duration)
     sent, before = hexapod_world.told(given, stages, 0, 0)
-    femur = servos.JOINTS.index("left_front_femur")
+    femur = JOINTS.index("left_front_femur")
     assert sent[:, femur] == pytest.approx([1.3, 1.3]) and before[femur] == 1.3
-    assert sent[0, servos.JOINTS.index("right_rear_coxa")] == 0.1
+    assert sent[0, JOINTS.index("right_rear_coxa")] == 0.1
     with pytest.raises(BnsError, match="servo_gain"):
         HardwareHexapod(damage=["servo_gain:joint=all,factor=0.5"])
 

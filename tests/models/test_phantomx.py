@@ -6,7 +6,7 @@ import pytest
 
 from bns import models
 from bns.errors import BnsError, OutOfBoundsError
-from bns.models import ax12a, servo_pendulum
+from bns.models import ax12a, legs, servo_pendulum
 from bns.models.phantomx import gait, kinematics, servos
 from bns.worlds import servo_joint, servo_law
 
@@ -30,7 +30,7 @@ def test_feet_are_where_the_model_has_them(model):
         data.qpos[:7] = [0, 0, 0, 1, 0, 0, 0]
         data.qpos[7:] = goals
         mujoco.mj_kinematics(model, data)
-        seen = [data.site(f"{leg}_foot").xpos for leg in servos.LEGS]
+        seen = [data.site(f"{leg}_foot").xpos for leg in legs.LEGS]
         np.testing.assert_allclose(kinematics.feet(goals), seen, atol=1e-6)
 
 
@@ -56,7 +56,7 @@ def test_half_way_is_the_pose_of_the_makers_numbers():
 
 
 def test_the_makers_neutral_pose_is_nearly_symmetric():
-    by_joint = np.array([NEUTRAL[servos.IDS[joint] - 1] for joint in servos.JOINTS])
+    by_joint = np.array([NEUTRAL[servos.IDS[joint] - 1] for joint in legs.JOINTS])
     goals = servos.goals(by_joint).reshape(6, 3)
     np.testing.assert_allclose(goals[::2], goals[1::2], atol=22 * ax12a.UNIT)
     np.testing.assert_allclose(goals[:, 1], goals[0, 1], atol=18 * ax12a.UNIT)
@@ -77,7 +77,7 @@ def test_identities_and_signs():
     up = servos.registers(np.full(18, 0.1))
     assert up[1] < 512 < up[4]  # left and right femur
     names = [command.name for command in models.robot("phantomx").commands]
-    assert names == list(servos.JOINTS)
+    assert names == list(legs.JOINTS)
 
 
 def test_masses_add_up(model):

@@ -6,19 +6,25 @@ import numpy as np
 import pytest
 
 from bns import models
-from bns.errors import FormatError, UnknownNameError
+from bns.errors import BnsError, FormatError, UnknownNameError
 from bns.models import check, places
 from bns.worlds import registry
 from bns.worlds.trial import Commands
 from tests.sources import ROOT
 
-BURGER = ROOT / "examples" / "burger"
+BURGER, QUAD = ROOT / "examples" / "burger", ROOT / "examples" / "quad"
 
 
 @pytest.fixture
 def mine(tmp_path):
     """A copy of the burger that a test may spoil."""
     return shutil.copytree(BURGER, tmp_path / "burger")
+
+
+@pytest.fixture
+def walker(tmp_path):
+    """A copy of the four-legged robot that a test may spoil."""
+    return shutil.copytree(QUAD, tmp_path / "quad")
 
 
 def faults(place) -> dict[str, tuple[str, ...]]:
@@ -33,8 +39,9 @@ def spoil(place, file: str, old: str, new: str) -> None:
     (place / file).write_text(text.replace(old, new))
 
 
-def test_every_point_holds():
-    assert faults(BURGER) == {}
+@pytest.mark.parametrize("place", [BURGER, QUAD], ids=lambda place: place.name)
+def test_every_point_holds(place):
+    assert faults(place) == {}
 
 
 @pytest.mark.parametrize(
@@ -58,6 +65,50 @@ def test_what_is_wrong_is_said(mine, file, old, new, expected):
         spoil(mine, file, 'right_wheel" pos="0 -0.08', 'right_wheel" pos="0 0.08')
     found = [text for item in faults(mine).values() for text in item]
     assert any(expected in text for text in found), found
+
+
+@pytest.mark.parametrize(
+    "file, old, new, expected",
+    [
+        ("robot.toml", 'name = "left_rear_tibia"', 'name = "left_rear_knee"',
+         "no command is called 'left_rear_tibia'"),
+        ("quad.xml", 'geom name="left_front_foot"', 'geom name="left_front_toe"',
+         "no geom called 'left_front_foot'"),
+        ("quad.xml", 'contact name="own"', 'contact name="other"', "called 'own'"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_walker_is_said(walker, file, old, new, expected):
+    spoil(walker, file, old, new)
+    found = [text for item in faults(walker).values() for text in item]
+    assert any(expected in text for text in found), found
+
+
+def walked(*damage: str):
+    """Where the four-legged robot is after leaning to its front, under damage."""
+    channels = models.robot(str(QUAD)).channels
+    front = [channel.name.endswith("front_femur") for channel in channels]
+    lean = Commands(np.where(front, 0.4, 0.0)[None], [1.0], channels)
+    return registry.make("hexapod", robot=str(QUAD), damage=damage).run([lean])[0]
+
+
+def test_a_walker_stands_and_loses_a_leg():
+    whole, less = walked(), walked("leg_missing:legs=right_front")
+    assert not whole.outcome.fell and less.outcome.fell
+    assert np.abs(whole.poses_world[-1][1:]).max() < 1e-3  # it leans straight ahead
+
+
+@pytest.mark.parametrize(
+    "damage, expected",
+    [
+        ("leg_raised:legs=5", "has no leg 5; it has left_front"),
+        ("joint_locked:joint=left_middle_tibia", "has no leg 5"),
+        ("servo_gain:servo=right_middle,factor=0.5", "has no leg 6"),
+        ("leg_raised:legs=1,2,3,4", "take all 4 legs away"),
+    ],
+)
+def test_legs_that_a_walker_lacks_are_refused(damage, expected):
+    with pytest.raises(BnsError, match=expected):
+        walked(damage)
 
 
 def test_a_missing_table_of_numbers_is_a_fault(mine):

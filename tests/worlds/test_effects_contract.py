@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError, OutOfBoundsError, UnknownNameError
+from bns.models.legs import JOINTS
 from bns.worlds import servo_law
 from bns.worlds.effects import listing, registry
 from bns.worlds.effects.base import (
@@ -15,7 +16,6 @@ from bns.worlds.effects.base import (
     SensorEffect,
     ServoEffect,
 )
-from bns.worlds.effects.legs import JOINTS
 from tests.worlds.subjects import (
     DT,
     LEGGED,

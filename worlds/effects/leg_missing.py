@@ -2,9 +2,10 @@
 
 from typing import Any
 
+from bns.models.legs import PARTS
 from bns.worlds.effects import bodies
 from bns.worlds.effects.base import BodyEffect, Parameter
-from bns.worlds.effects.legs import LEG_SET, PARTS, read
+from bns.worlds.effects.legs import LEG_SET, read
 from bns.worlds.effects.legs import bodies as leg_bodies
 
 LEFT = 1e-4  # share of mass and inertia that stays, so that the joints can be computed

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from bns.models.legs import LEGS, PARTS
 from bns.worlds.effects.base import CommandEffect, ControlSignal, Parameter
-from bns.worlds.effects.legs import LEG_SET, LEGS, PARTS, read
+from bns.worlds.effects.legs import LEG_SET, read
 
 RAISED = {"coxa": 0.0, "femur": 1.3, "tibia": 0.0}  # [rad] foot 0.1 m above the hip
 

@@ -1,6 +1,6 @@
 """Legs and servos of a walking robot: how effects name and find them.
 
-Legs have numbers (the dissertation's, figure 7.2) and names. Sets of legs are written
+Legs have numbers and names (`bns.models.legs`). Sets of legs are written
 ``1,5``, ``left_front+left_middle`` or, by the number of a damage type, ``type4``.
 """
 
@@ -10,20 +10,8 @@ from itertools import combinations
 from typing import Any
 
 from bns.errors import BnsError, UnknownNameError
+from bns.models.legs import JOINTS, LEGS, PARTS, present
 from bns.worlds.effects.parameter import Choice
-
-LEGS = (
-    "left_front",
-    "right_front",
-    "left_rear",
-    "right_rear",
-    "left_middle",
-    "right_middle",
-)
-"""by number, 1 to 6"""
-
-PARTS = ("coxa", "femur", "tibia")
-JOINTS = tuple(f"{leg}_{part}" for leg in LEGS for part in PARTS)
 
 ALL = "all"
 
@@ -35,6 +23,18 @@ TYPES: dict[int, tuple[int, ...]] = {
 }  # fmt: skip
 """Damage types: 0 to 15 of the dissertation's table 7.1, and the four classes of one to
 four legs under its left-right and front-back symmetry that the table lacks."""
+
+
+def named(effect: Any) -> frozenset[int]:
+    """Legs that an effect's choices name one by one; "all" names none."""
+    found: set[int] = set()
+    for choice in effect.choices:
+        value = str(effect[choice.name])
+        if choice.name == "legs" and value != ALL:
+            found.update(read(value))
+        elif choice.name in ("servo", "joint"):
+            found.update(present([value, f"{value}_"]))
+    return frozenset(found)
 
 
 def text(legs: Iterable[int]) -> str:
@@ -147,16 +147,8 @@ def chosen(spec: Any, which: str) -> Iterator[Any]:
 
 
 def bodies(spec: Any, legs: str, part: str) -> Iterator[Any]:
-    """One part's bodies of a set of legs (text) in an `MjSpec`.
-
-    Raises:
-        BnsError: the model has no such legs.
-    """
+    """One part's bodies of a set of legs (text), of those that an `MjSpec` has."""
     for leg in read(legs):
         body = spec.body(f"{LEGS[leg - 1]}_{part}")
-        if body is None:
-            raise BnsError(
-                f"Model {spec.modelname!r} has no leg {LEGS[leg - 1]!r}: this effect "
-                "needs a robot with six legs; see `bns robots`."
-            )
-        yield body
+        if body is not None:
+            yield body

@@ -1,0 +1,28 @@
+"""What the legs of a walking robot and their joints are called.
+
+Legs have numbers (the dissertation's, figure 7.2) and names; a robot with fewer than
+six has some of them. A joint is called after leg and part, "left_front_femur".
+"""
+
+from collections.abc import Iterable
+
+LEGS = (
+    "left_front",
+    "right_front",
+    "left_rear",
+    "right_rear",
+    "left_middle",
+    "right_middle",
+)
+"""by number, 1 to 6"""
+
+PARTS = ("coxa", "femur", "tibia")
+"""from the body outwards"""
+
+JOINTS = tuple(f"{leg}_{part}" for leg in LEGS for part in PARTS)
+
+
+def present(joints: Iterable[str]) -> tuple[int, ...]:
+    """Numbers of the legs that a robot has, from the names of its joints."""
+    legs = {joint.rpartition("_")[0] for joint in joints}
+    return tuple(n for n, leg in enumerate(LEGS, start=1) if leg in legs)
