@@ -3,7 +3,8 @@
 Counted are runs whose damage costs at least 20 % fitness: mean cost of the onset trial
 and the next one over that of the same run's unharmed twin, which has the same starts
 and, in the onset trial, the same controller. Costs vary threefold with the start alone,
-so that over the five trials before, which is said as well, chance counts too.
+so that over the five trials before, which is said as well, chance counts too. False
+alarms are those of the unharmed twins, all trials before the damage among them.
 """
 
 import numpy as np
@@ -18,26 +19,26 @@ BAR = ">= 95 % detected, <= 1 false alarm per 500 undamaged trials"
 SHARE, ALARMS, COSTLY = 0.95, 1.0, 1.2
 RUNS = 30  # of each damage
 AFTER = 2  # trials from the damage on
+QUIET = 20  # trials of the unharmed twins from there on
 OVER_BEFORE = ("costly over the trials before", "of those detected")
 
 
 def run(quick: bool) -> Result:
     """`RUNS` of each of nine damages, from trial 20 on, nobody told (table 6.7)."""
     configs = {damage: watched(damage) for damage in light_runs.ALL}
-    twin = watched("unharmed")
+    twin = watched("unharmed", after=QUIET)
     records = forking.records([twin, *configs.values()], quick=quick)
-    whole = records[twin.preset]["fitness"]
+    whole, quiet = (records[twin.preset][name] for name in ("fitness", "detected"))
     found = {
         damage: _row(records[config.preset], light_runs.AFFECTED[damage], whole)
         for damage, config in configs.items()
     }
     costly = sum(row["costly runs"] for row in found.values())
     hits = sum(row["of them detected"] for row in found.values())
-    alarms = sum(row["false alarms"] for row in found.values())
-    trials = sum(row["undamaged trials"] for row in found.values())
+    alarms, trials = int((quiet > 0).sum()), quiet.size
     before = [sum(row[name] for row in found.values()) for name in OVER_BEFORE]
     few = quick or RUNS < experiments.REPLICATES
-    share, rate = hits / max(costly, 1), 500 * alarms / max(trials, 1)
+    share, rate = hits / max(costly, 1), 500 * alarms / trials
     return Result(
         figure=share,
         unit="of costly damages",
@@ -45,6 +46,8 @@ def run(quick: bool) -> Result:
         n=costly,
         details={
             "false alarms per 500 trials": round(rate, 3),
+            "false alarms": alarms,
+            "undamaged trials": trials,
             **dict(zip(OVER_BEFORE, before, strict=True)),
             **found,
         },
@@ -83,6 +86,4 @@ def _row(
         OVER_BEFORE[0]: int(over.sum()),
         OVER_BEFORE[1]: int((near.any(1) & over).sum()),
         "detected of all": int(near.any(1).sum()),
-        "false alarms": int(alarm[:, :onset].sum()),
-        "undamaged trials": int(alarm[:, :onset].size),
     }

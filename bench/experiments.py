@@ -96,7 +96,7 @@ def known(config: RunConfig) -> dict[str, Any]:
     if config.light.readings == plain.light.readings:
         del settings["light"]["readings"]
     if not config.watch.detect:
-        for name in ("floor", "reach", "near"):
+        for name in ("floor", "grow", "reach", "near", "largest"):
             del settings["watch"][name]
     return settings
 

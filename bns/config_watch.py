@@ -11,7 +11,7 @@ class WatchConfig:
     """watch for damage; the adaptations to damage then follow what is detected
     instead of being told"""
     threshold: float = 6.0
-    """an alarm is an innovation (a mean square) so many times what it ought to be"""
+    """an alarm is an innovation so many times what is usual in its run"""
     warmup: int = 6
     """trials that are seen before the first alarm"""
     history: int = 12
@@ -19,11 +19,16 @@ class WatchConfig:
     floor: float = 0.03
     """an SNN is believed no better than this share of the largest motion or reading;
     what a damage changes less is not looked for"""
+    grow: float = 0.3
+    """by this share more for each unit of distance to the `near` nearest learned
+    patterns (scaled inputs)"""
     reach: float = 0.4
-    """a pattern is on known ground where `near` learned ones lie no further away
-    (scaled inputs)"""
+    """a pattern is on known ground where a learned one lies no further away"""
     near: int = 5
-    """see `reach`; a trial with fewer patterns on known ground is not judged"""
+    """what an SNN errs by at some place is its error on so many learned patterns; a
+    trial with fewer patterns on known ground is not judged"""
+    largest: int = 5
+    """a trial is judged by so many of its patterns, those that stand out most"""
     forget: bool = False
     """drop old trials whose patterns the newest trial contradicts"""
     forget_factor: float = 3.0

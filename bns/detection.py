@@ -2,12 +2,14 @@
 
 After each trial, before training on it, the SNNs' misses are divided by what they
 ought to err by: the disagreement of the ensemble's members, the error on their own
-training patterns, and a floor. The mean square of that is the normalised innovation
-squared of filtering (Bar-Shalom, Li and Kirubarajan 2001, section 5.4), 1 while the
-robot is the one that was learned. SNNs are sure of themselves where they have never
-been, members of an ensemble alike, so only patterns on known ground count: those with
-several learned ones nearby. Each channel (a wheel, a sensor) has its own innovation;
-the one that rises most names what is damaged.
+training patterns, there and overall, a floor, and what grows with the distance from
+those patterns, since SNNs are sure of themselves where they have never been, members
+of an ensemble alike. Squared, that is the normalised innovation of filtering
+(Bar-Shalom, Li and Kirubarajan 2001, section 5.4), 1 or less while the robot is the one
+that was learned. A trial's innovation is the mean of its few largest: damage shows in
+few patterns where the others are on new ground, or where it is intermittent. Each
+channel (a wheel, a sensor) has its own; the one that rises most over what is usual in
+its run names what is damaged.
 """
 
 from dataclasses import dataclass
@@ -17,7 +19,7 @@ import numpy as np
 
 from bns.config_watch import WatchConfig
 
-USUAL = 0.9  # quantile of its history that an innovation is compared with; assumed
+LEAST = 0.5  # innovation that is usual where a history's median is lower; assumed
 
 
 class Alarms(NamedTuple):
@@ -26,8 +28,8 @@ class Alarms(NamedTuple):
     Attributes:
         on: runs with an alarm, ``(R,)`` bool.
         suspect: channel that rose most, ``(R,)``; -1 without an alarm.
-        score: that channel's innovation over what it ought to be, ``(R,)``; NaN while
-            there is too little history.
+        score: that channel's innovation over what is usual, ``(R,)``; NaN while there
+            is too little history.
     """
 
     on: np.ndarray
@@ -97,55 +99,89 @@ class Detector:
         }
 
     def _score(self, now: np.ndarray, past: np.ndarray) -> np.ndarray:
-        """Times what it ought to be: 1, or what it was of late, ``(R, C)``."""
+        """Times what was usual of late, ``(R, C)``."""
         enough = np.isfinite(past).sum(1) >= self.config.warmup
         ordered = np.where(enough[:, None], past, 0.0)
-        usual = np.maximum(np.nanquantile(ordered, USUAL, axis=1), 1.0)
+        usual = np.maximum(np.nanmedian(ordered, axis=1), LEAST)
         return np.where(enough, now / usual, np.nan)
 
 
-def familiar(
-    inputs: np.ndarray, learned: np.ndarray, config: WatchConfig
-) -> np.ndarray:
-    """Which patterns are on known ground: `near` learned ones are within `reach`.
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """Where patterns lie among learned ones.
 
-    Args:
-        inputs: of the patterns, scaled, ``(N, I)``.
-        learned: inputs of the patterns that were trained on, ``(M, I)``.
-        config: thresholds.
-
-    Returns:
-        ``(N,)`` bool.
+    Attributes:
+        known: whether one of them is within `reach`, ``(N,)`` bool.
+        nearest: the `near` nearest ones, ``(N, near)`` indices.
+        far: distance of the last of those, scaled, ``(N,)``.
     """
-    if len(learned) < config.near:
-        return np.zeros(len(inputs), bool)
-    square = (inputs**2).sum(1)[:, None] + (learned**2).sum(1) - 2 * inputs @ learned.T
-    last = np.partition(square, config.near - 1, axis=1)[:, config.near - 1]
-    return last <= config.reach**2
+
+    known: np.ndarray
+    nearest: np.ndarray
+    far: np.ndarray
+
+    @classmethod
+    def of(
+        cls, inputs: np.ndarray, learned: np.ndarray, config: WatchConfig
+    ) -> "Ground":
+        """The ground of some patterns.
+
+        Args:
+            inputs: of the patterns, scaled, ``(N, I)``.
+            learned: inputs of the patterns that were trained on, ``(M, I)``.
+            config: thresholds.
+        """
+        count, near = len(inputs), config.near
+        if len(learned) < near:
+            none = np.zeros((count, near), np.int64)
+            return cls(np.zeros(count, bool), none, np.full(count, np.inf))
+        square = (inputs**2).sum(1)[:, None] + (learned**2).sum(1)
+        square = square - 2 * inputs @ learned.T
+        nearest = np.argpartition(square, near - 1, axis=1)[:, :near]
+        there = np.take_along_axis(square, nearest, axis=1).clip(min=0)
+        known = there.min(axis=1) <= config.reach**2
+        return cls(known, nearest, np.sqrt(there.max(axis=1)))
+
+
+class Misses(NamedTuple):
+    """How far SNNs are off, N patterns and C channels.
+
+    Attributes:
+        new: on the patterns of a trial, ``(N, C)``.
+        doubt: variance of the ensemble's members there, ``(N, C)``; 0 without one.
+        learned: on the patterns they were trained on, ``(M, C)``.
+        usual: RMS of those, ``(C,)``.
+    """
+
+    new: np.ndarray
+    doubt: np.ndarray
+    learned: np.ndarray
+    usual: np.ndarray
 
 
 def innovation(
-    miss: np.ndarray,
-    disagreement: np.ndarray,
-    usual: np.ndarray,
-    known: np.ndarray,
-    config: WatchConfig,
-    unit: float = 1.0,
+    misses: Misses, ground: Ground, config: WatchConfig, unit: float = 1.0
 ) -> np.ndarray:
-    """Misses over what is to be expected, squared, mean of a trial on known ground.
+    """Misses over what is to be expected, squared, mean of a trial's largest.
 
     Args:
-        miss: of each pattern and channel, ``(N, C)``.
-        disagreement: variance of the ensemble's members, ``(N, C)``; 0 without one.
-        usual: RMS error on the patterns trained on, ``(C,)``.
-        known: see `familiar`, ``(N,)`` bool.
+        misses: of the SNNs.
+        ground: where the trial's patterns lie among the learned ones.
         config: thresholds.
-        unit: the largest motion or reading, in units of `miss`.
+        unit: the largest motion or reading, in units of the misses.
 
     Returns:
-        ``(C,)``; NaN with too few patterns.
+        ``(C,)``; NaN with too few patterns on known ground.
     """
+    known = ground.known
     if known.sum() < config.near:
-        return np.full(miss.shape[1], np.nan)
-    expected = disagreement + usual**2 + (config.floor * unit) ** 2
-    return np.mean((miss**2 / expected)[known], axis=0)
+        return np.full(misses.new.shape[1], np.nan)
+    here = np.mean(misses.learned[ground.nearest[known]] ** 2, axis=1)
+    blind = config.floor**2 + (config.grow * ground.far[known]) ** 2
+    expected = (
+        misses.doubt[known]
+        + np.maximum(misses.usual**2, here)
+        + blind[:, None] * unit**2
+    )
+    found = np.sort(misses.new[known] ** 2 / expected, axis=0)
+    return found[-config.largest :].mean(axis=0)

@@ -6,9 +6,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from bns import detection
 from bns.config import RunConfig
-from bns.detection import Detector
+from bns.detection import Detector, Ground, Misses, innovation
 from bns.forgetting import contradicted
 from bns.learner import Learner
 from bns.snn.network import forward
@@ -67,13 +66,31 @@ class WatchedLearner(Learner):
         if not self.spread[run].any():  # nothing was learned yet
             return np.full(len(CHANNELS), np.nan)
         output = self.scaling.output.cpu().numpy()
-        mild = np.abs(moved[:, 2]) < SHARP
-        said = ways(self._said(run, inputs)[:, mild] * output)
-        miss, watch = said.mean(0) - ways(moved[mild]), self.config.watch
-        known = detection.familiar(inputs[mild], self.buffer.inputs[run], watch)
-        return detection.innovation(
-            miss, said.var(0), self.rolled[run], known, watch, unit=float(output[0])
-        )
+        mild, said, miss = self._missed(run, inputs, moved / output)
+        learned = self.buffer.inputs[run]
+        gentle, _, known = self._missed(run, learned, self.buffer.targets[run])
+        watch = self.config.watch
+        ground = Ground.of(inputs[mild], learned[gentle], watch)
+        misses = Misses(miss, said.var(0), known, self.rolled[run])
+        return innovation(misses, ground, watch, unit=float(output[0]))
+
+    def _missed(
+        self, run: int, inputs: np.ndarray, moved: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Which patterns turn mildly; ways of the wheels there, and their misses.
+
+        Args:
+            run: which.
+            inputs, moved: of patterns, scaled.
+
+        Returns:
+            ``(N,)`` bool; of M of them, what each network says ``(G, M, 2)`` and how
+            far they are off together ``(M, 2)`` [m].
+        """
+        output = self.scaling.output.cpu().numpy()
+        mild = np.abs(moved[:, 2] * output[2]) < SHARP
+        said = ways(self._said(run, inputs[mild]) * output)
+        return mild, said, said.mean(0) - ways(moved[mild] * output)
 
     def _said(self, run: int, inputs: np.ndarray) -> np.ndarray:
         """Scaled outputs of each network with all of them, ``(G, N, 3)``."""
@@ -84,14 +101,13 @@ class WatchedLearner(Learner):
         return said.transpose(1, 2).double().cpu().numpy()
 
     def _learn(self, tried: Sequence[Trial]) -> dict[str, np.ndarray]:
-        row, output = super()._learn(tried), self.scaling.output.cpu().numpy()
+        row = super()._learn(tried)
         for run in range(self.runs):
             inputs = self.buffer.inputs[run]
             if len(inputs):
-                said, moved = self._said(run, inputs).mean(0), self.buffer.targets[run]
-                self.spread[run] = _rms(said - moved)
-                mild = np.abs(moved[:, 2] * output[2]) < SHARP
-                far = ways(said[mild] * output) - ways(moved[mild] * output)
+                moved = self.buffer.targets[run]
+                self.spread[run] = _rms(self._said(run, inputs).mean(0) - moved)
+                mild, _, far = self._missed(run, inputs, moved)
                 self.rolled[run] = _rms(far) if mild.any() else 1.0
         return row
 

@@ -17,6 +17,7 @@ from bns.gap import diagnose as single
 from bns.gap.confirmed import confirmed
 from bns.gap.diagnose import Analysis
 from bns.gap.light_model import SightModel
+from bns.gap.light_ranking import weighed
 from bns.gap.model import GapModel
 from bns.gap.problem import narrowed
 from bns.gap.records import Candidate, Diagnosis, Fit, Verdict
@@ -72,7 +73,8 @@ def look(
     **given: Any,
 ) -> Analysis:
     """What readings say by themselves; arguments as `diagnose.analyse`."""
-    return confirmed(single.analyse(trials, sight, rules=light_rules(rules), **given))
+    made = single.analyse(trials, sight, rules=light_rules(rules), **given)
+    return confirmed(weighed(made))
 
 
 def light_rules(rules: Calibration | None = None) -> Calibration:

@@ -218,9 +218,10 @@ class LightLearner:
                 self.sensors.miss(run, views),
                 self.simulator.scales,
             )
-            innovations[run] = watching.innovations(
-                self.motion, moved, self.sensors, views, run, self.config.watch
-            )
+            if self.config.watch.detect:
+                innovations[run] = watching.innovations(
+                    self.motion, moved, self.sensors, views, run, self.config.watch
+                )
             self._keep(run, number, moved, light)
             if self.configs[run].light.mirror:
                 self._keep(

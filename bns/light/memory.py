@@ -63,6 +63,10 @@ class Learned:
         said = forward(self.shape, self.theta[run : run + 1], seen)[0]
         return said.var(0, unbiased=False).cpu().numpy().T
 
+    def patterns(self, run: int) -> Patterns:
+        """Those a run has learned."""
+        return Patterns(self.buffer.inputs[run], self.buffer.targets[run])
+
     def append(self, run: int, trial: int, patterns: Patterns) -> None:
         """Keep a trial's patterns."""
         self.buffer.append(run, patterns.inputs, patterns.targets)

@@ -6,8 +6,8 @@ A wheel's miss is that of the way it rolled: half the turn's share less (left) o
 
 import numpy as np
 
-from bns import detection
 from bns.config_watch import WatchConfig
+from bns.detection import Ground, Misses, innovation
 from bns.light.memory import Learned
 from bns.light.patterns import Patterns
 
@@ -30,24 +30,36 @@ def innovations(
         run: which.
         config: thresholds.
     """
-    miss, doubt = motion.miss(run, moved), motion.doubt(run, moved)
-    usual = motion.spread[run].cpu().numpy()
-    ways = np.stack([miss[:, 0] - miss[:, 2], miss[:, 0] + miss[:, 2]], axis=1)
-    both = (doubt[:, 0] + doubt[:, 2])[:, None].repeat(2, axis=1)
-    rolled = np.full(2, np.hypot(usual[0], usual[2]))
-    parts = (
-        (motion, moved, ways, both, rolled),
-        (
-            sensors,
-            light,
-            sensors.miss(run, light),
-            sensors.doubt(run, light),
-            sensors.spread[run].cpu().numpy(),
-        ),
+    turned = motion.spread[run].cpu().numpy()
+    doubt = motion.doubt(run, moved)
+    wheels = Misses(
+        _ways(motion.miss(run, moved)),
+        (doubt[:, 0] + doubt[:, 2])[:, None].repeat(2, axis=1),
+        _ways(motion.miss(run, motion.patterns(run))),
+        np.full(2, np.hypot(turned[0], turned[2])),
     )
-    found = []
-    for part, patterns, *expected in parts:
-        learned = part.buffer.inputs[run]
-        known = detection.familiar(patterns.inputs, learned, config)
-        found.append(detection.innovation(*expected, known, config))
-    return np.concatenate(found)
+    eyes = Misses(
+        sensors.miss(run, light),
+        sensors.doubt(run, light),
+        sensors.miss(run, sensors.patterns(run)),
+        sensors.spread[run].cpu().numpy(),
+    )
+    rolled = Ground.of(moved.inputs, motion.buffer.inputs[run], config)
+    seen = Ground.of(_places(light.inputs), _places(sensors.buffer.inputs[run]), config)
+    return np.concatenate(
+        [innovation(wheels, rolled, config), innovation(eyes, seen, config)]
+    )
+
+
+def _ways(miss: np.ndarray) -> np.ndarray:
+    """Misses of the left and the right wheel's way."""
+    return np.stack([miss[:, 0] - miss[:, 2], miss[:, 0] + miss[:, 2]], axis=1)
+
+
+def _places(views: np.ndarray) -> np.ndarray:
+    """Inputs of the sensor SNNs with the logarithm of the lamp's distance.
+
+    Light falls off with the square of the distance: a step towards the lamp changes a
+    reading by the share of the way that is left.
+    """
+    return np.column_stack([views[:, :-1], np.log(views[:, -1])])

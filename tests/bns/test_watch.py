@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bns.config_watch import WatchConfig
-from bns.detection import Detector, familiar, innovation
+from bns.detection import Detector, Ground, Misses, innovation
 from bns.forgetting import contradicted
 from bns.light.learner import LightLearner
 from bns.light.policy import GenomePolicy
@@ -17,50 +17,100 @@ WATCH = WatchConfig()
 
 
 class TestInnovation:
-    known = np.ones(6, bool)
+    def judged(self, miss, *, usual=0.3, doubt=0.0, learned=0.0, far=0.0, unit=1.0):
+        """Innovation of patterns that all lie `far` from the same learned ones."""
+        miss = np.asarray(miss, float).reshape(len(miss), -1)
+        count, channels = miss.shape
+        near = np.tile(np.arange(WATCH.near), (count, 1))
+        ground = Ground(np.ones(count, bool), near, np.full(count, far))
+        misses = Misses(
+            miss,
+            np.full(miss.shape, doubt),
+            np.full((WATCH.near, channels), learned),
+            np.full(channels, usual),
+        )
+        return innovation(misses, ground, WATCH, unit=unit)
 
     def test_misses_as_large_as_expected_give_one(self):
-        miss = np.array([[0.3, -0.5], [-0.3, 0.5]] * 3)
-        usual = np.array([0.3, 0.5])
-        got = innovation(miss, np.zeros((6, 2)), usual, self.known, WATCH)
+        got = self.judged([[0.3, -0.3], [-0.3, 0.3]] * 3)
         np.testing.assert_allclose(got, [1.0, 1.0], rtol=0.02)
 
     def test_disagreement_excuses_a_miss(self):
-        miss, usual = np.full((6, 1), 0.5), np.array([0.3])
-        got = innovation(miss, np.full((6, 1), 0.16), usual, self.known, WATCH)
+        got = self.judged([0.5] * 6, doubt=0.16)
         np.testing.assert_allclose(got, 1.0, rtol=0.02)
 
     def test_what_the_floor_is_hides_smaller_misses(self):
-        miss, none = np.full((6, 1), 0.06), np.zeros((6, 1))
-        got = innovation(miss, none, np.zeros(1), self.known, WATCH, unit=2.0)
+        got = self.judged([0.06] * 6, usual=0.0, unit=2.0)
         np.testing.assert_allclose(got, 1.0)
 
+    def test_where_an_snn_always_erred_a_miss_is_no_news(self):
+        miss = [0.3] * 6
+        assert self.judged(miss, usual=0.05, learned=0.3) < 1.0
+        assert self.judged(miss, usual=0.05, learned=0.01) > 20.0
+
+    def test_far_from_what_was_learned_more_is_expected(self):
+        far, miss = 0.4, [WATCH.grow * 0.4] * 6
+        got = self.judged(miss, usual=0.0, far=far)
+        share = 1 / (1 + (WATCH.floor / (WATCH.grow * far)) ** 2)
+        np.testing.assert_allclose(got, share)
+
+    def test_a_few_patterns_that_stand_out_are_enough(self):
+        usual = np.hypot(0.3, WATCH.floor)
+        got = self.judged([4 * usual] * WATCH.largest + [0.0] * 95)
+        np.testing.assert_allclose(got, 16.0)
+        got = self.judged([4 * usual] + [0.0] * 99)
+        np.testing.assert_allclose(got, 16.0 / WATCH.largest)
+
     def test_patterns_on_new_ground_do_not_count(self):
-        known = np.array([True] * 5 + [False])
+        near = np.zeros((6, WATCH.near), int)
+        ground = Ground(np.array([True] * 5 + [False]), near, np.zeros(6))
         miss = np.array([[0.3]] * 5 + [[9.0]])
-        got = innovation(miss, np.zeros((6, 1)), np.array([0.3]), known, WATCH)
-        np.testing.assert_allclose(got, 1.0, rtol=0.02)
+        none = np.zeros((1, 1))
+        misses = Misses(miss, np.zeros((6, 1)), none, np.array([0.3]))
+        np.testing.assert_allclose(innovation(misses, ground, WATCH), 1.0, rtol=0.02)
 
     def test_with_too_few_patterns_nothing_is_said(self):
         known = np.array([True] * (WATCH.near - 1) + [False] * 3)
-        count = (len(known), 1)
-        got = innovation(np.ones(count), np.zeros(count), np.ones(1), known, WATCH)
-        assert np.isnan(got).all()
+        many = len(known)
+        ground = Ground(known, np.zeros((many, WATCH.near), int), np.zeros(many))
+        ones = np.ones((many, 1))
+        misses = Misses(ones, ones, ones, np.ones(1))
+        assert np.isnan(innovation(misses, ground, WATCH)).all()
 
-    def test_known_ground_has_enough_learned_patterns_within_reach(self):
-        here = np.zeros((WATCH.near, 2))
-        there = np.full((WATCH.near - 1, 2), 5.0)
-        near = 0.9 * WATCH.reach
-        asked = np.array([[near, 0.0], [1.2 * WATCH.reach, 0.0], [5.0, 5.0]])
-        got = familiar(asked, np.vstack([here, there]), WATCH)
-        assert got.tolist() == [True, False, False]
-        assert not familiar(asked, there, WATCH).any()
+    def test_ground_says_what_is_near_and_how_far(self):
+        learned = np.array([[0.0, 0.1 * k] for k in range(WATCH.near)] + [[9.0, 9.0]])
+        asked = np.array([[0.9 * WATCH.reach, 0.0], [-1.2 * WATCH.reach, 0.0]])
+        got = Ground.of(asked, learned, WATCH)
+        assert got.known.tolist() == [True, False]
+        assert sorted(got.nearest[0]) == [*range(WATCH.near)]
+        last = 0.1 * (WATCH.near - 1)
+        np.testing.assert_allclose(got.far[0], np.hypot(0.9 * WATCH.reach, last))
+        assert not Ground.of(asked, learned[: WATCH.near - 1], WATCH).known.any()
 
 
 class TestDetector:
     def noise(self, trials, runs=20, seed=1):
         rng = np.random.default_rng(seed)
         return np.exp(0.2 * rng.normal(size=(trials, runs, 4)))
+
+    def drawn(self, rng, *, gain=1.0, every=1):
+        """Innovation of 100 patterns of one channel, every so many misses larger."""
+        miss = rng.normal(0, 0.1, (100, 1))
+        miss[::every] *= gain
+        near = rng.integers(0, 600, (100, WATCH.near))
+        ground = Ground(np.ones(100, bool), near, np.full(100, 0.02))
+        learned = rng.normal(0, 0.1, (600, 1))
+        misses = Misses(miss, np.zeros((100, 1)), learned, np.array([0.1]))
+        return innovation(misses, ground, WATCH)
+
+    @pytest.mark.parametrize(("gain", "every"), [(4.0, 1), (5.0, 5)])
+    def test_planted_misses_raise_an_alarm_and_normal_ones_none(self, gain, every):
+        rng = np.random.default_rng(5)
+        rows = np.array([[self.drawn(rng) for _ in range(40)] for _ in range(50)])
+        detector = Detector.fresh(WATCH, 40, 1)
+        assert not any(detector.update(row).on.any() for row in rows)  # of 2000 trials
+        hurt = [self.drawn(rng, gain=gain, every=every) for _ in range(40)]
+        assert detector.update(np.array(hurt)).on.mean() >= 0.95
 
     def test_undamaged_robots_raise_hardly_an_alarm(self):
         detector = Detector.fresh(WATCH, 20, 4)
