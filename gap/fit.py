@@ -1,6 +1,6 @@
 """Bounded fits of one to three effects, started from the signatures."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +14,7 @@ FINISHES = 3  # rounds in which a rough fit is put right by the true simulation
 # Fits that are worse than the best by so many `HOPELESS` and by this share of what it
 # explains stay rough; the rough simulation may misjudge a strong effect by as much.
 FAR, SHARE = 2.0, 0.2
+SCAN = 0.7, 0.85, 1.15, 1.35, 1.6  # of a fitted departure, tried where curves wind
 
 
 def refine(problem: Problem, start: Sequence[Term]) -> Point:
@@ -43,7 +44,7 @@ def refine_all(
         return points
     made = _trued(problem, points)
     if not hasattr(problem.model, "sketch"):
-        return made
+        return _scanned(problem, made) if getattr(problem.model, "winding", 0) else made
     again = list(range(len(made)))
     for _ in range(FINISHES):
         best = min((point.loss for point in made), default=np.inf)
@@ -75,6 +76,33 @@ def _trued(problem: Problem, points: Sequence[Point]) -> list[Point]:
     for number, true in zip(near, exact, strict=True):
         made[number] = replace(true, slopes=points[number].slopes)
     return made
+
+
+def _scanned(problem: Problem, points: Sequence[Point]) -> list[Point]:
+    """Points moved to another magnitude where that is better; far ones as they are.
+
+    Where signatures wind, the loss has many minima, and going downhill ends in one.
+    """
+    made, asked = list(points), []
+    best = min((point.loss for point in points), default=np.inf)
+    for number, point in enumerate(points):
+        if point.loss < best + HOPELESS:
+            asked += [(number, terms) for terms in _elsewhere(point.terms)]
+    found = evaluate(problem, [terms for _, terms in asked])
+    for (number, _), other in zip(asked, found, strict=True):
+        if other.loss < made[number].loss:
+            made[number] = replace(other, slopes=points[number].slopes)
+    return made
+
+
+def _elsewhere(terms: Sequence[Term]) -> Iterator[tuple[Term, ...]]:
+    """A support with one of its magnitudes changed by a share of its departure."""
+    for place, term in enumerate(terms):
+        item = term.candidate
+        for share in SCAN:
+            value = item.nominal + share * (term.magnitude - item.nominal)
+            moved = replace(term, magnitude=min(max(value, item.low), item.high))
+            yield (*terms[:place], moved, *terms[place + 1 :])
 
 
 def _side_by_side(

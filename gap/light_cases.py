@@ -17,6 +17,7 @@ from bns.gap.cases import Answer, Case
 from bns.gap.fit import Term
 from bns.gap.light_diagnosis import unhandled
 from bns.gap.light_model import SightModel
+from bns.gap.light_weighing import apart
 from bns.gap.model import GapModel
 from bns.gap.null import Null
 from bns.gap.problem import Problem
@@ -35,6 +36,7 @@ ALL_SENSORS = (*SINGLE, *(name.removeprefix("ir_") for name in BEHIND))
 LEAST = 0.4  # size below which an effect counts as not excited, and is drawn again
 POWER = 1.2816  # standard normal: 90 %
 TRIES = 100
+NEAREST = 16  # candidates whose likelihood is compared with an effect's
 
 
 class Wanderer:
@@ -160,6 +162,7 @@ def _hide(
         magnitudes=(term.magnitude,),
         sizes=(reached,),
         aliases=(_alike(problem, curves, term),),
+        near=(_near(problem, curves, term),) if isinstance(model, SightModel) else (),
         detected=seen,
     )
     return made, [term.effect()]
@@ -172,6 +175,38 @@ def _alike(problem: Problem, curves: Curves, term: Term) -> tuple[str, ...]:
     near = {curves.candidates[c].name for c in np.flatnonzero(gaps < ALIKE**2)}
     near |= {other.name for other in likeness(problem, curves, term) if other.alike}
     return tuple(sorted(near | {term.candidate.name}))
+
+
+def _near(
+    problem: Problem, curves: Curves, term: Term
+) -> tuple[tuple[str, float, float], ...]:
+    """Candidates near an effect by the likelihood of readings: name, distance, angle.
+
+    The signatures count a reading twice, as departure and as scatter, and are limited;
+    they say who may be near, the likelihood how near. See `light_weighing.apart`.
+    """
+    (shown,) = problem.signatures([[term.effect()]])
+    gaps, levels = signatures.nearest(curves, shown)
+    mine = curves.candidates.index(term.candidate)
+    order = [c for c in np.argsort(gaps) if c != mine and np.isfinite(gaps[c])]
+    order = order[:NEAREST]
+    starts = [
+        Term.at(
+            curves.candidates[c],
+            int(curves.branch[levels[c]]),
+            float(curves.magnitude[levels[c]]),
+        )
+        for c in order
+    ]
+    distances = apart(problem, term, starts)
+    angles = {
+        curves.candidates[c].name: signatures.angle(
+            shown, curves.signature[levels[c]].astype(float)
+        )
+        for c in order
+    }
+    found = [(name, far, float(angles[name])) for name, far in distances.items()]
+    return tuple(sorted(found, key=lambda item: item[1]))
 
 
 def _draw(rng: np.random.Generator, curves: Curves, length: float) -> Term | None:

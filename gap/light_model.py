@@ -6,6 +6,7 @@ rather than shift, how large that departure is whatever its sign.
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 
 import numpy as np
 
@@ -35,6 +36,11 @@ SCATTER = 0.188  # standard deviation of `unlikely` of a normal number
 def squeezed(departure: np.ndarray) -> np.ndarray:
     """Departures of which large ones count less: a noisy sensor has many of them."""
     return 2 * np.arcsinh(departure / 2) / SQUEEZED
+
+
+def stretched(seen: np.ndarray) -> np.ndarray:
+    """Departures from what `squeezed` made of them."""
+    return 2 * np.sinh(seen * SQUEEZED / 2)
 
 
 def unlikely(departure: np.ndarray) -> np.ndarray:
@@ -184,18 +190,28 @@ class SightModel:
         return [[self._expected(trial, items) for trial in trials] for items in effects]
 
     def _expected(self, trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
+        departure = self.departures(trial, effects)
+        scatter = unlikely(departure).mean(axis=1) / SCATTER
+        mean = squeezed(departure).mean(axis=1)
+        return np.hstack([trial.observed[:, :3], mean, scatter])
+
+    def departures(self, trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
+        """Draws of readings' departures in units of their noise, ``(T, D, R)``."""
         reads = self._reads(trial)
         key = trial.observed[:, :3].tobytes()
         if key not in self._nominal:
             mean, spread, dither = self._norm(reads)
-            noise = dither[:, None] * extra(len(mean), mean.shape[1])
+            noise = extra(len(mean), self.reader.draws, mean.shape[1])
+            noise = dither[:, None] * noise
             self._nominal[key] = mean[:, None], spread[:, None], noise
         mean, spread, noise = self._nominal[key]
-        drawn = self.reader.samples(reads, effects) + noise
-        departure = (drawn - mean) / spread
-        scatter = unlikely(departure).mean(axis=1) / SCATTER
-        mean = squeezed(departure).mean(axis=1)
-        return np.hstack([trial.observed[:, :3], mean, scatter])
+        return (self.reader.samples(reads, effects) + noise - mean) / spread
+
+    def finer(self, draws: int) -> "SightModel":
+        """The same with other draws of each reading's noise."""
+        made = copy(self)
+        made.reader, made._nominal = self.reader.finer(draws), {}
+        return made
 
     def windows(self, trial: Trial) -> Windows:
         """One per reading: from the one before that was not lost."""

@@ -8,6 +8,7 @@ are known also where readings saturate.
 """
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,6 +50,7 @@ class Reader:
         singles: whether readings have each single sensor, else the virtual two alone.
         screen: what objects leave of the light.
         pose_sd: noise of the poses along which they are read [m, m, rad].
+        draws: of each reading's noise.
     """
 
     def __init__(
@@ -59,13 +61,20 @@ class Reader:
         singles: bool,
         screen: Screen | None = None,
         pose_sd: Sequence[float] = (0.0, 0.0, 0.0),
+        draws: int = DRAWS,
     ):
         self.field, self.sensors = field, sensors
-        self.singles, self.screen = singles, screen
+        self.singles, self.screen, self.draws = singles, screen, draws
         self._law = sensors.law(field)
         self.pose_sd = np.array(pose_sd, dtype=float)
         self._plain: dict[bytes, np.ndarray] = {}  # draws without an effect
         self._unsure: dict[bytes, np.ndarray] = {}
+
+    def finer(self, draws: int) -> "Reader":
+        """The same with other draws of each reading's noise."""
+        made = copy(self)
+        made.draws, made._plain = draws, {}
+        return made
 
     def expected(self, reads: Reads) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Nominal readings, ``(T, R)`` [counts] each.
@@ -103,7 +112,7 @@ class Reader:
         return self._unsure[key]
 
     def samples(self, reads: Reads, effects: Sequence[Effect]) -> np.ndarray:
-        """Draws of what would have been read, ``(T, DRAWS, R)`` [counts]."""
+        """Draws of what would have been read, ``(T, D, R)`` [counts]."""
         names = self.sensors.names
         raw = self._raw(reads, effects)
         count = len(reads.times)
@@ -116,17 +125,17 @@ class Reader:
             if effect.name == "sensor_swapped":  # finds the twin by its place
                 parts = [
                     effect.apply(reads.times, raw[:, k], names, on, rng)
-                    for k in range(DRAWS)
+                    for k in range(self.draws)
                 ]
                 raw = np.stack(parts, axis=1)
             else:  # all draws as sensors side by side
                 flat = raw.reshape(count, -1)
-                made = effect.apply(reads.times, flat, names * DRAWS, on, rng)
+                made = effect.apply(reads.times, flat, names * self.draws, on, rng)
                 raw = made.reshape(raw.shape)
         return raw if self.singles else self.sensors.virtual(raw)
 
     def _known(self, reads: Reads, drawn: np.ndarray) -> np.ndarray:
-        """From drawn first readings to the recorded ones, ``(DRAWS, S)``."""
+        """From drawn first readings to the recorded ones, ``(D, S)``."""
         if self.singles:
             return reads.first - drawn
         lacks = reads.first - self.sensors.virtual(drawn).mean(axis=0)
@@ -148,7 +157,7 @@ class Reader:
         for effect in optics:
             law = effect.change(law, self.sensors.names)
         light = self._light(law, reads, reads.poses)
-        shape = (len(light), DRAWS, light.shape[1])
+        shape = (len(light), self.draws, light.shape[1])
         drawn = _noise(*shape)
         noise = tuple(part.reshape(-1, shape[2]) for part in drawn[:2])
         moved = light[:, None] * (1 + self.unsure(reads)[:, None] * drawn[2])
@@ -176,9 +185,9 @@ def _noise(count: int, draws: int, sensors: int) -> np.ndarray:
     return _KEPT[key]
 
 
-def extra(count: int, channels: int) -> np.ndarray:
-    """Further noise of each reading and draw, ``(T, DRAWS, R)``."""
-    return _noise(count, DRAWS, channels)[3]
+def extra(count: int, draws: int, channels: int) -> np.ndarray:
+    """Further noise of each reading and draw, ``(T, D, R)``."""
+    return _noise(count, draws, channels)[3]
 
 
 def _clipped(

@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from bns.gap import winding
 from bns.gap.problem import Problem
 from bns.gap.records import Candidate
 
@@ -54,20 +55,9 @@ def integer(candidate: Candidate) -> bool:
 
 
 def trace(problem: Problem, candidates: Sequence[Candidate]) -> Curves:
-    """Simulate all candidates at all their magnitudes, in one batch."""
-    sets, where = [], []
-    for number, item in enumerate(candidates):
-        for branch in range(len(item.branches)):
-            for value in levels_of(problem, item):
-                sets.append([item.make(value, branch)])
-                where.append((number, branch, value))
-    found = problem.signatures(sets, rough=True)
-    finite = np.isfinite(found).all(axis=1)
-    diverged = tuple(str(s[0]) for s, ok in zip(sets, finite, strict=True) if not ok)
-    curves: dict[tuple[int, int], list] = {}
-    for (number, branch, value), row, ok in zip(where, found, finite, strict=True):
-        if ok:
-            curves.setdefault((number, branch), []).append((value, row))
+    """Simulate all candidates, each at several magnitudes."""
+    around = winding.simulated if getattr(problem.model, "winding", False) else _grid
+    curves, diverged = around(problem, candidates)
     owner, branches, magnitudes, rows = [], [], [], []
     for (number, branch), points in curves.items():
         for value, row in _between(candidates[number], points):
@@ -83,6 +73,24 @@ def trace(problem: Problem, candidates: Sequence[Candidate]) -> Curves:
         np.array(rows).reshape(len(rows), -1),
         diverged,
     )
+
+
+def _grid(problem: Problem, candidates: Sequence[Candidate]) -> tuple[dict, tuple]:
+    """All magnitudes of all candidates, in one batch; see `winding.simulated`."""
+    sets, where = [], []
+    for number, item in enumerate(candidates):
+        for branch in range(len(item.branches)):
+            for value in levels_of(problem, item):
+                sets.append([item.make(value, branch)])
+                where.append((number, branch, value))
+    found = problem.signatures(sets, rough=True)
+    finite = np.isfinite(found).all(axis=1)
+    diverged = tuple(str(s[0]) for s, ok in zip(sets, finite, strict=True) if not ok)
+    curves: dict[tuple[int, int], list] = {}
+    for (number, branch, value), row, ok in zip(where, found, finite, strict=True):
+        if ok:
+            curves.setdefault((number, branch), []).append((value, row))
+    return curves, diverged
 
 
 def levels_of(problem: Problem, candidate: Candidate) -> tuple[float, ...]:

@@ -31,7 +31,9 @@ TRIALS, COMMANDS = 2, 2  # recordings of a case, and commands in each
 LIMIT = 1.0  # [s] of a command
 SAMPLE = 0.04  # [s] between samples
 SEEN = 5.5  # whitened length that is found nine times in ten, about
-SIZES = 0.7, 10.0  # of an effect over that, drawn evenly in the logarithm
+# Of an effect over that, drawn evenly in the logarithm: of all sizes, and of those that
+# have to be named.
+SIZES = {"single": (0.7, 10.0), "large": (3.3, 10.0)}
 TRIES = 40
 
 
@@ -90,7 +92,7 @@ def build(seed: int, kind: str, model: WalkModel) -> WalkCase:
 
     Args:
         seed: of everything in it.
-        kind: "single" or "none".
+        kind: of `SIZES`, or "none".
         model: nominal model.
     """
     rng = seeding.generator(seed, "walk case", kind)
@@ -101,7 +103,7 @@ def build(seed: int, kind: str, model: WalkModel) -> WalkCase:
     plain = record(told, reality, seed)
     problem = Problem.of(plain, model, candidates=model.candidates())
     for _ in range(TRIES):
-        term = _drawn(rng, problem)
+        term = _drawn(rng, problem, SIZES[kind])
         if term is None:
             continue
         try:
@@ -113,7 +115,9 @@ def build(seed: int, kind: str, model: WalkModel) -> WalkCase:
     raise BnsError(f"No effect could be hidden in case {seed}.")
 
 
-def _drawn(rng: np.random.Generator, problem: Problem) -> Term | None:
+def _drawn(
+    rng: np.random.Generator, problem: Problem, sizes: tuple[float, float]
+) -> Term | None:
     """A candidate, drawn evenly over effects, about as strong as drawn."""
     joint = JOINTS[int(rng.integers(len(JOINTS)))]
     leg = LEGS[int(rng.integers(len(LEGS)))]
@@ -131,7 +135,7 @@ def _drawn(rng: np.random.Generator, problem: Problem) -> Term | None:
     up = rng.random() < 0.5
     marks = [v for v in item.grid if (v > item.nominal) == up] or list(item.grid)
     marks = sorted(marks, key=lambda value: abs(value - item.nominal))
-    wanted = SEEN * float(np.exp(rng.uniform(*np.log(SIZES))))
+    wanted = SEEN * float(np.exp(rng.uniform(*np.log(sizes))))
     found = problem.signatures([[item.make(value, branch)] for value in marks])
     lengths = np.linalg.norm(found, axis=1)
     if not np.isfinite(lengths).all() or lengths.max() < 0.7 * wanted:

@@ -44,6 +44,8 @@ class WalkModel:
 
     timed = False
     """commands last until the robot rests, not as long as they are told"""
+    winding = True
+    """signatures turn as effects grow, see `winding`"""
 
     def __init__(self, robot: str = "phantomx", *, pose_sd: Sequence[float] = TRACKER):
         world = HexapodWorld(robot, threads=1)

@@ -193,7 +193,7 @@ def job(
     ramps = legged_goals.ramps(np.concatenate(goals), home, speed * dt)
     cuts = np.cumsum([len(told) for _, told in segments])
     pieces = _pieces(segments, cuts, ramps, counts, limits)
-    begin = stand(first, start, home.tobytes())
+    begin = stand(first, start, (home + 0.0).tobytes())  # -0 stands as 0 does
     return WalkJob(begin, pieces), servos(segments[-1].compiled)
 
 

@@ -1,0 +1,71 @@
+"""Candidates are simulated where they do about as much as a recording departs."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bns.gap import fit, signatures, winding
+from bns.gap.walk_library import candidates
+from bns.gap.walk_where import Suspects
+
+(GRIP,) = (
+    item
+    for item in candidates(Suspects((), (), True))
+    if item.name == "foot_slippery[all]"
+)
+
+
+class Turning:
+    """A recording of a robot whose signature goes round as its grip grows."""
+
+    model = SimpleNamespace(winding=True)
+
+    def __init__(self, factor: float):
+        self.rest, self.asked = self._shown(factor), []
+
+    def _shown(self, factor: float) -> np.ndarray:
+        off = factor - 1.0
+        return 200.0 * off * np.array([np.cos(4 * off), np.sin(4 * off)])
+
+    def signatures(self, effects, *, rough=False):
+        factors = [effect["factor"] for (effect,) in effects]
+        self.asked += factors
+        rows = np.array([self._shown(factor) for factor in factors])
+        rows[np.array(factors) < 0.2] = np.nan  # diverged
+        return rows
+
+
+@pytest.mark.parametrize("factor", [1.02, 1.15, 1.5, 0.6])
+def test_a_magnitude_near_the_true_one_is_simulated(factor):
+    problem = Turning(factor)
+    curves = signatures.trace(problem, [GRIP])
+    gap = np.linalg.norm(curves.signature - problem.rest, axis=1).min()
+    assert gap < 0.5 * np.linalg.norm(problem.rest)
+
+
+def test_what_does_far_more_than_the_recording_shows_is_left_out():
+    strong = (0.1, 0.5, 1.3, 1.7)
+    problem = Turning(1.05)
+    item = SimpleNamespace(
+        grid=strong, nominal=1.0, branches=({},), make=GRIP.make, name=GRIP.name
+    )
+    winding.simulated(problem, [item])
+    assert 1.3 in problem.asked
+    assert 1.7 not in problem.asked
+    assert len(problem.asked) <= len(strong) + 2 * winding.TRIES
+
+
+def test_what_diverges_is_told_and_does_not_count():
+    found, diverged = winding.simulated(Turning(1.5), [GRIP])
+    assert [value for value, _ in found[0, 0] if value < 0.2] == []
+    assert len(diverged) == 1
+    assert "foot_slippery" in diverged[0]
+
+
+def test_a_fit_looks_beyond_the_minimum_it_ends_in():
+    problem = Turning(1.3)
+    start = [fit.Term.at(GRIP, 0, 0.9)]
+    found = fit.refine(problem, start)
+    problem.model = SimpleNamespace(winding=False)
+    assert found.loss < 0.5 * fit.refine(problem, start).loss
