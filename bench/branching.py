@@ -1,11 +1,13 @@
 """A run that begins as a copy of another one, up to where the two begin to differ."""
 
+from dataclasses import replace
+
 from bench import experiments
 from bns.config import RunConfig
 from bns.errors import BnsError
 
 
-def begin(trunk: RunConfig, branch: RunConfig) -> None:
+def begin(trunk: RunConfig, branch: RunConfig, *, idle: tuple[str, ...] = ()) -> None:
     """Give a run, unless it has begun, the trials and the learner's state of another.
 
     A run and its bytes depend on its seed, its settings and, trial by trial, on its
@@ -15,6 +17,8 @@ def begin(trunk: RunConfig, branch: RunConfig) -> None:
     Args:
         trunk: of a finished run that `experiments` keeps.
         branch: of the run to begin, which goes on for longer.
+        idle: sections in which the two may differ since, up to there, what they ask
+            for does nothing; that is the caller's to see.
 
     Raises:
         BnsError: the two differ before the trunk's end.
@@ -24,7 +28,8 @@ def begin(trunk: RunConfig, branch: RunConfig) -> None:
     from bns.store import RunStore
     from bns.worlds.damage import Damage
 
-    refuse_unlike(trunk, branch, Damage.parse(branch.world.damage).first_trial)
+    shared = replace(branch, **{name: getattr(trunk, name) for name in idle})
+    refuse_unlike(trunk, shared, Damage.parse(branch.world.damage).first_trial)
     place = experiments.directory(branch)
     if (place / "run.json").exists():
         return
@@ -49,8 +54,6 @@ def refuse_unlike(trunk: RunConfig, branch: RunConfig, onset: int) -> None:
         BnsError: settings differ beside damage and number of trials, or the damage
             sets in too early.
     """
-    from dataclasses import replace
-
     world = replace(branch.world, damage=trunk.world.damage)
     alike = replace(branch, preset=trunk.preset, trials=trunk.trials, world=world)
     if alike != trunk or trunk.world.damage or 0 <= onset < trunk.trials:

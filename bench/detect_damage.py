@@ -19,14 +19,13 @@ BAR = ">= 95 % detected, <= 1 false alarm per 500 undamaged trials"
 SHARE, ALARMS, COSTLY = 0.95, 1.0, 1.2
 RUNS = 30  # of each damage
 AFTER = 2  # trials from the damage on
-QUIET = 20  # trials of the unharmed twins from there on
 OVER_BEFORE = ("costly over the trials before", "of those detected")
 
 
 def run(quick: bool) -> Result:
     """`RUNS` of each of nine damages, from trial 20 on, nobody told (table 6.7)."""
     configs = {damage: watched(damage) for damage in light_runs.ALL}
-    twin = watched("unharmed", after=QUIET)
+    twin = watched("unharmed")
     records = forking.records([twin, *configs.values()], quick=quick)
     whole, quiet = (records[twin.preset][name] for name in ("fitness", "detected"))
     found = {

@@ -14,8 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bench import branching, experiments
+from bench import branching, experiments, hexapod_evidence
 from bns.config import RunConfig
+from bns.errors import BnsError
 from bns.record import RunRecord
 from bns.store import RunStore
 from bns.worlds.trial import Trial
@@ -66,20 +67,22 @@ def undamaged(group: str = "", *, trials: int = ONSET, **walk: object) -> RunCon
     return replace(named, replicates=GROUP)
 
 
-def damaged(legs: str, group: str = "a") -> RunConfig:
+def damaged(legs: str, group: str = "a", *, forget: bool = False) -> RunConfig:
     """A batch of the preset whose legs are raised from trial `ONSET` on.
 
     Args:
         legs: as the effect `leg_raised` takes them.
         group: of which undamaged batch it is the continuation.
+        forget: forget by evidence, beside the window.
     """
     trunk = undamaged(group)
     damage = (f"leg_raised:legs={legs},blend=1@{ONSET}",)
     return replace(
         trunk,
-        preset=f"walk-{legs}-{group}",
+        preset=f"walk-{'forget-' if forget else ''}{legs}-{group}",
         trials=ONSET + AFTER,
         world=replace(trunk.world, damage=damage),
+        watch=replace(trunk.watch, forget=forget),
     )
 
 
@@ -127,14 +130,20 @@ def adequate(record: RunRecord, hand: Hand) -> np.ndarray:
     return in_time(record, hand.seconds) >= hand.distance
 
 
-def recovering(*, quick: bool = False) -> Mapping[str, RunRecord]:
-    """The runs of each damage of `TYPES`; quick: one small run of each."""
+def recovering(*, quick: bool = False, forget: bool = False) -> Mapping[str, RunRecord]:
+    """The runs of each damage of `TYPES`; quick: one small run of each.
+
+    Raises:
+        BnsError: to forget by evidence would have changed the undamaged runs.
+    """
     wanted = [(legs, group) for legs in TYPES for group in RECOVERING]
-    configs = {key: damaged(*key) for key in wanted}
+    configs = {key: damaged(*key, forget=forget) for key in wanted}
     if not quick:
-        records([undamaged(group) for group in RECOVERING])
+        trunks = records([undamaged(group) for group in RECOVERING])
+        if forget and any(hexapod_evidence.forgets(t).any() for t in trunks.values()):
+            raise BnsError("Run the undamaged runs with watch.forget, too.")
         for (_, group), config in configs.items():
-            branching.begin(undamaged(group), config)
+            branching.begin(undamaged(group), config, idle=("watch",) * forget)
     found = records(configs.values(), quick=quick)
     return {
         legs: joined([found[configs[legs, group].preset] for group in RECOVERING])

@@ -15,13 +15,20 @@ MILD, LIMIT_MILD, LIMIT = ("type0", "type1", "type3"), 30, 46
 def run(quick: bool) -> Result:
     """Damage from trial 100 of 150, ten runs a type; quick: one of 12 trials.
 
-    The runs of all types are those of `hexapod-gait` up to the damage.
+    The runs of all types are those of `hexapod-gait` up to the damage. The figure is
+    that of the window; beside it, from the same undamaged runs on, what forgetting by
+    evidence comes to (`watch.forget`).
     """
     records = hexapod_runs.recovering(quick=quick)
+    others = hexapod_runs.recovering(quick=quick, forget=True)
     found: dict[str, object] = {}
     medians, holds = [], True
     for legs, record in records.items():
         row = found[legs] = _recovery(legs, record)
+        row["with watch.forget"] = {
+            **_recovery(legs, others[legs]),
+            "trials until it forgot": solving.waits(_forgot(others[legs])),
+        }
         median = row["median"]
         limit = LIMIT_MILD if legs in MILD else LIMIT
         holds = holds and median is not None and median <= limit
@@ -33,6 +40,13 @@ def run(quick: bool) -> Result:
         n=min(record.replicates for record in records.values()),
         details=found,
     )
+
+
+def _forgot(record: RunRecord) -> np.ndarray:
+    """Trials with the damage until old patterns were dropped, ``(R,)``; inf = never."""
+    onset = int(record.damage_onset[0])
+    dropped = np.diff(record["patterns"][:, onset - 1 :], axis=1) < 0
+    return np.where(dropped.any(1), dropped.argmax(1) + 1.0, np.inf)
 
 
 def _recovery(legs: str, record: RunRecord) -> dict[str, object]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class WatchConfig:
-    """Damage detection, and forgetting by evidence (navigation, light following)."""
+    """Damage detection (navigation, light following), and forgetting by evidence."""
 
     detect: bool = False
     """watch for damage; the adaptations to damage then follow what is detected
@@ -30,7 +30,9 @@ class WatchConfig:
     largest: int = 5
     """a trial is judged by so many of its patterns, those that stand out most"""
     forget: bool = False
-    """drop old trials whose patterns the newest trial contradicts"""
+    """drop old trials whose patterns the newest trial contradicts; a walker drops all
+    that came before a change of the robot (bns/walk/forgetting.py), and the settings
+    below are not for it"""
     forget_factor: float = 3.0
     """an old trial is contradicted when it differs from the newest one by so many
     times what the newest one differs from itself"""

@@ -42,8 +42,13 @@ class PatternBuffer:
 
     def clear(self, run: int) -> None:
         """Forget all patterns of a run."""
-        self.inputs[run] = self.inputs[run][:0]
-        self.targets[run] = self.targets[run][:0]
+        self.keep(run, 0)
+
+    def keep(self, run: int, newest: int) -> None:
+        """Forget all patterns of a run but so many of the newest."""
+        first = max(len(self.inputs[run]) - newest, 0)
+        self.inputs[run] = self.inputs[run][first:]
+        self.targets[run] = self.targets[run][first:]
 
     @property
     def counts(self) -> np.ndarray:

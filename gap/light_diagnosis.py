@@ -176,13 +176,16 @@ def _fits(first: Diagnosis, second: Diagnosis) -> tuple[Fit, ...]:
     bare = [next(fit for fit in part.fits if not fit.names) for part in (first, second)]
     made = [_joined(fit, bare[1]) for fit in first.fits]
     made += [_joined(bare[0], fit) for fit in second.fits if fit.names]
-    for a, b in product(first.verdict.named, second.verdict.named):
-        made.append(_joined(_of(first, a), _of(second, b)))
+    for a, b in product(_named(first), _named(second)):
+        made.append(_joined(a, b))
     return tuple(made)
 
 
-def _of(found: Diagnosis, names: tuple[str, ...]) -> Fit:
-    return next(fit for fit in found.fits if set(fit.names) == set(names))
+def _named(found: Diagnosis) -> list[Fit]:
+    """Fits of the named supports; of many the first ones alone are listed."""
+    fits = {frozenset(fit.names): fit for fit in found.fits}
+    wanted = map(frozenset, found.verdict.named)
+    return [fits[names] for names in wanted if names in fits]
 
 
 def _joined(a: Fit, b: Fit) -> Fit:

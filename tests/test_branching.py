@@ -7,6 +7,7 @@ import pytest
 from bench import branching, experiments
 from bns.errors import BnsError
 from bns.run import train
+from bns.store import RunStore
 from tests.bns.walkers import small
 
 ONSET = 6
@@ -47,3 +48,14 @@ def test_a_branch_has_the_bytes_of_a_run_from_the_start(trunk, tmp_path):
 def test_a_branch_that_differs_earlier_is_refused(trunk, changes):
     with pytest.raises(BnsError, match="branch is no continuation of trunk"):
         branching.begin(trunk, damaged(trunk, **changes))
+
+
+def test_a_section_that_did_nothing_in_the_trunk_may_differ(trunk):
+    branch = damaged(trunk, watch=replace(trunk.watch, forget=True))
+    train(trunk, experiments.directory(trunk))
+    with pytest.raises(BnsError, match="no continuation"):
+        branching.begin(trunk, branch)
+    branching.begin(trunk, branch, idle=("watch",))
+    place = experiments.directory(branch)
+    assert len(list((place / "steps").iterdir())) == ONSET
+    assert RunStore.open(place).config.watch.forget

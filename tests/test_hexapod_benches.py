@@ -1,9 +1,18 @@
 """What the walking benches count, on records and searches whose answer is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from bench import hexapod_ceiling, hexapod_gait, hexapod_loads, hexapod_runs
+from bench import (
+    hexapod_ceiling,
+    hexapod_evidence,
+    hexapod_gait,
+    hexapod_loads,
+    hexapod_runs,
+    recover_hexapod,
+)
 from bns.record import RunRecord
 from tests.bns.walkers import small
 
@@ -55,6 +64,29 @@ def test_damaged_runs_continue_the_undamaged_ones():
     assert branch.trials == trunk.trials + hexapod_runs.AFTER
     assert branch.adaptation.window == trunk.adaptation.window == 300
     assert branch.world.damage == ("leg_raised:legs=type5,blend=1@100",)
+
+
+def test_runs_that_forget_differ_in_that_alone():
+    plain, other = (hexapod_runs.damaged("type2", forget=f) for f in (False, True))
+    assert other.watch.forget and not plain.watch.forget
+    assert replace(other, watch=plain.watch, preset=plain.preset) == plain
+
+
+def test_the_first_trial_with_fewer_patterns_is_when_it_forgot():
+    runs = record(np.zeros((3, 5)), onset=2)
+    counts = [[11, 22, 33, 22, 33], [30, 30, 30, 30, 30], [22, 33, 33, 33, 22]]
+    runs.columns["patterns"] = np.array(counts, float)
+    assert recover_hexapod._forgot(runs).tolist() == [2.0, np.inf, 3.0]
+
+
+def test_what_a_learner_would_have_forgotten_is_told_from_its_record():
+    walk = np.random.default_rng(0).uniform(-0.5, 0.5, (11, 18))
+    sent = np.tile(walk, (2, 12, 1, 1))  # the same in every trial
+    runs = replace(record(np.zeros((2, 12))), sent=sent)
+    runs.poses[..., 0] = np.linspace(0, 1, 12)
+    runs.poses[1, 9:] *= -1.0  # the second robot goes the other way from trial 9 on
+    assert not hexapod_evidence.forgets(runs)[0].any()
+    assert hexapod_evidence.forgets(runs)[1].argmax() == 10  # one trial says nothing
 
 
 def test_the_search_climbs_and_stays_within_the_stops(monkeypatch):

@@ -20,11 +20,10 @@ def make(
     """The learner of a batch, see `bns.walk.learner.WalkLearner`."""
     from bns.walk.learner import WalkLearner
 
-    watch = configs[0].watch
-    if watch.detect or watch.forget:
+    if configs[0].watch.detect:
         raise BnsError(
-            "watch.detect and watch.forget are for navigation and light following; "
-            "leave them out."
+            "watch.detect is for navigation and light following; leave it out. "
+            "watch.forget is for walking, too."
         )
     return WalkLearner(configs, replicates=replicates, onsets=onsets)
 

@@ -21,7 +21,7 @@ from bns.learner import Learner, check_alike
 from bns.patterns import PatternBuffer
 from bns.snn.network import Shape
 from bns.snn.scaling import OUTPUTS
-from bns.walk import observing, scaling
+from bns.walk import forgetting, observing, scaling
 from bns.walk.evaluation import WalkEvaluator
 from bns.walk.goals import TICK, GoalBreeder, Goals
 from bns.walk.loops import WalkLoops
@@ -119,6 +119,16 @@ class WalkLearner(Learner):
     def _predicted_cost(self) -> np.ndarray:
         poses = self.evaluator.poses(self.theta, self._chosen)[:, 0]
         return observing.cost(observing.distance(poses.double().cpu().numpy()))
+
+    def _train(self, which: Tensor) -> None:
+        """Train, once what is of another robot than now has been forgotten."""
+        if self.config.watch.forget:
+            for run in range(self.runs):
+                seen, told = self.buffer.inputs[run], self.buffer.targets[run]
+                newest = forgetting.changed(seen, told, self.config.walk.commands)
+                if newest:
+                    self.buffer.keep(run, newest)
+        super()._train(which)
 
     def _patterns(self, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
         return scaling.of_trial(trial)

@@ -76,9 +76,18 @@ def fit(
         shown = inputs.gather(2, index.expand(-1, inputs.shape[1], -1))
         wanted = targets.gather(2, index.expand(-1, targets.shape[1], -1))
         keep = dropout(shape, off, shown, draws) if off else None
-        grad = gradient(shape, theta, shown, wanted.unsqueeze(1), some, keep) / batch
+        grad = _gradient(shape, theta, shown, wanted.unsqueeze(1), some, keep) / batch
         here = torch.tensor(number / steps)
         rate = config.walk.learning_rate * (1 + torch.cos(torch.pi * here)) / 2
         grad = grad + decay * theta
         theta, state = adam(theta, grad, state, rate, torch.tensor(number + 1.0))
     return theta, mean_error(shape, theta, patterns)
+
+
+def _gradient(shape: Shape, theta: Tensor, *patterns: Tensor | None) -> Tensor:
+    """As `gradient`; on a CPU run by run, since one run's activations fit its cache."""
+    if theta.device.type != "cpu":
+        return gradient(shape, theta, *patterns)
+    parts = [(None,) * len(theta) if p is None else p.split(1) for p in patterns]
+    rows = zip(theta.split(1), *parts, strict=True)
+    return torch.cat([gradient(shape, *row) for row in rows])

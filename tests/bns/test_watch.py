@@ -153,6 +153,13 @@ class TestDetector:
         on = [bool(detector.update(row).on[0]) for row in rows]
         assert np.flatnonzero(on).tolist() == [18, 20]
 
+    def test_a_few_wild_trials_do_not_hide_what_follows(self):
+        detector = Detector.fresh(WATCH, 1, 4)
+        rows = np.ones((19, 1, 4))
+        rows[[8, 11, 14]], rows[18] = 50.0, 8.0
+        on = [bool(detector.update(row).on[0]) for row in rows]
+        assert np.flatnonzero(on).tolist() == [8, 11, 14, 18]
+
     def test_lost_trials_are_no_news(self):
         detector = Detector.fresh(WATCH, 1, 4)
         for trial in range(30):

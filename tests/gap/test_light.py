@@ -187,6 +187,12 @@ def test_verdicts_on_motion_and_light_join():
     assert light_diagnosis.merged(strange, gain).kind == "none of the library"
 
 
+def test_of_many_supports_those_listed_are_joined():
+    listed = SimpleNamespace(names=("a",))
+    many = SimpleNamespace(fits=[listed], verdict=verdict("either", "a", "b"))
+    assert light_diagnosis._named(many) == [listed]
+
+
 def test_a_recording_with_light_is_diagnosed_whole():
     gain = registry.make("sensor_gain", sensor="right", factor=0.9)
     slow = registry.make("wheel_gain", wheel="left", factor=0.9)

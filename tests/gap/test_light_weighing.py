@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bench.gap_light_effects import Coarse
+from bench.gap_sensors import _likened
 from bns.gap import diagnose, light_cases
 from bns.gap.fit import Term
 from bns.gap.light_diagnosis import light_rules
@@ -83,3 +84,12 @@ def test_without_a_gap_nothing_is_weighed():
     made = analysis()
     assert made.verdict.kind == "no gap"
     assert weighed(made) is made
+
+
+def test_what_the_likelihood_cannot_tell_is_merged():
+    row = {"answer": {"aliases": [["a"], ["b"]], "near": [[["c", 1.6, 5.0]], []]}}
+    assert _likened(row)["answer"]["aliases"] == [["a", "c"], ["b"]]
+    row["answer"]["near"][0][0][1] = 1.7
+    assert _likened(row)["answer"]["aliases"] == [["a"], ["b"]]
+    row["answer"]["near"] = []
+    assert _likened(row)["answer"]["aliases"] == [["a"], ["b"]]
