@@ -29,8 +29,8 @@ def residuals(
     chosen = rng.integers(0, len(problem.trials), (DRAWS, len(problem.trials)))
     rms, low, high = [], [], []
     for square in squares:
-        rms.append(np.sqrt(np.nanmean(square, axis=0)))
-        drawn = np.sqrt(np.nanmean(square[chosen], axis=1))
+        rms.append(np.sqrt(_mean(square, 0)))
+        drawn = np.sqrt(_mean(square[chosen], 1))
         low.append(np.nanquantile(drawn, 0.05, axis=0))
         high.append(np.nanquantile(drawn, 0.95, axis=0))
     return Residuals(
@@ -41,6 +41,13 @@ def residuals(
         channels=tuple(channel.name for channel in problem.model.features),
         units=tuple(channel.unit for channel in problem.model.features),
     )
+
+
+def _mean(square: np.ndarray, axis: int) -> np.ndarray:
+    """Mean of what is there; NaN where nothing is (trials shorter than a horizon)."""
+    there = ~np.isnan(square)
+    count, total = there.sum(axis), np.where(there, square, 0.0).sum(axis)
+    return np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
 
 
 def by_trial(problem: Problem, effects: Sequence[Effect], horizon: float) -> np.ndarray:

@@ -20,10 +20,10 @@ from bns.gap.problem import Problem
 from bns.gap.support import Term
 from bns.gap.walk_model import TRACKER, WalkModel
 from bns.gap.walk_where import Suspects
+from bns.models.legs import JOINTS, LEGS
 from bns.models.phantomx import gait
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect
-from bns.worlds.effects.legs import JOINTS, LEGS
 from bns.worlds.hexapod_world import HexapodWorld
 from bns.worlds.trial import Channel, Commands, Trial
 

@@ -1,14 +1,14 @@
 """Candidate explanations for a walking robot, from the library of effects."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
 from bns.gap.records import Candidate
 from bns.gap.walk_where import Suspects
+from bns.models.legs import JOINTS, LEGS, PARTS, present
 from bns.worlds.effects import registry
-from bns.worlds.effects.legs import JOINTS, LEGS, PARTS
 
 UPHILL = tuple({"direction": k * np.pi / 2} for k in (-1, 0, 1, 2))
 
@@ -44,19 +44,22 @@ EXCITE = {
 }
 
 
-def candidates(found: Suspects) -> tuple[Candidate, ...]:
+def candidates(
+    found: Suspects, joints: Sequence[str] = JOINTS
+) -> tuple[Candidate, ...]:
     """All candidates, in a fixed order.
 
     Args:
         found: joints and legs that are suspected beside all of them.
+        joints: that the robot has.
     """
-    return (*_servos(found), *_legs(), *_body())
+    return (*_servos(found, joints), *_legs(present(joints)), *_body())
 
 
-def _servos(found: Suspects) -> Iterable[Candidate]:
+def _servos(found: Suspects, joints: Sequence[str]) -> Iterable[Candidate]:
     for effect, parameter, grid, low, high, slack in _SERVOS:
         everywhere = ("all",) if found.all or slack else ()
-        near = JOINTS if effect in HIDDEN else found.joints
+        near = joints if effect in HIDDEN else found.joints
         for servo in (*everywhere, *found.legs, *near):
             yield _candidate(
                 effect,
@@ -70,9 +73,9 @@ def _servos(found: Suspects) -> Iterable[Candidate]:
             )
 
 
-def _legs() -> Iterable[Candidate]:
-    for leg in ("all", *LEGS):
-        number = "all" if leg == "all" else str(LEGS.index(leg) + 1)
+def _legs(present: Sequence[int]) -> Iterable[Candidate]:
+    for number in ("all", *map(str, present)):
+        leg = number if number == "all" else LEGS[int(number) - 1]
         for part in PARTS:
             yield _candidate(
                 "link_length",

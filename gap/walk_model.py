@@ -72,7 +72,7 @@ class WalkModel:
 
     def candidates(self) -> tuple[Candidate, ...]:
         """Effects on all legs together; `suspected` has those of single ones."""
-        return walk_library.candidates(Suspects((), (), True))
+        return walk_library.candidates(Suspects((), (), True), self.joints)
 
     def suspected(self, trials: Sequence[Trial]) -> tuple[Candidate, ...]:
         """Candidates on the joints and legs in which recordings depart, and on all."""
@@ -84,7 +84,7 @@ class WalkModel:
             rest = trial.observed[:, 3:] - path[:, 3:]
             rests.append(rest / np.sqrt(1 + np.nan_to_num(scatter) / READING**2))
         found = walk_where.suspects(rests, self.joints, READING)
-        return walk_library.candidates(found)
+        return walk_library.candidates(found, self.joints)
 
     def unsure(self, problem: Problem, uncertain: Sequence[Candidate]) -> Whitener:
         """The whitener that knows what walking scatters, see `walk_floor`."""

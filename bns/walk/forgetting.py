@@ -11,8 +11,8 @@ Neither how well the networks are trained nor the usual error enters, so that a 
 simulator is no change; and since the trial that says most does not count, nor is one
 odd trial, such as a fall.
 
-All numbers here were chosen on ten undamaged runs of 100 trials, where the evidence never
-came above 4.
+All numbers here were chosen on ten undamaged runs of 100 trials, where the evidence
+never came above 4.
 """
 
 import numpy as np
