@@ -11,6 +11,7 @@ from bns.worlds import legged_plan
 from bns.worlds.active import Stages
 from bns.worlds.damage import Damage
 from bns.worlds.effects import registry
+from tests.sources import ROOT
 
 KEPT = ("servo_gain[right_front]", "servo_delay[right_front]", "payload")
 
@@ -65,6 +66,15 @@ def test_one_leg_alone_leaves_out_effects_on_all():
     assert "servo_delay[all]" not in listed
     assert "servo_gain[all]" in listed  # as what the model is uncertain of
     assert "servo_delay[left_front_coxa]" in listed
+
+
+def test_candidates_are_on_legs_that_the_robot_has():
+    model = WalkModel(str(ROOT / "examples" / "quad"))
+    rests = [np.full((50, len(model.joints)), 0.1)]
+    found = walk_where.suspects(rests, model.joints, READING)
+    names = [item.name for item in walk_library.candidates(found, model.joints)]
+    assert "foot_slippery[right_rear]" in names and "link_length[tibia,all]" in names
+    assert not any("middle" in name for name in (*names, *found.legs))
 
 
 def test_what_walking_scatters_is_found_by_walking(model, told):
