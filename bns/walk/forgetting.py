@@ -35,32 +35,25 @@ def changed(inputs: np.ndarray, targets: np.ndarray, size: int) -> int:
     Returns:
         Their number, 0 = nothing speaks for a change.
     """
-    found = [(evidence(inputs, targets, size, new), new) for new in NEW]
-    most, new = max(found)
-    return new * size if most > ODDS else 0
-
-
-def evidence(inputs: np.ndarray, targets: np.ndarray, size: int, new: int) -> float:
-    """Logarithm of the odds that the robot changed before the newest trials.
-
-    Args:
-        inputs, targets, size: see `changed`.
-        new: number of newest trials.
-
-    Returns:
-        What all but the strongest of the new trials say; -inf where too few are old.
-    """
     trials = len(inputs) // size
-    if trials < OLD + new:
-        return -np.inf
+    wanted = [new for new in NEW if trials >= OLD + new]
+    if not wanted:
+        return 0
     seen, told = (a[-trials * size :].astype(float) for a in (inputs, targets))
     told = told.clip(-LARGEST, LARGEST)
     like, scale = covariance(seen), np.maximum((told**2).mean(0), 1e-12)
-    some = new * size
-    alone = foretold(like[-some:, -some:], told[-some:], scale)
-    after = foretold(like, told, scale)[-some:]
-    gain = (alone - after).reshape(new, size).sum(1)
-    return float(gain.sum() - max(gain.max(), 0.0))
+    together, found = foretold(like, told, scale), []
+    for some in (new * size for new in wanted):
+        alone = foretold(like[-some:, -some:], told[-some:], scale)
+        found.append((_evidence(alone - together[-some:], size), some))
+    most, newest = max(found)
+    return newest if most > ODDS else 0
+
+
+def _evidence(gain: np.ndarray, size: int) -> float:
+    """Logarithm of the odds of two accounts: what all trials but the strongest say."""
+    by_trial = gain.reshape(-1, size).sum(1)
+    return float(by_trial.sum() - max(by_trial.max(), 0.0))
 
 
 def covariance(inputs: np.ndarray) -> np.ndarray:
