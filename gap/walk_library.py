@@ -7,7 +7,7 @@ import numpy as np
 
 from bns.gap.records import Candidate
 from bns.gap.walk_where import Suspects
-from bns.models.legs import JOINTS, LEGS, PARTS, present
+from bns.models.legs import JOINTS, LEGS, PARTS, names
 from bns.worlds.effects import registry
 
 UPHILL = tuple({"direction": k * np.pi / 2} for k in (-1, 0, 1, 2))
@@ -53,7 +53,7 @@ def candidates(
         found: joints and legs that are suspected beside all of them.
         joints: that the robot has.
     """
-    return (*_servos(found, joints), *_legs(present(joints)), *_body())
+    return (*_servos(found, joints), *_legs(joints), *_body())
 
 
 def _servos(found: Suspects, joints: Sequence[str]) -> Iterable[Candidate]:
@@ -73,9 +73,9 @@ def _servos(found: Suspects, joints: Sequence[str]) -> Iterable[Candidate]:
             )
 
 
-def _legs(present: Sequence[int]) -> Iterable[Candidate]:
-    for number in ("all", *map(str, present)):
-        leg = number if number == "all" else LEGS[int(number) - 1]
+def _legs(joints: Sequence[str]) -> Iterable[Candidate]:
+    for leg in ("all", *names(joints)):
+        number = "all" if leg == "all" else str(LEGS.index(leg) + 1)
         for part in PARTS:
             yield _candidate(
                 "link_length",

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bns.models.legs import LEGS, present
+from bns.models.legs import names as legs_of
 
 MOST, LEAST = 0.6, 0.3  # share of the worst leg: beyond it alone, below it all alike
 NEARLY = 0.6  # of the worst leg's share: the second is suspected as well
@@ -48,7 +48,7 @@ def suspects(
     share = shares(rests, names, sigma)
     by_leg = {
         leg: sum(value for name, value in share.items() if name.startswith(leg))
-        for leg in (LEGS[number - 1] for number in present(names))
+        for leg in legs_of(names)
     }
     legs = sorted(by_leg, key=by_leg.__getitem__, reverse=True)
     worst = by_leg[legs[0]]

@@ -58,9 +58,7 @@ def trial(
     if lost.mean() > 0.3 or lost[boundaries].mean() > 0.3:
         raise Void(f"the robot was seen in {1 - lost.mean():.0%} of the samples")
     short = len(commands) - (len(moments) - 1)
-    times = np.append(times, times[-1] + BEHIND * np.arange(1, short + 1))
-    observed = np.vstack([observed, np.full((short, len(channels)), np.nan)])
-    boundaries = np.append(boundaries, len(times) - short + np.arange(short))
+    times, observed, boundaries = _unreached(short, times, observed, boundaries)
     spans = np.diff(times[boundaries])
     return Trial(
         commands=Commands(commands.values, spans, commands.channels),
@@ -79,6 +77,19 @@ def trial(
         world=world,
         conditions=conditions,
         handled=np.arange(len(commands)) >= len(commands) - short,
+    )
+
+
+def _unreached(
+    count: int, times: np.ndarray, observed: np.ndarray, boundaries: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Samples with one more for each command that was not reached, NaN as observed."""
+    later = times[-1] + BEHIND * np.arange(1, count + 1)
+    unseen = np.full((count, observed.shape[1]), np.nan)
+    return (
+        np.append(times, later),
+        np.vstack([observed, unseen]),
+        np.append(boundaries, len(times) + np.arange(count)),
     )
 
 

@@ -111,7 +111,7 @@ def _legs(robot: RobotModel, model: Any) -> list[str]:
     if robot.kind != "legged":
         return []
     names = {command.name for command in robot.commands}
-    own = [legs.LEGS[number - 1] for number in legs.present(names)]
+    own = legs.names(names)
     if not own:
         return [f"no command is called after a leg and a part, as {legs.JOINTS[0]}"]
     joints = [f"{leg}_{part}" for leg in own for part in legs.PARTS]

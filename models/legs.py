@@ -22,7 +22,12 @@ PARTS = ("coxa", "femur", "tibia")
 JOINTS = tuple(f"{leg}_{part}" for leg in LEGS for part in PARTS)
 
 
-def present(joints: Iterable[str]) -> tuple[int, ...]:
-    """Numbers of the legs that a robot has, from the names of its joints."""
+def names(joints: Iterable[str]) -> tuple[str, ...]:
+    """The legs that a robot has, from the names of its joints."""
     legs = {joint.rpartition("_")[0] for joint in joints}
-    return tuple(n for n, leg in enumerate(LEGS, start=1) if leg in legs)
+    return tuple(leg for leg in LEGS if leg in legs)
+
+
+def present(joints: Iterable[str]) -> tuple[int, ...]:
+    """The same by number."""
+    return tuple(LEGS.index(leg) + 1 for leg in names(joints))

@@ -8,8 +8,7 @@ import mujoco
 import numpy as np
 
 from bns.errors import BnsError
-from bns.models import RobotModel
-from bns.models.legs import LEGS, present
+from bns.models import RobotModel, legs
 from bns.worlds import (
     compile,
     control,
@@ -71,14 +70,9 @@ def _carried(model: mujoco.MjModel) -> np.ndarray:
     mujoco.mj_kinematics(model, data)
     hips = [
         [*data.body(f"{leg}_femur").xpos, model.geom(f"{leg}_femur").size[0]]
-        for leg in _legs(model)
+        for leg in legs.names(model.joint(at).name for at in model.actuator_trnid[:, 0])
     ]
     return np.vstack([corners, hips])
-
-
-def _legs(model: mujoco.MjModel) -> list[str]:
-    joints = (model.joint(at).name for at in model.actuator_trnid[:, 0])
-    return [LEGS[number - 1] for number in present(joints)]
 
 
 def legged(robot: RobotModel) -> RobotModel:
@@ -107,13 +101,14 @@ def refuse_legless(damage: Damage, robot: RobotModel) -> None:
         BnsError: all legs are raised, limp or missing together, or one that the robot
             does not have.
     """
-    own = frozenset(present(command.name for command in robot.commands))
+    joints = [command.name for command in robot.commands]
+    own = frozenset(legs.present(joints))
     for effect in (event.effect for event in damage.events):
         absent = named(effect) - own
         if absent:
             raise BnsError(
                 f"{effect}: {robot.name!r} has no leg {min(absent)}; it has "
-                f"{', '.join(LEGS[leg - 1] for leg in sorted(own))}."
+                f"{', '.join(legs.names(joints))}."
             )
     for onset in {event.onset_trial for event in damage.events}:
         held = [item.effect for item in damage.at(onset)]

@@ -1,8 +1,8 @@
 """The hexapod's servos: names, identities on the bus, and goals as registers.
 
 Columns of goals go by the numbers of legs (`bns.models.legs`): coxa, femur, tibia of
-leg 1, then of leg 2 and so on. Goals are angles from half-way
-[rad] with signs alike for all legs: coxa forward, femur up, tibia outward.
+leg 1, then of leg 2 and so on. Goals are angles from half-way [rad] with signs alike
+for all legs: coxa forward, femur up, tibia outward.
 """
 
 from types import MappingProxyType
