@@ -9,7 +9,7 @@ alarms are those of the unharmed twins, all trials before the damage among them.
 
 import numpy as np
 
-from bench import experiments, forking, light_runs
+from bench import forking, light_runs
 from bench.result import Result
 from bns.config import RunConfig
 from bns.record import RunRecord
@@ -36,12 +36,11 @@ def run(quick: bool) -> Result:
     hits = sum(row["of them detected"] for row in found.values())
     alarms, trials = int((quiet > 0).sum()), quiet.size
     before = [sum(row[name] for row in found.values()) for name in OVER_BEFORE]
-    few = quick or RUNS < experiments.REPLICATES
     share, rate = hits / max(costly, 1), 500 * alarms / trials
     return Result(
         figure=share,
         unit="of costly damages",
-        holds=None if few else share >= SHARE and rate <= ALARMS,
+        holds=None if quick else share >= SHARE and rate <= ALARMS,
         n=costly,
         details={
             "false alarms per 500 trials": round(rate, 3),

@@ -93,7 +93,7 @@ def run(quick: bool) -> Result:
             "virtual sensors alone": _of_recording(large, False),
             "merged by their signatures alone": _named(map(_twinned, kept)),
             "nothing merged but what each signature lists": _named(kept),
-            "among those named": scoring.share(large, _among),
+            "among those named": scoring.share(large, scoring.among),
             "strict": scoring.share(large, scoring.strict),
             "named as one of several": scoring.share(
                 large, lambda row: row["said"]["verdict"] == "either"
@@ -172,12 +172,6 @@ def _claims(row: dict) -> bool:
 
 def _strange(row: dict) -> bool:
     return row["said"]["verdict"] == "none of the library"
-
-
-def _among(row: dict) -> bool:
-    from bns.gap import scoring
-
-    return any(scoring.matches(names, row["answer"]) for names in row["said"]["named"])
 
 
 def _alone_wrong(row: dict) -> bool:

@@ -28,7 +28,7 @@ def run(quick: bool) -> Result:
         details={
             "strict": scoring.share(large, scoring.strict),
             "merged by angle as well": scoring.share(large, _by_angle),
-            "among those named": scoring.share(large, _among),
+            "among those named": scoring.share(large, scoring.among),
             "named alone, and wrong": scoring.share(large, scoring.confident_wrong),
             "named as one of several": scoring.share(
                 large, lambda row: row["said"]["verdict"] == "either"
@@ -49,12 +49,6 @@ def _by_angle(row: dict) -> bool:
 
     named = row["said"]["named"]
     return bool(named) and scoring.matches(named[0], row["answer"], angle=ANGLE)
-
-
-def _among(row: dict) -> bool:
-    from bns.gap import scoring
-
-    return any(scoring.matches(n, row["answer"]) for n in row["said"]["named"])
 
 
 def _baseline(row: dict, key: str) -> bool:

@@ -211,6 +211,11 @@ def right(row: dict[str, Any]) -> bool:
     return bool(named) and matches(named[0], row["answer"])
 
 
+def among(row: dict[str, Any]) -> bool:
+    """Whether the true support is among those named (aliases merged)."""
+    return any(matches(names, row["answer"]) for names in row["said"]["named"])
+
+
 def strict(row: dict[str, Any]) -> bool:
     """Whether the first support named is the true one, aliases not merged."""
     named = row["said"]["named"]
