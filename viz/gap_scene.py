@@ -13,7 +13,7 @@ ENLARGED = 5.0  # arrows
 ARROWS = 0.5  # share of the strongest residual below which there is no arrow
 LOUD = 10.0  # loss at which the path is fully red; 1 = the floor
 TRAIL = 0.003  # [m] half the width of a path
-MARGIN = 0.12  # [m] around what was driven
+GAP = 0.05  # [m] between robots side by side, beyond their own size
 LANES = {"nominal": -1.0, "recorded": 0.0, "corrected": 1.0}
 GREY = (90, 90, 90)
 QUIET, HOT = np.array([120.0, 120.0, 120.0]), np.array([230.0, 40.0, 20.0])
@@ -51,12 +51,26 @@ def _robots(seen: View) -> dict[str, tuple]:
     return shown
 
 
+@lru_cache(maxsize=8)
+def _reach(robot: str) -> float:
+    """Half the width of a robot as its model begins, all turned about [m]."""
+    import mujoco
+
+    model = _ghost(robot, NOMINAL)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    root = data.xpos[1, :2]
+    away = np.linalg.norm(data.geom_xpos[:, :2] - root, axis=1)
+    return float((away + model.geom_rbound).max())
+
+
 def _driven(seen: View) -> np.ndarray:
-    """Lowest and highest place along x and y on all paths, ``(2, 2)`` [m]."""
+    """Lowest and highest place along x and y that robots touched, ``(2, 2)`` [m]."""
+    margin = _reach(seen.problem.model.name) + GAP / 2
     paths = [*(trial.poses_world for trial in seen.trials), *seen.nominal]
     places = np.concatenate([path[:, :2] for path in paths])
     places = places[np.isfinite(places).all(axis=1)]
-    return np.array([places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN])
+    return np.array([places.min(axis=0) - margin, places.max(axis=0) + margin])
 
 
 def _lane(seen: View, name: str) -> np.ndarray:
@@ -73,7 +87,7 @@ def log_static(stream, seen: View) -> None:
     low, high = _driven(seen)
     for name, (model, _) in _robots(seen).items():
         geometry.log_static(stream, model, f"world/{name}")
-        beside = np.array([(low[0] + high[0]) / 2, low[1] + MARGIN / 2, HEIGHT])
+        beside = np.array([(low[0] + high[0]) / 2, low[1] + GAP, HEIGHT])
         place = _lane(seen, name) + beside
         stream.log(
             f"world/names/{name}",

@@ -1,4 +1,4 @@
-"""`bns view`: open a run's recording, or make a picture of it."""
+"""`bns view`: open the recording of a run or a diagnosis, or make a picture of it."""
 
 import os
 import sys
@@ -13,10 +13,11 @@ from bns.errors import BnsError, MissingDependencyError
 
 @dataclass(frozen=True, kw_only=True)
 class Arguments:
-    """Open a run's recording in the Rerun viewer, or draw it to a file."""
+    """Open the recording of a run or a gap diagnosis in the Rerun viewer, or draw it to
+    a file."""
 
     directory: tyro.conf.Positional[str]
-    """a run directory, or a recording (.rrd)"""
+    """directory of a run or of a gap diagnosis, or a recording (.rrd)"""
     png: str = ""
     """write a picture to this file instead; needs no display"""
 
@@ -37,20 +38,29 @@ def main(verb: str, argv: list[str]) -> int:
 
 
 def find(path: Path) -> Path:
-    """The recording of a run, written now if it was not before.
+    """The recording of a run, written now if it was not before, or of a diagnosis.
 
     Raises:
-        BnsError: neither a run nor a recording, or a run without a trial.
+        BnsError: neither a run, a diagnosis nor a recording, a run without a trial, or
+            a diagnosis that was told to make no recording.
     """
     from bns.cli.outputs import RECORDING, write_recording
+    from bns.gap.store import FILE
     from bns.store import load
 
     if path.suffix == ".rrd":
         if not path.is_file():
             raise BnsError(f"There is no recording {path}: give a run directory.")
         return path
-    record = load(path)
     recording = path / RECORDING
+    if (path / FILE).is_file():
+        if not recording.is_file():
+            raise BnsError(
+                f"{path} holds a diagnosis without a recording: repeat "
+                f"`bns gap diagnose` with --rerun and --out {path}."
+            )
+        return recording
+    record = load(path)
     if recording.exists() and record.trials == record.config.trials:
         return recording
     if record.trials == 0:

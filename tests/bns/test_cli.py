@@ -163,6 +163,17 @@ def test_view_without_a_display_says_what_to_do(capsys, tmp_path, monkeypatch):
     assert "No display" in text and "--png FILE" in text
 
 
+def test_view_of_a_diagnosis(capsys, tmp_path):
+    from bns.cli import view
+    from bns.gap.store import FILE
+
+    (tmp_path / FILE).write_text("{}")
+    text = said(capsys, "view", tmp_path, code=WRONG_INPUT)
+    assert "diagnosis without a recording" in text
+    (tmp_path / "recording.rrd").write_bytes(b"")
+    assert view.find(tmp_path) == tmp_path / "recording.rrd"
+
+
 def test_run_to_the_end_and_once_more(capsys, tmp_path):
     out = tmp_path / "out"
     quiet = ["--rerun", "off", "--no-report"]
