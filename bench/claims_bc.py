@@ -10,7 +10,7 @@ WANTED += ("C11", "C13", "C15", "C17", "C19", "C22")
 
 
 def run(quick: bool) -> Result:
-    """Train what is missing, 30 runs a side, then judge; quick: small and short.
+    """Train what is missing, `_claims.RUNS` a side, then judge; quick: small and short.
 
     Settings are the dissertation's (tables 5.1 and 6.1) over the preset; runs are
     kept, so a run that is stopped goes on.

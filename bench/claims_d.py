@@ -9,7 +9,7 @@ WANTED = ("D1", "D20", "D22", "D25", "D27", "D29")
 
 
 def run(quick: bool) -> Result:
-    """Train what is missing, 30 runs a side, then judge; quick: small and short.
+    """Train what is missing, `_claims.RUNS` a side, then judge; quick: small and short.
 
     Settings are the dissertation's (table 7.2) over the preset; runs are kept, so a
     run that is stopped goes on.
