@@ -1,7 +1,9 @@
 """The walking learner's inner loops: as `bns.inner`, but for the training.
 
-Where a run is compiled, making a generation is a compiled region; what the networks
-foresee is a matter of large matrix products, which are as fast without.
+No generation is compiled here. A compiled one took 4.5 times as long as an eager one
+(30 runs of 400 lists of 198 goals, one thread: 0.38 s against 0.085 s), since the
+compiler has no vectorised inverse error function, which normal mutations need; what the
+networks foresee is a matter of large matrix products, which are as fast without.
 """
 
 from functools import partial
@@ -28,7 +30,8 @@ class WalkLoops(InnerLoops):
         draws: Draws,
     ):
         super().__init__(config, evaluator, breeder, draws)
-        self._judge = partial(evaluator.judge)
+        self.compiled = False
+        self._breed, self._judge = self._bred, partial(evaluator.judge)
 
     def train(
         self,

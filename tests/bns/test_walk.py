@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from bns import models
+from bns import models, presets
 from bns.chromosome import Population
 from bns.draws import Draws
 from bns.errors import BnsError
@@ -285,3 +285,11 @@ class TestLearner:
         config = replace(config, walk=replace(config.walk, fitness=form))
         record = train(config, world=Slider())
         assert np.isfinite(record["worth_predicted"]).all()
+
+
+def test_generations_are_not_compiled():
+    """Compiled ones take several times as long: see `bns.walk.loops`."""
+    from bns.inner import should_compile
+
+    long = replace(presets.load("hexapod-walk"), trials=10**6, compiled="auto")
+    assert not should_compile(long)
