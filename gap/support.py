@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import norm
 
 from bns.gap.problem import Problem
 from bns.gap.records import Candidate
@@ -56,6 +57,18 @@ class Point:
     rest: np.ndarray
     loss: float
     slopes: np.ndarray
+
+    @property
+    def believed(self) -> float:
+        """Probability that a nominal model without any gap is off by so much.
+
+        By the slack of its one candidate; 0 where the model is exact there.
+        """
+        (term,) = self.terms
+        item = term.candidate
+        if not item.slack:
+            return 0.0
+        return float(2 * norm.sf(abs(term.magnitude - item.nominal) / item.slack))
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -108,18 +108,39 @@ def choose(
         worth: improvement by one effect that chance hardly exceeds.
         rules: thresholds.
     """
-    nothing, single = search.nothing, search.best(1)
-    gain = nothing.loss - min(single.loss, nothing.loss)
-    gain /= max(1.0, spread(single.rest)) ** 2  # noise that is larger than was thought
-    gain /= lasting(problem, single.rest)
-    p_gap = min(1.0, 2 * min(null.p_gain(gain), null.misfit(problem, nothing.rest)[0]))
+    p_gap = chance(problem, search, null)
     found = rungs(problem, search, null)
     rung = climb(found, worth, rules)
-    points = search.sizes[rung.size - 1] if rung.size else (nothing,)
+    points = search.sizes[rung.size - 1] if rung.size else (search.nothing,)
     scores = [score for _, score in rung.scores]
     left = _left(problem, null, points[0])
     ranked = tuple(zip(points, scores, strict=True))
     return Choice(found, rung, points[0], ranked, p_gap, worth, left)
+
+
+def chance(problem: Problem, search: Search, null: Null) -> float:
+    """Probability of so large a gap if there were none.
+
+    A recording speaks against "none" by what one effect improves and by the structure
+    that is there without any. It does not where the best effect is one that the nominal
+    model is unsure of, no farther off than it may be, and leaves no structure: where
+    signatures turn as effects grow, a whitener lets such an effect pass in proportion
+    alone.
+
+    Args:
+        problem: the recording.
+        search: what was fitted.
+        null: what chance gives.
+    """
+    nothing, single = search.nothing, search.best(1)
+    gain = nothing.loss - min(single.loss, nothing.loss)
+    gain /= max(1.0, spread(single.rest)) ** 2  # noise that is larger than was thought
+    gain /= lasting(problem, single.rest)
+    none = min(null.p_gain(gain), null.misfit(problem, nothing.rest)[0])
+    unsure = single.believed
+    if unsure:
+        unsure = min(unsure, null.misfit(problem, single.rest)[0])
+    return min(1.0, 2 * max(none, unsure))
 
 
 def _left(problem: Problem, null: Null, best: Point) -> tuple[float, float]:

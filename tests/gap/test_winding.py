@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.gap import fit, signatures, winding
+from bns.gap import fit, signatures, support, verdict, winding
 from bns.gap.walk_library import candidates
 from bns.gap.walk_where import Suspects
 
@@ -69,3 +69,27 @@ def test_a_fit_looks_beyond_the_minimum_it_ends_in():
     found = fit.refine(problem, start)
     problem.model = SimpleNamespace(winding=False)
     assert found.loss < 0.5 * fit.refine(problem, start).loss
+
+
+@pytest.mark.parametrize(
+    ("factor", "left", "gap"),
+    [
+        (1.15, 0.5, False),  # as the grip of a sound robot may be
+        (1.5, 0.5, True),
+        (1.15, 1e-6, True),  # something else is there besides
+    ],
+)
+def test_what_the_model_is_unsure_of_is_no_gap(factor, left, gap):
+    rest = np.array([1.0, -1.0])
+    nothing = support.Point((), 9 * rest, 400.0, rest)
+    single = support.Point((support.Term.at(GRIP, 0, factor),), rest, 100.0, rest)
+    search = SimpleNamespace(nothing=nothing, best=lambda size: single)
+    misfit = {9.0: 0.5, 1.0: left}
+    null = SimpleNamespace(
+        p_gain=lambda gain: 1e-5, misfit=lambda problem, z: (misfit[z[0]], 0.0)
+    )
+    problem = SimpleNamespace(
+        model=SimpleNamespace(features=(0, 1)),
+        floor=SimpleNamespace(source="model", sigma=()),
+    )
+    assert (verdict.chance(problem, search, null) < 0.005) == gap
