@@ -90,7 +90,7 @@ def climb(found: Sequence[Rung], worth: float, rules: Rules) -> Rung:
     A first effect has to improve the loss by more than chance does. A further one has
     to improve it by more than `Rules.more` and by more than the share `Rules.minor` of
     all that is explained then: a nominal model that is a little wrong always leaves
-    something. Both have to improve the loss on trials that they were not fitted to by
+    something; two at once by twice as much. Both have to improve the loss on trials that they were not fitted to by
     more than one standard error; a first effect that explains `BEYOND` times what
     chance does need not, since it may be felt in one trial alone.
 
@@ -105,6 +105,7 @@ def climb(found: Sequence[Rung], worth: float, rules: Rules) -> Rung:
             least = max(worth, rules.more, rules.minor * new.explained)
         else:
             least = worth
+        least *= new.size - now.size
         gains = np.subtract(now.held_out, new.held_out)
         error = float(gains.std(ddof=1) * np.sqrt(len(gains)))
         clear = new.size == 1 and now.loss - new.loss > BEYOND * worth

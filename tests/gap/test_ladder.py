@@ -32,3 +32,13 @@ def test_a_second_effect_does():
         rung(2, 300.0, (300.0, 190.0)),
     ]
     assert climb(found, WORTH, Calibration()).size == 1
+
+
+def test_two_further_effects_have_to_be_worth_two():
+    found = [
+        rung(0, 900.0, (450.0, 450.0)),
+        rung(1, 400.0, (200.0, 200.0)),
+        rung(2, 390.0, (195.0, 195.0)),  # not worth it
+        rung(3, 376.0, (188.0, 188.0)),  # worth more than one, less than two
+    ]
+    assert climb(found, WORTH, Calibration()).size == 1
