@@ -90,9 +90,10 @@ def climb(found: Sequence[Rung], worth: float, rules: Rules) -> Rung:
     A first effect has to improve the loss by more than chance does. A further one has
     to improve it by more than `Rules.more` and by more than the share `Rules.minor` of
     all that is explained then: a nominal model that is a little wrong always leaves
-    something; two at once by twice as much. Both have to improve the loss on trials that they were not fitted to by
-    more than one standard error; a first effect that explains `BEYOND` times what
-    chance does need not, since it may be felt in one trial alone.
+    something; two at once by twice as much. All have to improve the loss on trials that
+    they were not fitted to by more than one standard error; a first effect that
+    explains `BEYOND` times what chance does need not, since it may be felt in one trial
+    alone.
 
     Args:
         found: rungs, nothing first.
