@@ -8,7 +8,7 @@ import numpy as np
 
 from bns.gap.model import GapModel
 from bns.gap.records import Diagnosis
-from bns.viz import gap_scene, style
+from bns.viz import gap_scene, series, style
 from bns.viz.blueprint import BACKGROUND, LIVE_TIMELINE
 from bns.viz.gap_figures import CORRECTED, NOMINAL
 from bns.viz.gap_view import MOST, View, view
@@ -69,13 +69,6 @@ def _starts(seen: View, chosen: Sequence[int]) -> list[float]:
     return np.concatenate([[0.0], np.cumsum(lengths)[:-1]]).tolist()
 
 
-def times(seconds: np.ndarray):
-    """A column of times on the timeline of motion."""
-    import rerun as rr
-
-    return [rr.TimeColumn(LIVE_TIMELINE, duration=np.atleast_1d(seconds))]
-
-
 def _styles(stream, seen: View) -> None:
     import rerun as rr
 
@@ -99,37 +92,28 @@ def _styles(stream, seen: View) -> None:
 
 def _residuals(stream, seen: View, number: int, start: float) -> None:
     """Recorded minus predicted motion, window by window, in the features' units."""
-    import rerun as rr
-
     windows = seen.problem.windows[number]
-    index = times(start + windows.times - seen.trials[number].times[0])
-    series = {"nominal": seen.gap(number), "floor": 2 * seen.scatter(number)}
+    at = start + windows.times - seen.trials[number].times[0]
+    shown = {"nominal": seen.gap(number), "floor": 2 * seen.scatter(number)}
     if seen.effects:
-        series["corrected"] = seen.left[number]
+        shown["corrected"] = seen.left[number]
     for column, feature in enumerate(seen.problem.model.features):
-        for name, values in series.items():
-            stream.send_columns(
-                f"residuals/{feature.name}/{name}",
-                index,
-                rr.Scalars.columns(scalars=values[:, column]),
-            )
+        for name, values in shown.items():
+            path = f"residuals/{feature.name}/{name}"
+            series.send(stream, path, at, values[:, column])
 
 
 def _observed(stream, seen: View, number: int, start: float) -> None:
-    import rerun as rr
-
     trial = seen.trials[number]
-    series = {"recorded": trial.observed, "nominal": seen.nominal[number]}
+    at = start + trial.times - trial.times[0]
+    shown = {"recorded": trial.observed, "nominal": seen.nominal[number]}
     if seen.effects:
-        series["corrected"] = seen.corrected[number]
-    for name, values in series.items():
+        shown["corrected"] = seen.corrected[number]
+    for name, values in shown.items():
         for column, channel in enumerate(trial.channels):
             fine = np.isfinite(values[:, column])
-            stream.send_columns(
-                f"observed/{channel.name}/{name}",
-                times(start + trial.times[fine] - trial.times[0]),
-                rr.Scalars.columns(scalars=values[fine, column]),
-            )
+            path = f"observed/{channel.name}/{name}"
+            series.send(stream, path, at[fine], values[fine, column])
 
 
 def _features(seen: View) -> list[Channel]:

@@ -4,7 +4,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from bns.viz import geometry, scene, style
+from bns.viz import geometry, scene, series, style
+from bns.viz.blueprint import LIVE_TIMELINE
 from bns.viz.gap_figures import NOMINAL
 from bns.viz.gap_view import View
 
@@ -102,8 +103,6 @@ def send(stream, seen: View, number: int, start: float) -> None:
     """Log one trial: robots in motion, paths, arrows; they vanish after it."""
     import rerun as rr
 
-    from bns.viz.gap_recording import times
-
     trial = seen.trials[number]
     at = start + trial.times - trial.times[0]
     poses = {"recorded": trial.poses_world, "nominal": seen.nominal[number]}
@@ -114,11 +113,13 @@ def send(stream, seen: View, number: int, start: float) -> None:
         fine = np.isfinite(rows).all(axis=1)
         lane = _lane(seen, name)
         qpos = geometry.planar_qpos(model, rows[fine] + lane)
-        geometry.send_poses(stream, model, times(at[fine]), qpos, root=f"world/{name}")
+        geometry.send_poses(
+            stream, model, series.times(at[fine]), qpos, root=f"world/{name}"
+        )
         if name != "recorded":
             stream.send_columns(
                 f"world/paths/{name}",
-                times(at[:1]),
+                series.times(at[:1]),
                 rr.LineStrips3D.columns(
                     strips=[_lift(rows[fine] + lane)],
                     colors=[style.rgb(colour)],
@@ -129,7 +130,7 @@ def send(stream, seen: View, number: int, start: float) -> None:
             real = real[np.isfinite(real).all(axis=1)]
             stream.send_columns(
                 f"world/paths/recorded_beside_{name}",
-                times(at[:1]),
+                series.times(at[:1]),
                 rr.LineStrips3D.columns(
                     strips=[_lift(real + lane)], colors=[GREY], radii=[TRAIL / 2]
                 ),
@@ -140,8 +141,6 @@ def send(stream, seen: View, number: int, start: float) -> None:
 def _hurts(stream, seen: View, number: int, start: float) -> None:
     """The recorded path, red where the nominal model fails, with arrows."""
     import rerun as rr
-
-    from bns.viz.gap_recording import LIVE_TIMELINE
 
     trial, windows = seen.trials[number], seen.problem.windows[number]
     poses = trial.poses_world

@@ -4,8 +4,8 @@ import numpy as np
 
 from bns.config import RunConfig
 from bns.record import RunRecord
-from bns.viz import style
-from bns.viz.blueprint import LIVE_TIMELINE, READINGS
+from bns.viz import series, style
+from bns.viz.blueprint import READINGS
 
 _BULB = 0.03
 """m; radius of a lamp as drawn"""
@@ -71,7 +71,6 @@ def send_readings(stream, record: RunRecord, at: tuple[int, int], start: float) 
     if "readings" not in record.extra:
         return
     ends = start + np.concatenate([[0.0], np.nancumsum(record.sent[at][:, 2])])
-    index = [rr.TimeColumn(LIVE_TIMELINE, duration=ends)]
     for column, side in enumerate(("left", "right")):
         for kind, array, width in (
             ("real", "readings", 2.5),
@@ -79,7 +78,7 @@ def send_readings(stream, record: RunRecord, at: tuple[int, int], start: float) 
         ):
             path = f"{READINGS}/{side}_{kind}"
             values = record.extra[array][at][:, column]
-            stream.send_columns(path, index, rr.Scalars.columns(scalars=values))
+            series.send(stream, path, ends, values)
             stream.log(
                 path,
                 rr.SeriesLines(

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bns.record import RunRecord
-from bns.viz import geometry, light_view, scene, style, walk_view
-from bns.viz.blueprint import LIVE_TIMELINE, TRIAL_TIMELINE
+from bns.viz import geometry, light_view, scene, series, style, walk_view
+from bns.viz.blueprint import TRIAL_TIMELINE
 from bns.viz.choices import Choice
 from bns.viz.paths import arcs, dashes, listed
 from bns.worlds.trial import Trial
@@ -48,7 +48,7 @@ def send(
         times, poses, qpos = samples(record, at, trials.get(choice.trial), model)
         if not len(times):
             continue  # nothing was seen of it
-        index = _times(start + times)
+        index = series.times(start + times)
         geometry.send_poses(stream, model, index, qpos)
         done = _finish(record, at, times)
         foreseen = listed(record.predicted[at])
@@ -122,12 +122,6 @@ def _thin(times: np.ndarray) -> np.ndarray:
     return np.flatnonzero(keep)
 
 
-def _times(seconds):
-    import rerun as rr
-
-    return [rr.TimeColumn(LIVE_TIMELINE, duration=np.atleast_1d(seconds))]
-
-
 def _lift(poses: np.ndarray) -> np.ndarray:
     return np.column_stack([poses[:, :2], np.full(len(poses), _HEIGHT)])
 
@@ -174,7 +168,7 @@ def _wheels(stream, sent: np.ndarray, start: float) -> None:
     for column, wheel in enumerate(("left", "right")):
         values = np.append(sent[:, column], 0.0)
         stream.send_columns(
-            f"wheels/{wheel}", _times(begin), rr.Scalars.columns(scalars=values)
+            f"wheels/{wheel}", series.times(begin), rr.Scalars.columns(scalars=values)
         )
         stream.log(
             f"wheels/{wheel}",
@@ -200,7 +194,7 @@ def _states(stream, states, colours, end: float) -> None:
     )
     stream.send_columns(
         "moment",
-        _times(np.array([*(time for time, _ in states), end])),
+        series.times(np.array([*(time for time, _ in states), end])),
         rr.StateChange.columns(state=[*names, ""]),
     )
 
