@@ -1,5 +1,7 @@
 """Which controller is tried in the world (thesis 2.8 step 1, 5.3.9)."""
 
+from typing import Any, Protocol
+
 import torch
 from torch import Tensor
 
@@ -7,8 +9,14 @@ from bns.chromosome import Population
 from bns.config import RunConfig
 from bns.draws import Draws
 from bns.errors import BnsError, UnknownNameError
-from bns.evaluation import Evaluator
 from bns.evolution import selection
+
+
+class Judge(Protocol):
+    """Who knows how far an ensemble disagrees on controllers."""
+
+    def disagreement(self, theta: Any, population: Population) -> Tensor:
+        """By SNNs of these weights, ``(R, P)``."""
 
 
 def choose(
@@ -16,8 +24,8 @@ def choose(
     trial: int,
     cost: Tensor,
     population: Population,
-    theta: Tensor,
-    evaluator: Evaluator,
+    theta: Any,
+    evaluator: Judge,
     draws: Draws,
 ) -> Tensor:
     """Index of one controller a run, ``(R,)``.

@@ -41,8 +41,6 @@ def check(configs: Sequence[RunConfig]) -> None:
             "`evolution.mutation_rate` and `evolution.headless_chicken` only; train "
             "the others as a batch of their own."
         )
-    if first.choose == "disagreement":
-        raise BnsError("choose = 'disagreement' is for navigation; take another rule.")
     if first.evolution.population % first.light.islands:
         raise BnsError(
             f"evolution.population = {first.evolution.population} cannot be shared "

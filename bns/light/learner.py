@@ -128,7 +128,7 @@ class LightLearner:
         genomes = self.population.genes.reshape(*cost.shape, -1)
         whole = Population(genomes.unsqueeze(-1), torch.zeros_like(cost).long())
         index = choice.choose(
-            self.config, trial, cost, whole, self.snns.thetas, None, self.draws
+            self.config, trial, cost, whole, self.snns.thetas, self.loops, self.draws
         )
         rows = torch.arange(self.runs, device=index.device)
         best = cost.argmin(1)

@@ -15,7 +15,7 @@ from bns.draws import Draws, whole_below
 from bns.evolution.generation import Breeder, Rates
 from bns.evolution.mutation import normal
 from bns.inner import should_compile
-from bns.light.simulator import Noise, Simulator, Thetas
+from bns.light.simulator import Noise, Simulator, State, Thetas
 from bns.light.task import LightTask
 from bns.snn import fitting
 
@@ -84,16 +84,35 @@ class LightLoops:
             drawn.append(normal(coins) * scale)
         return [Noise(*pair) for pair in zip(*drawn, strict=True)]
 
-    def cost(self, snns: Snns, genomes: Tensor) -> Tensor:
-        """Predicted cost ``(R, P)`` of genomes ``(R, P, D)`` from fresh starts."""
+    def _begin(self, genomes: Tensor) -> tuple[tuple[Tensor, ...], State]:
+        """Controllers of genomes ``(R, P, D)``, and their robots at fresh starts."""
         runs, count, _ = genomes.shape
         starts = self.starts(runs).unsqueeze(-1).expand(-1, -1, -1, count)
         ahead, left = starts[:, :, 0].contiguous(), starts[:, :, 1].contiguous()
         layers = self.simulator.controllers.layers(genomes)
-        state = self.simulator.begin(ahead, left)
+        return layers, self.simulator.begin(ahead, left)
+
+    def cost(self, snns: Snns, genomes: Tensor) -> Tensor:
+        """Predicted cost ``(R, P)`` of genomes ``(R, P, D)`` from fresh starts."""
+        layers, state = self._begin(genomes)
         for noise in self.noise(snns.spread):
             state = self._advance(snns.thetas, layers, state, noise)
         return (state.error / state.begun).mean(1)
+
+    def disagreement(self, thetas: Thetas, population: Population) -> Tensor:
+        """How far ensembles disagree on the way from fresh starts, ``(R, P)``.
+
+        Args:
+            thetas: weights of the SNNs.
+            population: genomes ``(R, P, D, 1)``, the islands of a run side by side.
+        """
+        layers, state = self._begin(population.genes.squeeze(-1))
+        total = torch.zeros_like(state.error)
+        for _ in range(self.config.light.cycles):
+            after = self._advance(thetas, layers, state, None)
+            total += self.simulator.doubt(thetas, state, after)
+            state = after
+        return total.mean(1)
 
     def cost_of(self, snns: Snns, population: Population) -> Tensor:
         """The same of a population whose rows are islands, ``(R I, p)``."""

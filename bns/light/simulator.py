@@ -14,7 +14,7 @@ from torch import Tensor
 from bns.config import RunConfig, SnnConfig
 from bns.light.controller import Controllers
 from bns.light.scaling import FAR, MOTION_INPUTS, MOTION_OUTPUTS, SENSORS, Scales
-from bns.snn.network import Shape, predict
+from bns.snn.network import Shape, forward, predict
 
 
 class Thetas(NamedTuple):
@@ -182,6 +182,28 @@ class Simulator:
         if noise is not None:
             bright = bright + noise.sensors
         return bright.clamp(0.0, 1.0)
+
+    def doubt(self, thetas: Thetas, state: State, after: State) -> Tensor:
+        """How far ensembles disagree on a cycle, ``(R, S, P)``.
+
+        Variance over the members, summed over the scaled outputs of all SNNs; needs
+        SNNs of kind "ensemble".
+
+        Args:
+            thetas: weights of the SNNs.
+            state, after: before and after the cycle.
+        """
+        runs, starts, count = state.ahead.shape
+        told = torch.cat([state.before, after.before], dim=1).flatten(2)
+        views = self.views(state.ahead.flatten(1), state.left.flatten(1))
+        parts = (
+            forward(shape, theta, inputs).var(1, unbiased=False).sum(1)
+            for shape, theta, inputs in (
+                (self.motion, thetas.motion, told),
+                (self.sensors, thetas.sensors, views),
+            )
+        )
+        return sum(parts).view(runs, starts, count)
 
     def advance(
         self,

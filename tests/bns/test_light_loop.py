@@ -164,3 +164,36 @@ def test_windows_and_magnitudes_follow_the_adaptations():
     assert isinstance(learner.adaptations, Adaptations)
     assert learner._rates(1).magnitude.tolist() == [[pytest.approx(0.05)]]
     assert learner._rates(2).magnitude.tolist() == [[pytest.approx(0.3)]]
+
+
+class TestDisagreement:
+    def learner(self, **light):
+        config = small(**light)
+        config = replace(config, choose="disagreement")
+        config = replace(config, snn=replace(config.snn, kind="ensemble", members=4))
+        return LightLearner([config] * 2, replicates=[0, 1], onsets=[-1, -1])
+
+    def test_is_the_variance_over_members_summed_over_cycles(self):
+        learner = self.learner()
+        for learned, shape in (
+            (learner.motion, learner.simulator.motion),
+            (learner.sensors, learner.simulator.sensors),
+        ):
+            learned.theta.zero_()  # every member says its last bias
+            learned.theta[1, -shape.outputs] = 0.2  # of the last member of run 1
+        genomes = learner.population.genes.reshape(2, 12, -1, 1)
+        whole = Population(genomes, torch.zeros(2, 12).long())
+        found = learner.loops.disagreement(learner.snns.thetas, whole)
+        each = 0.2**2 * (1 / 4 - 1 / 16)  # of a member of four that is off by 0.2
+        assert found[0].tolist() == [0.0] * 12
+        assert found[1].tolist() == pytest.approx([20 * 2 * each] * 12)
+
+    def test_what_is_tried_need_not_be_the_best(self):
+        record = train(self.learner(islands=2).config, world=FakeLightWorld())
+        assert (record["fitness_best"] != record["fitness"]).any()
+
+    def test_needs_an_ensemble(self):
+        config = replace(small(), choose="disagreement")
+        learner = LightLearner([config], replicates=[0], onsets=[-1])
+        with pytest.raises(BnsError, match="needs an ensemble"):
+            learner.propose(0)
