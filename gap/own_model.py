@@ -215,9 +215,7 @@ class OwnModel:
         Predicted and not recorded ones: the noise of these is part of what is tested.
         """
         ((expected,),) = self.simulate([trial], [()])
-        ends = np.cumsum(trial.commands.durations)
-        at = windows.times - trial.times[trial.boundaries[0]]
-        index = np.minimum(np.searchsorted(ends, at), len(ends) - 1)
+        index, since, at = pieces.told(trial, windows)
         told = trial.commands.values
         before = np.vstack([told[:1], told[:-1]])[index]
         made = {}
@@ -230,9 +228,7 @@ class OwnModel:
             made[channel.name] = seen[windows.first]
             step = seen[windows.last] - seen[windows.first]
             made[f"speed of {channel.name}"] = step / windows.durations
-        made["time since the command changed"] = (
-            at - (ends - trial.commands.durations)[index]
-        )
+        made["time since the command changed"] = since
         made["time in the trial"] = at
         return made
 

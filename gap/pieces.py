@@ -54,6 +54,29 @@ def pieces_of(trial: Trial, steps: int, dt: float) -> list[Piece]:
     return made
 
 
+class Told(NamedTuple):
+    """What a robot was told in each of W windows.
+
+    Attributes:
+        index: number of the command, ``(W,)``.
+        since: time since it began [s].
+        at: time in the trial [s].
+    """
+
+    index: np.ndarray
+    since: np.ndarray
+    at: np.ndarray
+
+
+def told(trial: Trial, windows: Windows) -> Told:
+    """The command that was in force in the middle of each window."""
+    lasting = trial.commands.durations
+    ends = np.cumsum(lasting)
+    at = windows.times - trial.times[trial.boundaries[0]]
+    index = np.minimum(np.searchsorted(ends, at), len(ends) - 1)
+    return Told(index, at - (ends - lasting)[index], at)
+
+
 def stitched(poses: Sequence[np.ndarray]) -> np.ndarray:
     """Pieces of a path put end to end; motion in the robot's frame is kept.
 

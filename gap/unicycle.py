@@ -15,7 +15,7 @@ from bns.gap.own_candidates import EXCITE, LATE, RATIOS, OwnCandidate
 from bns.gap.records import Candidate
 from bns.worlds import control
 from bns.worlds.effects.base import ControlSignal, Effect
-from bns.worlds.trial import POSE_CHANNELS, Channel, Trial
+from bns.worlds.trial import POSE_CHANNELS, Channel, Trial, body_displacement
 
 STEP = 0.01  # [s] grid of the integration
 WINDOW = 0.5  # [s] between two poses that are compared
@@ -92,17 +92,11 @@ class UnicycleModel:
     ) -> np.ndarray:
         """Displacement in the robot's frame at the start of each window."""
         begin, end = observed[..., windows.first, :], observed[..., windows.last, :]
-        step = end - begin
-        cos, sin = np.cos(begin[..., 2]), np.sin(begin[..., 2])
-        forward = cos * step[..., 0] + sin * step[..., 1]
-        left = cos * step[..., 1] - sin * step[..., 0]
-        return np.stack([forward, left, step[..., 2]], axis=-1)
+        return body_displacement(begin, end)
 
     def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
         """Commands, their changes, and time."""
-        ends = np.cumsum(trial.commands.durations)
-        at = windows.times - trial.times[trial.boundaries[0]]
-        index = np.minimum(np.searchsorted(ends, at), len(ends) - 1)
+        index, since, at = pieces.told(trial, windows)
         told = trial.commands.values
         before = np.vstack([told[:1], told[:-1]])[index]
         return {
@@ -110,8 +104,7 @@ class UnicycleModel:
             "turning rate told": told[index, 1],
             "change of the speed told": told[index, 0] - before[:, 0],
             "change of the rate told": told[index, 1] - before[:, 1],
-            "time since the command changed": at
-            - (ends - trial.commands.durations)[index],
+            "time since the command changed": since,
             "time in the trial": at,
         }
 

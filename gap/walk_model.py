@@ -22,7 +22,7 @@ from bns.worlds.damage import Damage
 from bns.worlds.effects.base import Effect
 from bns.worlds.hexapod_world import SPEED, HexapodWorld
 from bns.worlds.legged_physics import walk
-from bns.worlds.trial import Channel, Trial, body_displacements
+from bns.worlds.trial import Channel, Trial, body_displacement
 
 WINDOW = 0.12  # [s] over which the body's motion is compared
 TRACKER = (1e-3, 1e-3, 1e-2)  # [m, m, rad] noise of the tracker; assumed
@@ -139,8 +139,7 @@ class WalkModel:
     ) -> np.ndarray:
         """The body's displacement in its frame, and servo positions at the end."""
         begin, end = observed[..., windows.first, :], observed[..., windows.last, :]
-        pair = np.stack([begin[..., :3], end[..., :3]], axis=-2)
-        moved = body_displacements(pair)[..., 0, :]
+        moved = body_displacement(begin[..., :3], end[..., :3])
         return np.concatenate([moved, end[..., 3:]], axis=-1)
 
     def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:

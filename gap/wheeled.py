@@ -19,7 +19,13 @@ from bns.worlds import compile, control, observe
 from bns.worlds.active import Placed
 from bns.worlds.effects.base import ControlSignal, Effect, PoseSignal
 from bns.worlds.physics import Job, Pool
-from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Trial
+from bns.worlds.trial import (
+    POSE_CHANNELS,
+    Channel,
+    Commands,
+    Trial,
+    body_displacement,
+)
 
 KEPT = 40_000  # simulated drives kept in memory, about 24 kB each
 WINDOW = 0.1  # [s] shortest piece of motion that is compared
@@ -252,17 +258,11 @@ class WheeledModel:
     ) -> np.ndarray:
         """Displacement in the robot's frame at the start of each window."""
         begin, end = observed[..., windows.first, :], observed[..., windows.last, :]
-        step = end - begin
-        cos, sin = np.cos(begin[..., 2]), np.sin(begin[..., 2])
-        forward = cos * step[..., 0] + sin * step[..., 1]
-        left = cos * step[..., 1] - sin * step[..., 0]
-        return np.stack([forward, left, step[..., 2]], axis=-1)
+        return body_displacement(begin, end)
 
     def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
         """Commands, their signs, changes, pose and time in each window."""
-        ends = np.cumsum(trial.commands.durations)
-        at = windows.times - trial.times[trial.boundaries[0]]
-        index = np.minimum(np.searchsorted(ends, at), len(ends) - 1)
+        index, since, at = pieces.told(trial, windows)
         told = trial.commands.values
         before = np.vstack([np.zeros(2), told])[index]
         pose = pieces.coarse(trial.poses_world[windows.first])
@@ -272,8 +272,7 @@ class WheeledModel:
             "speed told to the right wheel [m/s]": now[:, 1],
             "change of the left wheel's command [m/s]": now[:, 0] - before[:, 0],
             "change of the right wheel's command [m/s]": now[:, 1] - before[:, 1],
-            "time since the command changed [s]": at
-            - (ends - trial.commands.durations)[index],
+            "time since the command changed [s]": since,
             "forward speed told [m/s]": now.mean(axis=1),
             "turn told [m/s]": now[:, 1] - now[:, 0],
             "heading": np.angle(np.exp(1j * pose[:, 2])),

@@ -209,9 +209,20 @@ def body_displacements(poses_world: np.ndarray) -> np.ndarray:
         ``(..., K, 3)``: forward [m], left [m], turn [rad] (continuous).
     """
     poses = np.asarray(poses_world, dtype=np.float64)
-    step = np.diff(poses, axis=-2)
-    yaw = poses[..., :-1, 2]
-    cos, sin = np.cos(yaw), np.sin(yaw)
+    return body_displacement(poses[..., :-1, :], poses[..., 1:, :])
+
+
+def body_displacement(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Motion from a pose to another, in the body frame of the first.
+
+    Args:
+        begin, end: poses ``(..., 3)`` [m, m, rad].
+
+    Returns:
+        ``(..., 3)``: forward [m], left [m], turn [rad] (continuous).
+    """
+    step = end - begin
+    cos, sin = np.cos(begin[..., 2]), np.sin(begin[..., 2])
     return np.stack(
         [
             cos * step[..., 0] + sin * step[..., 1],

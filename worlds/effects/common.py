@@ -30,3 +30,12 @@ def spans(active: np.ndarray) -> Iterator[slice]:
     edges = np.flatnonzero(np.diff(active.astype(np.int8), prepend=0, append=0))
     for start, stop in edges.reshape(-1, 2):
         yield slice(int(start), int(stop))
+
+
+def rarer(effect: Effect, severity: float) -> int:
+    """The parameter `every` at a severity: half of it hits half as often; 0 = never."""
+    every = int(effect["every"])
+    if severity <= 0 or every <= 0:
+        return 0
+    every = round(every / severity)
+    return every if every <= effect.parameters[0].high else 0

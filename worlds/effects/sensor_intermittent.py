@@ -3,6 +3,7 @@
 import numpy as np
 
 from bns.worlds.effects.base import Parameter, SensorEffect
+from bns.worlds.effects.common import rarer
 from bns.worlds.effects.sensors import FULL_SCALE, SENSOR, columns
 
 
@@ -54,8 +55,5 @@ class SensorIntermittent(SensorEffect):
 
     def scaled(self, severity: float) -> "SensorIntermittent":
         """Milder means rarer: half the severity hits half as many readings."""
-        every = 0
-        if severity > 0 and self["every"] > 0:
-            every = round(self["every"] / severity)
-            every = every if every <= self.parameters[0].high else 0
+        every = rarer(self, severity)
         return type(self)({**super().scaled(severity).values, "every": every})

@@ -3,7 +3,7 @@
 import numpy as np
 
 from bns.worlds.effects.base import CommandEffect, ControlSignal, Parameter
-from bns.worlds.effects.common import TOP_SPEED, WHEEL, columns
+from bns.worlds.effects.common import TOP_SPEED, WHEEL, columns, rarer
 
 
 class WheelIntermittent(CommandEffect):
@@ -39,10 +39,7 @@ class WheelIntermittent(CommandEffect):
 
     def scaled(self, severity: float) -> "WheelIntermittent":
         """Milder means rarer: half the severity hits half as many commands."""
-        every = 0
-        if severity > 0 and self["every"] > 0:
-            every = round(self["every"] / severity)
-            every = every if every <= self.parameters[0].high else 0
+        every = rarer(self, severity)
         return type(self)({**super().scaled(severity).values, "every": every})
 
     def apply(
