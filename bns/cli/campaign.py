@@ -10,9 +10,10 @@ from bns.cli.parse import dispatch
 from bns.cli.tables import show
 from bns.errors import BnsError
 
-MANUAL = """usage: bns campaign {run,status,table,plot} ... [...]
+MANUAL = """usage: bns campaign {run,merge,status,table,plot} ... [...]
 
   run FILE.toml --out DIR  run what is missing; --resume goes on
+  merge DIR OTHER...       take the runs of other machines' directories
   status DIR               what is done, what failed and why
   table DIR                medians, p (Mann-Whitney, Holm), A12, power
   plot DIR                 recovery curves and sensitivity, as PNG
@@ -50,6 +51,20 @@ class Run:
     """allow results of several package versions in one directory"""
     yes: bool = False
     """take a very large campaign"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Merge:
+    """Take runs that a campaign's directory lacks from others: of the same campaign on
+    other machines, or of parts of it. The others are not changed.
+    """
+
+    directory: tyro.conf.Positional[str]
+    """a campaign's directory"""
+    others: tyro.conf.Positional[tuple[str, ...]]
+    """directories to take from"""
+    mix: bool = False
+    """take results of other package versions as well"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,6 +106,7 @@ def main(verb: str, argv: list[str]) -> int:
     """Run a verb of campaigns; gives the exit code."""
     does = {
         "run": (Run, _run),
+        "merge": (Merge, _merge),
         "status": (Status, _status),
         "table": (TableOf, _table),
         "plot": (Plot, _plot),
@@ -140,6 +156,17 @@ def _say(session: Any, out: Path, stopped: int) -> int:
     if bad:
         print(f"Try them again: bns campaign run {out} --resume --retry")
         return FAILED
+    return 0
+
+
+def _merge(given: Merge) -> int:
+    from bns.campaign.merge import merge
+
+    if not given.others:
+        raise BnsError("No directory was given to take from: name one or more.")
+    others = [Path(other) for other in given.others]
+    taken = merge(Path(given.directory), others, mix=given.mix)
+    print(f"{taken} runs taken. Results: {given.directory}")
     return 0
 
 

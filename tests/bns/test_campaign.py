@@ -13,6 +13,7 @@ from bns.campaign import drive, results
 from bns.campaign.engines.base import Outcome
 from bns.campaign.engines.inline import InlineEngine
 from bns.campaign.engines.pool import PoolEngine
+from bns.campaign.merge import merge
 from bns.campaign.plan import plan
 from bns.campaign.store import CampaignStore
 from bns.campaign.table import table
@@ -222,6 +223,33 @@ class SecondDriver:
 def test_two_drivers_cannot_write_one_store(tmp_path):
     session = drive.run(campaign(), tmp_path / "run", SecondDriver(tmp_path / "run"))
     assert session.done == 2
+
+
+def test_what_two_machines_ran_is_put_together_to_the_same_bytes(clean, tmp_path):
+    here, there = tmp_path / "here", tmp_path / "there"
+    drive.run(campaign(), here, InlineEngine(), stop=lambda: True)
+    drive.run(campaign(), there, InlineEngine())
+    before = held(there)
+    assert held(here) != held(clean)
+    assert merge(here, [there]) == 4
+    assert held(here) == held(clean)
+    assert held(there) == before
+    assert merge(here, [there]) == 0
+
+
+def test_what_does_not_belong_together_is_not_put_together(clean, tmp_path):
+    other = tmp_path / "other"
+    drive.run(campaign(seed=1), other, InlineEngine(), stop=lambda: True)
+    with pytest.raises(BnsError, match="seed = 0"):
+        merge(other, [clean])
+    with pytest.raises(BnsError, match="given twice"):
+        merge(clean, [clean])
+    head = files.read_json(other / "campaign.json")
+    head["seed"], head["versions"]["mujoco"] = 0, "1.0"
+    files.write_json(other / "campaign.json", head)
+    with pytest.raises(BnsError, match="another mujoco"):
+        merge(other, [clean])
+    assert merge(other, [clean], mix=True) == 4  # of eight; it has the first four
 
 
 def test_the_table_compares_members_that_differ_in_one_setting(clean):

@@ -83,6 +83,8 @@ def test_a_wrong_file_is_one_line(capsys, tiny, text, words):
         (["campaign", "run", "none.toml"], "no campaign file"),
         (["campaign", "status", "."], "not a campaign directory"),
         (["campaign", "table", "nowhere"], "not a campaign directory"),
+        (["campaign", "merge", "nowhere"], "No directory was given"),
+        (["campaign", "merge", "nowhere", "."], "not a campaign directory"),
         (["campaign", "run", "tiny.toml", "--ray-address", "a:1"], "--engine ray"),
         (
             ["campaign", "run", "tiny.toml", "--engine", "ray", "--ray-address", "x"],

@@ -1,0 +1,69 @@
+"""Runs of other stores taken into one: a campaign that several machines share."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from bns.campaign.part import Block, encode
+from bns.campaign.store import CampaignStore
+from bns.errors import BnsError
+
+
+def merge(out: Path, others: Sequence[Path], *, mix: bool = False) -> int:
+    """Take what a campaign's directory lacks from others; gives the number of runs.
+
+    A run is known by its configuration, the campaign's seed and its number, wherever it
+    ran; one that is held already is left alone. The others are not changed.
+
+    Args:
+        out: a campaign's directory.
+        others: directories of campaigns of the same seed.
+        mix: take results of other package versions as well.
+
+    Raises:
+        BnsError: a campaign of another seed or version, one that is being written.
+        FormatError: a directory that holds no campaign, or a damaged file.
+    """
+    store = CampaignStore.open(out)
+    sources = [CampaignStore.open(other) for other in others]
+    for source in sources:
+        _check(store, source, mix)
+    store.lock()
+    try:
+        held = {run for part in store.read() for b in part.blocks for run in _runs(b)}
+        begun = len(held)
+        for source in sources:
+            for part in source.read():
+                blocks = tuple(b for b in part.blocks if held.isdisjoint(_runs(b)))
+                if blocks:
+                    store.add(part.key, encode(replace(part, blocks=blocks)))
+                    held.update(run for block in blocks for run in _runs(block))
+        store.note(event="merge", runs=len(held) - begun)
+        store.compact()
+    finally:
+        store.close()
+    return len(held) - begun
+
+
+def _runs(block: Block) -> set[tuple[str, int]]:
+    return {(block.identity, block.start + i) for i in range(block.count)}
+
+
+def _check(store: CampaignStore, other: CampaignStore, mix: bool) -> None:
+    if other.directory.resolve() == store.directory.resolve():
+        raise BnsError(f"{other.directory} is given twice: name the others once each.")
+    if other.seed != store.seed:
+        raise BnsError(
+            f"{other.directory} was made with seed = {other.seed}, {store.directory} "
+            f"with {store.seed}: a run of one is not that of the other."
+        )
+    if not mix and dict(other.versions) != dict(store.versions):
+        differing = sorted(
+            name
+            for name in {*other.versions, *store.versions}
+            if other.versions.get(name) != store.versions.get(name)
+        )
+        raise BnsError(
+            f"{other.directory} was made with another {', '.join(differing)} than "
+            f"{store.directory}: add --mix to put results of both into one store."
+        )
