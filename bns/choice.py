@@ -8,8 +8,9 @@ from torch import Tensor
 from bns.chromosome import Population
 from bns.config import RunConfig
 from bns.draws import Draws
-from bns.errors import BnsError, UnknownNameError
+from bns.errors import UnknownNameError
 from bns.evolution import selection
+from bns.validate import check_choice
 
 
 class Judge(Protocol):
@@ -53,10 +54,7 @@ def choose(
         coins = draws.uniform(len(cost), 1, size)
         return selection.tournament(cost, coins).squeeze(1)
     if kind == "disagreement":
-        if config.snn.kind != "ensemble":
-            raise BnsError(
-                "choose = 'disagreement' needs an ensemble; set snn.kind = 'ensemble'."
-            )
+        check_choice(config)
         spread = evaluator.disagreement(theta, population)
         good = cost <= cost.median(1, keepdim=True).values
         return torch.where(good, spread, -1.0).argmax(1)

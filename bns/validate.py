@@ -150,4 +150,17 @@ def check(config: RunConfig) -> RunConfig:
                 f"{lower} = {values[lower]} is larger than {upper} = {values[upper]}: "
                 f"raise {upper} or lower {lower}."
             )
+    check_choice(config)
     return config
+
+
+def check_choice(config: RunConfig) -> None:
+    """Refuse to choose by the disagreement of networks that can not disagree.
+
+    Raises:
+        BnsError: there is no ensemble.
+    """
+    if config.choose == "disagreement" and config.snn.kind != "ensemble":
+        raise BnsError(
+            "choose = 'disagreement' needs an ensemble; set snn.kind = 'ensemble'."
+        )

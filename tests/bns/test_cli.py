@@ -120,6 +120,10 @@ WRONG = {
         ["run", "demo", "--world.damage", "wheel_gain@soon"],
         "cannot be read: write NAME",
     ),
+    "no ensemble": (
+        ["run", "demo", "--choose", "disagreement", "--out", "new"],
+        "set snn.kind = 'ensemble'",
+    ),
     "foreign directory": (["run", "demo", "--out", "."], "not empty and holds no run"),
     "no directory": (["report", "nowhere"], "nowhere is not a run directory"),
     "nothing to report": (["report"], "No run was given"),
