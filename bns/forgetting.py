@@ -1,9 +1,11 @@
 """Forgetting by evidence: drop the old trials that the newest one contradicts.
 
 An alternative to a sliding window, which forgets by age. Patterns of an old trial are
-compared with the nearest ones of the newest trial; what the newest trial's own
-patterns differ by among each other, at their distances, is the yardstick. So noise
-alone is no contradiction, and neither is ground that the newest trial did not see.
+compared with the nearest ones of the newest trial; what the patterns of either trial
+differ by among each other, at their distances, is the yardstick, whichever is less: a
+wheel that stops now and then makes the newest trial differ from itself as well. So
+noise alone is no contradiction, and neither is ground that the newest trial did not
+see.
 """
 
 import numpy as np
@@ -27,7 +29,7 @@ def contradicted(
         trials: the trial each pattern is of, ``(N,)``.
         config: thresholds.
         usual: the yardstick, ``(O,)``, where trials are too short to be compared with
-            themselves; None = what the newest trial's patterns differ by.
+            themselves; None = what the patterns of a trial differ by.
 
     Returns:
         Numbers of these trials, sorted.
@@ -38,23 +40,30 @@ def contradicted(
     new, told = inputs[newest], targets[newest]
     if len(new) < 2:
         return np.empty(0, dtype=np.int64)
-    if usual is None:
-        own = _differences(new, told, new, told, config.forget_reach, itself=True)
-        if len(own[0]) < config.forget_least:
-            return np.empty(0, dtype=np.int64)
-        usual = _typical(own[1])
-    usual = np.maximum(usual, FLOOR)
+    own = _scatter(new, told, config) if usual is None else usual
+    if own is None:
+        return np.empty(0, dtype=np.int64)
     found = []
     for trial in np.unique(trials[~newest]):
-        of = trials == trial
-        rows, apart = _differences(
-            inputs[of], targets[of], new, told, config.forget_reach
-        )
+        seen, was = inputs[trials == trial], targets[trials == trial]
+        rows, apart = _differences(seen, was, new, told, config.forget_reach)
         if len(rows) < config.forget_least:
             continue
-        if (_typical(apart) > config.forget_factor * usual).any():
+        its = _scatter(seen[rows], was[rows], config) if usual is None else None
+        least = own if its is None else np.minimum(own, its)
+        least = np.maximum(least, FLOOR)
+        if (_typical(apart) > config.forget_factor * least).any():
             found.append(trial)
     return np.array(found, dtype=np.int64)
+
+
+def _scatter(
+    inputs: np.ndarray, targets: np.ndarray, config: WatchConfig
+) -> np.ndarray | None:
+    """What patterns of a trial differ by among each other, ``(O,)``; None: too few."""
+    reach = config.forget_reach
+    rows, apart = _differences(inputs, targets, inputs, targets, reach, itself=True)
+    return None if len(rows) < config.forget_least else _typical(apart)
 
 
 def _differences(

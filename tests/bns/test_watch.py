@@ -191,6 +191,12 @@ class TestForgetting:
         targets[last] += 0.04 * rng.normal(size=targets[last].shape)
         assert len(contradicted(inputs, targets, trials, WATCH)) == 0
 
+    def test_a_robot_that_fails_now_and_then_is_another_one(self):
+        inputs, targets, trials = self.data()
+        last = np.flatnonzero(trials == trials.max())
+        targets[last[::5]] = -1.0
+        assert contradicted(inputs, targets, trials, WATCH).tolist() == [0, 1, 2, 3, 4]
+
     def test_ground_that_was_not_seen_again_is_kept(self):
         inputs, targets, trials = self.data(gain=0.2)
         far = trials == 1
