@@ -9,16 +9,14 @@ from bns.claims import report, runner
 from bns.claims.claim import claims
 
 WORLD = "mujoco"
-RUNS = 10  # a side; with fewer than the rule's 30 or 100 a verdict is provisional
 
 
-def judged(wanted: Sequence[str], *, quick: bool) -> Result:
-    """How many of some claims have a verdict, by `RUNS` a side; they are kept.
-
-    The bar is judged from 30 a side on.
+def judged(wanted: Sequence[str], *, runs: int, quick: bool) -> Result:
+    """How many of some claims have a verdict; runs are kept, so a run goes on.
 
     Args:
         wanted: identifiers of claims.
+        runs: a side, at least; the bar is judged from 30 on.
         quick: small and short runs.
     """
     from bns.campaign.engines import registry
@@ -26,12 +24,12 @@ def judged(wanted: Sequence[str], *, quick: bool) -> Result:
     chosen = [claims()[name] for name in wanted]
     root = ROOT / "runs" / "claims"
     engine = registry.make("local", workers=experiments.WORKERS)
-    runs = 0 if quick else RUNS
-    runner.run(chosen, engine, world=WORLD, quick=quick, runs=runs, root=root)
+    least = 0 if quick else runs
+    runner.run(chosen, engine, world=WORLD, quick=quick, runs=least, root=root)
     place = runner.directory(WORLD, quick=quick, root=root)
     rows = report.judged(chosen, place, world=WORLD, quick=quick)
     found = [row for row in rows if row.findings]
-    few = quick or RUNS < experiments.REPLICATES
+    few = quick or runs < experiments.REPLICATES
     return Result(
         figure=len(found),
         unit=f"of {len(wanted)}",
