@@ -62,10 +62,9 @@ class InnerLoops:
         self.evaluator = evaluator
         self.breeder = breeder
         self.draws = draws
-        self.compiled = should_compile(config)
         self._breed, self._judge = self._bred, self.evaluator.judge
         self._epoch = fitting.epoch_of(evaluator.shape, config.snn)
-        if self.compiled:
+        if should_compile(config):
             torch._dynamo.config.cache_size_limit = 64
             judge = partial(self.evaluator.judge, fused=True)
             # two regions: in one, the compiler would compute the inputs anew for

@@ -40,6 +40,17 @@ class Term:
         ends = [end for end in (item.low, item.high) if end != item.nominal]
         return any(abs(self.magnitude - end) <= near for end in ends)
 
+    @property
+    def believed(self) -> float:
+        """Probability that a nominal model without any gap is off by so much.
+
+        By the slack of the candidate; 0 where the model is exact there.
+        """
+        item = self.candidate
+        if not item.slack:
+            return 0.0
+        return float(2 * norm.sf(abs(self.magnitude - item.nominal) / item.slack))
+
 
 @dataclass(frozen=True, eq=False)
 class Point:
@@ -57,18 +68,6 @@ class Point:
     rest: np.ndarray
     loss: float
     slopes: np.ndarray
-
-    @property
-    def believed(self) -> float:
-        """Probability that a nominal model without any gap is off by so much.
-
-        By the slack of its one candidate; 0 where the model is exact there.
-        """
-        (term,) = self.terms
-        item = term.candidate
-        if not item.slack:
-            return 0.0
-        return float(2 * norm.sf(abs(term.magnitude - item.nominal) / item.slack))
 
     @property
     def names(self) -> tuple[str, ...]:

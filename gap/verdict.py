@@ -108,8 +108,8 @@ def choose(
         worth: improvement by one effect that chance hardly exceeds.
         rules: thresholds.
     """
-    p_gap = chance(problem, search, null)
     found = rungs(problem, search, null)
+    p_gap = chance(problem, search, null, found)
     rung = climb(found, worth, rules)
     points = search.sizes[rung.size - 1] if rung.size else (search.nothing,)
     scores = [score for _, score in rung.scores]
@@ -118,7 +118,9 @@ def choose(
     return Choice(found, rung, points[0], ranked, p_gap, worth, left)
 
 
-def chance(problem: Problem, search: Search, null: Null) -> float:
+def chance(
+    problem: Problem, search: Search, null: Null, found: Sequence[Rung]
+) -> float:
     """Probability of so large a gap if there were none.
 
     A recording speaks against "none" by what one effect improves and by the structure
@@ -131,15 +133,15 @@ def chance(problem: Problem, search: Search, null: Null) -> float:
         problem: the recording.
         search: what was fitted.
         null: what chance gives.
+        found: rungs, nothing first.
     """
     nothing, single = search.nothing, search.best(1)
     gain = nothing.loss - min(single.loss, nothing.loss)
     gain /= max(1.0, spread(single.rest)) ** 2  # noise that is larger than was thought
     gain /= lasting(problem, single.rest)
-    none = min(null.p_gain(gain), null.misfit(problem, nothing.rest)[0])
-    unsure = single.believed
-    if unsure:
-        unsure = min(unsure, null.misfit(problem, single.rest)[0])
+    none = min(null.p_gain(gain), found[0].p_misfit)
+    (term,) = single.terms
+    unsure = min(term.believed, found[1].p_misfit)
     return min(1.0, 2 * max(none, unsure))
 
 

@@ -138,6 +138,7 @@ def _layout(seen: View, planar: bool, length: float):
     )
 
     def plots(root: str, words: str, channels):
+        """One below the other, a plot of each channel."""
         return rrb.Vertical(
             *(
                 rrb.TimeSeriesView(

@@ -13,7 +13,9 @@ def merge(out: Path, others: Sequence[Path], *, mix: bool = False) -> int:
     """Take what a campaign's directory lacks from others; gives the number of runs.
 
     A run is known by its configuration, the campaign's seed and its number, wherever it
-    ran; one that is held already is left alone. The others are not changed.
+    ran; one that is held already is left alone. What a batch has of a configuration is
+    taken as a whole, or not at all where some of its runs are held. The others are not
+    changed.
 
     Args:
         out: a campaign's directory.
@@ -57,13 +59,10 @@ def _check(store: CampaignStore, other: CampaignStore, mix: bool) -> None:
             f"{other.directory} was made with seed = {other.seed}, {store.directory} "
             f"with {store.seed}: a run of one is not that of the other."
         )
-    if not mix and dict(other.versions) != dict(store.versions):
-        differing = sorted(
-            name
-            for name in {*other.versions, *store.versions}
-            if other.versions.get(name) != store.versions.get(name)
-        )
+    unlike = {*other.versions.items()} ^ {*store.versions.items()}
+    differing = ", ".join(sorted({name for name, _ in unlike}))
+    if differing and not mix:
         raise BnsError(
-            f"{other.directory} was made with another {', '.join(differing)} than "
+            f"{other.directory} was made with another {differing} than "
             f"{store.directory}: add --mix to put results of both into one store."
         )

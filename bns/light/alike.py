@@ -21,6 +21,7 @@ def check(configs: Sequence[RunConfig]) -> None:
     same = {name: getattr(first.light, name) for name in PER_RUN}
 
     def core(config: RunConfig) -> RunConfig:
+        """What all runs of a batch share; the rest as in the first."""
         return replace(
             config,
             preset=first.preset,

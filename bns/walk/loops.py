@@ -30,7 +30,6 @@ class WalkLoops(InnerLoops):
         draws: Draws,
     ):
         super().__init__(config, evaluator, breeder, draws)
-        self.compiled = False
         self._breed, self._judge = self._bred, partial(evaluator.judge)
 
     def train(

@@ -84,12 +84,10 @@ def test_what_the_model_is_unsure_of_is_no_gap(factor, left, gap):
     nothing = support.Point((), 9 * rest, 400.0, rest)
     single = support.Point((support.Term.at(GRIP, 0, factor),), rest, 100.0, rest)
     search = SimpleNamespace(nothing=nothing, best=lambda size: single)
-    misfit = {9.0: 0.5, 1.0: left}
-    null = SimpleNamespace(
-        p_gain=lambda gain: 1e-5, misfit=lambda problem, z: (misfit[z[0]], 0.0)
-    )
+    null = SimpleNamespace(p_gain=lambda gain: 1e-5)
+    found = [SimpleNamespace(p_misfit=p) for p in (0.5, left)]
     problem = SimpleNamespace(
         model=SimpleNamespace(features=(0, 1)),
         floor=SimpleNamespace(source="model", sigma=()),
     )
-    assert (verdict.chance(problem, search, null) < 0.005) == gap
+    assert (verdict.chance(problem, search, null, found) < 0.005) == gap
