@@ -93,8 +93,9 @@ def directory(config: RunConfig) -> Path:
 def known(config: RunConfig) -> dict[str, Any]:
     """A configuration as plain values, without newer settings that change nothing."""
     settings, plain = asdict(config), RunConfig()
-    if config.light.readings == plain.light.readings:
-        del settings["light"]["readings"]
+    for name in ("readings", "renewed"):
+        if settings["light"][name] == getattr(plain.light, name):
+            del settings["light"][name]
     if not config.watch.detect:
         for name in ("floor", "grow", "reach", "near", "largest"):
             del settings["watch"][name]

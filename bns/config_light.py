@@ -74,6 +74,8 @@ class LightConfig:
     """which individuals go: the best, winners of tournaments, or any"""
     replaced: Replaced = "random"
     """which individuals they take the place of"""
+    renewed: int = 0
+    """islands that start anew before each trial, those whose best is the worst (own)"""
     reset_every: int = 0
     """fresh random population every so many trials (B2); 0 = never"""
     reset_elitists: int = 5

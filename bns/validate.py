@@ -71,6 +71,7 @@ BOUNDS = {
     "light.islands": Bound(1, 10_000, "islands"),
     "light.migration_every": Bound(1, 1_000_000, "trials"),
     "light.migrants": Bound(0, 100_000, "individuals"),
+    "light.renewed": Bound(0, 10_000, "islands"),
     "light.reset_every": Bound(0, 1_000_000, "trials"),
     "light.reset_elitists": Bound(0, 100_000, "individuals"),
     "walk.commands": Bound(1, 200, "commands"),

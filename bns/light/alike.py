@@ -47,3 +47,9 @@ def check(configs: Sequence[RunConfig]) -> None:
             f"evolution.population = {first.evolution.population} cannot be shared "
             f"alike by light.islands = {first.light.islands}; take a multiple."
         )
+    if 0 < first.light.renewed >= first.light.islands:
+        raise BnsError(
+            f"light.renewed = {first.light.renewed} would start all of light.islands = "
+            f"{first.light.islands} anew before each trial, and nothing would be "
+            "learned: take fewer, or more islands."
+        )

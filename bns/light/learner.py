@@ -5,7 +5,7 @@ and a trial of 100 cycles trains the motion SNN and the two sensor SNNs at once.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -22,19 +22,11 @@ from bns.light import alike, islands, observing, patterns, resets, watching
 from bns.light.controller import Weights
 from bns.light.loops import LightLoops, Snns
 from bns.light.memory import Learned
-from bns.light.policy import Attempt
+from bns.light.policy import Attempt, Proposal
 from bns.light.scaling import MOTION_OUTPUTS, SENSORS
 from bns.light.simulator import Simulator, Thetas
 from bns.light.task import LightTask
 from bns.worlds.trial import Trial
-
-
-@dataclass(frozen=True)
-class Proposal:
-    """What to run in the world: R controllers each; see `bns.learner.Proposal`."""
-
-    tried: list[Attempt]
-    best: list[Attempt] | None
 
 
 class LightLearner:
@@ -113,16 +105,24 @@ class LightLearner:
         self._reset(trial)
         cost = self.loops.cost_of(self.snns, self.population)
         if trial >= self.config.evolve_from:
-            every = self.config.light.migration_every
-            if trial > 0 and trial % every == 0:
-                self.population = islands.migrate(
-                    self.population, cost, self.config.light, self.draws
-                )
-                cost = self.loops.cost_of(self.snns, self.population)
+            cost = self._settle(trial, cost)
             self.population, cost = self.loops.evolve(
                 self.snns, self.population, cost, self._rates(trial)
             )
         return self._proposal(trial, cost.reshape(self.runs, -1))
+
+    def _settle(self, trial: int, cost: Tensor) -> Tensor:
+        """Migrants go and the worst islands start anew; the costs of all after that."""
+        light = self.config.light
+        if trial > 0 and trial % light.migration_every == 0:
+            self.population = islands.migrate(self.population, cost, light, self.draws)
+            cost = self.loops.cost_of(self.snns, self.population)
+        if light.renewed:
+            fresh = self._random_population().genes
+            worst = resets.worst_islands(cost, light.islands, light.renewed)
+            self._replace(worst, fresh)
+            cost = self.loops.cost_of(self.snns, self.population)
+        return cost
 
     def _proposal(self, trial: int, cost: Tensor) -> Proposal:
         genomes = self.population.genes.reshape(*cost.shape, -1)
@@ -179,8 +179,13 @@ class LightLearner:
             cost = self.loops.cost_of(self.snns, self.population)
             wanted = [config.light.reset_elitists for config in self.configs]
             fresh = resets.with_elitists(fresh, old, cost, wanted)
-        rows = self._rows(which).bool()[:, None, None, None]
-        self.population = self.population._replace(genes=torch.where(rows, fresh, old))
+        self._replace(self._rows(which).bool(), fresh)
+
+    def _replace(self, rows: Tensor, fresh: Tensor) -> None:
+        """Take other genes in some rows (islands), ``(R I,)`` bool."""
+        old = self.population.genes
+        genes = torch.where(rows[:, None, None, None], fresh, old)
+        self.population = self.population._replace(genes=genes)
 
     def observe(
         self, trial: int, tried: Sequence[Trial], best: Sequence[Trial] | None

@@ -1,4 +1,4 @@
-"""Intermittent population reset: the best survive it (B2, reset-elitists)."""
+"""Populations that start anew: all but the best (B2), or the worst islands."""
 
 from collections.abc import Sequence
 
@@ -27,3 +27,16 @@ def with_elitists(
     mine = mine.to(fresh.device)[..., None, None]
     first = torch.where(mine, before.gather(1, index), new[:, :most])
     return torch.cat([first, new[:, most:]], dim=1).reshape(fresh.shape)
+
+
+def worst_islands(cost: Tensor, islands: int, count: int) -> Tensor:
+    """Which islands have the worst best of their run, ``(R I,)`` bool.
+
+    Args:
+        cost: of the rows (islands), ``(R I, p)``.
+        islands: I.
+        count: how many in each run.
+    """
+    best = cost.amin(1).reshape(-1, islands)
+    worst = best.topk(count, dim=1).indices
+    return torch.zeros_like(best).scatter(1, worst, 1.0).flatten().bool()

@@ -70,6 +70,17 @@ class TestEvolution:
         same = (learner.population.genes[:, :, None] == before[:, None]).all(-1).all(-1)
         assert same.any(2).sum(1).tolist() == [0, 3]
 
+    def test_the_worst_islands_start_anew_and_the_others_do_not(self):
+        config = small(islands=4, renewed=3)
+        learner = LightLearner([config] * 2, replicates=[0, 1], onsets=[-1, -1])
+        before = learner.population.genes.clone()
+        size = before.shape[1]
+        cost = torch.arange(8.0)[:, None].expand(8, size).clone()
+        cost[5, 0] = -1.0  # an island counts by its best: of run 1 it is the second
+        learner._settle(1, cost)
+        kept = (learner.population.genes == before).flatten(1).all(1)
+        assert kept.tolist() == [True, *[False] * 4, True, False, False]
+
     def test_weights_stay_within_their_limit(self):
         config = small(weight_limit=12.0)
         learner = LightLearner([config], replicates=[0], onsets=[-1])
@@ -91,7 +102,9 @@ class TestLoop:
         assert record["sensor_left"][:, -1].mean() < record["sensor_left"][:, 0].mean()
         assert record.extra["readings"].shape == (2, 6, 41, 2)
 
-    @pytest.mark.parametrize("light", [{}, {"islands": 2, "migration_every": 1}])
+    @pytest.mark.parametrize(
+        "light", [{}, {"islands": 2, "migration_every": 1, "renewed": 1}]
+    )
     def test_a_run_that_was_stopped_resumes_to_the_same_bytes(self, tmp_path, light):
         config = small(**light)
         train(config, tmp_path / "whole", world=FakeLightWorld())
@@ -136,6 +149,8 @@ class TestLoop:
             LightLearner([small(), small(hidden=7)], replicates=[0, 1], onsets=[-1, -1])
         with pytest.raises(BnsError, match="multiple"):
             LightLearner([small(islands=5)], replicates=[0], onsets=[-1])
+        with pytest.raises(BnsError, match="nothing would be learned"):
+            LightLearner([small(renewed=1)], replicates=[0], onsets=[-1])
 
     def test_foreseen_and_measured_agree_where_the_snns_are_right(self):
         """A robot that was seen to stand still is foreseen where it stands."""
