@@ -25,8 +25,12 @@ def run(quick: bool) -> Result:
     as far in as many commands, whatever the time.
     """
     groups, hand = hexapod_runs.walking(quick=quick), hexapod_runs.by_hand()
-    timed = np.concatenate([first(hexapod_runs.adequate(g, hand)) for g in groups])
-    told = np.concatenate([first(g["distance"] >= hand.distance) for g in groups])
+    timed = np.concatenate(
+        [solving.first(hexapod_runs.adequate(g, hand)) for g in groups]
+    )
+    told = np.concatenate(
+        [solving.first(g["distance"] >= hand.distance) for g in groups]
+    )
     waits = solving.waits(timed)
     median = waits["median"]
     return Result(
@@ -66,8 +70,3 @@ def at_the_end(record: RunRecord) -> dict[str, object]:
             round(float(load), 3) for load in loads
         ],
     }
-
-
-def first(hit: np.ndarray) -> np.ndarray:
-    """Number of the first trial that did it, counted from 1; inf = none, ``(R,)``."""
-    return np.where(hit.any(1), hit.argmax(1) + 1.0, np.inf)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bench import branching, experiments, hexapod_evidence
+from bench import branching, experiments, hexapod_evidence, solving
 from bns.config import RunConfig
 from bns.errors import BnsError
 from bns.record import RunRecord
@@ -202,14 +202,15 @@ def trials_to_regain(record: RunRecord) -> np.ndarray:
     Counted from 1 (the onset trial itself); before is the median of the last `BEFORE`
     undamaged trials. Shape ``(R,)``; inf = never.
     """
-    found = np.full(record.replicates, np.inf)
-    for run, onset in enumerate(record.damage_onset):
-        ways = record["distance"][run]
-        before = np.median(ways[max(onset - BEFORE, 0) : onset])
-        hit = np.flatnonzero(ways[onset:] >= SHARE * before)
-        if len(hit):
-            found[run] = hit[0] + 1
-    return found
+    onset = int(record.damage_onset[0])
+    enough = SHARE * before(record)
+    return solving.first(record["distance"][:, onset:] >= enough[:, None])
+
+
+def before(record: RunRecord) -> np.ndarray:
+    """How far robots got before their damage, ``(R,)`` [m]; see `trials_to_regain`."""
+    onset = int(record.damage_onset[0])
+    return np.median(record["distance"][:, max(onset - BEFORE, 0) : onset], axis=1)
 
 
 def by_hand() -> Hand:

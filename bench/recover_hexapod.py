@@ -53,8 +53,14 @@ def _recovery(legs: str, record: RunRecord) -> dict[str, object]:
     onset, ways = int(record.damage_onset[0]), record["distance"]
     late = np.median(ways[:, -hexapod_runs.BEFORE :], axis=1)
     share = hexapod_ceiling.share(late, legs)
+    enough = hexapod_runs.SHARE * hexapod_runs.before(record)
+    adequate = hexapod_runs.adequate(record, hexapod_runs.by_hand())
     return {
         **solving.waits(hexapod_runs.trials_to_regain(record)),
+        "until adequate again": solving.waits(solving.first(adequate[:, onset:])),
+        "as far undamaged, from the start": solving.waits(
+            solving.first(ways[:, :onset] >= enough[:, None])
+        ),
         "before [m]": spread(ways[:, :onset][:, -hexapod_runs.BEFORE :].mean(1)),
         "first damaged trial [m]": spread(ways[:, onset]),
         "last ten trials [m]": spread(late),

@@ -23,6 +23,11 @@ def waits(values: np.ndarray) -> dict[str, object]:
     }
 
 
+def first(hit: np.ndarray) -> np.ndarray:
+    """Number of the first trial that did it, counted from 1; inf = none, ``(R,)``."""
+    return np.where(hit.any(1), hit.argmax(1) + 1.0, np.inf)
+
+
 def solved_within(record: RunRecord, limit: int) -> int:
     """Runs that reached all objectives within `limit` trials."""
     return int((stats.trials_to_solve(record) <= limit).sum())
