@@ -100,7 +100,22 @@ def damaged(
     return replace(config, seed=forking.seed(config)) if damage else config
 
 
-def _preset() -> RunConfig:
+def recovering(damage: str, *, runs: int = experiments.REPLICATES) -> RunConfig:
+    """The preset `khepera-light-recover` with another damage.
+
+    Args:
+        damage: key of `ALL`.
+        runs: runs a side.
+    """
+    config = _preset("khepera-light-recover")
+    world = replace(config.world, damage=(f"{ALL[damage]}@{ONSET}",))
+    config = replace(config, trials=ONSET + AFTER, world=world)
+    config = experiments.named(config, f"light-recover-{damage}")
+    config = replace(config, replicates=runs)
+    return replace(config, seed=forking.seed(config))
+
+
+def _preset(name: str = "khepera-light") -> RunConfig:
     from bns import presets
 
-    return presets.load("khepera-light")
+    return presets.load(name)

@@ -1,6 +1,7 @@
 """Recovery in light following: a slow wheel and three sensor damages (table 6.7).
 
-The sensor at its minimum once more with settings of our own, which judge no bar.
+All four once more with the preset `khepera-light-recover`, whose islands start anew;
+table 6.7 does not have these, so they judge no bar.
 """
 
 from bench import experiments, forking, light_runs, solving
@@ -11,8 +12,7 @@ from bns.record import RunRecord
 DOC = "most trials to recover (median, over four damages) in light following, T6.7"
 BAR = "slow wheel / noisy / minimum / maximum sensor: median <= 12 / 10 / 12 / 10"
 MEDIANS = {"slow-wheel": 12, "noisy": 10, "minimum": 12, "maximum": 10}
-RUNS = 10  # of each damage; 30 are the full bench, which then judges the bar
-OURS = {"readings": "balanced", "charge_stopped": "far"}
+RUNS = 30  # of each damage
 THESIS = {"slow-wheel": 10, "noisy": 4, "minimum": "8 and 9", "maximum": 7}
 
 
@@ -21,8 +21,12 @@ def run(quick: bool) -> Result:
     configs = {
         damage: light_runs.damaged(damage, runs=RUNS) for damage in light_runs.DAMAGES
     }
-    ours = light_runs.damaged("minimum", light=OURS, runs=RUNS)
-    records = forking.records([*configs.values(), ours], quick=quick)
+    ours = {
+        damage: light_runs.recovering(damage, runs=RUNS)
+        for damage in light_runs.DAMAGES
+    }
+    wanted = [*configs.values(), *ours.values()]
+    records = forking.records(wanted, quick=quick)
     found: dict[str, dict[str, object]] = {}
     holds, worst = True, 0.0
     for damage, config in configs.items():
@@ -35,8 +39,8 @@ def run(quick: bool) -> Result:
             "bar": MEDIANS[damage],
             "one run on the robot (6.5)": THESIS[damage],
             **row,
+            "khepera-light-recover": _row(records[ours[damage].preset]),
         }
-    found["minimum, settings of our own"] = OURS | _row(records[ours.preset])
     few = quick or RUNS < experiments.REPLICATES
     return Result(
         figure=worst,
