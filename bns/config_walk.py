@@ -24,6 +24,9 @@ class WalkConfig:
     mutation_magnitude: float = 20.0
     """standard deviation of a goal's mutation [ticks of 300/1023 deg] (table 7.2,
     unit silent)"""
+    repeat: float = 0.0
+    """chance that a command of a child is copied to another place, and that its
+    commands go round from some place on (own; bns/walk/repetition.py)"""
     fitness: Literal["repaired", "printed"] = "repaired"
     """printed: equations 7.1 and 7.2, which reward agreement on standing still;
     repaired: distance less `doubt` times the spread of the members' end points"""

@@ -79,6 +79,7 @@ BOUNDS = {
     "walk.initial": Bound(0, 3.2, "rad"),
     "walk.reach": Bound(0.01, 3.2, "rad"),
     "walk.mutation_magnitude": Bound(0, 1023, "ticks"),
+    "walk.repeat": Bound(0, 1),
     "walk.doubt": Bound(0, 1000),
     "walk.batch": Bound(0, 100_000, "patterns"),
     "walk.learning_rate": Bound(1e-6, 1),

@@ -41,6 +41,7 @@ class Coins(NamedTuple):
         fresh_lengths: ``(R, F)``.
         crossover: as the operator needs.
         mutation: ``(R, N, K, 3)``.
+        own: what an operator of one encoding alone needs; None = there is none.
     """
 
     parents: Tensor
@@ -49,6 +50,7 @@ class Coins(NamedTuple):
     fresh_lengths: Tensor
     crossover: Tensor
     mutation: Tensor
+    own: Tensor | None = None
 
 
 @dataclass(frozen=True)

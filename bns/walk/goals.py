@@ -14,6 +14,7 @@ from bns.draws import Draws
 from bns.errors import BnsError
 from bns.evolution.generation import Breeder, Coins, Rates
 from bns.evolution.selection import tournament_by_rank
+from bns.walk import repetition
 from bns.worlds.trial import Channel, Commands
 
 TICK = math.radians(300 / 1023)  # [rad] AX-12A manual: 300 degrees are 1023 ticks
@@ -93,17 +94,27 @@ class Goals:
         return [Commands(row.clip(low, high), longest, self.channels) for row in goals]
 
 
+@dataclass(frozen=True)
 class GoalBreeder(Breeder):
     """Makes the next population; children of crossover stay within the bounds, too.
 
     The winner of a tournament is drawn by its rank, as likely as if all entrants had
     been drawn: the dissertation's are of 200, and such numbers are dear.
+
+    Attributes:
+        repeat: chance that a child repeats commands, see `bns.walk.repetition`.
     """
+
+    repeat: float = 0.0
 
     def draw(self, runs: int, draws: Draws) -> Coins:
         """The random numbers of one generation, one a parent."""
         one = replace(self.config, tournament=1)
-        return Breeder(one, self.encoding, self.fixed_length).draw(runs, draws)
+        coins = Breeder(one, self.encoding, self.fixed_length).draw(runs, draws)
+        if self.repeat == 0:
+            return coins
+        count = self.config.population - self.config.elitism
+        return coins._replace(own=draws.uniform(runs, count, repetition.COINS))
 
     def parents(self, cost: Tensor, coins: Tensor) -> Tensor:
         """Indices of the parents, see `Breeder.parents`."""
@@ -116,5 +127,9 @@ class GoalBreeder(Breeder):
     ) -> Population:
         """The next generation, see `Breeder.breed`."""
         bred = super().breed(population, cost, rates, coins)
+        if self.repeat > 0:
+            elites, children = bred.genes.tensor_split([self.config.elitism], dim=1)
+            children = repetition.repeated(children, coins.own, self.repeat)
+            bred = bred._replace(genes=torch.cat([elites, children], dim=1))
         low, high = self.encoding.low, self.encoding.high
         return bred._replace(genes=torch.minimum(torch.maximum(bred.genes, low), high))

@@ -74,7 +74,7 @@ class WalkLearner(Learner):
         )
         self.scaling = scaling.Scaling()
         self.evaluator = WalkEvaluator(self.shape, config.walk)
-        breeder = GoalBreeder(config.evolution, self.encoding, True)
+        breeder = GoalBreeder(config.evolution, self.encoding, True, config.walk.repeat)
         self.inner = WalkLoops(config, self.evaluator, breeder, self.draws)
         self.adaptations = Adaptations(configs, onsets)
         self.buffer = PatternBuffer(

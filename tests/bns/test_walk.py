@@ -7,17 +7,16 @@ import numpy as np
 import pytest
 import torch
 
-from bns import models, presets
+from bns import presets
 from bns.chromosome import Population
 from bns.draws import Draws
 from bns.errors import BnsError
-from bns.evolution.generation import Rates
 from bns.run import train
 from bns.snn.fitting import Patterns
 from bns.snn.network import Shape, forward
 from bns.walk import fitness, observing, scaling, training
 from bns.walk.evaluation import WalkEvaluator, path, variance
-from bns.walk.goals import TICK, GoalBreeder, Goals
+from bns.walk.goals import TICK, Goals
 from bns.walk.learner import WalkLearner
 from bns.worlds.trial import Commands, Outcome, Trial
 from tests.bns.walkers import STRIDE, Slider, small
@@ -96,39 +95,6 @@ class TestEvaluator:
         torch.testing.assert_close(
             evaluator.poses(theta, both)[:, 1:], evaluator.poses(theta, alone)
         )
-
-
-class TestGoals:
-    def test_a_tick_is_what_the_maker_says(self):
-        assert math.degrees(TICK) == pytest.approx(0.2933, abs=1e-4)
-
-    def test_random_goals_lie_around_half_way_and_within_the_stops(self):
-        config = small(walk=replace(small().walk, initial=1.5, reach=3.0))
-        genes = Goals.of(config).random(2, 50, Draws(0)).genes
-        low, high = models.robot("phantomx").ranges.T
-        assert genes.shape == (2, 50, 11, 18)
-        assert (genes >= torch.tensor(np.maximum(low, -1.5) - 1e-6)).all()
-        assert (genes <= torch.tensor(np.minimum(high, 1.5) + 1e-6)).all()
-        assert genes.amax() > 1.45 and genes.amin() < -1.45
-
-    def test_commands_never_pass_the_stops_by_a_rounding(self):
-        goals = Goals.of(small())
-        genes = goals.low.expand(1, 1, 11, 18).clone()
-        told = goals.commands(Population(genes, torch.full((1, 1), 11)))[0]
-        assert (told.values >= models.robot("phantomx").ranges[:, 0]).all()
-
-    def test_children_stay_within_bounds_whatever_the_crossover(self):
-        config = small(walk=replace(small().walk, reach=0.5))
-        goals, draws = Goals.of(config), Draws(0)
-        breeder = GoalBreeder(config.evolution, goals, True)
-        population = goals.random(1, 40, draws)
-        edge = torch.where(population.genes > 0, goals.high, goals.low)
-        population = population._replace(genes=edge)
-        rates = Rates(torch.tensor([0.5]), torch.full((1, 18), 0.3))
-        coins = breeder.draw(1, draws)
-        bred = breeder.breed(population, draws.uniform(1, 40), rates, coins)
-        assert bred.genes.abs().max() <= 0.5
-        assert (bred.genes.abs() < 0.49).any()
 
 
 class TestTraining:
