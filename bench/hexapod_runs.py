@@ -76,14 +76,16 @@ def damaged(legs: str, group: str = "a", *, forget: bool = False) -> RunConfig:
         forget: forget by evidence, beside the window.
     """
     trunk = undamaged(group)
+    watch = replace(trunk.watch, forget=forget)
+    name = f"walk-{'forget-' if forget else ''}{legs}-{group}"
+    return replace(_hurt(trunk, legs, name), watch=watch)
+
+
+def _hurt(trunk: RunConfig, legs: str, name: str) -> RunConfig:
+    """Undamaged runs, going on with legs raised from trial `ONSET` on."""
     damage = (f"leg_raised:legs={legs},blend=1@{ONSET}",)
-    return replace(
-        trunk,
-        preset=f"walk-{'forget-' if forget else ''}{legs}-{group}",
-        trials=ONSET + AFTER,
-        world=replace(trunk.world, damage=damage),
-        watch=replace(trunk.watch, forget=forget),
-    )
+    world = replace(trunk.world, damage=damage)
+    return replace(trunk, preset=name, trials=ONSET + AFTER, world=world)
 
 
 def records(
@@ -149,6 +151,20 @@ def recovering(*, quick: bool = False, forget: bool = False) -> Mapping[str, Run
         legs: joined([found[configs[legs, group].preset] for group in RECOVERING])
         for legs in TYPES
     }
+
+
+def own(*, quick: bool = False) -> Mapping[str, RunRecord]:
+    """As `recovering`, with the preset `hexapod-recover` from the first trial on."""
+    trunk = _preset("hexapod-recover")
+    trunk = replace(trunk, trials=ONSET, world=replace(trunk.world, damage=()))
+    trunk = replace(experiments.named(trunk, "walk-own"), replicates=GROUP)
+    configs = {legs: _hurt(trunk, legs, f"walk-own-{legs}") for legs in TYPES}
+    if not quick:
+        records([trunk])
+        for config in configs.values():
+            branching.begin(trunk, config)
+    found = records(configs.values(), quick=quick)
+    return {legs: found[config.preset] for legs, config in configs.items()}
 
 
 def kept(legs: str) -> list[RunRecord]:
@@ -269,7 +285,7 @@ def _place(config: RunConfig) -> Path:
     return experiments.directory(config)
 
 
-def _preset() -> RunConfig:
+def _preset(name: str = "hexapod-walk") -> RunConfig:
     from bns import presets
 
-    return presets.load("hexapod-walk")
+    return presets.load(name)

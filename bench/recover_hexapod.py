@@ -17,10 +17,11 @@ def run(quick: bool) -> Result:
 
     The runs of all types are those of `hexapod-gait` up to the damage. The figure is
     that of the window; beside it, from the same undamaged runs on, what forgetting by
-    evidence comes to (`watch.forget`).
+    evidence comes to (`watch.forget`), and the preset `hexapod-recover`.
     """
     records = hexapod_runs.recovering(quick=quick)
     others = hexapod_runs.recovering(quick=quick, forget=True)
+    ours = hexapod_runs.own(quick=quick)
     found: dict[str, object] = {}
     medians, holds = [], True
     for legs, record in records.items():
@@ -29,6 +30,7 @@ def run(quick: bool) -> Result:
             **_recovery(legs, others[legs]),
             "trials until it forgot": solving.waits(_forgot(others[legs])),
         }
+        row["hexapod-recover"] = _recovery(legs, ours[legs])
         median = row["median"]
         limit = LIMIT_MILD if legs in MILD else LIMIT
         holds = holds and median is not None and median <= limit
