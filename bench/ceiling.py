@@ -92,9 +92,10 @@ def _search(config: RunConfig) -> dict[str, object]:
     population = _tried(record, encoding)
     cost, goals = _in_world(world, encoding, task, population)
     begun = float(cost.min())
+    rates = _rates(config)
     for _ in range(GENERATIONS):
-        coins = breeder.draw(RUNS, draws)
-        population = breeder.breed(population, cost, _rates(config), coins)
+        coins = breeder.draw(draws, rates)
+        population = breeder.breed(population, cost, rates, coins)
         cost, goals = _in_world(world, encoding, task, population)
     best = int(cost[0].argmin())
     return {

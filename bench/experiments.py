@@ -96,8 +96,9 @@ def known(config: RunConfig) -> dict[str, Any]:
     for name in ("readings", "renewed"):
         if settings["light"][name] == getattr(plain.light, name):
             del settings["light"][name]
-    if config.walk.repeat == plain.walk.repeat:
-        del settings["walk"]["repeat"]
+    for name in ("repeat", "repeat_after"):
+        if settings["walk"][name] == getattr(plain.walk, name):
+            del settings["walk"][name]
     if not config.watch.detect:
         for name in ("floor", "grow", "reach", "near", "largest"):
             del settings["watch"][name]

@@ -67,25 +67,28 @@ def undamaged(group: str = "", *, trials: int = ONSET, **walk: object) -> RunCon
     return replace(named, replicates=GROUP)
 
 
-def damaged(legs: str, group: str = "a", *, forget: bool = False) -> RunConfig:
+def damaged(
+    legs: str, group: str = "a", *, forget: bool = False, own: bool = False
+) -> RunConfig:
     """A batch of the preset whose legs are raised from trial `ONSET` on.
 
     Args:
         legs: as the effect `leg_raised` takes them.
         group: of which undamaged batch it is the continuation.
         forget: forget by evidence, beside the window.
+        own: as the preset `hexapod-recover` does (which forgets as well).
     """
-    trunk = undamaged(group)
-    watch = replace(trunk.watch, forget=forget)
-    name = f"walk-{'forget-' if forget else ''}{legs}-{group}"
-    return replace(_hurt(trunk, legs, name), watch=watch)
-
-
-def _hurt(trunk: RunConfig, legs: str, name: str) -> RunConfig:
-    """Undamaged runs, going on with legs raised from trial `ONSET` on."""
+    trunk, recover = undamaged(group), _preset("hexapod-recover")
+    kind = "own-" if own else "forget-" if forget else ""
     damage = (f"leg_raised:legs={legs},blend=1@{ONSET}",)
-    world = replace(trunk.world, damage=damage)
-    return replace(trunk, preset=name, trials=ONSET + AFTER, world=world)
+    return replace(
+        trunk,
+        preset=f"walk-{kind}{legs}-{group}",
+        trials=ONSET + AFTER,
+        world=replace(trunk.world, damage=damage),
+        walk=recover.walk if own else trunk.walk,
+        watch=replace(trunk.watch, forget=forget or own),
+    )
 
 
 def records(
@@ -132,39 +135,30 @@ def adequate(record: RunRecord, hand: Hand) -> np.ndarray:
     return in_time(record, hand.seconds) >= hand.distance
 
 
-def recovering(*, quick: bool = False, forget: bool = False) -> Mapping[str, RunRecord]:
+def recovering(*, quick: bool = False, **kind: bool) -> Mapping[str, RunRecord]:
     """The runs of each damage of `TYPES`; quick: one small run of each.
+
+    Args:
+        quick: a look.
+        kind: `forget` or `own` of `damaged`.
 
     Raises:
         BnsError: to forget by evidence would have changed the undamaged runs.
     """
     wanted = [(legs, group) for legs in TYPES for group in RECOVERING]
-    configs = {key: damaged(*key, forget=forget) for key in wanted}
+    configs = {key: damaged(*key, **kind) for key in wanted}
     if not quick:
         trunks = records([undamaged(group) for group in RECOVERING])
-        if forget and any(hexapod_evidence.forgets(t).any() for t in trunks.values()):
+        if kind and any(hexapod_evidence.forgets(t).any() for t in trunks.values()):
             raise BnsError("Run the undamaged runs with watch.forget, too.")
         for (_, group), config in configs.items():
-            branching.begin(undamaged(group), config, idle=("watch",) * forget)
+            idle = ("watch", "walk") if kind else ()
+            branching.begin(undamaged(group), config, idle=idle)
     found = records(configs.values(), quick=quick)
     return {
         legs: joined([found[configs[legs, group].preset] for group in RECOVERING])
         for legs in TYPES
     }
-
-
-def own(*, quick: bool = False) -> Mapping[str, RunRecord]:
-    """As `recovering`, with the preset `hexapod-recover` from the first trial on."""
-    trunk = _preset("hexapod-recover")
-    trunk = replace(trunk, trials=ONSET, world=replace(trunk.world, damage=()))
-    trunk = replace(experiments.named(trunk, "walk-own"), replicates=GROUP)
-    configs = {legs: _hurt(trunk, legs, f"walk-own-{legs}") for legs in TYPES}
-    if not quick:
-        records([trunk])
-        for config in configs.values():
-            branching.begin(trunk, config)
-    found = records(configs.values(), quick=quick)
-    return {legs: found[config.preset] for legs, config in configs.items()}
 
 
 def kept(legs: str) -> list[RunRecord]:

@@ -27,6 +27,8 @@ class WalkConfig:
     repeat: float = 0.0
     """chance that a command of a child is copied to another place, and that its
     commands go round from some place on (own; bns/walk/repetition.py)"""
+    repeat_after: float = 0.0
+    """the same once damage is known; 0 = unchanged"""
     fitness: Literal["repaired", "printed"] = "repaired"
     """printed: equations 7.1 and 7.2, which reward agreement on standing still;
     repaired: distance less `doubt` times the spread of the members' end points"""

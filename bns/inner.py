@@ -88,7 +88,7 @@ class InnerLoops:
     ) -> tuple[Population, Tensor]:
         """All generations between two trials; gives the population and its costs."""
         for _ in range(self.config.evolution.generations):
-            coins = self.breeder.draw(len(cost), self.draws)
+            coins = self.breeder.draw(self.draws, rates)
             population, inputs = self._breed(population, cost, rates, coins)
             cost = self._judge(theta, inputs, population.lengths)
         return population, cost

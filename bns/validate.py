@@ -80,6 +80,7 @@ BOUNDS = {
     "walk.reach": Bound(0.01, 3.2, "rad"),
     "walk.mutation_magnitude": Bound(0, 1023, "ticks"),
     "walk.repeat": Bound(0, 1),
+    "walk.repeat_after": Bound(0, 1),
     "walk.doubt": Bound(0, 1000),
     "walk.batch": Bound(0, 100_000, "patterns"),
     "walk.learning_rate": Bound(1e-6, 1),

@@ -24,11 +24,14 @@ class Rates(NamedTuple):
         magnitude: of each gene kind, ``(R, 3)`` [m/s, m/s, s] (weights: ``(R, 1)``).
         chicken: probability of a fresh second parent, ``(R,)``; None = that of the
             configuration.
+        repeat: probability that a walker's child repeats its commands, ``(R,)``, see
+            `bns.walk.repetition`; None = none does.
     """
 
     rate: Tensor
     magnitude: Tensor
     chicken: Tensor | None = None
+    repeat: Tensor | None = None
 
 
 class Coins(NamedTuple):
@@ -41,7 +44,7 @@ class Coins(NamedTuple):
         fresh_lengths: ``(R, F)``.
         crossover: as the operator needs.
         mutation: ``(R, N, K, 3)``.
-        own: what an operator of one encoding alone needs; None = there is none.
+        repeat: what repetition needs; None = there is none.
     """
 
     parents: Tensor
@@ -50,7 +53,7 @@ class Coins(NamedTuple):
     fresh_lengths: Tensor
     crossover: Tensor
     mutation: Tensor
-    own: Tensor | None = None
+    repeat: Tensor | None = None
 
 
 @dataclass(frozen=True)
@@ -61,14 +64,15 @@ class Breeder:
     encoding: Encoding
     fixed_length: bool
 
-    def draw(self, runs: int, draws: Draws) -> Coins:
-        """The random numbers of one generation.
+    def draw(self, draws: Draws, rates: Rates) -> Coins:
+        """The random numbers of one generation of as many runs as `rates` has.
 
         Fresh individuals (headless chicken) are a pool twice the expected number;
         were more wanted, one would serve twice.
         """
         config = self.config
         count = config.population - config.elitism
+        runs = len(rates.rate)
         genes = (runs, count, *self.encoding.gene_shape)
         pool = 0
         if config.headless_chicken > 0:

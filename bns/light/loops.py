@@ -127,7 +127,7 @@ class LightLoops:
         """All generations between two trials; gives the population and its costs."""
         limit = self.config.light.weight_limit
         for _ in range(self.config.evolution.generations):
-            coins = self.breeder.draw(len(cost), self.draws)
+            coins = self.breeder.draw(self.draws, rates)
             population = self.breeder.breed(population, cost, rates, coins)
             genes = population.genes.clamp(-limit, limit)  # SBX spreads without end
             population = population._replace(genes=genes)

@@ -94,27 +94,21 @@ class Goals:
         return [Commands(row.clip(low, high), longest, self.channels) for row in goals]
 
 
-@dataclass(frozen=True)
 class GoalBreeder(Breeder):
     """Makes the next population; children of crossover stay within the bounds, too.
 
     The winner of a tournament is drawn by its rank, as likely as if all entrants had
     been drawn: the dissertation's are of 200, and such numbers are dear.
-
-    Attributes:
-        repeat: chance that a child repeats commands, see `bns.walk.repetition`.
     """
 
-    repeat: float = 0.0
-
-    def draw(self, runs: int, draws: Draws) -> Coins:
+    def draw(self, draws: Draws, rates: Rates) -> Coins:
         """The random numbers of one generation, one a parent."""
         one = replace(self.config, tournament=1)
-        coins = Breeder(one, self.encoding, self.fixed_length).draw(runs, draws)
-        if self.repeat == 0:
+        coins = Breeder(one, self.encoding, self.fixed_length).draw(draws, rates)
+        if rates.repeat is None:
             return coins
-        count = self.config.population - self.config.elitism
-        return coins._replace(own=draws.uniform(runs, count, repetition.COINS))
+        shape = (*coins.chicken.shape, repetition.COINS)
+        return coins._replace(repeat=draws.uniform(*shape))
 
     def parents(self, cost: Tensor, coins: Tensor) -> Tensor:
         """Indices of the parents, see `Breeder.parents`."""
@@ -127,9 +121,9 @@ class GoalBreeder(Breeder):
     ) -> Population:
         """The next generation, see `Breeder.breed`."""
         bred = super().breed(population, cost, rates, coins)
-        if self.repeat > 0:
+        if rates.repeat is not None:
             elites, children = bred.genes.tensor_split([self.config.elitism], dim=1)
-            children = repetition.repeated(children, coins.own, self.repeat)
+            children = repetition.repeated(children, coins.repeat, rates.repeat)
             bred = bred._replace(genes=torch.cat([elites, children], dim=1))
         low, high = self.encoding.low, self.encoding.high
         return bred._replace(genes=torch.minimum(torch.maximum(bred.genes, low), high))

@@ -74,7 +74,7 @@ class WalkLearner(Learner):
         )
         self.scaling = scaling.Scaling()
         self.evaluator = WalkEvaluator(self.shape, config.walk)
-        breeder = GoalBreeder(config.evolution, self.encoding, True, config.walk.repeat)
+        breeder = GoalBreeder(config.evolution, self.encoding, True)
         self.inner = WalkLoops(config, self.evaluator, breeder, self.draws)
         self.adaptations = Adaptations(configs, onsets)
         self.buffer = PatternBuffer(
@@ -100,8 +100,19 @@ class WalkLearner(Learner):
         each = torch.tensor(size, dtype=torch.float32)[:, None] * TICK
         device, servos = self.config.device, len(self.encoding.channels)
         return Rates(
-            torch.from_numpy(rate).to(device), each.expand(-1, servos).to(device)
+            torch.from_numpy(rate).to(device),
+            each.expand(-1, servos).to(device),
+            repeat=self._repeat(trial),
         )
+
+    def _repeat(self, trial: int) -> Tensor | None:
+        """Chance that a child repeats its commands, of each run; None = of no run."""
+        known = self.adaptations.damage_known(trial)
+        walk = self.config.walk
+        chance = np.where(known, walk.repeat_after or walk.repeat, walk.repeat)
+        if not chance.any():
+            return None
+        return torch.from_numpy(chance.astype(np.float32)).to(self.config.device)
 
     def _measured(
         self, tried: Sequence[Trial], best: Sequence[Trial] | None

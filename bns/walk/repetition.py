@@ -14,7 +14,7 @@ PERIODS = (2, 3, 4)  # commands of a round
 COINS = 6  # uniform numbers that a child takes
 
 
-def repeated(genes: Tensor, coins: Tensor, chance: float) -> Tensor:
+def repeated(genes: Tensor, coins: Tensor, chance: Tensor) -> Tensor:
     """Children of which some repeat their own commands.
 
     With `chance` one command is copied to another place, and with `chance` the
@@ -23,8 +23,9 @@ def repeated(genes: Tensor, coins: Tensor, chance: float) -> Tensor:
     Args:
         genes: ``(R, N, K, C)``.
         coins: uniform numbers, ``(R, N, COINS)``.
-        chance: 0 to 1.
+        chance: of each run, ``(R,)``.
     """
+    chance = chance[:, None, None]
     count = genes.shape[2]
     copies, source, target, rounds, begin, period = coins.unsqueeze(-1).unbind(-2)
     place = torch.arange(count, device=genes.device).expand(*genes.shape[:2], -1)

@@ -36,7 +36,9 @@ class TestEvolution:
         genes = torch.arange(8.0).view(1, 8, 1, 1).expand(1, 8, kind.genes, 1).clone()
         whole = Population(genes, torch.full((1, 8), kind.genes))
         rates = Rates(torch.tensor([0.0]), torch.tensor([[0.1]]))
-        children = breeder.breed(whole, torch.rand(1, 8), rates, breeder.draw(1, draws))
+        children = breeder.breed(
+            whole, torch.rand(1, 8), rates, breeder.draw(draws, rates)
+        )
         for child in children.genes[0, :, :, 0]:
             assert (child.diff() != 0).sum() <= 1  # one cut, at the same place
 

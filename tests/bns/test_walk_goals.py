@@ -13,6 +13,7 @@ from bns.draws import Draws
 from bns.evolution.generation import Rates
 from bns.walk import repetition
 from bns.walk.goals import TICK, GoalBreeder, Goals
+from bns.walk.learner import WalkLearner
 from tests.bns.walkers import small
 
 
@@ -43,7 +44,7 @@ class TestGoals:
         edge = torch.where(population.genes > 0, goals.high, goals.low)
         population = population._replace(genes=edge)
         rates = Rates(torch.tensor([0.5]), torch.full((1, 18), 0.3))
-        coins = breeder.draw(1, draws)
+        coins = breeder.draw(draws, rates)
         bred = breeder.breed(population, draws.uniform(1, 40), rates, coins)
         assert bred.genes.abs().max() <= 0.5
         assert (bred.genes.abs() < 0.49).any()
@@ -55,7 +56,9 @@ class TestRepetition:
     @staticmethod
     def child(*coins, chance=0.5):
         genes = torch.arange(8.0).view(1, 1, 8, 1).expand(1, 1, 8, 2)
-        told = repetition.repeated(genes, torch.tensor([[coins]]), chance)
+        told = repetition.repeated(
+            genes, torch.tensor([[coins]]), torch.tensor([chance])
+        )
         assert (told[..., 0] == told[..., 1]).all()
         return told[0, 0, :, 0].tolist()
 
@@ -74,8 +77,9 @@ class TestRepetition:
         draws = Draws(2)
         genes = draws.uniform(1, 4000, 8, 3)
         coins = draws.uniform(1, 4000, repetition.COINS)
-        assert torch.equal(repetition.repeated(genes, coins, 0.0), genes)
-        changed = (repetition.repeated(genes, coins, 0.1) != genes).any(-1).any(-1)
+        never, seldom = torch.tensor([0.0]), torch.tensor([0.1])
+        assert torch.equal(repetition.repeated(genes, coins, never), genes)
+        changed = (repetition.repeated(genes, coins, seldom) != genes).any(-1).any(-1)
         # of the copies one in eight finds its own place
         assert changed.float().mean() == pytest.approx(1 - 0.9125 * 0.9, abs=0.02)
 
@@ -83,15 +87,25 @@ class TestRepetition:
         config = small()
         evolution = replace(config.evolution, elitism=3, mutation_rate=0.0)
         goals, cost = Goals.of(config), Draws(1).uniform(1, config.evolution.population)
-        rates = Rates(torch.tensor([0.0]), torch.full((1, 18), 0.1))
         population = goals.random(1, config.evolution.population, Draws(0))
         best = population.genes[0, cost[0].argsort()[:3]]
         bred, after = [], []
-        for repeat in (0.0, 1.0):
-            draws, breeder = Draws(5), GoalBreeder(evolution, goals, True, repeat)
-            coins = breeder.draw(1, draws)
+        for repeat in (None, torch.tensor([1.0])):
+            draws, breeder = Draws(5), GoalBreeder(evolution, goals, True)
+            usual = Rates(torch.tensor([0.0]), torch.full((1, 18), 0.1))
+            rates = usual._replace(repeat=repeat)
+            coins = breeder.draw(draws, rates)
             bred.append(breeder.breed(population, cost, rates, coins).genes[0])
             after.append(draws.uniform(3))
             assert torch.equal(bred[-1][:3], best)
         assert (bred[0][3:] != bred[1][3:]).flatten(1).any(1).float().mean() > 0.9
         assert not torch.equal(*after)
+
+    def test_only_once_damage_is_known(self):
+        config = small(walk=replace(small().walk, repeat_after=0.2))
+        learner = WalkLearner([config] * 2, replicates=[0, 1], onsets=[3, -1])
+        assert learner._rates(3).repeat is None
+        assert learner._rates(4).repeat.tolist() == pytest.approx([0.2, 0.0])
+        always = replace(config, walk=replace(config.walk, repeat=0.1))
+        learner = WalkLearner([always] * 2, replicates=[0, 1], onsets=[3, -1])
+        assert learner._rates(4).repeat.tolist() == pytest.approx([0.2, 0.1])
