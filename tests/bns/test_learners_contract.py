@@ -18,7 +18,7 @@ def small(name: str):
     config = presets.load(PRESETS[name])
     return replace(
         config,
-        evolution=replace(config.evolution, population=10, generations=2, tournament=3),
+        evolution=replace(config.evolution, population=12, generations=2, tournament=3),
         snn=replace(config.snn, epochs=4),
         trials=2,
         replicates=2,
