@@ -184,7 +184,7 @@ def test_elites_survive_unchanged():
     draws = Draws(5)
     before = made.encoding.random(1, 60, draws)
     cost = Draws(6).uniform(1, 60)
-    after = made.breed(before, cost, rates, made.draw(1, draws))
+    after = made.breed(before, cost, rates, made.draw(draws, rates))
     best = cost.argsort(1)[0, :2]
     assert torch.equal(after.genes[0, :2], before.genes[0, best])
     assert torch.equal(after.lengths[0, :2], before.lengths[0, best])
@@ -197,9 +197,9 @@ def test_headless_chicken_brings_fresh_genes():
     same = made.encoding.random(1, 1, draws)
     before = Population(same.genes.expand(1, 60, 6, 3), same.lengths.expand(1, 60))
     still = Rates(torch.tensor([1e-9]), rates.magnitude)
-    with_chicken = made.breed(before, torch.ones(1, 60), still, made.draw(1, draws))
+    with_chicken = made.breed(before, torch.ones(1, 60), still, made.draw(draws, still))
     without, _ = breeder(headless_chicken=0.0, elitism=0)
-    plain = without.breed(before, torch.ones(1, 60), still, without.draw(1, draws))
+    plain = without.breed(before, torch.ones(1, 60), still, without.draw(draws, still))
     known = {0.0, *same.genes.flatten().tolist()}
     assert set(plain.genes.flatten().tolist()) <= known
     assert len(set(with_chicken.genes.flatten().tolist()) - known) > 50
@@ -221,5 +221,5 @@ def test_evolution_reaches_a_known_optimum(kind):
     if kind in ("uniform", "sbx"):  # they never change a length
         now = now._replace(lengths=torch.ones_like(now.lengths))
     for _ in range(60):
-        now = made.breed(now, cost(now), rates, made.draw(1, draws))
+        now = made.breed(now, cost(now), rates, made.draw(draws, rates))
     assert cost(now).min().item() < 0.05
