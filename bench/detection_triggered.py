@@ -17,8 +17,8 @@ from bns.config import RunConfig
 DOC = "cost after damage (O), detected over told, worst of four damages"
 BAR = "<= 1.05"
 LIMIT = 1.05
-RUNS = 12  # a side; 30 are the full bench, which then judges the bar
-AFTER = 10  # trials from the damage on; 20 are the full bench
+RUNS = 30  # a side
+AFTER = 20  # trials from the damage on
 
 
 def run(quick: bool) -> Result:
