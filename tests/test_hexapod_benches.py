@@ -8,11 +8,12 @@ import pytest
 from bench import (
     hexapod_ceiling,
     hexapod_evidence,
-    hexapod_gait,
     hexapod_loads,
     hexapod_runs,
     recover_hexapod,
+    solving,
 )
+from bns import presets
 from bns.record import RunRecord
 from tests.bns.walkers import small
 
@@ -42,7 +43,7 @@ def test_a_walk_that_takes_twice_as_long_counts_half_and_a_short_one_as_it_is():
 
 def test_the_first_trial_that_did_it_is_counted_from_one():
     hit = np.array([[True, False], [False, True], [False, False]])
-    assert hexapod_gait.first(hit).tolist() == [1.0, 2.0, np.inf]
+    assert solving.first(hit).tolist() == [1.0, 2.0, np.inf]
 
 
 def test_regained_is_nine_tenths_of_the_median_before_the_damage():
@@ -70,6 +71,12 @@ def test_runs_that_forget_differ_in_that_alone():
     plain, other = (hexapod_runs.damaged("type2", forget=f) for f in (False, True))
     assert other.watch.forget and not plain.watch.forget
     assert replace(other, watch=plain.watch, preset=plain.preset) == plain
+    own, recover = (
+        hexapod_runs.damaged("type2", own=True),
+        presets.load("hexapod-recover"),
+    )
+    assert replace(own, walk=plain.walk, preset=other.preset) == other
+    assert (own.walk, own.watch) == (recover.walk, recover.watch)
 
 
 def test_the_first_trial_with_fewer_patterns_is_when_it_forgot():
