@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench import detect_damage, experiments, forking, light_runs, solving
+from bench import detect_damage, forking, light_runs, solving
 from bench.result import Result
 from bns import stats
 from bns.config import RunConfig
@@ -48,11 +48,10 @@ def run(quick: bool) -> Result:
             "the same runs": int(np.sum(same)),
             **compared,
         }
-    few = quick or RUNS < experiments.REPLICATES
     return Result(
         figure=worst,
         unit="x",
-        holds=None if few else worst <= LIMIT,
+        holds=None if quick else worst <= LIMIT,
         n=one.replicates,
         details=found,
     )

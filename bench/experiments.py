@@ -29,14 +29,26 @@ DAMAGES = {
     "right-50": "wheel_gain:wheel=right,factor=0.5",
 }
 LATER = ("learner", "light", "walk", "watch")  # newer than the first stored runs
+NEWER = (
+    ("light", "readings"),
+    ("light", "renewed"),
+    ("walk", "repeat"),
+    ("walk", "repeat_after"),
+)
+"""settings newer than some stored runs of their sections"""
 QUICK = {"replicates": 6, "trials": 12}
+
+
+def preset(name: str) -> RunConfig:
+    """A preset by name."""
+    from bns import presets
+
+    return presets.load(name)
 
 
 def undamaged(problem: str, world: str = "mujoco") -> RunConfig:
     """The preset of a problem, without damage."""
-    from bns import presets
-
-    config = presets.load(f"khepera-{problem}")
+    config = preset(f"khepera-{problem}")
     trials = 30 if problem == "simple" else 60
     return named(
         replace(config, trials=trials, world=WorldConfig(name=world)),
@@ -52,10 +64,8 @@ def damaged(damage: str, *, world: str = "mujoco", **adaptation: object) -> RunC
         world: name of the world.
         adaptation: fields of `AdaptationConfig`.
     """
-    from bns import presets
-
     config = replace(
-        presets.load("khepera-simple"),
+        preset("khepera-simple"),
         trials=100,
         adaptation=AdaptationConfig(**adaptation),
         world=WorldConfig(name=world, damage=(f"{DAMAGES[damage]}@{ONSET}",)),
@@ -93,12 +103,9 @@ def directory(config: RunConfig) -> Path:
 def known(config: RunConfig) -> dict[str, Any]:
     """A configuration as plain values, without newer settings that change nothing."""
     settings, plain = asdict(config), RunConfig()
-    for name in ("readings", "renewed"):
-        if settings["light"][name] == getattr(plain.light, name):
-            del settings["light"][name]
-    for name in ("repeat", "repeat_after"):
-        if settings["walk"][name] == getattr(plain.walk, name):
-            del settings["walk"][name]
+    for section, name in NEWER:
+        if settings[section][name] == getattr(getattr(plain, section), name):
+            del settings[section][name]
     if not config.watch.detect:
         for name in ("floor", "grow", "reach", "near", "largest"):
             del settings["watch"][name]

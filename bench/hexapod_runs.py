@@ -8,9 +8,10 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from bns.record import RunRecord
 from bns.store import RunStore
 from bns.worlds.trial import Trial
 
+Kind = Literal["window", "forget", "own"]  # of recovering, see `damaged`
 ONSET = 100  # trial of the damage (dissertation, table 7.4)
 AFTER = 50  # trials from the damage on: more than the latest bar
 GROUPS = ("a", "b", "c")
@@ -54,7 +56,7 @@ def undamaged(group: str = "", *, trials: int = ONSET, **walk: object) -> RunCon
         trials: of each run.
         walk: settings of the section `walk` that differ.
     """
-    config = _preset()
+    config = experiments.preset("hexapod-walk")
     config = replace(
         config,
         trials=trials,
@@ -67,28 +69,27 @@ def undamaged(group: str = "", *, trials: int = ONSET, **walk: object) -> RunCon
     return replace(named, replicates=GROUP)
 
 
-def damaged(
-    legs: str, group: str = "a", *, forget: bool = False, own: bool = False
-) -> RunConfig:
+def damaged(legs: str, group: str = "a", *, kind: Kind = "window") -> RunConfig:
     """A batch of the preset whose legs are raised from trial `ONSET` on.
 
     Args:
         legs: as the effect `leg_raised` takes them.
         group: of which undamaged batch it is the continuation.
-        forget: forget by evidence, beside the window.
-        own: as the preset `hexapod-recover` does (which forgets as well).
+        kind: with the window alone, forgetting by evidence besides, or as the preset
+            `hexapod-recover` does (which forgets as well).
     """
-    trunk, recover = undamaged(group), _preset("hexapod-recover")
-    kind = "own-" if own else "forget-" if forget else ""
+    trunk = undamaged(group)
     damage = (f"leg_raised:legs={legs},blend=1@{ONSET}",)
-    return replace(
+    config = replace(
         trunk,
-        preset=f"walk-{kind}{legs}-{group}",
+        preset=f"walk-{'' if kind == 'window' else f'{kind}-'}{legs}-{group}",
         trials=ONSET + AFTER,
         world=replace(trunk.world, damage=damage),
-        walk=recover.walk if own else trunk.walk,
-        watch=replace(trunk.watch, forget=forget or own),
+        watch=replace(trunk.watch, forget=kind != "window"),
     )
+    if kind == "own":
+        return replace(config, walk=experiments.preset("hexapod-recover").walk)
+    return config
 
 
 def records(
@@ -135,30 +136,31 @@ def adequate(record: RunRecord, hand: Hand) -> np.ndarray:
     return in_time(record, hand.seconds) >= hand.distance
 
 
-def recovering(*, quick: bool = False, **kind: bool) -> Mapping[str, RunRecord]:
-    """The runs of each damage of `TYPES`; quick: one small run of each.
-
-    Args:
-        quick: a look.
-        kind: `forget` or `own` of `damaged`.
+def recovering(*, quick: bool = False) -> Mapping[Kind, Mapping[str, RunRecord]]:
+    """The runs of each kind and each damage of `TYPES`; quick: one small run of each.
 
     Raises:
         BnsError: to forget by evidence would have changed the undamaged runs.
     """
-    wanted = [(legs, group) for legs in TYPES for group in RECOVERING]
-    configs = {key: damaged(*key, **kind) for key in wanted}
+    kinds: tuple[Kind, ...] = get_args(Kind)
+    configs = {
+        (kind, legs, group): damaged(legs, group, kind=kind)
+        for kind, legs, group in product(kinds, TYPES, RECOVERING)
+    }
     if not quick:
         trunks = records([undamaged(group) for group in RECOVERING])
-        if kind and any(hexapod_evidence.forgets(t).any() for t in trunks.values()):
+        if any(hexapod_evidence.forgets(trunk).any() for trunk in trunks.values()):
             raise BnsError("Run the undamaged runs with watch.forget, too.")
-        for (_, group), config in configs.items():
-            idle = ("watch", "walk") if kind else ()
-            branching.begin(undamaged(group), config, idle=idle)
+        for (_, _, group), config in configs.items():
+            branching.begin(undamaged(group), config, idle=("watch", "walk"))
     found = records(configs.values(), quick=quick)
-    return {
-        legs: joined([found[configs[legs, group].preset] for group in RECOVERING])
-        for legs in TYPES
-    }
+
+    def of(kind: Kind, legs: str) -> RunRecord:
+        """All groups of a kind and a damage."""
+        names = [configs[kind, legs, group].preset for group in RECOVERING]
+        return joined([found[name] for name in names])
+
+    return {kind: {legs: of(kind, legs) for legs in TYPES} for kind in kinds}
 
 
 def kept(legs: str) -> list[RunRecord]:
@@ -245,7 +247,7 @@ def standing_by(lists: Iterable[np.ndarray], *, damage: str = ""):
 
     world = registry.make("hexapod", damage=(f"{damage}@0",) if damage else ())
     channels = tuple(Channel(*item) for item in models.robot("phantomx").channels)
-    limit = _preset().walk.limit
+    limit = experiments.preset("hexapod-walk").walk.limit
     return world, [
         Commands(item, np.full(len(item), limit), channels) for item in lists
     ]
@@ -277,9 +279,3 @@ def spread(values: np.ndarray) -> dict[str, float]:
 
 def _place(config: RunConfig) -> Path:
     return experiments.directory(config)
-
-
-def _preset(name: str = "hexapod-walk") -> RunConfig:
-    from bns import presets
-
-    return presets.load(name)

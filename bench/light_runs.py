@@ -50,7 +50,7 @@ def undamaged(**light: object) -> RunConfig:
     Args:
         light: settings of the section `light` that differ.
     """
-    config = _preset()
+    config = experiments.preset("khepera-light")
     config = replace(config, trials=SOLVING, light=replace(config.light, **light))
     words = [f"{key}={value}" for key, value in sorted(light.items())]
     return experiments.named(config, "-".join(["light", *words]))
@@ -77,7 +77,11 @@ def damaged(
         after: trials from the damage on.
         adaptation: fields of `AdaptationConfig` that differ from table 6.7.
     """
-    config, light, watch = _preset(), dict(light or {}), dict(watch or {})
+    config, light, watch = (
+        experiments.preset("khepera-light"),
+        dict(light or {}),
+        dict(watch or {}),
+    )
     snn = replace(config.snn, kind="ensemble", hidden=15) if ensemble else config.snn
     settings = {"window": 600, "population_reset": True} | adaptation
     own = {"hidden": 5, "weights": 5.0, "mirror": False} | light
@@ -107,15 +111,9 @@ def recovering(damage: str, *, runs: int = experiments.REPLICATES) -> RunConfig:
         damage: key of `ALL`.
         runs: runs a side.
     """
-    config = _preset("khepera-light-recover")
+    config = experiments.preset("khepera-light-recover")
     world = replace(config.world, damage=(f"{ALL[damage]}@{ONSET}",))
     config = replace(config, trials=ONSET + AFTER, world=world)
     config = experiments.named(config, f"light-recover-{damage}")
     config = replace(config, replicates=runs)
     return replace(config, seed=forking.seed(config))
-
-
-def _preset(name: str = "khepera-light") -> RunConfig:
-    from bns import presets
-
-    return presets.load(name)

@@ -19,18 +19,18 @@ def run(quick: bool) -> Result:
     that of the window; beside it, from the same undamaged runs on, what forgetting by
     evidence comes to (`watch.forget`), and the preset `hexapod-recover`.
     """
-    records = hexapod_runs.recovering(quick=quick)
-    others = hexapod_runs.recovering(quick=quick, forget=True)
-    ours = hexapod_runs.recovering(quick=quick, own=True)
+    kinds = hexapod_runs.recovering(quick=quick)
+    records, others, ours = (kinds[kind] for kind in ("window", "forget", "own"))
+    hand = hexapod_runs.by_hand()
     found: dict[str, object] = {}
     medians, holds = [], True
     for legs, record in records.items():
-        row = found[legs] = _recovery(legs, record)
+        row = found[legs] = _recovery(legs, record, hand)
         row["with watch.forget"] = {
-            **_recovery(legs, others[legs]),
+            **_recovery(legs, others[legs], hand),
             "trials until it forgot": solving.waits(_forgot(others[legs])),
         }
-        row["hexapod-recover"] = _recovery(legs, ours[legs])
+        row["hexapod-recover"] = _recovery(legs, ours[legs], hand)
         median = row["median"]
         limit = LIMIT_MILD if legs in MILD else LIMIT
         holds = holds and median is not None and median <= limit
@@ -51,12 +51,14 @@ def _forgot(record: RunRecord) -> np.ndarray:
     return np.where(dropped.any(1), dropped.argmax(1) + 1.0, np.inf)
 
 
-def _recovery(legs: str, record: RunRecord) -> dict[str, object]:
+def _recovery(
+    legs: str, record: RunRecord, hand: hexapod_runs.Hand
+) -> dict[str, object]:
     onset, ways = int(record.damage_onset[0]), record["distance"]
     late = np.median(ways[:, -hexapod_runs.BEFORE :], axis=1)
     share = hexapod_ceiling.share(late, legs)
     enough = hexapod_runs.SHARE * hexapod_runs.before(record)
-    adequate = hexapod_runs.adequate(record, hexapod_runs.by_hand())
+    adequate = hexapod_runs.adequate(record, hand)
     return {
         **solving.waits(hexapod_runs.trials_to_regain(record)),
         "until adequate again": solving.waits(solving.first(adequate[:, onset:])),

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bns.adaptations import registry
 from bns.config import RunConfig
@@ -84,33 +85,40 @@ class Adaptations:
             for part in registry.PARTS
         }
 
-    def magnitudes(self, trial: int, usual: Sequence[float]) -> list[float]:
+    def since_damage(
+        self, trial: int, usual: ArrayLike, after: ArrayLike
+    ) -> np.ndarray:
+        """A setting of each run at a trial, ``(R,)``.
+
+        Args:
+            trial: its number.
+            usual: before damage is known, of each run or of all.
+            after: once it is; 0 = unchanged.
+        """
+        new = np.asarray(after)
+        return np.where(self.damage_known(trial) & (new > 0), new, usual)
+
+    def magnitudes(self, trial: int, usual: Sequence[float]) -> np.ndarray:
         """Size of a mutation of each run at a trial, in the learner's own unit.
 
         Args:
             trial: its number.
             usual: before damage is known, of each run.
         """
-        known = self.damage_known(trial)
-        after = [c.adaptation.mutation_magnitude_after for c in self.configs]
-        return [
-            new if damaged and new > 0 else size
-            for new, damaged, size in zip(after, known, usual, strict=True)
-        ]
+        after = self._setting("mutation_magnitude_after")
+        return self.since_damage(trial, usual, after)
 
     def mutation(self, trial: int) -> tuple[np.ndarray, np.ndarray]:
         """Mutation rate ``(R,)`` and magnitude ``(R, 3)`` [m/s, m/s, s] at a trial."""
-        known = self.damage_known(trial)
-        rates, sizes = [], []
-        for config, damaged in zip(self.configs, known, strict=True):
-            evolution, after = config.evolution, config.adaptation
-            rate, size = evolution.mutation_rate, evolution.mutation_magnitude
-            grown = 1.0
-            if damaged and after.mutation_rate_after > 0:
-                rate = after.mutation_rate_after
-            if damaged and after.mutation_magnitude_after > 0:
-                grown = after.mutation_magnitude_after / size
-            speed = metres_per_second(size) * grown
-            rates.append(rate)
-            sizes.append([speed, speed, evolution.duration_magnitude * grown])
-        return np.array(rates, np.float32), np.array(sizes, np.float32)
+        each = [config.evolution for config in self.configs]
+        rates = self.since_damage(
+            trial, [e.mutation_rate for e in each], self._setting("mutation_rate_after")
+        )
+        sizes = self.magnitudes(trial, [e.mutation_magnitude for e in each])
+        found = []
+        for evolution, size in zip(each, sizes, strict=True):
+            usual = evolution.mutation_magnitude
+            grown = size / usual if usual else 1.0
+            speed = metres_per_second(usual) * grown
+            found.append([speed, speed, evolution.duration_magnitude * grown])
+        return rates.astype(np.float32), np.array(found, np.float32)

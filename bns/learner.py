@@ -7,6 +7,7 @@ caller runs it, `observe` learns from what came back.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
 
 import numpy as np
 import torch
@@ -26,21 +27,23 @@ from bns.snn.network import Shape, predict
 from bns.snn.scaling import Scaling
 from bns.tasks import NavigationTask
 from bns.tasks.trials import score_trials
-from bns.worlds.trial import Commands, Trial
+from bns.worlds.trial import Trial
+
+Controller = TypeVar("Controller")  # a list of commands, or a policy's genome
 
 
 @dataclass(frozen=True)
-class Proposal:
+class Proposal(Generic[Controller]):
     """What to run in the world.
 
     Attributes:
-        tried: the controller each run learns from, R lists of commands.
+        tried: the controller each run learns from, R of them.
         best: the population's best, where that is another one: to be measured, not
             learned from and not charged; else None.
     """
 
-    tried: list[Commands]
-    best: list[Commands] | None
+    tried: list[Controller]
+    best: list[Controller] | None
 
 
 class Learner:

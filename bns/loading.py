@@ -37,9 +37,18 @@ def from_file(path: Path | str) -> RunConfig:
         FormatError: not there, or not TOML.
         BnsError: as `from_mapping`.
     """
+    return from_document(read_toml(Path(path)))
+
+
+def from_document(content: Mapping[str, Any]) -> RunConfig:
+    """A configuration from the content of a TOML file, see `from_file`.
+
+    Raises:
+        BnsError: as `from_mapping`.
+    """
     from bns import presets
 
-    content = read_toml(Path(path))
+    content = dict(content)
     content.pop("description", None)
     name = content.pop("preset", "")
     if not isinstance(name, str):

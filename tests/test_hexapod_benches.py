@@ -68,13 +68,12 @@ def test_damaged_runs_continue_the_undamaged_ones():
 
 
 def test_runs_that_forget_differ_in_that_alone():
-    plain, other = (hexapod_runs.damaged("type2", forget=f) for f in (False, True))
+    plain, other, own = (
+        hexapod_runs.damaged("type2", kind=kind) for kind in ("window", "forget", "own")
+    )
     assert other.watch.forget and not plain.watch.forget
     assert replace(other, watch=plain.watch, preset=plain.preset) == plain
-    own, recover = (
-        hexapod_runs.damaged("type2", own=True),
-        presets.load("hexapod-recover"),
-    )
+    recover = presets.load("hexapod-recover")
     assert replace(own, walk=plain.walk, preset=other.preset) == other
     assert (own.walk, own.watch) == (recover.walk, recover.watch)
 

@@ -115,7 +115,7 @@ class Breeder:
             eta=config.sbx_eta,
             fixed_length=self.fixed_length,
         )
-        children = self._mutate(children, rates, coins.mutation)
+        children = self._mutate(children, rates, coins)
         return self._with_elites(population, cost, children)
 
     def parents(self, cost: Tensor, coins: Tensor) -> Tensor:
@@ -138,11 +138,11 @@ class Breeder:
             torch.where(chosen, fresh.lengths, second.lengths),
         )
 
-    def _mutate(self, children: Population, rates: Rates, coins: Tensor) -> Population:
+    def _mutate(self, children: Population, rates: Rates, coins: Coins) -> Population:
         genes = mutation.mutate(
             self.config.mutation,
             children.genes,
-            coins,
+            coins.mutation,
             rates.rate,
             rates.magnitude,
             self.encoding.low,

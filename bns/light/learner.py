@@ -18,11 +18,12 @@ from bns.config import RunConfig
 from bns.detection import Detector
 from bns.draws import Draws
 from bns.evolution.generation import Breeder, Rates
+from bns.learner import Proposal
 from bns.light import alike, islands, observing, patterns, resets, watching
 from bns.light.controller import Weights
 from bns.light.loops import LightLoops, Snns
 from bns.light.memory import Learned
-from bns.light.policy import Attempt, Proposal
+from bns.light.policy import Attempt
 from bns.light.scaling import MOTION_OUTPUTS, SENSORS
 from bns.light.simulator import Simulator, Thetas
 from bns.light.task import LightTask
@@ -100,7 +101,7 @@ class LightLearner:
             Thetas(self.motion.spread, self.sensors.spread),
         )
 
-    def propose(self, trial: int) -> Proposal:
+    def propose(self, trial: int) -> Proposal[Attempt]:
         """Adapt, evolve inside the SNNs, and choose what to try in trial `trial`."""
         self._reset(trial)
         cost = self.loops.cost_of(self.snns, self.population)
@@ -124,7 +125,7 @@ class LightLearner:
             cost = self.loops.cost_of(self.snns, self.population)
         return cost
 
-    def _proposal(self, trial: int, cost: Tensor) -> Proposal:
+    def _proposal(self, trial: int, cost: Tensor) -> Proposal[Attempt]:
         genomes = self.population.genes.reshape(*cost.shape, -1)
         whole = Population(genomes.unsqueeze(-1), torch.zeros_like(cost).long())
         index = choice.choose(

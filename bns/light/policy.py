@@ -28,14 +28,6 @@ class Attempt:
     cycle: float
 
 
-@dataclass(frozen=True)
-class Proposal:
-    """What to run in the world: R controllers each; see `bns.learner.Proposal`."""
-
-    tried: list[Attempt]
-    best: list[Attempt] | None
-
-
 @dataclass(frozen=True, eq=False)
 class GenomePolicy:
     """N genomes, one a robot; a `bns.worlds.closed_loop.Policy`.

@@ -1,5 +1,9 @@
-"""Configurations by name: one TOML file each, only what differs from the defaults."""
+"""Configurations by name: one TOML file each, only what differs from the defaults.
 
+A file may start from another preset (`preset` at its top), as any TOML file of a run.
+"""
+
+from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -30,11 +34,9 @@ def load(name: str) -> RunConfig:
     Raises:
         UnknownNameError: there is no such preset.
     """
-    from bns.loading import from_mapping
+    from bns.loading import from_document
 
-    content = _content(name)
-    content.pop("description")
-    return from_mapping({**content, "preset": name})
+    return replace(from_document(_content(name)), preset=name)
 
 
 def _content(name: str) -> dict[str, Any]:

@@ -121,9 +121,12 @@ class GoalBreeder(Breeder):
     ) -> Population:
         """The next generation, see `Breeder.breed`."""
         bred = super().breed(population, cost, rates, coins)
-        if rates.repeat is not None:
-            elites, children = bred.genes.tensor_split([self.config.elitism], dim=1)
-            children = repetition.repeated(children, coins.repeat, rates.repeat)
-            bred = bred._replace(genes=torch.cat([elites, children], dim=1))
         low, high = self.encoding.low, self.encoding.high
         return bred._replace(genes=torch.minimum(torch.maximum(bred.genes, low), high))
+
+    def _mutate(self, children: Population, rates: Rates, coins: Coins) -> Population:
+        mutated = super()._mutate(children, rates, coins)
+        if rates.repeat is None:
+            return mutated
+        genes = repetition.repeated(mutated.genes, coins.repeat, rates.repeat)
+        return mutated._replace(genes=genes)

@@ -107,9 +107,8 @@ class WalkLearner(Learner):
 
     def _repeat(self, trial: int) -> Tensor | None:
         """Chance that a child repeats its commands, of each run; None = of no run."""
-        known = self.adaptations.damage_known(trial)
         walk = self.config.walk
-        chance = np.where(known, walk.repeat_after or walk.repeat, walk.repeat)
+        chance = self.adaptations.since_damage(trial, walk.repeat, walk.repeat_after)
         if not chance.any():
             return None
         return torch.from_numpy(chance.astype(np.float32)).to(self.config.device)
