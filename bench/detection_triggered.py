@@ -39,14 +39,13 @@ def run(quick: bool) -> Result:
     worst = 0.0
     for damage, pair in sides.items():
         one, other = (records[config.preset] for config in pair.values())
-        compared = solving.versus(one, other)
-        ratio = compared["medians"][0] / compared["medians"][1]
-        worst = max(worst, ratio)
-        same = stats.observation_after(one) == stats.observation_after(other)
+        costs = stats.observation_after(one), stats.observation_after(other)
+        ratio = solving.ratio(*costs)
+        worst = max(worst, ratio["ratio"])
         found[damage] = {
-            "ratio of medians": round(ratio, 4),
-            "the same runs": int(np.sum(same)),
-            **compared,
+            **ratio,
+            "the same runs": int(np.equal(*costs).sum()),
+            **solving.versus(one, other),
         }
     return Result(
         figure=worst,

@@ -4,12 +4,9 @@ Undamaged runs come in groups of ten; the runs of each damage begin as copies of
 group after its last trial, since up to there nothing differs (`branching`).
 """
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from itertools import product
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Literal, NamedTuple, get_args
 
@@ -27,8 +24,12 @@ ONSET = 100  # trial of the damage (dissertation, table 7.4)
 AFTER = 50  # trials from the damage on: more than the latest bar
 GROUPS = ("a", "b", "c")
 GROUP = 10  # runs of a batch
-RECOVERING = ("a",)  # groups that are damaged
-SHORT = 40  # trials of groups that are not
+RECOVERING: Mapping[Kind, Sequence[str]] = {
+    "window": GROUPS[:1],
+    "forget": GROUPS[:1],
+    "own": GROUPS,
+}
+"""groups that are damaged"""
 WINDOW = 300
 TYPES = ("type0", "type1", "type3", "type2", "type5")
 BEFORE = 10  # trials whose median distance is what the robot did before the damage
@@ -100,35 +101,9 @@ def records(
 
 
 def walking(*, quick: bool = False) -> list[RunRecord]:
-    """All undamaged runs, trained where they are missing; quick: one small run.
-
-    The groups of `RECOVERING` go on to `ONSET`. Of the others only the trial counts in
-    which a run first walks well enough, and of that the median: they end after `SHORT`
-    trials, once more than half of their runs do.
-    """
-    if quick:
-        return list(records([undamaged(GROUPS[0])], quick=True).values())
-    spawn = get_context("spawn")
-    with ProcessPoolExecutor(experiments.WORKERS, mp_context=spawn) as pool:
-        list(pool.map(walk, GROUPS))
-    return [RunStore.open(_place(undamaged(group))).record() for group in GROUPS]
-
-
-def walk(group: str) -> None:
-    """Train a group of undamaged runs as far as it is needed."""
-    from bns.run import train
-
-    os.environ["OMP_NUM_THREADS"] = "1"
-    config, hand = undamaged(group), by_hand()
-    place, whole = _place(config), group in RECOVERING
-
-    def enough() -> bool:
-        if whole or not (place / "run.json").exists():
-            return False
-        record = RunStore.open(place).record()
-        return record.trials >= SHORT and adequate(record, hand).any(1).mean() > 0.5
-
-    train(config, place, resume=True, stop=enough)
+    """All undamaged runs, trained where they are missing; quick: one small run."""
+    groups = GROUPS[:1] if quick else GROUPS
+    return list(records(map(undamaged, groups), quick=quick).values())
 
 
 def adequate(record: RunRecord, hand: Hand) -> np.ndarray:
@@ -145,10 +120,11 @@ def recovering(*, quick: bool = False) -> Mapping[Kind, Mapping[str, RunRecord]]
     kinds: tuple[Kind, ...] = get_args(Kind)
     configs = {
         (kind, legs, group): damaged(legs, group, kind=kind)
-        for kind, legs, group in product(kinds, TYPES, RECOVERING)
+        for kind, legs in product(kinds, TYPES)
+        for group in RECOVERING[kind]
     }
     if not quick:
-        trunks = records([undamaged(group) for group in RECOVERING])
+        trunks = records(map(undamaged, GROUPS))
         if any(hexapod_evidence.forgets(trunk).any() for trunk in trunks.values()):
             raise BnsError("Run the undamaged runs with watch.forget, too.")
         for (_, _, group), config in configs.items():
@@ -157,7 +133,7 @@ def recovering(*, quick: bool = False) -> Mapping[Kind, Mapping[str, RunRecord]]
 
     def of(kind: Kind, legs: str) -> RunRecord:
         """All groups of a kind and a damage."""
-        names = [configs[kind, legs, group].preset for group in RECOVERING]
+        names = [configs[kind, legs, group].preset for group in RECOVERING[kind]]
         return joined([found[name] for name in names])
 
     return {kind: {legs: of(kind, legs) for legs in TYPES} for kind in kinds}
@@ -168,7 +144,7 @@ def kept(legs: str) -> list[RunRecord]:
     if legs == "none":
         configs = [undamaged(group) for group in GROUPS]
     else:
-        configs = [damaged(legs, group) for group in RECOVERING]
+        configs = [damaged(legs, group) for group in RECOVERING["window"]]
     places = [_place(config) for config in configs]
     stores = [RunStore.open(place) for place in places if (place / "run.json").exists()]
     return [store.record() for store in stores if store.finished]

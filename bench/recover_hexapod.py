@@ -13,11 +13,12 @@ MILD, LIMIT_MILD, LIMIT = ("type0", "type1", "type3"), 30, 46
 
 
 def run(quick: bool) -> Result:
-    """Damage from trial 100 of 150, ten runs a type; quick: one of 12 trials.
+    """Damage from trial 100 of 150; quick: one run of 12 trials.
 
     The runs of all types are those of `hexapod-gait` up to the damage. The figure is
-    that of the window; beside it, from the same undamaged runs on, what forgetting by
-    evidence comes to (`watch.forget`), and the preset `hexapod-recover`.
+    that of the window, ten runs a type; beside it, from the same undamaged runs on,
+    what forgetting by evidence comes to (`watch.forget`), and, thirty runs a type, the
+    preset `hexapod-recover`.
     """
     kinds = hexapod_runs.recovering(quick=quick)
     records, others, ours = (kinds[kind] for kind in ("window", "forget", "own"))
@@ -65,7 +66,7 @@ def _recovery(
         "as far undamaged, from the start": solving.waits(
             solving.first(ways[:, :onset] >= enough[:, None])
         ),
-        "before [m]": spread(ways[:, :onset][:, -hexapod_runs.BEFORE :].mean(1)),
+        "before [m]": spread(hexapod_runs.before(record)),
         "first damaged trial [m]": spread(ways[:, onset]),
         "last ten trials [m]": spread(late),
         "ceiling [m]": hexapod_ceiling.known(legs),

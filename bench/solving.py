@@ -54,6 +54,26 @@ def versus(a: RunRecord, b: RunRecord) -> dict[str, object]:
     }
 
 
+def ratio(first: np.ndarray, second: np.ndarray) -> dict[str, object]:
+    """Median of one side over that of another, with its 95 % bootstrap interval.
+
+    Args:
+        first, second: values of two sides whose runs belong together, each ``(R,)``:
+            pairs are drawn.
+    """
+    from scipy.stats import bootstrap
+
+    def medians(one: np.ndarray, other: np.ndarray, axis: int = -1) -> np.ndarray:
+        return np.median(one, axis=axis) / np.median(other, axis=axis)
+
+    drawn = bootstrap((first, second), medians, paired=True, method="percentile", rng=0)
+    ends = drawn.confidence_interval
+    return {
+        "ratio": round(float(medians(first, second)), 4),
+        "ratio interval": [round(float(ends.low), 4), round(float(ends.high), 4)],
+    }
+
+
 def plain(value: float) -> float | None:
     """A number for JSON; None for never."""
     return float(value) if np.isfinite(value) else None
