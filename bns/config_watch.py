@@ -13,7 +13,7 @@ class WatchConfig:
     threshold: float = 6.0
     """an alarm is an innovation so many times what is usual in its run"""
     warmup: int = 6
-    """trials that are seen before the first alarm"""
+    """trials that are seen before the first alarm, and after each before the next"""
     history: int = 12
     """trials before this one that an innovation is compared with"""
     floor: float = 0.03

@@ -58,22 +58,20 @@ class Detector:
     def update(self, innovations: np.ndarray) -> Alarms:
         """Judge a trial, and remember it.
 
-        An alarm is a rise: none follows while the trial before stood out as well, and
-        what stood out twice is history that later trials are compared with. So a
-        robot that is still being learned raises no second alarm, while one false
-        alarm leaves nobody blind.
+        An alarm starts the history anew: what was usual of the robot before says
+        nothing of the one that is learned now, whose misses go up and down for some
+        trials. So a change raises one alarm, and for `warmup` trials none follows.
 
         Args:
             innovations: ``(R, C)``, positive; NaN where nothing was seen.
         """
         score = self._score(innovations, self.past)
-        before = self._score(self.past[:, -1], self.past[:, :-1])
-        risen = ~(before >= self.config.threshold).any(1)
         known = np.isfinite(score).any(1)
         filled = np.where(np.isfinite(score), score, -np.inf)
         suspect, worst = filled.argmax(1), filled.max(1)
-        on = known & risen & (worst >= self.config.threshold)
+        on = known & (worst >= self.config.threshold)
         self.past = np.concatenate([self.past[:, 1:], innovations[:, None]], axis=1)
+        self.past[on] = np.nan
         return Alarms(on, np.where(on, suspect, -1), np.where(known, worst, np.nan))
 
     def figures(
