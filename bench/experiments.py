@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.versions import ROOT
+from bns import presets
 from bns.config import AdaptationConfig, RunConfig, WorldConfig
 from bns.record import RunRecord
 
@@ -39,16 +40,9 @@ NEWER = (
 QUICK = {"replicates": 6, "trials": 12}
 
 
-def preset(name: str) -> RunConfig:
-    """A preset by name."""
-    from bns import presets
-
-    return presets.load(name)
-
-
 def undamaged(problem: str, world: str = "mujoco") -> RunConfig:
     """The preset of a problem, without damage."""
-    config = preset(f"khepera-{problem}")
+    config = presets.load(f"khepera-{problem}")
     trials = 30 if problem == "simple" else 60
     return named(
         replace(config, trials=trials, world=WorldConfig(name=world)),
@@ -65,7 +59,7 @@ def damaged(damage: str, *, world: str = "mujoco", **adaptation: object) -> RunC
         adaptation: fields of `AdaptationConfig`.
     """
     config = replace(
-        preset("khepera-simple"),
+        presets.load("khepera-simple"),
         trials=100,
         adaptation=AdaptationConfig(**adaptation),
         world=WorldConfig(name=world, damage=(f"{DAMAGES[damage]}@{ONSET}",)),

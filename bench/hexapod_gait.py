@@ -22,7 +22,7 @@ def run(quick: bool) -> Result:
     time that the tripod gait takes; one that takes longer counts in proportion.
     Beside it: as far in as many commands, whatever the time, and how far walks get.
     """
-    record = hexapod_runs.joined(hexapod_runs.walking(quick=quick))
+    record = hexapod_runs.walking(quick=quick)
     hand = hexapod_runs.by_hand()
     timed = solving.first(hexapod_runs.adequate(record, hand))
     told = solving.first(record["distance"] >= hand.distance)

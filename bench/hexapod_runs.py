@@ -13,6 +13,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 
 from bench import branching, experiments, hexapod_evidence, solving
+from bns import presets
 from bns.config import RunConfig
 from bns.errors import BnsError
 from bns.record import RunRecord
@@ -57,7 +58,7 @@ def undamaged(group: str = "", *, trials: int = ONSET, **walk: object) -> RunCon
         trials: of each run.
         walk: settings of the section `walk` that differ.
     """
-    config = experiments.preset("hexapod-walk")
+    config = presets.load("hexapod-walk")
     config = replace(
         config,
         trials=trials,
@@ -89,7 +90,7 @@ def damaged(legs: str, group: str = "a", *, kind: Kind = "window") -> RunConfig:
         watch=replace(trunk.watch, forget=kind != "window"),
     )
     if kind == "own":
-        return replace(config, walk=experiments.preset("hexapod-recover").walk)
+        return replace(config, walk=presets.load("hexapod-recover").walk)
     return config
 
 
@@ -100,10 +101,11 @@ def records(
     return experiments.records([small(c) if quick else c for c in configs])
 
 
-def walking(*, quick: bool = False) -> list[RunRecord]:
+def walking(*, quick: bool = False) -> RunRecord:
     """All undamaged runs, trained where they are missing; quick: one small run."""
     groups = GROUPS[:1] if quick else GROUPS
-    return list(records(map(undamaged, groups), quick=quick).values())
+    found = records(map(undamaged, groups), quick=quick)
+    return joined(list(found.values()))
 
 
 def adequate(record: RunRecord, hand: Hand) -> np.ndarray:
@@ -223,7 +225,7 @@ def standing_by(lists: Iterable[np.ndarray], *, damage: str = ""):
 
     world = registry.make("hexapod", damage=(f"{damage}@0",) if damage else ())
     channels = tuple(Channel(*item) for item in models.robot("phantomx").channels)
-    limit = experiments.preset("hexapod-walk").walk.limit
+    limit = presets.load("hexapod-walk").walk.limit
     return world, [
         Commands(item, np.full(len(item), limit), channels) for item in lists
     ]

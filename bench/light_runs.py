@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from bench import experiments, forking
+from bns import presets
 from bns.config import AdaptationConfig, RunConfig, WorldConfig
 from bns.config_watch import WatchConfig
 
@@ -50,7 +51,7 @@ def undamaged(**light: object) -> RunConfig:
     Args:
         light: settings of the section `light` that differ.
     """
-    config = experiments.preset("khepera-light")
+    config = presets.load("khepera-light")
     config = replace(config, trials=SOLVING, light=replace(config.light, **light))
     words = [f"{key}={value}" for key, value in sorted(light.items())]
     return experiments.named(config, "-".join(["light", *words]))
@@ -77,11 +78,8 @@ def damaged(
         after: trials from the damage on.
         adaptation: fields of `AdaptationConfig` that differ from table 6.7.
     """
-    config, light, watch = (
-        experiments.preset("khepera-light"),
-        dict(light or {}),
-        dict(watch or {}),
-    )
+    config = presets.load("khepera-light")
+    light, watch = dict(light or {}), dict(watch or {})
     snn = replace(config.snn, kind="ensemble", hidden=15) if ensemble else config.snn
     settings = {"window": 600, "population_reset": True} | adaptation
     own = {"hidden": 5, "weights": 5.0, "mirror": False} | light
@@ -111,7 +109,7 @@ def recovering(damage: str, *, runs: int = experiments.REPLICATES) -> RunConfig:
         damage: key of `ALL`.
         runs: runs a side.
     """
-    config = experiments.preset("khepera-light-recover")
+    config = presets.load("khepera-light-recover")
     world = replace(config.world, damage=(f"{ALL[damage]}@{ONSET}",))
     config = replace(config, trials=ONSET + AFTER, world=world)
     config = experiments.named(config, f"light-recover-{damage}")

@@ -69,7 +69,7 @@ class Detector:
         known = np.isfinite(score).any(1)
         filled = np.where(np.isfinite(score), score, -np.inf)
         suspect, worst = filled.argmax(1), filled.max(1)
-        on = known & (worst >= self.config.threshold)
+        on = worst >= self.config.threshold
         self.past = np.concatenate([self.past[:, 1:], innovations[:, None]], axis=1)
         self.past[on] = np.nan
         return Alarms(on, np.where(on, suspect, -1), np.where(known, worst, np.nan))

@@ -269,16 +269,9 @@ def check_alike(configs: Sequence[RunConfig]) -> None:
         BnsError: they differ in more than `adaptation` and `world`.
     """
 
-    def core(config: RunConfig) -> RunConfig:
-        first = configs[0]
-        return replace(
-            config,
-            preset=first.preset,
-            adaptation=first.adaptation,
-            world=first.world,
-        )
-
-    if any(core(config) != core(configs[0]) for config in configs):
+    first = configs[0]
+    free = {name: getattr(first, name) for name in ("preset", "adaptation", "world")}
+    if any(replace(config, **free) != first for config in configs):
         raise BnsError(
             "Runs of one batch may differ in `adaptation` and `world` only; "
             "train the others as a batch of their own."
