@@ -1,4 +1,4 @@
-"""Claims of one investigation, trained where they are missing, and judged."""
+"""Claims of one investigation, run where they are missing, and judged."""
 
 from collections.abc import Sequence
 
@@ -14,10 +14,13 @@ WORLD = "mujoco"
 def judged(wanted: Sequence[str], *, runs: int, quick: bool) -> Result:
     """How many of some claims have a verdict; runs are kept, so a run goes on.
 
+    Claims of which as many runs a side are published are not run again:
+    `bns claims run ID --runs N` does that.
+
     Args:
         wanted: identifiers of claims.
         runs: a side, at least; the bar is judged from 30 on.
-        quick: small and short runs.
+        quick: small and short runs, all of them made here.
     """
     from bns.campaign.engines import registry
 
@@ -25,22 +28,35 @@ def judged(wanted: Sequence[str], *, runs: int, quick: bool) -> Result:
     root = ROOT / "runs" / "claims"
     engine = registry.make("local", workers=experiments.WORKERS)
     least = 0 if quick else runs
-    runner.run(chosen, engine, world=WORLD, quick=quick, runs=least, root=root)
     place = runner.directory(WORLD, quick=quick, root=root)
-    rows = report.judged(chosen, place, world=WORLD, quick=quick)
+
+    def judge() -> list[report.Judged]:
+        return report.judged(chosen, place, world=WORLD, quick=quick, own=False)
+
+    due = [row.claim for row in judge() if _fewest(row) < max(least, 1)]
+    runner.run(due, engine, world=WORLD, quick=quick, runs=least, root=root)
+    rows = judge()
     found = [row for row in rows if row.findings]
     few = quick or runs < experiments.REPLICATES
     return Result(
         figure=len(found),
         unit=f"of {len(wanted)}",
         holds=None if few else len(found) == len(wanted),
-        n=min((min(f.runs) for row in found for f in row.findings), default=0),
+        n=min(map(_fewest, found), default=0),
         details={
             row.claim.id: {
                 "says": row.claim.says,
                 "verdict": row.verdict,
                 "cells": [list(cell) for cell in report.cells(row)],
+                "published": sum(finding.published for finding in row.findings),
             }
             for row in rows
         },
     )
+
+
+def _fewest(row: report.Judged) -> int:
+    """Runs of the side that has fewest; 0 where a comparison is missing."""
+    if len(row.findings) < len(row.claim.cells):
+        return 0
+    return min(min(finding.runs) for finding in row.findings)

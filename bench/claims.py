@@ -1,4 +1,4 @@
-"""Claims of investigation A that have a verdict, from the runs that are there."""
+"""Claims of investigation A that have a verdict, from runs here and published ones."""
 
 from bench import experiments
 from bench.result import Result
@@ -14,7 +14,8 @@ WORLDS = ("mujoco", "static-snn")
 def run(quick: bool) -> Result:
     """Judge what has been run: nothing is trained here.
 
-    Runs of the other benches are taken first; `bns claims run --all` runs the rest.
+    Runs of the other benches are taken first; where more are published of the same
+    settings, those count. `bns claims run --all` runs the rest.
     """
     del quick
     chosen = list(claims().values())
@@ -24,7 +25,7 @@ def run(quick: bool) -> Result:
     details: dict[str, object] = {}
     for world in WORLDS:
         place = runner.directory(world, quick=False, root=root)
-        rows = report.judged(chosen, place, world=world)
+        rows = report.judged(chosen, place, world=world, own=False)
         details[world] = report.counts(rows)
         mine = [row for row in rows if row.claim.investigation == "A"]
         details[f"{world}: verdicts of A"] = {row.claim.id: row.verdict for row in mine}

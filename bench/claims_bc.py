@@ -11,7 +11,7 @@ RUNS = 10  # a side, at least; with fewer than 30 or 100 a verdict is provisiona
 
 
 def run(quick: bool) -> Result:
-    """Train what is missing, `RUNS` a side, then judge; quick: small and short.
+    """Train what is neither here nor published, `RUNS` a side; quick: small and short.
 
     Settings are the dissertation's (tables 5.1 and 6.1) over the preset; runs are
     kept, so a run that is stopped goes on.

@@ -10,7 +10,7 @@ RUNS = 4  # a side, at least; with fewer than 30 or 100 a verdict is provisional
 
 
 def run(quick: bool) -> Result:
-    """Train what is missing, `RUNS` a side, then judge; quick: small and short.
+    """Train what is neither here nor published, `RUNS` a side; quick: small and short.
 
     Settings are the dissertation's (table 7.2) over the preset; runs are kept, so a
     run that is stopped goes on.

@@ -11,6 +11,8 @@
                 and `cells`, or why it is `untested`; `reading` says how a statement
                 without a table is measured
 
+`data/published.json` holds the findings that come with the package (`published`).
+
 Kinds: S a difference with a p value, N no difference, Q read from a figure, R one run
 on the real robot, I an interpretation.
 

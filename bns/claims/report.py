@@ -1,14 +1,14 @@
 """Findings on claims, as rows and as the page docs/claims.md."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from bns.campaign.results import records
 from bns.campaign.store import CampaignStore
-from bns.claims import sides, verdict
-from bns.claims.claim import KINDS, Claim
+from bns.claims import published, sides, verdict
+from bns.claims.claim import KINDS, Cell, Claim
 from bns.claims.verdict import Finding
 from bns.errors import BnsError
 from bns.record import RunRecord
@@ -43,9 +43,22 @@ class Judged:
 
 
 def judged(
-    claims: Sequence[Claim], directory: Path, *, world: str, quick: bool = False
+    claims: Sequence[Claim],
+    directory: Path,
+    *,
+    world: str,
+    quick: bool = False,
+    own: bool = True,
 ) -> list[Judged]:
     """All claims, judged by the runs in a store; without a store none has runs.
+
+    Args:
+        claims: to be judged.
+        directory: the store.
+        world: where its runs are of.
+        quick: whether they are the small and short ones.
+        own: by these runs alone; else a comparison of which more runs are published
+            than there are has the published finding (never a quick one).
 
     Raises:
         FormatError: the store is damaged or of a newer version.
@@ -59,7 +72,7 @@ def judged(
             for name in _names(claim, cell.sides, world, quick)
         }
         found = records(CampaignStore.open(directory), wanted)
-    rows = [_judge(claim, found, world, quick) for claim in claims]
+    rows = [_judge(claim, found, world, quick, own or quick) for claim in claims]
     flat = [finding for row in rows for finding in row.findings]
     adjusted = iter(verdict.adjusted(flat))
     return [
@@ -87,27 +100,54 @@ def _names(
 
 
 def _judge(
-    claim: Claim, found: dict[str, RunRecord], world: str, quick: bool
+    claim: Claim, found: dict[str, RunRecord], world: str, quick: bool, own: bool
 ) -> Judged:
     if claim.untested:
         return Judged(claim, (), NOT_TESTED, claim.untested)
     findings, missing = [], []
     for cell in claim.cells:
         names = _names(claim, cell.sides, world, quick)
-        have = [found[name] for name in names if name in found]
-        if not names:
+        finding = _finding(cell, [found[name] for name in names if name in found])
+        kept = None if own else published.finding(claim, cell, names, world=world)
+        if finding is None or (kept and min(kept.runs) > min(finding.runs)):
+            finding = kept
+        if finding:
+            findings.append(finding)
+        elif not names:
             missing.append(sides.missing(claim.investigation, cell, world=world))
-        elif len(have) < len(names):
+        elif not all(name in found for name in names):
             missing.append("no runs yet")
-        else:
-            finding = verdict.judge(cell, have[0], have[1] if cell.b else None)
-            if finding:
-                findings.append(finding)
     if not findings:
         return Judged(claim, (), NOT_RUN, missing[0] if missing else "no such figures")
     note = f"{len(missing)} of {len(claim.cells)} cells not run" if missing else ""
     said = verdict.of_claim(claim.kind, findings)
     return Judged(claim, tuple(findings), said, note)
+
+
+def _finding(cell: Cell, have: Sequence[RunRecord]) -> Finding | None:
+    """What runs say of a cell; None where a side has none."""
+    if not have or len(have) < len(cell.sides):
+        return None
+    return verdict.judge(cell, have[0], have[1] if cell.b else None)
+
+
+def publishable(worlds: Mapping[str, Sequence[Judged]]) -> list[published.Row]:
+    """All findings as they are published.
+
+    Args:
+        worlds: name of the world -> all claims, judged.
+    """
+    return [
+        published.row(
+            row.claim,
+            finding,
+            _names(row.claim, finding.cell.sides, world, False),
+            world=world,
+        )
+        for world, rows in worlds.items()
+        for row in rows
+        for finding in row.findings
+    ]
 
 
 def counts(rows: Sequence[Judged]) -> dict[str, int]:

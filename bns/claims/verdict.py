@@ -64,6 +64,7 @@ class Finding:
         share: of pairs that a wins, with its 95 % interval.
         power: chance to find an effect of this size with these runs.
         verdict: one of `ORDER`.
+        published: whether it came with the package, and not from runs at hand.
     """
 
     cell: Cell
@@ -74,6 +75,7 @@ class Finding:
     power: float
     verdict: str
     p_holm: float = 1.0
+    published: bool = False
 
     @property
     def provisional(self) -> bool:
@@ -113,11 +115,22 @@ def judge(cell: Cell, a: RunRecord, b: RunRecord | None) -> Finding | None:
     low = measures.measure(cell.measure).low
     share = stats.a12(other, mine) if low else stats.a12(mine, other)
     p = stats.mann_whitney(mine, other)
-    runs = (len(mine), len(other))
-    chance = power(share.value, *runs)
-    return Finding(
-        cell, runs, runs_wanted(cell), p, share, chance, verdict(cell.says, share, p)
-    )
+    return finding(cell, (len(mine), len(other)), p, share)
+
+
+def finding(cell: Cell, runs: tuple[int, ...], p: float, share: Interval) -> Finding:
+    """The finding of a cell from its statistics.
+
+    Args:
+        cell: what is compared.
+        runs: on each side, or on the one that is held against a number.
+        p: two-sided.
+        share: of pairs, or of runs, with its interval.
+    """
+    against_number = len(runs) == 1
+    chance = (_sign_power if against_number else power)(share.value, *runs)
+    said = verdict(">" if against_number else cell.says, share, p)
+    return Finding(cell, runs, runs_wanted(cell), p, share, chance, said)
 
 
 def verdict(says: str, share: Interval, p: float) -> str:
@@ -160,12 +173,7 @@ def _against_number(cell: Cell, values: np.ndarray) -> Finding:
     test = scipy_stats.binomtest(count, len(values), 0.5)
     limits = test.proportion_ci(stats.CONFIDENCE, method="wilson")
     share = Interval(count / len(values), float(limits.low), float(limits.high))
-    p = float(test.pvalue)
-    runs = (len(values),)
-    chance = _sign_power(share.value, len(values))
-    return Finding(
-        cell, runs, runs_wanted(cell), p, share, chance, verdict(">", share, p)
-    )
+    return finding(cell, (len(values),), float(test.pvalue), share)
 
 
 def _sign_power(share: float, runs: int) -> float:

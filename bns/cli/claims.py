@@ -16,11 +16,13 @@ MANUAL = """usage: bns claims {list,run,take,table} [...]
   run ID ...     run what a claim needs and is missing, then say what it says
   run --all      the same for every claim whose preset exists
   take DIR ...   use finished `bns run` directories below DIR
-  table          holds / direction only / null / reversed, with effect sizes
+  table          holds / direction only / null / reversed, with effect sizes: by
+                 your runs, and by published ones where you have fewer
 
 The rule is in docs/claims.md. `bns claims VERB --help` is the manual of a verb."""
 
 WORLDS = ("mujoco", "static-snn")
+PUBLISHED = "published"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +81,9 @@ class Take:
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """Judge the claims by the runs that are there."""
+    """Judge the claims by the runs that are there, or by the findings that come with
+    the package where those rest on more runs of the same settings.
+    """
 
     ids: tyro.conf.Positional[tuple[str, ...]] = ()
     """claims; none means all"""
@@ -87,10 +91,14 @@ class Table:
     """which runs"""
     quick: bool = False
     """judge the quick runs"""
+    own: bool = False
+    """by the runs in --root alone"""
     json: bool = False
     """print JSON instead of a table"""
     write: str = ""
-    """write the whole page, both worlds, to this file"""
+    """write the whole page, both worlds, to this file (docs/claims.md)"""
+    publish: str = ""
+    """write all findings to this file (bns/claims/data/published.json)"""
     root: str = "runs/claims"
     """where runs are kept"""
 
@@ -161,8 +169,15 @@ def _run(given: Run) -> int:
     for session in sessions:
         for key, reason in session.failed.items():
             print(f"failed: {key}: {reason}")
-    shown = Table(ids=given.ids, world=given.world, quick=given.quick, root=given.root)
-    _table(shown)
+    _table(
+        Table(
+            ids=given.ids,
+            world=given.world,
+            quick=given.quick,
+            own=True,
+            root=given.root,
+        )
+    )
     if any(session.missing for session in sessions):
         return STOPPED
     return int(any(session.failed or session.waiting for session in sessions))
@@ -186,23 +201,23 @@ def _take(given: Take) -> int:
 
 
 def _table(given: Table) -> int:
-    from bns.claims import page, report, runner
+    from bns.claims import report, runner
 
     chosen = _chosen(given.ids)
     root = Path(given.root)
 
     def judged(world: str) -> list:
         place = runner.directory(world, quick=given.quick, root=root)
-        return report.judged(chosen, place, world=world, quick=given.quick)
+        return report.judged(
+            chosen, place, world=world, quick=given.quick, own=given.own
+        )
 
-    if given.write:
+    if given.write or given.publish:
         if given.ids or given.quick:
-            raise BnsError("--write writes all claims: leave ids and --quick out.")
-        from bns import files
-
-        text = page.page({world: judged(world) for world in WORLDS})
-        files.write_bytes(Path(given.write), text.encode())
-        print(given.write)
+            raise BnsError(
+                "--write and --publish take all claims: leave ids and --quick out."
+            )
+        _written(given, {world: judged(world) for world in WORLDS})
         return 0
     rows = judged(given.world)
     _show(rows, json=given.json, brief=not given.ids)
@@ -211,21 +226,42 @@ def _table(given: Table) -> int:
         what = "claim" if len(rows) == 1 else "claims"
         print(f"{len(rows)} {what} in {given.world}: {said}")
         print("* fewer runs than the rule asks for. The rule: docs/claims.md")
+        if any(finding.published for row in rows for finding in row.findings):
+            print(f"{PUBLISHED}: came with bns; `bns claims run ID` runs it here.")
     return 0
+
+
+def _written(given: Table, worlds: dict) -> None:
+    """The page, the findings, or both as files."""
+    from bns import files
+    from bns.claims import page, published, report
+
+    if given.write:
+        files.write_bytes(Path(given.write), page.page(worlds).encode())
+        print(given.write)
+    if given.publish:
+        published.write(Path(given.publish), report.publishable(worlds))
+        print(given.publish)
 
 
 def _show(rows: list, *, json: bool, brief: bool) -> None:
     from bns.claims import report
 
-    head = ["claim", "claim's verdict", *report.HEAD]
+    head = ["claim", "claim's verdict", *report.HEAD, "from"]
     lines = []
     for row in rows:
-        found = report.cells(row)
+        origin = [PUBLISHED if f.published else "" for f in row.findings]
+        found = list(zip(report.cells(row), origin, strict=True))
         if not found and (json or not brief):
-            found = [(row.note, *[""] * (len(report.HEAD) - 1))]
-        for number, cell in enumerate(found):
+            found = [((row.note, *[""] * (len(report.HEAD) - 1)), "")]
+        for number, (cell, source) in enumerate(found):
             first = json or number == 0
             lines.append(
-                [row.claim.id if first else "", row.verdict if first else "", *cell]
+                [
+                    row.claim.id if first else "",
+                    row.verdict if first else "",
+                    *cell,
+                    source,
+                ]
             )
     show(head, lines, json=json)

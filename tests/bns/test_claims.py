@@ -12,7 +12,7 @@ from bns import presets, stats
 from bns.campaign.engines.inline import InlineEngine
 from bns.campaign.identity import identity
 from bns.campaign.part import Block
-from bns.claims import measures, page, report, runner, sides, verdict
+from bns.claims import measures, report, runner, sides, verdict
 from bns.claims.claim import Cell, claims, content, find
 from bns.config import RunConfig, WorldConfig
 from bns.errors import BnsError
@@ -270,15 +270,3 @@ def test_quick_sides_are_short():
     short = sides.member("A", "left-20-at-40", world="mujoco", quick=True).config
     assert (whole.trials, short.trials) == (100, 20)
     assert short.world.damage == ("wheel_gain:wheel=left,factor=0.8@8",)
-
-
-def test_the_page_has_every_claim_and_is_the_committed_one_in_form():
-    text = (ROOT / "docs" / "claims.md").read_text(encoding="utf-8")
-    rows = {w: report.judged(list(claims().values()), ROOT / "none", world=w)
-            for w in ("mujoco", "static-snn")}  # fmt: skip
-    empty = page.page(rows)
-    for claim in claims().values():
-        line = f"| {claim.id} | {claim.where} |"
-        assert line in empty
-        assert line in text, "docs/claims.md is of other data: write it anew"
-    assert "reversed" in text and "{rule}" not in text

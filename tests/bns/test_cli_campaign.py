@@ -142,6 +142,8 @@ def test_claims_are_listed_and_judged_without_runs(capsys, tiny):
     assert len(rows) == 157
     assert "p 0.05543" in " ".join(said(capsys, "claims", "list", "a15").split())
     text = said(capsys, "claims", "table", "A15", "B1")
-    assert "not run" in text and "not tested" in text
-    said(capsys, "claims", "table", "--write", "claims.md")
+    assert "published" in text and "not tested" in text
+    assert "not run" in said(capsys, "claims", "table", "A15", "--own")
+    said(capsys, "claims", "table", "--write", "claims.md", "--publish", "all.json")
     assert (tiny.parent / "claims.md").read_text().startswith("# Claims")
+    assert len(json.loads((tiny.parent / "all.json").read_text())) > 100
