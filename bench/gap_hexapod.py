@@ -13,11 +13,13 @@ from bench.result import Result
 
 DOC = "withheld effects of the hexapod named, aliases merged, leg right, at 3 x"
 BAR = ">= 0.90, <= 300 s a case"
-COUNTS = {"large": 28, "none": 16}
+COUNTS = {"large": 56, "none": 32}
 # Seeds from 70 000 on were scored once, with a floor that was assumed.
 # Those from 170 000 on were scored once, with curves of a fixed grid.
 # Those from 180 000 on were scored once, when a grip as it may be was still a gap.
-CASES = Cases("gap_hexapod4", COUNTS, first=190_000)
+# Those from 190 000 on were scored once: 25 of 25 named, no gap in 16 without one.
+# Those from 290 000 on: planned first, scored once, with nothing changed since.
+CASES = Cases("gap_hexapod5", COUNTS, first=290_000)
 QUICK = {"large": 1, "none": 1}
 LARGE = 3.0  # sizes from which effects have to be named
 SLOWEST = 300.0  # [s] a case on two cores
