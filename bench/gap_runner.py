@@ -13,11 +13,11 @@ import time
 from bench import _gap_cases
 
 ROUND = 2  # of the plans
-ROUNDS = {"scored": (3,), "calibrate": (2, 3), "sets": (4,)}
+ROUNDS = {"scored": (4,), "calibrate": (2, 3), "sets": (4,)}
 """of diagnoses, those of a later one count; each has scored cases of its own, see
 docs/decisions.md"""
 SEEN = 1_000_000  # seeds from here on were scored once, calibration uses lower ones
-SEALED = 3_000_000  # seeds of the scored cases begin here
+SEALED = 8_000_000  # seeds of the scored cases begin here
 CALIBRATION = 400_000  # seeds of the calibration cases begin here
 SPAN = 10_000  # seeds between the scored kinds
 SETS = {
