@@ -250,18 +250,15 @@ def _show(rows: list, *, json: bool, brief: bool) -> None:
     head = ["claim", "claim's verdict", *report.HEAD, "from"]
     lines = []
     for row in rows:
-        origin = [PUBLISHED if f.published else "" for f in row.findings]
-        found = list(zip(report.cells(row), origin, strict=True))
+        found = [
+            (*cell, PUBLISHED if finding.published else "")
+            for cell, finding in zip(report.cells(row), row.findings, strict=True)
+        ]
         if not found and (json or not brief):
-            found = [((row.note, *[""] * (len(report.HEAD) - 1)), "")]
-        for number, (cell, source) in enumerate(found):
+            found = [(row.note, *[""] * len(report.HEAD))]
+        for number, cell in enumerate(found):
             first = json or number == 0
             lines.append(
-                [
-                    row.claim.id if first else "",
-                    row.verdict if first else "",
-                    *cell,
-                    source,
-                ]
+                [row.claim.id if first else "", row.verdict if first else "", *cell]
             )
     show(head, lines, json=json)
