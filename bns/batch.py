@@ -127,7 +127,8 @@ def check_device(name: str) -> None:
 
 
 def check_world(config: RunConfig, *, named: bool = True) -> None:
-    """Refuse a world, robot, damage or reality that does not exist.
+    """Refuse a world, robot, damage or reality that does not exist, and speeds that
+    the robot does not take.
 
     Args:
         config: says which.
@@ -138,10 +139,10 @@ def check_world(config: RunConfig, *, named: bool = True) -> None:
         BnsError: a text that cannot be read, a value out of bounds.
     """
     if named:
-        from bns import models
+        from bns import robots
         from bns.worlds import registry
 
         registry.get(config.world.name)
-        models.robot(config.world.robot)
+        robots.check_speeds(config)
     Damage.parse(config.world.damage)
     Damage.parse(config.world.reality)

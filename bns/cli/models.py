@@ -1,8 +1,8 @@
-"""`bns models`: a robot model checked, on the screen or in a picture."""
+"""`bns models`: a robot model begun, checked, on the screen or in a picture."""
 
 import os
 import sys
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import tyro
@@ -12,9 +12,11 @@ from bns.errors import BnsError
 
 MANUAL = """usage: bns models view ROBOT [--png FILE]
        bns models check ROBOT
+       bns models new DIRECTORY --wheel-radius M --axle-length M --mass KG ...
 
   view   open a robot model in MuJoCo's viewer, or draw it to a file
   check  see whether a robot's directory is what the worlds and the learner need
+  new    make the directory of a robot with two driven wheels from its numbers
 
 ROBOT is a name that `bns robots` lists, or a directory of your own that holds a
 robot.toml (docs/your_robot.md). `bns models VERB --help` is the manual of each."""
@@ -42,13 +44,38 @@ class Check:
     """name of the robot, see `bns robots`, or its directory"""
 
 
+@dataclass(frozen=True, kw_only=True)
+class New:
+    """Make the directory of a robot with two driven wheels from a handful of its
+    numbers: a box on two wheels and a ball, that drives, can be damaged, learns and is
+    diagnosed at once. numbers.toml lists what was assumed.
+    """
+
+    directory: tyro.conf.Positional[str]
+    """to be made; its name is the robot's"""
+    wheel_radius: float
+    """of the driven wheels [m]"""
+    axle_length: float
+    """between the middles of the driven wheels [m]"""
+    mass: float
+    """of the whole robot [kg]"""
+    top_speed: float
+    """of a wheel over the floor [m/s]"""
+    length: float = 0.0
+    """of the body [m]; 0 = as long as the axle"""
+    width: float = 0.0
+    """of the body [m]; 0 = 0.7 times the axle"""
+    height: float = 0.0
+    """of the body above the floor [m]; 0 = a wheel's radius and half the axle"""
+
+
 def main(verb: str, argv: list[str]) -> int:
     """Run a verb on robot models; gives the exit code.
 
     Raises:
         BnsError: what the user gave cannot be used.
     """
-    does = {"view": (View, view), "check": (Check, check)}
+    does = {"view": (View, view), "check": (Check, check), "new": (New, new)}
     return dispatch(verb, argv, does, MANUAL)
 
 
@@ -82,6 +109,27 @@ def check(given: Check) -> int:
     rest = f", {left} not looked at because of that" if left else ""
     print(f"{len(done) - wrong} of {len(done)} points hold{rest}.")
     return 2 if wrong else 0
+
+
+def new(given: New) -> int:
+    """Write the directory, then check it; 2 if it is not what is needed.
+
+    Raises:
+        BnsError: numbers or a name that no robot can have; a directory that is there.
+    """
+    from bns.models.new import Wheeled, write
+
+    numbers = asdict(given)
+    place = numbers.pop("directory")
+    write(Path(place), Wheeled(**numbers))
+    code = check(Check(robot=place))
+    print(f"{place} is made. What is assumed stands in {Path(place) / 'numbers.toml'}.")
+    print(f"  bns models view {place} --png {Path(place).name}.png")
+    print(f"  bns run khepera-simple --world.robot {place} --out runs/mine")
+    print(
+        "Presets are made for a Khepera III: docs/your_robot.md says what to look at."
+    )
+    return code
 
 
 def draw(given: View) -> int:

@@ -57,6 +57,37 @@ def test_wrong_words_are_one_line(capsys, words, expected):
     assert code == 2 and expected in text and text.count("\n") == 1
 
 
+SIZES = ["--wheel-radius=0.02", "--axle-length=0.053", "--mass=0.16", "--top-speed=0.1"]
+
+
+def test_a_robot_is_made_of_its_numbers(capsys, tmp_path):
+    mine = tmp_path / "robots" / "mine"
+    code, text = said(capsys, "models", "new", mine, *SIZES)
+    assert code == 0 and "13 of 13 points hold." in text
+    code, text = said(capsys, "models", "new", mine, *SIZES)
+    assert code == 2 and "is there already" in text
+    run = ("run", "khepera-simple", "--world.robot", mine, "--out", tmp_path / "run")
+    code, text = said(capsys, *run)
+    assert code == 2 and "--controller.speed-high 14401 " in text
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    "place, changed, expected",
+    [
+        ("my robot", (), "cannot be a robot's name"),
+        ("mine", ("--mass", "0"), "mass = 0.0 is not possible"),
+        ("mine", ("--height", "-1"), "height = -1.0 is not possible"),
+        ("mine", ("--top-speed", "nan"), "top_speed = nan is not possible"),
+        ("mine", ("--wheel-radius", "20"), "do not go on an axle"),
+    ],
+)
+def test_what_no_robot_can_be_is_not_made(capsys, tmp_path, place, changed, expected):
+    code, text = said(capsys, "models", "new", tmp_path / place, *SIZES, *changed)
+    assert code == 2 and expected in text and text.count("\n") == 1
+    assert not any(tmp_path.iterdir())
+
+
 def test_without_a_display_it_says_what_to_do(capsys, monkeypatch):
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)

@@ -1,0 +1,169 @@
+"""A first model of a robot with two driven wheels, from a handful of its numbers.
+
+A box on two wheels and a ball. What has to be known are two lengths, the mass and the
+top speed; the rest is computed from them or assumed, and `numbers.toml` says which.
+Where an assumption is off, a recording of the robot and the gap diagnosis tell.
+"""
+
+import math
+import re
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from bns.errors import BnsError
+
+GRAVITY = 9.81  # [m/s2]
+FRICTION = 0.8  # rubber on a board; assumed
+WHEEL = 0.03  # share of the mass in each wheel; assumed
+ROTOR = 0.2  # armature over the body's inertia as a wheel feels it; assumed
+RISE = 0.03  # [s] in which wheels come up to speed; assumed
+GRIP = 2.0  # largest torque over that at which a wheel slips; assumed
+BACK, UP = 0.05, 0.35  # shares of length and height at which the mass lies; assumed
+BALL = 0.2  # radius of the ball over the wheel's; assumed
+CLEAR = 0.03  # height of the nose over the length; assumed
+DIGITS = 5  # of what is computed
+FILES = {
+    "{name}.xml": "wheeled.xml.jinja",
+    "scene.xml": "wheeled_scene.xml.jinja",
+    "robot.toml": "wheeled_robot.toml.jinja",
+    "numbers.toml": "wheeled_numbers.toml.jinja",
+}
+OPTIONAL = ("length", "width", "height")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wheeled:
+    """What is known of the robot.
+
+    Attributes:
+        wheel_radius: [m].
+        axle_length: between the middles of the wheels [m].
+        mass: of all of it [kg].
+        top_speed: of a wheel over the floor [m/s].
+        length, width, height: of the box [m]; 0 = as long as the axle, 0.7 times as
+            wide, and as high as a wheel and half the axle.
+
+    Raises:
+        BnsError: a number that is not positive; wheels larger than the axle.
+    """
+
+    wheel_radius: float
+    axle_length: float
+    mass: float
+    top_speed: float
+    length: float = 0.0
+    width: float = 0.0
+    height: float = 0.0
+
+    def __post_init__(self):
+        for name, value in asdict(self).items():
+            if not math.isfinite(value) or value < 0 or not (value or name in OPTIONAL):
+                raise BnsError(
+                    f"{name} = {value} is not possible: give a number above 0, in m, "
+                    "kg or m/s."
+                )
+        if self.wheel_radius > self.axle_length:
+            raise BnsError(
+                f"Wheels of radius {self.wheel_radius} m do not go on an axle of "
+                f"{self.axle_length} m: give both in metres, the axle from wheel to "
+                "wheel."
+            )
+
+    @property
+    def box(self) -> tuple[float, float, float]:
+        """Length, width and height [m]."""
+        return (
+            self.length or self.axle_length,
+            self.width or 0.7 * self.axle_length,
+            self.height or self.wheel_radius + 0.5 * self.axle_length,
+        )
+
+
+def write(directory: Path, known: Wheeled) -> None:
+    """Make the directory of a robot, named as the directory is.
+
+    Raises:
+        BnsError: a name that no model can have; something is there already.
+    """
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    name = directory.name
+    if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
+        raise BnsError(
+            f"{name!r} cannot be a robot's name: give a directory whose name is made "
+            "of letters, digits and underscores."
+        )
+    if directory.exists():
+        raise BnsError(f"{directory} is there already: give another name.")
+    environment = Environment(
+        loader=PackageLoader("bns.models", "templates"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        keep_trailing_newline=True,
+    )
+    content = {"name": name, **asdict(known), **_numbers(known), **_looks(known)}
+    try:
+        directory.mkdir(parents=True)
+        for file, template in FILES.items():
+            text = environment.get_template(template).render(content)
+            (directory / file.format(name=name)).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise BnsError(f"{directory} cannot be written: {error.strerror}.") from error
+
+
+def _numbers(known: Wheeled) -> dict[str, float | list[float]]:
+    """What numbers.toml lists, beside what is known."""
+    length, width, height = known.box
+    radius, wheel = known.wheel_radius, WHEEL * known.mass
+    body, spin = known.mass - 2 * wheel, wheel * radius**2 / 2
+    felt = known.mass / 2 * radius**2  # by one wheel, when the robot speeds up
+    ball = BALL * radius
+    made = {
+        "body_mass": body,
+        "inertia": [
+            body / 12 * (width**2 + height**2),
+            body / 12 * (length**2 + height**2),
+            body / 12 * (length**2 + width**2),
+        ],
+        "centre_of_mass": [-BACK * length, 0.0, UP * height],
+        "wheel_mass": wheel,
+        "wheel_spin_inertia": spin,
+        "wheel_tilt_inertia": 0.6 * spin,  # of a disc a third as thick as its radius
+        "ball_radius": ball,
+        "ball_position": ball - length / 2,
+        "nose_position": length / 2 - ball,
+        "nose_height": ball + CLEAR * length,
+        "torque_limit": GRIP * FRICTION * known.mass / 2 * GRAVITY * radius,
+        "servo_gain": (felt * (1 + ROTOR) + spin) / RISE,
+        "armature": ROTOR * felt,
+    }
+    exact = {
+        "wheel_speed_limit": known.top_speed / radius,
+        "wheel_friction": FRICTION,
+        "half_axle": known.axle_length / 2,
+    }
+    return {name: _short(value) for name, value in made.items()} | exact
+
+
+def _looks(known: Wheeled) -> dict[str, float | list[float]]:
+    """What only shows: half sizes, places, the camera."""
+    length, width, height = known.box
+    low, size = 0.5 * known.wheel_radius, max(length, known.axle_length, height)
+    made = {
+        "tyre": known.wheel_radius / 6,
+        "box": [length / 2, width / 2, (height - low) / 2],
+        "middle": (height + low) / 2,
+        "top": height,
+        "mark": [0.05 * length, 0.05 * length, 0.01 * length],
+        "ahead": 0.4 * length,
+        "extent": 2 * size,
+        "camera": [2.8 * size, -2.3 * size, 1.6 * size],
+    }
+    return {name: _short(value) for name, value in made.items()}
+
+
+def _short(value: float | list[float]) -> float | list[float]:
+    """Rounded to a few digits."""
+    if isinstance(value, list):
+        return [float(f"{each:.{DIGITS}g}") for each in value]
+    return float(f"{value:.{DIGITS}g}")

@@ -1,0 +1,46 @@
+"""Robots made of a handful of numbers keep to every point, from small to large."""
+
+import numpy as np
+import pytest
+
+from bns import models
+from bns.models import check, new, numbers
+from bns.worlds import registry
+from bns.worlds.trial import Commands
+
+ROBOTS = {  # wheel radius, axle [m], mass [kg], top speed [m/s], of makers' data
+    "epuck": (0.0205, 0.053, 0.15, 0.13),
+    "burger": (0.033, 0.16, 1.0, 0.22),
+    "create": (0.036, 0.235, 2.9, 0.5),
+    "pioneer": (0.0975, 0.33, 9.0, 1.2),
+    "jackal": (0.098, 0.376, 17.0, 2.0),
+}
+NAMES = ("wheel_radius", "axle_length", "mass", "top_speed")
+
+
+def made(tmp_path, name):
+    known = new.Wheeled(**dict(zip(NAMES, ROBOTS[name], strict=True)))
+    new.write(tmp_path / name, known)
+    return str(tmp_path / name), known
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_every_point_holds(tmp_path, name):
+    place, _ = made(tmp_path, name)
+    done = check.check(models.robot(place))
+    assert {point.says: point.faults for point in done if point.faults} == {}
+    assert len(done) == 13
+
+
+def test_it_weighs_and_turns_as_it_was_told(tmp_path):
+    place, known = made(tmp_path, "create")
+    compiled = models.spec(place).compile()
+    assert compiled.body_subtreemass[0] == pytest.approx(known.mass, rel=1e-4)
+    listed = numbers.read(tmp_path / "create")
+    assert {n for n, item in listed.items() if "given" in item.source} >= {
+        "wheel_radius", "axle_length", "wheel_speed_limit",
+    }  # fmt: skip
+    world = registry.make("mujoco", robot=place)
+    (trial,) = world.run([Commands(np.array([(-0.05, 0.05)]), [2.0])])
+    spin = 0.1 / known.axle_length
+    assert trial.poses_world[-1][2] == pytest.approx(2 * spin, rel=0.05)
