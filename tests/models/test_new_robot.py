@@ -7,6 +7,7 @@ from bns import models
 from bns.models import check, new, numbers
 from bns.worlds import registry
 from bns.worlds.trial import Commands
+from tests.sources import ROOT
 
 ROBOTS = {  # wheel radius, axle [m], mass [kg], top speed [m/s], of makers' data
     "epuck": (0.0205, 0.053, 0.15, 0.13),
@@ -44,3 +45,23 @@ def test_it_weighs_and_turns_as_it_was_told(tmp_path):
     (trial,) = world.run([Commands(np.array([(-0.05, 0.05)]), [2.0])])
     spin = 0.1 / known.axle_length
     assert trial.poses_world[-1][2] == pytest.approx(2 * spin, rel=0.05)
+
+
+def test_a_burger_of_four_numbers_goes_where_the_detailed_one_goes(tmp_path):
+    place, _ = made(tmp_path, "burger")
+    rng = np.random.default_rng(0)
+    drives = [
+        Commands(rng.uniform(-0.2, 0.2, (10, 2)), np.full(10, 1.0)) for _ in range(20)
+    ]
+    ends = [
+        np.array(
+            [
+                trial.poses_world[-1]
+                for trial in registry.make("mujoco", robot=name).run(drives)
+            ]
+        )
+        for name in (place, str(ROOT / "examples" / "burger"))
+    ]
+    apart = np.abs(ends[0] - ends[1])
+    assert np.median(np.hypot(apart[:, 0], apart[:, 1])) < 0.003  # [m], 0.8 m driven
+    assert np.median(apart[:, 2]) < np.radians(0.5)
