@@ -158,7 +158,8 @@ def _same(given: object, wanted: str) -> bool:
 
 
 def _of_robot(found: Sequence[Trial], model: GapModel) -> None:
-    others = sorted({t.robot for t in found if t.robot and t.robot != model.name})
+    mine = Path(model.name).name
+    others = sorted({t.robot for t in found if t.robot and Path(t.robot).name != mine})
     if others:
         raise BnsError(
             f"The recording is of {', '.join(others)}, the model is {model.name!r}; "

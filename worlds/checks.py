@@ -45,7 +45,7 @@ def checked_start(
 def shared(
     damage: Damage | tuple[Damage, ...], seeds: Sequence[int], robots: int
 ) -> tuple[Sequence[Damage], Sequence[int]]:
-    """A damage and a seed for each of the robots.
+    """A damage and a seed for each of the robots; without seeds 0, 1, 2, ...
 
     Raises:
         BnsError: there are other numbers of them, or a negative seed.
@@ -57,7 +57,7 @@ def shared(
             f"{len(damage)} damages were given for {robots} robots: give one for "
             "each, or a single one for all."
         )
-    seeds = [int(seed) for seed in seeds] if len(seeds) else [0] * robots
+    seeds = [int(seed) for seed in seeds] if len(seeds) else list(range(robots))
     if len(seeds) != robots or min(seeds, default=0) < 0:
         raise BnsError(
             f"seeds has {len(seeds)} entries for {robots} robots: give one "

@@ -39,7 +39,7 @@ class Loops:
             cycles: commands of the trial.
             cycle: duration of each [s].
             trial: number of this trial, counted from 0.
-            seeds: of what is random, one a robot; empty means zeros.
+            seeds: of what is random, one a robot; empty means 0, 1, 2, ...
             starts: poses in the world frame, shape ``(n, 3)`` [m, m, rad]; None =
                 where this world's trials start.
 

@@ -32,7 +32,7 @@ class World(Protocol):
             trial: number of this trial, counted from 0; effects have their onset
                 on it.
             seeds: N seeds for what is random in the world (noise, jitter); empty
-                means zeros. The same seed and trial give the same bytes.
+                means 0, 1, 2, ... The same seed and trial give the same bytes.
 
         Returns:
             N trials, in order. A diverged one is flagged, never raised.

@@ -35,6 +35,9 @@ def test_recordings_are_pooled_chosen_and_of_one_robot(model, drive, tmp_path):
     dataset.write(tmp_path / "c", [drive.replace(robot="rover")])
     with pytest.raises(BnsError, match="recording is of rover, the model is 'khep"):
         inputs.trials([str(tmp_path / "c")], model)
+    moved = f"/elsewhere/{model.name}"  # a directory of robots, on another machine
+    dataset.write(tmp_path / "d", [drive.replace(robot=moved)])
+    assert len(inputs.trials([str(tmp_path / "d")], model)) == 1
 
 
 def test_commands_that_the_robot_can_not_be_told_are_refused(model, drive):

@@ -87,6 +87,15 @@ def test_seed_and_trial_decide_what_is_random(name, kind):
     assert not np.array_equal(first.observed, other_trial.observed)
 
 
+def test_without_seeds_each_robot_has_noise_of_its_own(name, kind):
+    world = registry.make(name, reality=[NOISE])
+    (commands,) = kind.lists(1)
+    told = world.run([commands] * 3, trial=1, seeds=[0, 1, 2])
+    found = world.run([commands] * 3, trial=1)
+    assert all(map(same, found, told))
+    assert not same(found[0], found[1])
+
+
 def test_damage_sets_in_at_its_trial_and_is_in_the_record(name, kind):
     commands, damage = [kind.ahead(1)], [f"{kind.damage}@3"]
     sound, damaged = registry.make(name), registry.make(name, damage=damage)
