@@ -7,6 +7,11 @@ are then run in the real world. Transfer loss is how much farther from the place
 the real world, than what was evolved with the true effect.
 """
 
+from concurrent.futures import ProcessPoolExecutor
+from itertools import repeat
+from multiprocessing import get_context
+
+from bench import experiments
 from bench.result import Result
 
 DOC = (
@@ -34,7 +39,9 @@ def run(quick: bool) -> Result:
     """One case per hidden effect."""
     from statistics import median
 
-    rows = [_case(k, text, quick) for k, text in enumerate(HIDDEN[: 1 if quick else 8])]
+    hidden = HIDDEN[: 1 if quick else 8]
+    with ProcessPoolExecutor(experiments.WORKERS, get_context("spawn")) as pool:
+        rows = list(pool.map(_case, range(len(hidden)), hidden, repeat(quick)))
     ratios = [row["ratio"] for row in rows]
     figure = float(median(ratios))
     return Result(
