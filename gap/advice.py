@@ -45,6 +45,13 @@ def _travel(observed: np.ndarray) -> float:
 def warnings(found: Diagnosis, model: GapModel) -> tuple[str, ...]:
     """Further warnings on a diagnosis, one line each."""
     made = []
+    change = found.where.get("change") or {}
+    if change.get("direction") and change["trial"] > 0:
+        made.append(
+            f"The gap {change['direction']} at trial {change['trial']} of those given, "
+            "but effects are fitted as if they held throughout: diagnose what comes "
+            "before and after apart (--trials)."
+        )
     singles = [fit for fit in found.fits if len(fit.names) == 1]
     if singles and all(fit.at_bound for fit in singles):
         made.append(

@@ -10,6 +10,7 @@ from bns.gap.model import GapModel
 from bns.worlds.importing import MOMENTS
 from bns.worlds.trial import Trial
 
+TURNS = 1.5  # steps beside it that a spike is larger than; a turn is one; assumed
 SPIKE = 8.0  # robust standard deviations from both neighbours
 WRAP = 0.6  # of a full turn, between two samples, that counts as a wrap
 LOST = 0.5  # share of samples that may be missing
@@ -139,7 +140,7 @@ def _repaired(trial: Trial, label: str, timed: bool) -> tuple[Trial, list[str]]:
             notes.append(f"{label}: {infinite.sum()} infinite {channel.name}, dropped")
         observed[:, column] = values
         notes += _noticed(trial, values, channel.name, label)
-    spikes = _spikes(observed)
+    spikes = _spikes(observed, trial.times)
     if spikes.any():
         observed[spikes] = np.nan
         notes.append(f"{label}: {spikes.sum()} spikes, dropped")
@@ -167,7 +168,7 @@ def _unwrapped(values: np.ndarray) -> tuple[np.ndarray, int]:
     return made, int(jumps.sum())
 
 
-def _spikes(observed: np.ndarray) -> np.ndarray:
+def _spikes(observed: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Single samples far from both neighbours, which agree with each other."""
     found = np.zeros(len(observed), dtype=bool)
     for values in observed.T:
@@ -183,6 +184,12 @@ def _spikes(observed: np.ndarray) -> np.ndarray:
         before = 2 * kept[1:-3] - kept[:-4] - kept[2:-2]
         after = 2 * kept[3:-1] - kept[4:] - kept[2:-2]
         hit[1:-1] &= np.minimum(np.abs(before), np.abs(after)) > SPIKE * scale
+        # and it stands out by no more than the speeds on either side make of a step
+        lasted = np.maximum(np.diff(times[seen]), 1e-9)
+        speed = np.abs(np.diff(kept)) / lasted
+        step = np.maximum(lasted[1:-2], lasted[2:-1])
+        beside = np.minimum(speed[:-3], speed[3:]) * step
+        hit[1:-1] &= np.abs(off[1:-1]) > TURNS * beside
         found[seen[1:-1][hit]] = True
     return found
 

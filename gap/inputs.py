@@ -1,6 +1,6 @@
 """Recordings and nominal models by what a user calls them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from bns import models
 from bns.errors import BnsError, FormatError, OutOfBoundsError, UnknownNameError
+from bns.gap import choosing
 from bns.gap.model import GapModel
 from bns.worlds.trial import Commands, Trial
 
@@ -28,8 +29,7 @@ SAMPLES = 300
 """samples of a trial that are used at most; more of them tell no more of its motion,
 and what has to be kept of their noise grows with their square"""
 
-SHOWN = 12  # values of a condition that an error lists
-
+RUN = "dataset"  # where the directory of a run keeps its recordings
 PART = 20.0  # [s] length of the trials that long recordings are cut into
 
 
@@ -82,49 +82,62 @@ def trials(
     columns: str = "",
     importer: str = "",
     only: Sequence[str] = (),
+    numbers: str = "",
 ) -> list[Trial]:
     """All trials of some recordings, pooled.
 
     Args:
-        paths: dataset directories; or CSV or MCAP logs with `columns`; or directories
-            that `importer` reads.
+        paths: dataset directories, or those of runs, which hold one; or CSV or MCAP
+            logs with `columns`; or directories that `importer` reads.
         model: which they are for.
         columns: TOML file that maps the columns of logs to channels.
         importer: one of `IMPORTERS`.
         only: ``name=value``: keep trials whose conditions say so.
+        numbers: of the trials to keep, counted in each recording (in each run of one)
+            from 0, see `bns.gap.choosing.numbered`; empty means all.
 
     Raises:
         BnsError: something is missing, malformed, or of another robot.
     """
     if importer and columns:
         raise BnsError("Give --importer or --columns, not both.")
-    found = [trial for path in paths for trial in _read(path, model, columns, importer)]
-    for text in only:
-        name, _, value = text.partition("=")
-        known = sorted({key for trial in found for key in trial.conditions})
-        if not value or (known and name not in known):
-            raise UnknownNameError("condition (write name=value)", text, known)
-        kept = [t for t in found if _same(t.conditions.get(name), value)]
-        if found and not kept:
-            there = sorted({str(trial.conditions.get(name)) for trial in found})
-            raise UnknownNameError(f"value of {name}", value, there[:SHOWN])
-        found = kept
+    wanted = choosing.numbered(numbers)
+    found = [
+        trial
+        for path in paths
+        for number, trial in _read(path, model, columns, importer)
+        if wanted(number)
+    ]
+    found = choosing.with_conditions(found, only)
     if not found:
-        raise BnsError("No trial is left: nothing was recorded, or --only drops all.")
+        raise BnsError(
+            "No trial is left: nothing was recorded, or --only and --trials drop all."
+        )
     _of_robot(found, model)
     step = getattr(model, "dt", 0.0)
     return [on_grid(thinned(_fitting(trial, model)), step) for trial in found]
 
 
-def _read(path: str, model: GapModel, columns: str, importer: str) -> list[Trial]:
-    from bns.worlds import dataset, importing
+def _read(
+    path: str, model: GapModel, columns: str, importer: str
+) -> Iterable[tuple[int, Trial]]:
+    """Trials of a recording with their numbers."""
+    from bns.worlds import dataset
 
     if importer:
-        return _imported(importer, path)
+        return enumerate(_imported(importer, path))
     if Path(path).is_dir():
-        return list(dataset.read(path).trials)
+        inside = Path(path) / RUN
+        found = dataset.read(inside if inside.is_dir() else path)
+        return zip(found.numbers, found.trials, strict=True)
     if hasattr(model, "read_log"):
-        return model.read_log(path)
+        return enumerate(model.read_log(path))
+    return enumerate(_log(path, columns))
+
+
+def _log(path: str, columns: str) -> list[Trial]:
+    from bns.worlds import importing
+
     if not Path(path).exists():
         raise FormatError(f"{path} is neither a dataset directory nor a log.")
     if not columns:
@@ -145,16 +158,6 @@ def _imported(name: str, path: str) -> list[Trial]:
         return [trial for part in parts for trial in part]
     found = reader.read(path)
     return [found] if isinstance(found, Trial) else list(found)
-
-
-def _same(given: object, wanted: str) -> bool:
-    if isinstance(given, int | float):
-        try:
-            near = round(given, len(wanted.partition(".")[2]))  # as it was written
-            return bool(np.isclose(float(wanted), [given, near]).any())
-        except ValueError:
-            return False
-    return str(given) == wanted
 
 
 def _of_robot(found: Sequence[Trial], model: GapModel) -> None:

@@ -52,7 +52,7 @@ def where(found: Diagnosis) -> str:
     change = found.where.get("change") or {}
     if change.get("direction") and change["trial"] > 0:
         text += (
-            f" It {change['direction']} in trial {change['trial']} at "
+            f" It {change['direction']} at trial {change['trial']}, "
             f"{change['time']:.1f} s."
         )
     return text

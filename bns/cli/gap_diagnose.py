@@ -10,6 +10,8 @@ import tyro
 from bns.cli.parse import parse
 from bns.errors import BnsError
 
+LISTED = 8  # faults that are printed at most
+
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
@@ -19,7 +21,7 @@ class Check:
     """
 
     data: tyro.conf.Positional[tuple[str, ...]]
-    """dataset directories; or CSV or MCAP logs, with --columns"""
+    """dataset directories, or those of runs; or CSV or MCAP logs, with --columns"""
     model: str = ""
     """nominal robot (see `bns robots`), or the TOML file of a model of your own
     (docs/gap_your_robot.md); default: khepera3, or what the importer reads"""
@@ -29,6 +31,9 @@ class Check:
     """reader of a known recording: khepera3_odometry, kscale_sts3215, mrclam6, xl330"""
     only: tuple[str, ...] = ()
     """NAME=VALUE: keep trials whose conditions say so (gain=8 mass=0.741)"""
+    trials: str = ""
+    """numbers of the trials to use, as 15-19, 15- or 0,3,5-7, counted in each recording
+    from 0; empty = all"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,6 +87,7 @@ def recorded(given: Check, model: Any) -> list[Any]:
         columns=given.columns,
         importer=given.importer,
         only=given.only,
+        numbers=given.trials,
     )
 
 
@@ -147,7 +153,7 @@ def _general(given: Diagnose, model: Any, trials: list[Any], out: Path | None) -
         if given.reference and model.name == inputs.SERVO:
             return _servo(given, model, usable)
         advice.reproducible(usable, model)
-        unchanged = recorded(replace(given, data=given.reference), model)
+        unchanged = recorded(replace(given, data=given.reference, trials=""), model)
         found = diagnose(
             trials, model, seed=given.seed, most=given.most, reference=unchanged
         )
@@ -161,10 +167,11 @@ def _general(given: Diagnose, model: Any, trials: list[Any], out: Path | None) -
 
 
 def _servo(given: Diagnose, model: Any, trials: Any) -> Any:
-    """Beside unchanged runs of the same servo, of which `--only` chooses none."""
+    """Beside unchanged runs of the same servo, all of them."""
     from bns.gap import servo_record
 
-    unchanged = recorded(replace(given, data=given.reference, only=()), model)
+    all_of = replace(given, data=given.reference, only=(), trials="")
+    unchanged = recorded(all_of, model)
     return servo_record.record(trials, unchanged, seed=given.seed)
 
 
@@ -186,6 +193,7 @@ def _provenance(given: Diagnose, model: Any, trials: list[Any]) -> dict[str, Any
         "importer": given.importer,
         "columns": given.columns,
         "only": list(given.only),
+        "trials": given.trials,
         "reference": list(given.reference),
         "told": shared(trials),
         "versions": dict(versions.collect()),
@@ -218,7 +226,11 @@ def _say(found: Any) -> None:
         print(
             f"  held-out loss {fit.held_out:.5g}  {' + '.join(fit.names) or 'nothing'}"
         )
-    for line in (*found.faults, *found.warnings):
+    faults = list(found.faults)
+    if len(faults) > LISTED:
+        more = len(faults) - LISTED
+        faults = [*faults[:LISTED], f"{more} more faults of the data (`bns gap check`)"]
+    for line in (*found.warnings, *faults):
         print(f"note: {line}")
 
 

@@ -68,6 +68,17 @@ def test_a_motion_that_turns_back_is_no_spike(model):
     assert "spikes" not in " ".join(notes)
 
 
+def test_drives_without_noise_have_no_spikes(model):
+    rng = np.random.default_rng(0)
+    told = [
+        Commands(rng.uniform(-0.12, 0.12, (12, 2)), rng.uniform(0.4, 2.0, 12))
+        for _ in range(8)
+    ]
+    trials = MujocoWorld(threads=1).run(told)
+    made, notes = check.check(trials, model)
+    assert len(made) == 8 and not [note for note in notes if "spike" in note]
+
+
 def test_a_wrong_unit_is_refused(model, told):
     trials = MujocoWorld(reality=[NOISE], threads=1).run(told, seeds=range(4))
     large = [t.replace(observed=t.observed * [1000, 1000, 1]) for t in trials]

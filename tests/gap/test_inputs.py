@@ -40,6 +40,26 @@ def test_recordings_are_pooled_chosen_and_of_one_robot(model, drive, tmp_path):
     assert len(inputs.trials([str(tmp_path / "d")], model)) == 1
 
 
+def test_trials_are_chosen_by_their_numbers_of_a_run_too(model, drive, tmp_path):
+    run = tmp_path / "run"
+    run.mkdir()
+    marked = [drive.replace(conditions={"n": n}) for n in range(6)]
+    dataset.write(run / "dataset", marked, replicates=[0, 0, 0, 1, 1, 1])
+
+    def numbers(text):
+        found = inputs.trials([str(run)], model, numbers=text)
+        return [trial.conditions["n"] for trial in found]
+
+    assert numbers("") == [0, 1, 2, 3, 4, 5]
+    assert numbers("1-") == [1, 2, 4, 5]  # 1 and 2 of both replicates
+    assert numbers("-0") == [0, 3] and numbers("0, 2") == [0, 2, 3, 5]
+    with pytest.raises(BnsError, match="--trials drop all"):
+        numbers("7-9")
+    for wrong in ("a", "1..2", "1,", "-1-2"):
+        with pytest.raises(BnsError, match="is no number of a trial"):
+            numbers(wrong)
+
+
 def test_commands_that_the_robot_can_not_be_told_are_refused(model, drive):
     inputs.tellable([drive], model)
     fast = drive.commands.values * 20
