@@ -16,7 +16,7 @@ VERBS = {
     "presets": ("lists", "list the presets"),
     "worlds": ("lists", "list the worlds"),
     "robots": ("lists", "list the robot models"),
-    "models": ("models", "open a robot model, or make a picture of it"),
+    "models": ("models", "make, check, open or draw a robot model"),
     "effects": ("lists", "list the effects with parameters, units and ranges"),
     "gap": ("gap", "diagnose the gap between recordings and a model (experimental)"),
     "hardware": ("hardware", "real robots: rehearse, check, calibrate, record"),
