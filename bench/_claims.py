@@ -33,16 +33,18 @@ def judged(wanted: Sequence[str], *, runs: int, quick: bool) -> Result:
     def judge() -> list[report.Judged]:
         return report.judged(chosen, place, world=WORLD, quick=quick, own=False)
 
-    due = [row.claim for row in judge() if _fewest(row) < max(least, 1)]
-    runner.run(due, engine, world=WORLD, quick=quick, runs=least, root=root)
     rows = judge()
+    due = [r.claim for r in rows if not r.complete or r.fewest < max(least, 1)]
+    if due:
+        runner.run(due, engine, world=WORLD, quick=quick, runs=least, root=root)
+        rows = judge()
     found = [row for row in rows if row.findings]
     few = quick or runs < experiments.REPLICATES
     return Result(
         figure=len(found),
         unit=f"of {len(wanted)}",
         holds=None if few else len(found) == len(wanted),
-        n=min(map(_fewest, found), default=0),
+        n=min((row.fewest for row in found), default=0),
         details={
             row.claim.id: {
                 "says": row.claim.says,
@@ -53,10 +55,3 @@ def judged(wanted: Sequence[str], *, runs: int, quick: bool) -> Result:
             for row in rows
         },
     )
-
-
-def _fewest(row: report.Judged) -> int:
-    """Runs of the side that has fewest; 0 where a comparison is missing."""
-    if len(row.findings) < len(row.claim.cells):
-        return 0
-    return min(min(finding.runs) for finding in row.findings)

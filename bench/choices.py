@@ -5,18 +5,16 @@ Run in the static-SNN world, which costs no physics: the simple problem, left wh
 """
 
 import os
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
 
-from bench import solving
+from bench import experiments, solving
 from bench.result import Result
 from bns import stats
 from bns.config import RunConfig
 
 DOC = "sweep of the dissertation's silent settings: variants that beat the defaults"
 BAR = "none: the table behind docs/choices.md"
-ONSET, TRIALS, RUNS, WORKERS = 12, 40, 8, 2
+ONSET, TRIALS, RUNS = 12, 40, 8
 
 VARIANTS: dict[str, tuple[str, object]] = {
     "defaults": ("preset", "defaults"),
@@ -45,7 +43,7 @@ VARIANTS: dict[str, tuple[str, object]] = {
 def run(quick: bool) -> Result:
     """8 runs of 40 trials a variant; quick: 3 variants, 2 runs of 6 trials."""
     names = list(VARIANTS)[:3] if quick else list(VARIANTS)
-    with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
+    with experiments.pool_of_workers() as pool:
         rows = list(pool.map(_row, names, [quick] * len(names)))
     found = dict(zip(names, rows, strict=True))
     base = found["defaults"]["recovered"]["came"]

@@ -35,7 +35,7 @@ def run(quick: bool) -> Result:
             few = [row.claim.id for row in judged if row.provisional]
     details["A, with comparisons not run"] = partly
     details["A, provisional"] = few
-    runs = min((min(f.runs) for row in judged for f in row.findings), default=0)
+    runs = min((row.fewest for row in judged), default=0)
     return Result(
         figure=len(judged),
         unit=f"of {len(mine)}",

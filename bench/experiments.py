@@ -119,14 +119,18 @@ def records(
     if quick:
         wanted = [shortened(config) for config in wanted]
     RUNS.mkdir(parents=True, exist_ok=True)
-    spawn = get_context("spawn")
-    with ProcessPoolExecutor(WORKERS, mp_context=spawn) as pool:
+    with pool_of_workers() as pool:
         waiting = {pool.submit(_train, config): config for config in wanted}
         for done in as_completed(waiting):
             done.result()
     from bns.store import load
 
     return {config.preset: load(directory(config)) for config in wanted}
+
+
+def pool_of_workers() -> ProcessPoolExecutor:
+    """Processes that work side by side, `WORKERS` of them."""
+    return ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn"))
 
 
 def shortened(config: RunConfig) -> RunConfig:

@@ -6,11 +6,9 @@ first trial on, since all sides of a trunk have its seed.
 """
 
 from collections.abc import Iterable, Mapping
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from hashlib import sha256
 from itertools import count
-from multiprocessing import get_context
 from pathlib import Path
 from shutil import copytree, rmtree
 
@@ -71,8 +69,7 @@ def records(
     missing = [c for c in wanted if not (_place(c) / "run.json").exists()]
     trunks = {_place(trunk(config)): config for config in missing}
     experiments.RUNS.mkdir(parents=True, exist_ok=True)
-    spawn = get_context("spawn")
-    with ProcessPoolExecutor(experiments.WORKERS, mp_context=spawn) as pool:
+    with experiments.pool_of_workers() as pool:
         list(pool.map(grow, trunks.values()))
         list(pool.map(branch, wanted))
     from bns.store import load

@@ -18,7 +18,7 @@ COUNTS = {"large": 56, "none": 32}
 # Those from 170 000 on were scored once, with curves of a fixed grid.
 # Those from 180 000 on were scored once, when a grip as it may be was still a gap.
 # Those from 190 000 on were scored once: 25 of 25 named, no gap in 16 without one.
-# Those from 290 000 on: planned first, scored once, with nothing changed since.
+# Those from 290 000 on: planned first, scored once.
 CASES = Cases("gap_hexapod5", COUNTS, first=290_000)
 QUICK = {"large": 1, "none": 1}
 LARGE = 3.0  # sizes from which effects have to be named

@@ -7,9 +7,7 @@ are then run in the real world. Transfer loss is how much farther from the place
 the real world, than what was evolved with the true effect.
 """
 
-from concurrent.futures import ProcessPoolExecutor
 from itertools import repeat
-from multiprocessing import get_context
 
 from bench import experiments
 from bench.result import Result
@@ -40,7 +38,7 @@ def run(quick: bool) -> Result:
     from statistics import median
 
     hidden = HIDDEN[: 1 if quick else 8]
-    with ProcessPoolExecutor(experiments.WORKERS, get_context("spawn")) as pool:
+    with experiments.pool_of_workers() as pool:
         rows = list(pool.map(_case, range(len(hidden)), hidden, repeat(quick)))
     ratios = [row["ratio"] for row in rows]
     figure = float(median(ratios))

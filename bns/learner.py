@@ -268,7 +268,6 @@ def check_alike(configs: Sequence[RunConfig]) -> None:
     Raises:
         BnsError: they differ in more than `adaptation` and `world`.
     """
-
     first = configs[0]
     free = {name: getattr(first, name) for name in ("preset", "adaptation", "world")}
     if any(replace(config, **free) != first for config in configs):

@@ -45,8 +45,7 @@ def _travel(observed: np.ndarray) -> float:
 def warnings(found: Diagnosis, model: GapModel) -> tuple[str, ...]:
     """Further warnings on a diagnosis, one line each."""
     made = []
-    change = found.where.get("change") or {}
-    if change.get("direction") and change["trial"] > 0:
+    if change := found.change:
         made.append(
             f"The gap {change['direction']} at trial {change['trial']} of those given, "
             "but effects are fitted as if they held throughout: diagnose what comes "

@@ -236,6 +236,12 @@ class Diagnosis:
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @property
+    def change(self) -> Mapping[str, Any]:
+        """When the gap sets in or ends, if not in the first trial; else empty."""
+        found = self.where.get("change") or {}
+        return found if found.get("direction") and found["trial"] > 0 else {}
+
+    @property
     def best(self) -> Fit:
         """The fit that the verdict rests on (the empty one if it names nothing)."""
         wanted = self.verdict.named[0] if self.verdict.named else ()

@@ -35,25 +35,24 @@ OPTIONAL = ("length", "width", "height")
 class Wheeled:
     """What is known of the robot.
 
-    Attributes:
-        wheel_radius: [m].
-        axle_length: between the middles of the wheels [m].
-        mass: of all of it [kg].
-        top_speed: of a wheel over the floor [m/s].
-        length, width, height: of the box [m]; 0 = as long as the axle, 0.7 times as
-            wide, and as high as a wheel and half the axle.
-
     Raises:
         BnsError: a number that is not positive; wheels larger than the axle.
     """
 
     wheel_radius: float
+    """of the driven wheels [m]"""
     axle_length: float
+    """between the middles of the driven wheels [m]"""
     mass: float
+    """of the whole robot [kg]"""
     top_speed: float
+    """of a wheel over the floor [m/s]"""
     length: float = 0.0
+    """of the body [m]; 0 = as long as the axle"""
     width: float = 0.0
+    """of the body [m]; 0 = 0.7 times the axle"""
     height: float = 0.0
+    """of the body above the floor [m]; 0 = a wheel's radius and half the axle"""
 
     def __post_init__(self):
         for name, value in asdict(self).items():

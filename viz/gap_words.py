@@ -49,8 +49,7 @@ def where(found: Diagnosis) -> str:
     regime = found.where.get("regime") or {}
     if regime.get("words") and regime.get("explained", 0.0) > 0.02:
         text += f" It is largest when {regime['words']}."
-    change = found.where.get("change") or {}
-    if change.get("direction") and change["trial"] > 0:
+    if change := found.change:
         text += (
             f" It {change['direction']} at trial {change['trial']}, "
             f"{change['time']:.1f} s."

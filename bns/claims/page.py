@@ -120,9 +120,8 @@ def _short(row: Judged, first: Judged | None = None) -> str:
     if not row.findings:
         told = first is not None and row.note == first.note
         return row.verdict if told else f"{row.verdict}: {_plain(row.note)}"
-    fewest = min(min(finding.runs) for finding in row.findings)
     said = ["provisional"] if row.provisional else []
-    said += [f"{fewest} runs", *([row.note] if row.note else [])]
+    said += [f"{row.fewest} runs", *([row.note] if row.note else [])]
     return f"**{row.verdict}** ({', '.join(said)})"
 
 

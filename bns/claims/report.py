@@ -34,11 +34,20 @@ class Judged:
     note: str = ""
 
     @property
+    def complete(self) -> bool:
+        """Whether every cell has a finding."""
+        return len(self.findings) == len(self.claim.cells)
+
+    @property
+    def fewest(self) -> int:
+        """Runs of the side that has fewest, of the cells with a finding; 0 = none."""
+        return min((min(finding.runs) for finding in self.findings), default=0)
+
+    @property
     def provisional(self) -> bool:
         """Whether cells are missing, or rest on fewer runs than the rule asks for."""
         return bool(self.findings) and (
-            len(self.findings) < len(self.claim.cells)
-            or any(finding.provisional for finding in self.findings)
+            not self.complete or any(finding.provisional for finding in self.findings)
         )
 
 

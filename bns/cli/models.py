@@ -2,13 +2,14 @@
 
 import os
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import tyro
 
 from bns.cli.parse import dispatch
 from bns.errors import BnsError
+from bns.models.new import Wheeled, write
 
 MANUAL = """usage: bns models view ROBOT [--png FILE]
        bns models check ROBOT
@@ -53,20 +54,7 @@ class New:
 
     directory: tyro.conf.Positional[str]
     """to be made; its name is the robot's"""
-    wheel_radius: float
-    """of the driven wheels [m]"""
-    axle_length: float
-    """between the middles of the driven wheels [m]"""
-    mass: float
-    """of the whole robot [kg]"""
-    top_speed: float
-    """of a wheel over the floor [m/s]"""
-    length: float = 0.0
-    """of the body [m]; 0 = as long as the axle"""
-    width: float = 0.0
-    """of the body [m]; 0 = 0.7 times the axle"""
-    height: float = 0.0
-    """of the body above the floor [m]; 0 = a wheel's radius and half the axle"""
+    robot: tyro.conf.OmitArgPrefixes[Wheeled]
 
 
 def main(verb: str, argv: list[str]) -> int:
@@ -117,11 +105,8 @@ def new(given: New) -> int:
     Raises:
         BnsError: numbers or a name that no robot can have; a directory that is there.
     """
-    from bns.models.new import Wheeled, write
-
-    numbers = asdict(given)
-    place = numbers.pop("directory")
-    write(Path(place), Wheeled(**numbers))
+    place = given.directory
+    write(Path(place), given.robot)
     code = check(Check(robot=place))
     print(f"{place} is made. What is assumed stands in {Path(place) / 'numbers.toml'}.")
     print(f"  bns models view {place} --png {Path(place).name}.png")
