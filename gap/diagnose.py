@@ -73,7 +73,7 @@ def diagnose(
         "most": most,
         "reference": reference,
     }
-    if model.name == "khepera3" and light_model.sees((*trials, *reference)):
+    if light_model.told_by(model, (*trials, *reference)):
         from bns.gap import light_diagnosis
 
         parts = light_diagnosis.analyse(trials, model, **given)

@@ -187,7 +187,7 @@ def _sighted(trial: Trial, model: GapModel) -> bool:
     """Whether light was recorded beside the pose of a robot that can see."""
     from bns.gap import light_model
 
-    return model.name == light_model.ROBOT and light_model.sees([trial])
+    return light_model.told_by(model, [trial])
 
 
 def thinned(trial: Trial, most: int = SAMPLES) -> Trial:

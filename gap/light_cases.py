@@ -25,14 +25,13 @@ from bns.gap.signatures import Curves
 from bns.gap.wheeled import WheeledModel
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect
-from bns.worlds.effects.sensors import BEHIND, SINGLE
+from bns.worlds.effects.sensors import SINGLE
 from bns.worlds.light_world import LightWorld
 from bns.worlds.trial import Trial
 
 KINDS = ("single", "motion", "none", "off-library")
 TRIALS, CYCLES = 3, 40  # recordings of a case, and commands of 0.4 s in each
 SIZES = 0.5, 8.0  # of an effect over what is detected, drawn evenly in the logarithm
-ALL_SENSORS = (*SINGLE, *(name.removeprefix("ir_") for name in BEHIND))
 LEAST = 0.4  # size below which an effect counts as not excited, and is drawn again
 POWER = 1.2816  # standard normal: 90 %
 TRIES = 100
@@ -72,7 +71,7 @@ class Wanderer:
 def imperfection(rng: np.random.Generator) -> list[Effect]:
     """How real sensors and lamps depart from the nominal ones; assumed."""
     made = [registry.make("light_dimmed", factor=float(rng.normal(1, 0.01)))]
-    for sensor in ALL_SENSORS:
+    for sensor in SINGLE:
         bent, lost = float(rng.normal(0, 0.01)), abs(float(rng.normal(0, 0.01)))
         made.append(registry.make("sensor_misaligned", sensor=sensor, angle=bent))
         made.append(registry.make("sensor_dead", sensor=sensor, loss=lost))

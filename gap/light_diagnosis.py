@@ -53,7 +53,7 @@ def analyse(
         rules=rules,
         **given,
     )
-    sight = SightModel(trials, pose_sd=motion.problem.floor.sigma)
+    sight = SightModel(trials, robot=model.name, pose_sd=motion.problem.floor.sigma)
     seen = look(
         trials,
         sight,

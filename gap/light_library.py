@@ -1,16 +1,16 @@
 """Candidate explanations for light sensors and lamps, from the library of effects."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from bns.gap.records import Candidate
+from bns.models.light_sites import NAMES, SIDES
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect
-from bns.worlds.effects.sensors import BEHIND, SINGLE
+from bns.worlds.effects.sensors import FORWARD, SINGLE
 
-BEHIND_TOO = (*SINGLE, *(name.removeprefix("ir_") for name in BEHIND))
 GROUPS = ("all", "left", "right")
 BOTH_WAYS = np.array([0.02, 0.07, 0.25, 0.6])
 SHARES = (0.05, 0.2, 0.5, 1.0)
@@ -126,17 +126,27 @@ class LightCandidate(Candidate):
         return super().make(magnitude, branch, extras)
 
 
-def candidates(*, singles: bool) -> tuple[Candidate, ...]:
+def candidates(
+    *, singles: bool, sensors: Collection[str] = NAMES
+) -> tuple[Candidate, ...]:
     """All candidates, in a fixed order.
 
     Args:
-        singles: whether each sensor was recorded; else the virtual two, which the
-            three behind are not part of.
+        singles: whether each sensor was recorded; else the virtual two, which those
+            behind are not part of.
+        sensors: that the robot has. One that is all of a virtual sensor is no candidate
+            of its own.
     """
-    return tuple(_sensors(BEHIND_TOO if singles else SINGLE)) + tuple(_light())
+    virtual = [set(side) & set(sensors) for side in SIDES.values()]
+    own = [
+        name
+        for name in (SINGLE if singles else FORWARD)
+        if f"ir_{name}" in sensors and {f"ir_{name}"} not in virtual
+    ]
+    return tuple(_sensors(own)) + tuple(_light())
 
 
-def _sensors(names: tuple[str, ...]) -> Iterable[Candidate]:
+def _sensors(names: Iterable[str]) -> Iterable[Candidate]:
     for effect, parameter, grid, low, high, slack in _SENSORS:
         about = next(p for p in registry.get(effect).parameters if p.name == parameter)
         for sensor in (*GROUPS, *names):

@@ -13,7 +13,7 @@ import numpy as np
 from bns.gap import light_library
 from bns.gap.floor import Floor
 from bns.gap.light_reader import Reader, Reads, extra
-from bns.gap.model import Windows
+from bns.gap.model import GapModel, Windows
 from bns.gap.problem import Problem
 from bns.gap.records import Candidate
 from bns.gap.whiten import Whitener
@@ -25,7 +25,6 @@ from bns.worlds.objects import Post, RayScreen
 from bns.worlds.sensing import LEAD
 from bns.worlds.trial import POSE_CHANNELS, Channel, Trial
 
-ROBOT = "khepera3"
 FEWEST = 8  # readings of a trial
 WIDTH = 1.5  # departures beyond some of these look alike to the scatter
 FAR = 3.0  # standard deviations at which what sensors differ by is looked at
@@ -48,6 +47,11 @@ def unlikely(departure: np.ndarray) -> np.ndarray:
     return 1 - np.exp(-0.5 * (departure / WIDTH) ** 2)
 
 
+def told_by(model: GapModel, trials: Sequence[Trial]) -> bool:
+    """Whether the model's robot can see and all recordings have its readings."""
+    return light_sensors.can_see(model.name) and sees(trials)
+
+
 def sees(trials: Sequence[Trial]) -> bool:
     """Whether recordings have readings of light sensors."""
     names = {channel.name for channel in VIRTUAL}
@@ -57,25 +61,27 @@ def sees(trials: Sequence[Trial]) -> bool:
 
 
 class SightModel:
-    """The light sensors of a Khepera III, as `GapModel`.
+    """The light sensors of a robot, as `GapModel`.
 
     Args:
         trials: recordings; the lamps are those of their conditions, else the nominal
             one, and single sensors count if all trials have them.
         pose_sd: noise of the tracker [m, m, rad].
-        sensors: which way the sensors look, see `light_sensors.khepera3`.
+        robot: its name or directory; default: that of the first recording.
+        headings: which way the sensors look, see `light_sensors.of`.
     """
-
-    name = f"{ROBOT} light sensors"
 
     def __init__(
         self,
         trials: Sequence[Trial],
         *,
         pose_sd: Sequence[float] = (0.0, 0.0, 0.0),
-        sensors: str = "thesis",
+        robot: str = "",
+        headings: str = "",
     ):
-        known = light_sensors.khepera3(sensors)
+        robot = robot or trials[0].robot
+        known = light_sensors.of(robot, headings)
+        self.name = f"{robot} light sensors"
         seen = [{channel.name for channel in trial.channels} for trial in trials]
         singles = all(set(known.names) <= names for names in seen)
         names = known.names if singles else tuple(item.name for item in VIRTUAL)
@@ -105,7 +111,9 @@ class SightModel:
 
     def candidates(self) -> tuple[Candidate, ...]:
         """All effects on sensors and lamps."""
-        return light_library.candidates(singles=self.singles)
+        return light_library.candidates(
+            singles=self.singles, sensors=self.reader.sensors.names
+        )
 
     def unsure(self, problem: Problem, uncertain: Sequence[Candidate]) -> Whitener:
         """The whitener that knows how sensors may differ, see `problem.Problem`.

@@ -94,7 +94,8 @@ class Reader:
         if self.singles:
             return mean, np.sqrt(variance), free
         mean, variance, free = map(self.sensors.virtual, (mean, variance, free**2))
-        return mean, np.sqrt(variance / 3), np.sqrt(free / 3)
+        many = [len(side) for side in self.sensors.sides]
+        return mean, np.sqrt(variance / many), np.sqrt(free / many)
 
     def unsure(self, reads: Reads) -> np.ndarray:
         """What noise of the pose adds to the light, as a share of it, ``(T, S)``."""

@@ -123,7 +123,7 @@ class HardwareLight(HardwareWorld):
                 self.arena,
                 channels,
                 self.model.limits,
-                light_sensors.khepera3(),
+                light_sensors.of("khepera3"),
             ),
             cycles=cycles,
             cycle=cycle,
@@ -154,7 +154,7 @@ class HardwareLight(HardwareWorld):
             world=self.name,
             conditions=conditions,
         )
-        read = light_sensors.khepera3().virtual(np.array(done.readings))
+        read = light_sensors.of("khepera3").virtual(np.array(done.readings))
         held = np.searchsorted(trial.boundaries, np.arange(len(trial.times)), "right")
         return trial.replace(
             observed=np.hstack([trial.observed, read[held - 1]]),

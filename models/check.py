@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bns.errors import BnsError
-from bns.models import drive, edits, legs, numbers
+from bns.models import drive, edits, legs, light_sites, numbers
 from bns.models.robot_model import RobotModel
 
 KINDS = ("wheeled", "legged", "servo")
@@ -122,6 +122,11 @@ def _legs(robot: RobotModel, model: Any) -> list[str]:
     return faults + _absent(model, [*wanted, ("geom", "belly"), ("sensor", "own")])
 
 
+def _eyes(robot: RobotModel, model: Any) -> list[str]:
+    """Light sensors are what effects and the world `light` look for."""
+    return light_sites.faults(robot)
+
+
 def _controls(robot: RobotModel, model: Any) -> list[str]:
     order = [model.actuator(index).name for index in range(model.nu)]
     named = [command.actuator for command in robot.commands]
@@ -231,6 +236,7 @@ POINTS: dict[str, Callable[[RobotModel, Any], list[str]]] = {
     "its base floats (or stands), its wheels touch": _base,
     "commands are the actuators, in order, with their ranges": _controls,
     "a walking robot's legs and joints have the names that effects know": _legs,
+    "light sensors, if any, come in pairs, with the names that effects know": _eyes,
     "numbers.toml agrees with the model, each number with unit and source": _numbers,
     "at home it rests": _rests,
     "it is driven without warnings": _drives,

@@ -21,6 +21,19 @@ GRIP = 2.0  # largest torque over that at which a wheel slips; assumed
 BACK, UP = 0.05, 0.35  # shares of length and height at which the mass lies; assumed
 BALL = 0.2  # radius of the ball over the wheel's; assumed
 CLEAR = 0.03  # height of the nose over the length; assumed
+EYES = 0.9  # height of the light sensors over the body's; assumed
+HEADINGS = {
+    "ir_left_90": 85.0,
+    "ir_left_45": 45.0,
+    "ir_front_left": 10.0,
+    "ir_front_right": -10.0,
+    "ir_right_45": -45.0,
+    "ir_right_90": -85.0,
+    "ir_back_right": -129.2,
+    "ir_back_left": 129.2,
+}
+"""[deg] of light sensors, around the body; those of a Khepera III, assumed"""
+
 DIGITS = 5  # of what is computed
 FILES = {
     "{name}.xml": "wheeled.xml.jinja",
@@ -54,8 +67,13 @@ class Wheeled:
     height: float = 0.0
     """of the body above the floor [m]; 0 = a wheel's radius and half the axle"""
 
+    light_sensors: bool = False
+    """eight of them around the body, for the world `light`"""
+
     def __post_init__(self):
         for name, value in asdict(self).items():
+            if name == "light_sensors":
+                continue
             if not math.isfinite(value) or value < 0 or not (value or name in OPTIONAL):
                 raise BnsError(
                     f"{name} = {value} is not possible: give a number above 0, in m, "
@@ -101,6 +119,7 @@ def write(directory: Path, known: Wheeled) -> None:
         keep_trailing_newline=True,
     )
     content = {"name": name, **asdict(known), **_numbers(known), **_looks(known)}
+    content["eyes"] = _eyes(known) if known.light_sensors else {}
     try:
         directory.mkdir(parents=True)
         for file, template in FILES.items():
@@ -144,12 +163,25 @@ def _numbers(known: Wheeled) -> dict[str, float | list[float]]:
     return {name: _short(value) for name, value in made.items()} | exact
 
 
+def _eyes(known: Wheeled) -> dict[str, dict[str, list[float]]]:
+    """Where each light sensor sits on the body, and the direction in which it looks."""
+    length, width, height = known.box
+    found = {}
+    for name, heading in HEADINGS.items():
+        ahead = math.cos(math.radians(heading)), math.sin(math.radians(heading))
+        way = min(length / 2 / abs(ahead[0]), width / 2 / abs(ahead[1]))
+        place = [way * ahead[0], way * ahead[1], EYES * height]
+        found[name] = {"position": _short(place), "ahead": [*ahead, 0.0]}
+    return found
+
+
 def _looks(known: Wheeled) -> dict[str, float | list[float]]:
     """What only shows: half sizes, places, the camera."""
     length, width, height = known.box
     low, size = 0.5 * known.wheel_radius, max(length, known.axle_length, height)
     made = {
         "tyre": known.wheel_radius / 6,
+        "lens": 0.02 * known.axle_length,
         "box": [length / 2, width / 2, (height - low) / 2],
         "middle": (height + low) / 2,
         "top": height,

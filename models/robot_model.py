@@ -77,6 +77,8 @@ class RobotModel:
         tracker_site: what an overhead camera tracks.
         picture: camera of the scene for the portrait.
         sensor_sites: in the order of the robot's readings; they look along their z.
+            Light sensors have the names of `bns.models.light_sites`.
+        light: what those do, where it is not as usual (`bns.worlds.light_sensors`).
         wheels: driven wheels by side, "left" and "right".
         caster_geom: "" where there is none.
         options: what else `models.spec` takes.
@@ -94,6 +96,7 @@ class RobotModel:
     tracker_site: str
     picture: str
     sensor_sites: tuple[str, ...] = ()
+    light: Mapping[str, float | str] = field(default_factory=dict)
     wheels: Mapping[str, Wheel] = field(default_factory=dict)
     caster_geom: str = ""
     options: Mapping[str, Option] = field(default_factory=dict)

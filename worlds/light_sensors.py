@@ -1,26 +1,28 @@
-"""The Khepera III's ambient light sensors, as data: `LightSensors`.
+"""A robot's ambient light sensors, as data: `LightSensors`.
 
 Pure NumPy: the same numbers serve the physics world and anything that has no physics.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
 from bns import models
 from bns.errors import BnsError, UnknownNameError
-from bns.models import numbers
+from bns.models import light_sites
+from bns.models.robot_model import RobotModel
 from bns.worlds import light_law, sight
+from bns.worlds.damage import Damage
+from bns.worlds.effects.sensors import columns
 from bns.worlds.light_field import LightField
 from bns.worlds.light_law import Screen, Sight
 from bns.worlds.trial import Channel
 
 VIRTUAL = (Channel("light_left", "count"), Channel("light_right", "count"))
-"""Mean of the left three and of the right three forward sensors (thesis 5.2.1)."""
-
-LEFT = ("ir_left_90", "ir_left_45", "ir_front_left")
-RIGHT = ("ir_right_90", "ir_right_45", "ir_front_right")
+"""Mean of the left and of the right forward sensors, of which the Khepera III has three
+on each side (thesis 5.2.1)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +104,7 @@ class LightSensors:
         return light_law.counts(law, light, noise)
 
     def virtual(self, counts: np.ndarray) -> np.ndarray:
-        """The virtual left and right sensor: means of three.
+        """The virtual left and right sensor: means of the forward ones of a side.
 
         Args:
             counts: shape ``(..., S)``.
@@ -110,44 +112,97 @@ class LightSensors:
         Returns:
             Shape ``(..., 2)`` [counts].
         """
-        left, right = (self._columns(side) for side in (LEFT, RIGHT))
-        return np.stack(
-            [counts[..., left].mean(-1), counts[..., right].mean(-1)], axis=-1
-        )
+        sides = [counts[..., columns].mean(-1) for columns in self.sides]
+        return np.stack(sides, axis=-1)
 
-    def _columns(self, side: tuple[str, ...]) -> list[int]:
-        try:
-            return [self.names.index(name) for name in side]
-        except ValueError as error:
+    @property
+    def radius(self) -> float:
+        """From the robot's middle to its outermost sensor [m]."""
+        return float(np.hypot(*self.position[:, :2].T).max().round(3))
+
+    @cached_property
+    def sides(self) -> tuple[list[int], ...]:
+        """Columns of the left and of the right forward sensors.
+
+        Raises:
+            BnsError: there are none on a side.
+        """
+        found = tuple(
+            [self.names.index(name) for name in side if name in self.names]
+            for side in light_sites.SIDES.values()
+        )
+        if not all(found):
             raise BnsError(
                 f"The sensors {', '.join(self.names)} have no virtual pair: it needs "
-                f"{', '.join((*LEFT, *RIGHT))}."
-            ) from error
+                f"one of {', '.join(light_sites.SIDES['left'])} and its twin."
+            )
+        return found
 
 
 @cache
-def khepera3(table: str = "thesis") -> LightSensors:
-    """The nine outward sensors of the Khepera III, in the order of its answers.
+def of(robot: str, headings: str = "") -> LightSensors:
+    """The light sensors of a robot, in the order of its `sensor_sites`.
 
     Args:
-        table: which headings: "thesis" (85, 45, 10 degrees; the default, as the
-            dissertation's figures are reproduced with it) or "public" (76.7, 42.8,
-            13.3 degrees, of the published models).
+        robot: its name, or its directory.
+        headings: which of the tables that it offers (`ir_table`), "" = its usual one.
 
     Raises:
-        UnknownNameError: no such table.
+        UnknownNameError: no such robot or table.
+        BnsError: it has no light sensors, or they cannot be used.
     """
-    robot = models.robot("khepera3")
-    tables = robot.options["ir_table"].headings
-    if table not in tables:
-        raise UnknownNameError("ir_table", table, tables)
-    known = numbers.read(robot.directory)
-    names = tuple(site for site in robot.sensor_sites if "ground" not in site)
-    behind = {"ir_back_left": 129.2, "ir_back_right": -129.2, "ir_back": 180.0}
-    headings = behind | dict(tables[table])
+    model = models.robot(robot)
+    faults = light_sites.faults(model)
+    if faults:
+        raise BnsError(
+            f"The light sensors of robot {robot!r}: {'; '.join(faults)} "
+            "(docs/your_robot.md)."
+        )
+    if not can_see(robot):
+        raise BnsError(
+            f"Robot {robot!r} has no light sensors; 'khepera3' has, and one of your "
+            "own may (docs/your_robot.md)."
+        )
+    placed, turned = light_sites.placed(model), _table(model, headings)
+    own = {name: float(model.light.get(name, 0)) for name in light_sites.NUMBERS}
     return LightSensors(
-        names=names,
-        position=np.array([known[name].value for name in names]),
-        heading=np.radians([headings[name] for name in names]),
-        sight=sight.kept(robot.name, names),
+        names=tuple(placed),
+        position=np.array([site.position for site in placed.values()]),
+        heading=np.radians([turned.get(n, site.heading) for n, site in placed.items()]),
+        sight=sight.kept(robot, tuple(placed)),
+        **{name: value for name, value in own.items() if value},
     )
+
+
+def can_see(robot: str) -> bool:
+    """Whether there is such a robot and it has light sensors."""
+    known = models.known(robot)
+    return known and bool(light_sites.present(models.robot(robot).sensor_sites))
+
+
+def refuse_absent(damage: Damage, robot: str) -> None:
+    """Stop if damage is of a sensor that the robot lacks.
+
+    Raises:
+        BnsError: it is so, or the robot has no light sensors.
+    """
+    names = of(robot).names
+    for effect in (event.effect for event in damage.events):
+        chosen = effect.values.get("sensor")
+        if chosen and not columns(effect, names):
+            raise BnsError(
+                f"{effect}: {robot!r} has no sensor {chosen!r}; it has "
+                f"{', '.join(name.removeprefix('ir_') for name in names)}."
+            )
+
+
+def _table(model: RobotModel, headings: str) -> Mapping[str, float]:
+    """Headings [deg] that differ from the model's."""
+    option = model.options.get("ir_table")
+    tables = option.headings if option else {}
+    chosen = headings or str(model.light.get("headings", ""))
+    if not chosen:
+        return {}
+    if chosen not in tables:
+        raise UnknownNameError(f"headings of {model.name}", chosen, tables)
+    return tables[chosen]

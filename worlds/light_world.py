@@ -20,9 +20,6 @@ from bns.worlds.sensing import LEAD, Sensing
 from bns.worlds.supervisor import Supervisor
 from bns.worlds.trial import Trial
 
-ROBOT_RADIUS = 0.067
-"""m; from the axle's middle to the outermost sensor (Webots' Khepera III)"""
-
 
 class LightWorld(MujocoWorld):
     """Robots that see light in MuJoCo and steer themselves, N at a time.
@@ -34,7 +31,8 @@ class LightWorld(MujocoWorld):
         lights: lamps, as `Lamp` or as tables with its fields.
         ambient: irradiance that is everywhere [W/m2].
         posts: things in the way, as `Post` or as tables with its fields.
-        sensors: which way the sensors look, "thesis" or "public" headings.
+        sensors: which way the sensors look, where the robot offers several: of a
+            Khepera III "thesis" (the usual) or "public".
         singles: whether trials have each single sensor beside the virtual two.
         supervisor: what happens at the lamp and at the edge, as `Supervisor` or as a
             table with its fields.
@@ -54,7 +52,7 @@ class LightWorld(MujocoWorld):
         lights: Sequence[Lamp | Mapping] = (Lamp(),),
         ambient: float = 0.02,
         posts: Sequence[Post | Mapping] = (),
-        sensors: str = "thesis",
+        sensors: str = "",
         singles: bool = False,
         supervisor: Supervisor | Mapping | None = None,
         damage: Damage | Sequence = (),
@@ -77,19 +75,18 @@ class LightWorld(MujocoWorld):
             name=name,
             truth=truth,
         )
-        if robot != "khepera3":
-            raise BnsError(
-                f"Robot {robot!r} has no light sensors; the world {name!r} takes "
-                "'khepera3'."
-            )
         self.field = LightField(given.several(Lamp, "lamp", lights), ambient)
         self.posts = given.several(Post, "object", posts)
-        objects.checked(self.posts, self._places, np.zeros((0, 2)), ROBOT_RADIUS)
+        self.sensors = light_sensors.of(robot, sensors)
+        self.radius = self.sensors.radius
+        objects.checked(self.posts, self._places, np.zeros((0, 2)), self.radius)
         self._screen = RayScreen(self.posts) if self.posts else None
-        self.sensors = light_sensors.khepera3(sensors)
         self.singles = singles
         told = {} if supervisor is None else supervisor
         self.supervisor = given.one(Supervisor, "supervisor", told)
+
+    def _refuse(self, damage: Damage) -> None:
+        light_sensors.refuse_absent(damage, self.robot)
 
     def _supervisor(self) -> Supervisor:
         return self.supervisor
@@ -150,21 +147,21 @@ class LightWorld(MujocoWorld):
     def _start(self, seed: int, trial: int) -> tuple[float, float, float]:
         """Anywhere on the board, but not near a lamp, an object or the edge."""
         rng = seeding.generator(seed, "world", trial, "start")
-        taken = [(p.x, p.y, p.radius + ROBOT_RADIUS) for p in self.posts]
+        taken = [(p.x, p.y, p.radius + self.radius) for p in self.posts]
         return light_starts.anywhere(
             rng, self.arena, self._places, edge=self.supervisor.edge, taken=taken
         )
 
     def _checked_starts(self, starts: object, n: int) -> np.ndarray:
         poses = super()._checked_starts(starts, n)
-        objects.checked(self.posts, self._places, poses, ROBOT_RADIUS)
+        objects.checked(self.posts, self._places, poses, self.radius)
         for pose in poses:
             way = np.hypot(*(self._places - pose[:2]).T)
             lamp = int(way.argmin())
             where = (
                 f"lamp {lamp} at ({', '.join(f'{v:g}' for v in self._places[lamp])})"
             )
-            if way[lamp] < ROBOT_RADIUS:
+            if way[lamp] < self.radius:
                 raise BnsError(
                     f"Start ({pose[0]:g}, {pose[1]:g}) puts {where} inside the robot; "
                     "start further away."

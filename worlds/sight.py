@@ -2,7 +2,8 @@
 
 Found by casting rays in MuJoCo, once, and kept in the robot's directory, so that what
 has no physics sees the same: for each sensor and elevation the stretch of azimuths
-that is free. `python -m bns.worlds.sight` casts them anew.
+that is free. `python -m bns.worlds.sight` casts them anew for the project's robots;
+for one of the user's they are cast when it is first used.
 """
 
 import json
@@ -14,6 +15,7 @@ import numpy as np
 
 from bns import models
 from bns.errors import BnsError
+from bns.models import light_sites
 
 FILE = "sight.json"
 ELEVATIONS = np.radians(np.arange(0, 90, 10))
@@ -54,18 +56,21 @@ class BodySight:
 
 @cache
 def kept(robot: str, names: tuple[str, ...]) -> BodySight:
-    """What is kept for a robot's sensors.
+    """What is kept for a robot's sensors; where it keeps nothing, it is cast.
 
     Raises:
-        BnsError: nothing is kept for one of them.
+        BnsError: nothing is kept for one of them, but for others.
     """
     file = models.path(robot) / FILE
-    known = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+    if file.is_file():
+        known = json.loads(file.read_text(encoding="utf-8"))
+    else:
+        known = cast(robot)
     missing = [name for name in names if name not in known]
     if missing:
         raise BnsError(
             f"Robot {robot!r} has no kept sight for {', '.join(missing)}; "
-            "run python -m bns.worlds.sight."
+            f"cast it anew (python -m bns.worlds.sight) or delete {file}."
         )
     degrees = np.array([known[name] for name in names], dtype=np.float64)
     return BodySight(np.radians(degrees[..., 0]), np.radians(degrees[..., 1]))
@@ -79,8 +84,7 @@ def cast(robot: str) -> dict[str, list[list[float]]]:
             _stretch(np.array([rays.free(site, a, e) for a in AZIMUTHS]))
             for e in ELEVATIONS
         ]
-        for site in models.robot(robot).sensor_sites
-        if "ground" not in site
+        for site in light_sites.present(models.robot(robot).sensor_sites)
     }
 
 
@@ -88,6 +92,8 @@ def _stretch(free: np.ndarray) -> list[float]:
     """The free azimuths as one stretch; they are one for a body without hollows."""
     if free.all():
         return [0.0, 180.0]
+    if not free.any():
+        return [0.0, -1.0]
     ends = np.flatnonzero(free & ~np.roll(free, -1))
     begins = np.flatnonzero(free & ~np.roll(free, 1))
     width, begin = max(
@@ -140,9 +146,9 @@ class Rays:
 
 
 def main() -> None:
-    """Cast anew for every robot that has sensors, and keep the result."""
+    """Cast anew for every robot that has light sensors, and keep the result."""
     for robot in models.names():
-        if models.robot(robot).sensor_sites:
+        if light_sites.present(models.robot(robot).sensor_sites):
             rows = (
                 f' "{name}": {json.dumps(stretches)}'
                 for name, stretches in cast(robot).items()

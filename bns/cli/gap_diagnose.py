@@ -115,7 +115,7 @@ def _motion(trials: list[Any], model: Any) -> list[Any]:
     """What of recordings is motion: without light, and where nobody held the robot."""
     from bns.gap import light_diagnosis, light_model
 
-    if model.name == light_model.ROBOT and light_model.sees(trials):
+    if light_model.told_by(model, trials):
         return light_diagnosis.unhandled(trials, model)
     return trials
 

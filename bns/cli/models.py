@@ -110,7 +110,8 @@ def new(given: New) -> int:
     code = check(Check(robot=place))
     print(f"{place} is made. What is assumed stands in {Path(place) / 'numbers.toml'}.")
     print(f"  bns models view {place} --png {Path(place).name}.png")
-    print(f"  bns run khepera-simple --world.robot {place} --out runs/mine")
+    preset = "khepera-light" if given.robot.light_sensors else "khepera-simple"
+    print(f"  bns run {preset} --world.robot {place} --out runs/mine")
     print(
         "Presets are made for a Khepera III: docs/your_robot.md says what to look at."
     )

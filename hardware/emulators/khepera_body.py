@@ -117,7 +117,7 @@ class KheperaBody(LiveBody):
         if self._light is None:
             return (DARK,) * 11
         pose = np.array([self.pose()])
-        seen = light_sensors.khepera3().counts(
+        seen = light_sensors.of("khepera3").counts(
             self._light, pose, self.now, rng=self._rng
         )
         return (*map(int, seen[0]), DARK, DARK)

@@ -47,7 +47,7 @@ def find():
 
 def test_a_reading_stuck_at_zero_in_part_is_a_gain():
     readings = np.linspace(0, 4095, 22).reshape(2, 11)
-    names = tuple(f"ir_{name}" for name in light_library.SINGLE) + tuple("abcde")
+    names = tuple(f"ir_{name}" for name in light_library.FORWARD) + tuple("abcde")
     on, rng = np.ones(2, dtype=bool), np.random.default_rng(0)
     gain = registry.parse("sensor_gain:sensor=left_45,factor=0.8")
     stuck = registry.parse("sensor_stuck_min:sensor=left_45,blend=0.2")

@@ -68,7 +68,7 @@ def test_what_it_reads_is_the_light_where_it_is():
     policy = Fixed(0.06, 0.05)
     trial, _ = drive(policy, (-0.8, 0.4, -0.4), cycles=8)
     poses = trial.poses_world[trial.boundaries]
-    sensors = light_sensors.khepera3()
+    sensors = light_sensors.of("khepera3")
     due = sensors.virtual(sensors.counts(_field(), poses))[:-1]
     assert np.abs(np.array(policy.seen) - due).mean() < 0.05 * 4095
     assert np.ptp(due) > 0.2 * 4095  # it matters where it is

@@ -5,7 +5,7 @@ import pytest
 
 from bns import models
 from bns.models import check, new, numbers
-from bns.worlds import registry
+from bns.worlds import light_sensors, registry
 from bns.worlds.trial import Commands
 from tests.sources import ROOT
 
@@ -19,8 +19,8 @@ ROBOTS = {  # wheel radius, axle [m], mass [kg], top speed [m/s], of makers' dat
 NAMES = ("wheel_radius", "axle_length", "mass", "top_speed")
 
 
-def made(tmp_path, name):
-    known = new.Wheeled(**dict(zip(NAMES, ROBOTS[name], strict=True)))
+def made(tmp_path, name, **more):
+    known = new.Wheeled(**dict(zip(NAMES, ROBOTS[name], strict=True)), **more)
     new.write(tmp_path / name, known)
     return str(tmp_path / name), known
 
@@ -30,7 +30,7 @@ def test_every_point_holds(tmp_path, name):
     place, _ = made(tmp_path, name)
     done = check.check(models.robot(place))
     assert {point.says: point.faults for point in done if point.faults} == {}
-    assert len(done) == 13
+    assert len(done) == 14
 
 
 def test_it_weighs_and_turns_as_it_was_told(tmp_path):
@@ -65,3 +65,19 @@ def test_a_burger_of_four_numbers_goes_where_the_detailed_one_goes(tmp_path):
     apart = np.abs(ends[0] - ends[1])
     assert np.median(np.hypot(apart[:, 0], apart[:, 1])) < 0.003  # [m], 0.8 m driven
     assert np.median(apart[:, 2]) < np.radians(0.5)
+
+
+def test_light_sensors_sit_on_the_body_and_look_out(tmp_path):
+    place, known = made(tmp_path, "burger", light_sensors=True)
+    assert [p for p in check.check(models.robot(place)) if p.faults] == []
+    sensors = light_sensors.of(place)
+    assert sensors.names == tuple(new.HEADINGS)
+    assert np.degrees(sensors.heading) == pytest.approx([*new.HEADINGS.values()])
+    length, width, _ = known.box
+    out = np.abs(sensors.position[:, :2]) / [length / 2, width / 2]
+    assert out.max(axis=1) == pytest.approx(1.0, abs=1e-4)
+    # the body hides what is behind a sensor, and nothing of what is ahead
+    ahead = np.stack([np.cos(sensors.heading), np.sin(sensors.heading)], axis=1)
+    for way, free in ((ahead, 1.0), (-ahead, 0.0)):
+        unit = np.append(way, np.zeros((8, 1)), axis=1)
+        assert (sensors.sight(unit[:, None]) == free).all()

@@ -8,12 +8,11 @@ import pytest
 
 from bns import models
 from bns.errors import BnsError, UnknownNameError
-from bns.worlds import light_law, registry, sight
+from bns.worlds import light_law, light_sensors, registry, sight
 from bns.worlds.light_field import Lamp, LightField
-from bns.worlds.light_sensors import khepera3
 from bns.worlds.objects import Post, RayScreen
 
-SENSORS = khepera3()
+SENSORS = light_sensors.of("khepera3")
 BACK = SENSORS.names.index("ir_back")
 SIDE = SENSORS.names.index("ir_left_45")
 
@@ -213,7 +212,11 @@ def test_open_loop_trials_have_the_readings_as_well():
 
 
 BAD = {
-    "no table": (lambda: khepera3("mine"), UnknownNameError, "public, thesis"),
+    "no table": (
+        lambda: light_sensors.of("khepera3", "mine"),
+        UnknownNameError,
+        "public, thesis",
+    ),
     "post on the lamp": (
         lambda: registry.make("light", posts=[Post(0.0, 0.02)]),
         BnsError,
@@ -233,7 +236,7 @@ BAD = {
     ),
     "negative": (lambda: LightField((Lamp(),), -1), BnsError, "ambient light = -1"),
     "no pair": (
-        lambda: khepera3().__class__(("a",), np.zeros((1, 3)), np.zeros(1)).virtual(
+        lambda: SENSORS.__class__(("a",), np.zeros((1, 3)), np.zeros(1)).virtual(
             np.zeros((2, 1))
         ),
         BnsError,

@@ -147,7 +147,7 @@ def test_a_slow_sensor_covers_63_percent_of_a_step_in_its_time_constant():
 
 def lit(text=None, pose=(-0.9, 0.0, 0.0), times=0.0):
     """Readings without noise at a pose under an effect on the light."""
-    sensors = light_sensors.khepera3()
+    sensors = light_sensors.of("khepera3")
     law = sensors.law(LightField())
     if text:
         law = registry.parse(text).change(law, sensors.names)
@@ -175,7 +175,7 @@ def test_effects_on_the_light_do_what_they_say():
 
 
 def test_doubled_noise_doubles_the_scatter_and_leaves_saturation():
-    sensors, rng = light_sensors.khepera3(), np.random.default_rng(1)
+    sensors, rng = light_sensors.of("khepera3"), np.random.default_rng(1)
     noise = tuple(rng.standard_normal((2, 4000, 9)))
     scatter = {}
     for factor in (1, 2):

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from bns.models.light_sites import twin
 from bns.worlds.effects.base import Parameter, SensorEffect
 
 
@@ -34,13 +35,8 @@ class SensorSwapped(SensorEffect):
         changed = readings.copy()
         if self.is_nominal:
             return changed
-        twin = [channels.index(_twin(name)) for name in channels]
+        from_there = [channels.index(twin(name)) for name in channels]
         changed[active] += self["blend"] * (
-            readings[active][:, twin] - readings[active]
+            readings[active][:, from_there] - readings[active]
         )
         return changed
-
-
-def _twin(name: str) -> str:
-    sides = {"left": "right", "right": "left"}
-    return "_".join(sides.get(part, part) for part in name.split("_"))

@@ -2,23 +2,21 @@
 
 import numpy as np
 
+from bns.models.light_sites import NAMES, SIDES
 from bns.worlds.effects.base import Choice, Effect
 
 # [count] 12 bits; the dissertation writes 4200, the maker's test program scales by 4096
 FULL_SCALE = 4095.0
 
-SIDES = {
-    "left": ("ir_left_90", "ir_left_45", "ir_front_left"),
-    "right": ("ir_right_90", "ir_right_45", "ir_front_right"),
-}
-BEHIND = ("ir_back_left", "ir_back_right", "ir_back")
-SINGLE = tuple(name.removeprefix("ir_") for name in (*SIDES["left"], *SIDES["right"]))
+FORWARD = tuple(name.removeprefix("ir_") for side in SIDES.values() for name in side)
+SINGLE = tuple(name.removeprefix("ir_") for name in NAMES)
+"""each sensor as effects call it"""
 
 SENSOR = Choice(
     "sensor",
-    ("all", "left", "right", *SINGLE, *(name.removeprefix("ir_") for name in BEHIND)),
+    ("all", "left", "right", *SINGLE),
     "all",
-    "which sensors are affected; left and right: the three of a virtual sensor",
+    "which sensors are affected; left and right: those of a virtual sensor",
 )
 
 
