@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from bns import seeding
+from bns import models, seeding
 from bns.gap import fit, signatures
 from bns.gap.aliases import likeness
 from bns.gap.faults import faulty
@@ -32,6 +32,7 @@ from bns.worlds.trial import Commands, Trial
 KINDS = ("single", "pair", "none", "off-library", "fault")
 TRIALS, LENGTH = 5, 8.0  # recordings of a case, and how long each is [s]
 FASTEST = 0.14  # [m/s] largest wheel speed told
+SHARE = 0.95  # at most of what a slow robot takes
 SIZES = 0.5, 8.0  # magnitudes over what is detected, drawn evenly in the logarithm
 PAIR_SIZES = 2.0, 8.0  # of each of two
 LEAST = 0.4  # size below which an effect counts as not excited, and is drawn again
@@ -85,14 +86,17 @@ class Case:
     commands: tuple[Commands, ...]
 
 
-def commands(rng: np.random.Generator, count: int = TRIALS) -> list[Commands]:
-    """Random wheel speeds, each held for 0.4 to 1.6 s."""
+def commands(
+    rng: np.random.Generator, count: int = TRIALS, *, robot: str = "khepera3"
+) -> list[Commands]:
+    """Random wheel speeds that a robot takes, each held for 0.4 to 1.6 s."""
+    fastest = min(FASTEST, SHARE * float(models.robot(robot).limits.min()))
     made = []
     for _ in range(count):
         number = int(rng.integers(5, 10))
         held = rng.uniform(0.4, 1.6, number)
         held = np.maximum(np.rint(held * LENGTH / held.sum() / 0.005), 20) * 0.005
-        values = rng.uniform(-FASTEST, FASTEST, (number, 2))
+        values = rng.uniform(-fastest, fastest, (number, 2))
         straight = rng.random(number) < 0.2
         values[straight, 1] = values[straight, 0]
         made.append(Commands(values, held))
@@ -167,7 +171,7 @@ def build(
         wanted: name of the candidate to plant; "" = drawn.
     """
     rng = seeding.generator(seed, "case", kind)
-    told = commands(rng)
+    told = commands(rng, robot=model.name)
     reality = (*imperfection(rng), *extra)
     noise = tracker(rng)
     plain = record(told, [*reality, *noise], seed, model.name)

@@ -17,6 +17,7 @@ from functools import lru_cache
 import mujoco
 import numpy as np
 
+from bns import models
 from bns.gap import travel
 from bns.gap.travel import EVERY, Map
 from bns.worlds import compile, observe
@@ -27,7 +28,7 @@ from bns.worlds.trial import body_displacements
 
 DRIVES, CHECKS = 2, 1  # simulated drives that are fitted, that are checked
 DRIVE = 4.0  # [s] each
-SPEED = 0.16  # [m/s] largest speed in them
+SPEED = 0.16  # [m/s] largest speed in them, or the robot's own where it is slower
 TILT, STEEPEST = 0.08, 0.12  # [rad] slope of the floor in drives, if it may slope
 # Shares of the way from the nominal value to a bound at which maps are learnt.
 LATTICE = np.array(
@@ -243,7 +244,8 @@ def _drive(
     steps = round(DRIVE / dt / EVERY) * EVERY
     lengths = rng.integers(round(0.2 / dt), round(0.8 / dt), 60)
     index = np.repeat(np.arange(60), lengths)[:steps]
-    told = rng.uniform(-SPEED, SPEED, (60, 2))[index]
+    most = min(SPEED, float(models.robot(robot).limits.min()))
+    told = rng.uniform(-most, most, (60, 2))[index]
     begin = compile.start_state(scene, (0.0, 0.0, 0.0))
     states = run(Job(begin, (Segment(scene, told * per_command),))).states[::EVERY]
     place = compile.free_joint(model)

@@ -41,9 +41,9 @@ def apply(text, signal, active=None, seed=0):
     return registry.parse(text).apply(signal, active, np.random.default_rng(seed))
 
 
-def compiled(text="") -> mujoco.MjModel:
+def compiled(*texts) -> mujoco.MjModel:
     spec = mujoco.MjSpec.from_string(ROVER)
-    if text:
+    for text in texts:
         registry.parse(text).edit(spec)
     return spec.compile()
 
@@ -246,6 +246,12 @@ class TestBodies:
         data = driven(compiled("torque_limit:factor=0.01,wheel=left"), seconds=0.05)
         assert data.actuator_force[0] == pytest.approx(0.01 * 0.057)
         assert data.actuator_force[1] > 2 * 0.01 * 0.057
+
+    def test_a_motor_without_torque_does_not_drive(self):
+        both = compiled("torque_limit:factor=0", "torque_limit:factor=0.5,wheel=left")
+        data = driven(both, seconds=0.5)
+        assert np.abs(data.actuator_force).max() < 1e-9
+        assert abs(data.qpos[0]) < 1e-4
 
     def test_a_robot_without_wheels_is_refused(self):
         spec = mujoco.MjSpec()

@@ -2,10 +2,14 @@
 
 from typing import Any
 
+import numpy as np
+
 from bns.errors import BnsError
 from bns.worlds.effects import bodies
 from bns.worlds.effects.base import BodyEffect, Parameter
 from bns.worlds.effects.common import WHEEL
+
+LEAST = 1e-9  # of the torque; MuJoCo takes a range of nothing for no limit at all
 
 
 class TorqueLimit(BodyEffect):
@@ -37,4 +41,5 @@ class TorqueLimit(BodyEffect):
                     f"Actuator {motor.name!r} has no force range to scale: give it a "
                     "`forcerange` in the model."
                 )
-            motor.forcerange *= self["factor"]
+            share = max(self["factor"], LEAST)
+            motor.forcerange = np.asarray(motor.forcerange) * share
