@@ -78,7 +78,7 @@ def reached(damage: str) -> dict[str, object]:
 
 
 def _search(config: RunConfig) -> dict[str, object]:
-    from bns.run import make_world
+    from bns.surroundings import make_world
 
     torch.set_num_threads(1)
     record = experiments.records([replace(config, threads=1)])[config.preset]

@@ -47,7 +47,7 @@ def run(quick: bool) -> Result:
 def measure(config: RunConfig) -> dict[str, float]:
     """Seconds of evolution, world and training, start-up included in the total."""
     from bns.batch import Batch, resolve
-    from bns.run import make_world
+    from bns.surroundings import make_world
 
     begun, wall = time.process_time(), time.perf_counter()
     config, mode = resolve(config)

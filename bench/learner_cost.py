@@ -57,7 +57,7 @@ def measure(config: RunConfig, after: int = 0) -> dict[str, float]:
         after: trials not counted in "without start-up" beside the first one.
     """
     from bns.batch import Batch, resolve
-    from bns.run import make_world
+    from bns.surroundings import make_world
     from bns.worlds.physics import Pool
 
     begin = time.perf_counter()

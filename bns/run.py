@@ -2,8 +2,6 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +9,15 @@ import numpy as np
 
 from bns import files, versions
 from bns.batch import Batch, check_device, check_world, resolve
-from bns.config import AdaptationConfig, RunConfig, WorldConfig
+from bns.config import RunConfig
 from bns.directory import check_free
 from bns.errors import BnsError
-from bns.learners import registry as learners
 from bns.loading import differences
 from bns.progress import Progress
 from bns.record import RunRecord
 from bns.step import Step, assemble
 from bns.store import RunStore
+from bns.surroundings import make_world, surroundings
 from bns.validate import check
 from bns.worlds.damage import Damage
 from bns.worlds.trial import Trial
@@ -127,32 +125,6 @@ def train_many(
     ]
 
 
-def make_world(config: RunConfig, directory: Path | None = None) -> World:
-    """The world of a configuration.
-
-    Args:
-        config: says which, where the robot starts, and what is wrong with it.
-        directory: where a static SNN world keeps its nets; None trains them anew.
-    """
-    from bns.worlds import registry
-
-    name = config.world.name
-    settings: dict[str, Any] = {
-        "robot": config.world.robot,
-        "damage": config.world.damage,
-        "reality": config.world.reality,
-        **learners.get(config.learner).surroundings(config),
-    }
-    if name == "static-snn":
-        return registry.make(name, nets=_nets(config, directory), **settings)
-    return registry.make(
-        name,
-        sample_dt=config.world.sample_dt,
-        threads=config.threads,
-        **settings,
-    )
-
-
 def facts(config: RunConfig, mode: str) -> dict[str, Any]:
     """What a record says of the world beside the configuration."""
     damage = Damage.parse(config.world.damage)
@@ -237,6 +209,7 @@ def _batch(
         return Batch([config], [world or make_world(config)], learner=learner)
     keeps_nets = world is None and config.world.name == "static-snn"
     if keeps_nets and not store.exists:
+        surroundings(config)  # stops before there is a directory
         store.create()
     made = world or make_world(config, store.directory)
     batch = Batch([config], [made], learner=learner)
@@ -271,29 +244,3 @@ def _keep(
         seconds=round(computed - started, 6),
         storing=round(stored - computed, 6),
     )
-
-
-def _nets(config: RunConfig, directory: Path | None) -> Any:
-    """Nets of the static SNN world, from the run's directory if they are there."""
-    from bns.worlds.static_nets import StaticNets
-
-    path = directory / "static_snn.npz" if directory else None
-    if path and path.exists():
-        return StaticNets.load(path)
-    nets = _fitted(replace(config, adaptation=AdaptationConfig(), world=_bare(config)))
-    if path:
-        files.replace(path, nets.save)
-    return nets
-
-
-@lru_cache(maxsize=4)
-def _fitted(config: RunConfig) -> Any:
-    """Nets are dear: configurations of one batch share them."""
-    from bns import static_snn
-
-    return static_snn.nets_for(config)
-
-
-def _bare(config: RunConfig) -> WorldConfig:
-    """The world without what differs within a batch."""
-    return WorldConfig(name=config.world.name, robot=config.world.robot)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bns.errors import BnsError
+from bns.gap import labels
 from bns.gap.model import GapModel
 from bns.gap.records import Diagnosis
 from bns.worlds.trial import Trial
@@ -24,7 +25,7 @@ def reproducible(trials: Sequence[Trial], model: GapModel) -> None:
         bad = ~np.isfinite(made).all(axis=1)
         if bad.any():
             raise BnsError(
-                f"The simulation of trial {number} by the nominal model "
+                f"The simulation of {labels.of(trial, number)} by the nominal model "
                 f"{model.name!r} diverges at {trial.times[bad.argmax()]:.2f} s; check "
                 "its time step, its start and the commands."
             )
@@ -47,9 +48,9 @@ def warnings(found: Diagnosis, model: GapModel) -> tuple[str, ...]:
     made = []
     if change := found.change:
         made.append(
-            f"The gap {change['direction']} at trial {change['trial']} of those given, "
-            "but effects are fitted as if they held throughout: diagnose what comes "
-            "before and after apart (--trials)."
+            f"The gap {change['direction']} at trial {change['trial']}, but effects "
+            "are fitted as if they held throughout: diagnose what comes before and "
+            "after apart (--trials)."
         )
     singles = [fit for fit in found.fits if len(fit.names) == 1]
     if singles and all(fit.at_bound for fit in singles):

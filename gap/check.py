@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bns.errors import BnsError, FormatError
-from bns.gap import stuck
+from bns.gap import labels, stuck
 from bns.gap.model import GapModel
 from bns.worlds.importing import MOMENTS
 from bns.worlds.trial import Trial
@@ -44,20 +44,20 @@ def check(
     wanted = tuple(channel.name for channel in model.channels)
     notes: list[str] = []
     kept: list[Trial] = []
-    seen: dict[bytes, int] = {}
+    seen: dict[bytes, str] = {}
     timed = getattr(model, "timed", True)  # else commands end by themselves
     odd = _odd_clocks(trials) if timed else {}
     for number, trial in enumerate(trials):
-        _channels(trial, model, number)
-        label = f"trial {number}"
+        label = labels.of(trial, number)
+        _channels(trial, model, label)
         if not trial.outcome.usable:
             notes.append(f"{label}: flagged as diverged, left out")
             continue
         same = trial.observed.tobytes()
         if same in seen:
-            notes.append(f"{label}: the same samples as trial {seen[same]}, left out")
+            notes.append(f"{label}: the same samples as {seen[same]}, left out")
             continue
-        seen[same] = number
+        seen[same] = label
         trial, found = _repaired(trial, label, timed)
         notes += found
         trial, found = stuck.dropped(trial, model)
@@ -106,17 +106,17 @@ def _units(trials: Sequence[Trial], model: GapModel) -> None:
             )
 
 
-def _channels(trial: Trial, model: GapModel, number: int) -> None:
+def _channels(trial: Trial, model: GapModel, label: str) -> None:
     given = {channel.name: channel.unit for channel in trial.channels}
     for channel in model.channels:
         if channel.name not in given:
             raise FormatError(
-                f"Trial {number} has no channel {channel.name!r}; model {model.name!r} "
+                f"The {label} has no channel {channel.name!r}; model {model.name!r} "
                 f"needs {', '.join(c.name for c in model.channels)}."
             )
         if given[channel.name] != channel.unit:
             raise FormatError(
-                f"Trial {number}: {channel.name} is in {given[channel.name]!r}, the "
+                f"The {label}: {channel.name} is in {given[channel.name]!r}, the "
                 f"model's in {channel.unit!r}; convert it to SI."
             )
     if [c.name for c in trial.channels][: len(model.channels)] != [

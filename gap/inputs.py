@@ -8,7 +8,7 @@ import numpy as np
 
 from bns import models
 from bns.errors import BnsError, FormatError, OutOfBoundsError, UnknownNameError
-from bns.gap import choosing
+from bns.gap import choosing, labels
 from bns.gap.model import GapModel
 from bns.worlds.trial import Commands, Trial
 
@@ -103,9 +103,11 @@ def trials(
         raise BnsError("Give --importer or --columns, not both.")
     wanted = choosing.numbered(numbers)
     found = [
-        trial
+        labels.labelled(
+            trial, number, run=run, recording=path if len(paths) > 1 else None
+        )
         for path in paths
-        for number, trial in _read(path, model, columns, importer)
+        for run, number, trial in _read(path, model, columns, importer)
         if wanted(number)
     ]
     found = choosing.with_conditions(found, only)
@@ -120,19 +122,23 @@ def trials(
 
 def _read(
     path: str, model: GapModel, columns: str, importer: str
-) -> Iterable[tuple[int, Trial]]:
-    """Trials of a recording with their numbers."""
+) -> Iterable[tuple[int | None, int, Trial]]:
+    """Trials of a recording with their run, where there are several, and number."""
     from bns.worlds import dataset
 
-    if importer:
-        return enumerate(_imported(importer, path))
-    if Path(path).is_dir():
+    if Path(path).is_dir() and not importer:
         inside = Path(path) / RUN
         found = dataset.read(inside if inside.is_dir() else path)
-        return zip(found.numbers, found.trials, strict=True)
-    if hasattr(model, "read_log"):
-        return enumerate(model.read_log(path))
-    return enumerate(_log(path, columns))
+        several = len(set(found.replicates)) > 1
+        runs = found.replicates if several else [None] * len(found.trials)
+        return zip(runs, found.numbers, found.trials, strict=True)
+    if importer:
+        listed = _imported(importer, path)
+    elif hasattr(model, "read_log"):
+        listed = model.read_log(path)
+    else:
+        listed = _log(path, columns)
+    return ((None, number, trial) for number, trial in enumerate(listed))
 
 
 def _log(path: str, columns: str) -> list[Trial]:
@@ -245,16 +251,17 @@ def tellable(found: Sequence[Trial], model: GapModel) -> None:
         BnsError: other command channels, or speeds beyond the robot's limits.
     """
     known = limits(model)
-    for number, trial in enumerate(found):
+    for place, trial in enumerate(found):
+        label = labels.of(trial, place)
         if not len(trial.commands):
             raise BnsError(
-                f"Trial {number} has no commands, so that it can not be simulated; map "
+                f"The {label} has no commands, so that it can not be simulated; map "
                 f"columns to {', '.join(known) or 'the commands'}."
             )
         for column, channel in enumerate(trial.commands.channels if known else ()):
             if channel.name not in known:
                 raise BnsError(
-                    f"Trial {number} has the command channel {channel.name!r}; model "
+                    f"The {label} has the command channel {channel.name!r}; model "
                     f"{model.name!r} is told {', '.join(known)}."
                 )
             low, high, unit = known[channel.name]
@@ -262,7 +269,7 @@ def tellable(found: Sequence[Trial], model: GapModel) -> None:
             values = trial.commands.values[:, column]
             for value in (float(values.min()), float(values.max())):
                 if not low - margin <= value <= high + margin:
-                    told = f"trial {number}: {channel.name}"
+                    told = f"{label}: {channel.name}"
                     raise OutOfBoundsError(told, value, low, high, unit)
 
 

@@ -10,7 +10,7 @@ from copy import copy
 
 import numpy as np
 
-from bns.gap import light_library
+from bns.gap import labels, light_library
 from bns.gap.floor import Floor
 from bns.gap.light_reader import Reader, Reads, extra
 from bns.gap.model import GapModel, Windows
@@ -136,7 +136,9 @@ class SightModel:
         for number, trial in enumerate(trials):
             ready = self.prepared(trial)
             if np.isfinite(ready.observed).all(axis=1).sum() < FEWEST:
-                notes.append(f"trial {number}: hardly any reading, left out")
+                notes.append(
+                    f"{labels.of(trial, number)}: hardly any reading, left out"
+                )
             else:
                 made.append(ready)
         return tuple(made), tuple(notes)

@@ -239,7 +239,8 @@ class Diagnosis:
     def change(self) -> Mapping[str, Any]:
         """When the gap sets in or ends, if not in the first trial; else empty."""
         found = self.where.get("change") or {}
-        return found if found.get("direction") and found["trial"] > 0 else {}
+        later = found.get("place", found.get("trial", 0)) > 0
+        return found if found.get("direction") and later else {}
 
     @property
     def best(self) -> Fit:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from bns import seeding
-from bns.gap import floor, residuals, tree
+from bns.gap import floor, labels, residuals, tree
 from bns.gap.fit import Point
 from bns.gap.problem import Problem
 from bns.gap.whiten import terms
@@ -117,15 +117,19 @@ def change_point(problem: Problem) -> dict[str, Any]:
     """The moment at which the gap sets in or ends, if there is one.
 
     The energy of the rest is compared before and after every window, over all trials
-    in order; the largest contrast counts, corrected for having looked everywhere.
+    in the order of their numbers, so that runs that had the same damage at the same
+    trial say it together; the largest contrast counts, corrected for having looked
+    everywhere.
     """
     channels = len(problem.model.features)
+    numbers = labels.numbers(problem.trials)
     energy, stamps = [], []
-    for number, rows in enumerate(problem.whiten.rows):
+    for place in sorted(range(len(numbers)), key=numbers.__getitem__):
+        rows = problem.whiten.rows[place]
         piece = terms(problem.rest[rows]).reshape(-1, channels).sum(axis=1)
         energy.append(np.minimum(piece, 8.0 * channels))
-        times = problem.windows[number].times
-        stamps += [(number, float(time)) for time in times]
+        times = problem.windows[place].times
+        stamps += [(numbers[place], float(time)) for time in times]
     series = np.concatenate(energy)
     count = len(series)
     if count < 40:
@@ -143,7 +147,10 @@ def change_point(problem: Problem) -> dict[str, Any]:
         return {"p": p}
     trial, time = stamps[at[best]]
     direction = "sets in" if right[best] > left[best] else "ends"
-    return {"p": p, "trial": trial, "time": time, "direction": direction}
+    place = sum(number < trial for number in set(numbers))
+    return {
+        "p": p, "trial": trial, "time": time, "direction": direction, "place": place,
+    }  # fmt: skip
 
 
 def phase(problem: Problem) -> dict[str, Any]:

@@ -35,6 +35,7 @@ EXPERIMENT = {
     "bns.batch",
     "bns.loading",
     "bns.robots",
+    "bns.surroundings",
     "bns.static_snn",
     "bns.static_walk",
     "bns.doctor",

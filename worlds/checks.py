@@ -5,7 +5,28 @@ from collections.abc import Sequence
 import numpy as np
 
 from bns.errors import BnsError, OutOfBoundsError
+from bns.models.robot_model import RobotModel
 from bns.worlds.damage import Damage
+
+WORLDS = {"wheeled": ("mujoco", "khepera3"), "legged": ("hexapod", "phantomx")}
+"""by kind of robot, the physics world that it moves in, and a robot of the kind"""
+
+
+def of_kind(kind: str, robot: RobotModel) -> RobotModel:
+    """The robot, if it is of a kind.
+
+    Raises:
+        BnsError: it is not.
+    """
+    if robot.kind != kind:
+        _, usual = WORLDS[kind]
+        fit, _ = WORLDS.get(robot.kind, ("", ""))
+        other = f", or the world {fit!r}" if fit else ""
+        raise BnsError(
+            f"Robot {robot.name!r} is {robot.kind}, this world is for {kind} ones: "
+            f"take {usual!r} or the directory of one of your own{other}."
+        )
+    return robot
 
 
 def bounded(name: str, value: float, low: float, high: float, unit: str) -> float:

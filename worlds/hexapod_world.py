@@ -10,7 +10,7 @@ from bns import models
 from bns.models.ax12a import SPEED_UNIT
 from bns.worlds import control, legged_flags, legged_plan, observe
 from bns.worlds.active import Stages
-from bns.worlds.checks import bounded
+from bns.worlds.checks import bounded, of_kind
 from bns.worlds.damage import Damage
 from bns.worlds.legged_goals import in_units
 from bns.worlds.legged_physics import Walk, WalkJob, walk
@@ -76,7 +76,7 @@ class HexapodWorld(PhysicsWorld[Plan]):
     ):
         super().__init__(
             robot,
-            legged_plan.legged(models.robot(robot)),
+            of_kind("legged", models.robot(robot)),
             damage=damage,
             reality=reality,
             sample_dt=sample_dt,

@@ -75,20 +75,6 @@ def _carried(model: mujoco.MjModel) -> np.ndarray:
     return np.vstack([corners, hips])
 
 
-def legged(robot: RobotModel) -> RobotModel:
-    """The robot, if it walks.
-
-    Raises:
-        BnsError: it does not.
-    """
-    if robot.kind != "legged":
-        raise BnsError(
-            f"Robot {robot.name!r} is {robot.kind}, this world is for legged ones: "
-            "take 'phantomx', the directory of one of your own, or the world 'mujoco'."
-        )
-    return robot
-
-
 def timestep(robot: str) -> float:
     """Physics step of a robot [s]."""
     return float(compile.compiled(robot).model.opt.timestep)

@@ -8,7 +8,7 @@ import numpy as np
 from bns import models
 from bns.worlds import compile, control, observe
 from bns.worlds.active import Stages
-from bns.worlds.checks import bounded
+from bns.worlds.checks import bounded, of_kind
 from bns.worlds.damage import Damage
 from bns.worlds.loops import Loops
 from bns.worlds.physics import Job, Motion, Pool
@@ -59,7 +59,7 @@ class MujocoWorld(PhysicsWorld[Plan], Loops):
     ):
         super().__init__(
             robot,
-            models.robot(robot),
+            of_kind("wheeled", models.robot(robot)),
             damage=damage,
             reality=reality,
             sample_dt=sample_dt,

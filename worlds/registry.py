@@ -12,7 +12,7 @@ well (`bns.worlds.corrected`).
 """
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -85,7 +85,26 @@ def settings(name: str) -> tuple[str, ...]:
     Raises:
         UnknownNameError: no such world.
     """
-    return tuple(inspect.signature(get(name)).parameters)
+    return tuple(_parameters(name))
+
+
+def lacking(name: str, wanted: Iterable[str]) -> list[str]:
+    """Which of some settings a world does not take.
+
+    Raises:
+        UnknownNameError: no such world.
+    """
+    known = _parameters(name)
+    if any(p.kind is p.VAR_KEYWORD for p in known.values()):
+        return []
+    return [setting for setting in wanted if setting not in known]
+
+
+def _parameters(name: str) -> Mapping[str, inspect.Parameter]:
+    """What a world takes; one that a user keeps takes what its base does."""
+    kept = corrected.known()
+    base = kept[name].base if name in kept else name
+    return inspect.signature(get(base)).parameters
 
 
 def make(name: str, /, **settings: Any) -> World:
@@ -99,10 +118,6 @@ def make(name: str, /, **settings: Any) -> World:
         UnknownNameError: no such world, or it has no such setting.
         BnsError: a setting that the world refuses.
     """
-    factory = get(name)
-    parameters = inspect.signature(factory).parameters
-    if not any(p.kind is p.VAR_KEYWORD for p in parameters.values()):
-        for setting in settings:
-            if setting not in parameters:
-                raise UnknownNameError(f"setting of {name}", setting, parameters)
-    return factory(**settings)
+    for setting in lacking(name, settings):
+        raise UnknownNameError(f"setting of {name}", setting, _parameters(name))
+    return get(name)(**settings)

@@ -22,7 +22,8 @@ def run(job: Job, beat: Beat = lambda trials: None) -> bytes:
     Raises:
         BnsError: a setting that is not allowed.
     """
-    from bns.run import facts, make_world, train_many
+    from bns.run import facts, train_many
+    from bns.surroundings import make_world
 
     configs = list(job.configs.values())
     mode = _mode(configs)

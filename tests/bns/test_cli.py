@@ -124,6 +124,14 @@ WRONG = {
         ["run", "demo", "--choose", "disagreement", "--out", "new"],
         "set snn.kind = 'ensemble'",
     ),
+    "no lamps": (
+        ["run", "khepera-light", "--world.name", "static-snn", "--out", "new"],
+        "which 'static-snn' has not: give --world.name light.",
+    ),
+    "no legs": (
+        ["run", "hexapod-walk", "--world.name", "mujoco", "--out", "new"],
+        "'phantomx' is legged, this world is for wheeled ones",
+    ),
     "foreign directory": (["run", "demo", "--out", "."], "not empty and holds no run"),
     "no directory": (["report", "nowhere"], "nowhere is not a run directory"),
     "nothing to report": (["report"], "No run was given"),

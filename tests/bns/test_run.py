@@ -7,7 +7,8 @@ import pytest
 
 from bns.config import AdaptationConfig, RunConfig, SnnConfig, WorldConfig
 from bns.errors import BnsError
-from bns.run import make_world, train, train_many
+from bns.run import train, train_many
+from bns.surroundings import make_world
 from bns.worlds.trial import WHEEL_CHANNELS
 
 LEFT = "wheel_gain:wheel=left,factor=0.5@1"

@@ -148,3 +148,34 @@ def test_unknown_models_say_what_there_is():
         inputs.model("khepera4")
     with pytest.raises(BnsError, match="gap_your_robot"):
         inputs.model("arm.xml")
+
+
+def test_trials_keep_their_numbers_in_what_is_said(model, tmp_path):
+    rng = np.random.default_rng(2)
+    told = [
+        Commands(rng.uniform(-0.12, 0.12, (6, 2)), np.full(6, 0.8)) for _ in range(8)
+    ]
+    world = MujocoWorld(
+        damage=["wheel_gain:wheel=left,factor=0.9@4"],
+        reality=["tracker_noise:position_sd=0.001,heading_sd=0.005"],
+    )
+    recorded = [
+        world.run([item], trial=number, seeds=[run])[0]
+        for run in range(2)
+        for number, item in enumerate(told)
+    ]
+    recorded[2] = recorded[1]
+    place = str(
+        dataset.write(tmp_path / "runs", recorded, replicates=[0] * 8 + [1] * 8)
+    )
+    few = [c for c in model.candidates() if c.name.startswith("wheel_gain")]
+    found = diagnose(inputs.trials([place], model), model, candidates=few)
+    assert (found.change["trial"], found.change["direction"]) == (4, "sets in")
+    notes = advice.warnings(found, model)
+    assert any("sets in at trial 4, but" in note for note in notes)
+    same = "trial 2 of run 0: the same samples as trial 1 of run 0, left out"
+    assert same in found.faults
+    after = inputs.trials([place], model, numbers="4-")
+    later = diagnose(after, model, candidates=few)
+    assert later.change == {}
+    assert later.verdict.named == (("wheel_gain[left]",),)

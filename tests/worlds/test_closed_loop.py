@@ -7,6 +7,9 @@ from bns.errors import BnsError, OutOfBoundsError
 from bns.worlds import registry
 from bns.worlds.supervisor import Supervisor
 from bns.worlds.trial import Commands
+from tests.sources import ROOT
+
+BURGER = str(ROOT / "examples" / "burger")
 
 
 class Replay:
@@ -182,7 +185,9 @@ BAD_LIGHT = {
     "no lamp": ({"lights": (3,)}, {}, "3 is no lamp"),
     "slip": ({"lights": ({"hight": 1},)}, {}, "Did you mean 'height'"),
     "below": ({"lights": ({"height": -1},)}, {}, "lamp height = -1 m"),
-    "robot": ({"robot": "servo_pendulum"}, {}, "no light sensors"),
+    "robot": ({"robot": BURGER}, {}, "no light sensors"),
+    "legs": ({"robot": "phantomx"}, {}, "is legged, .* or the world 'hexapod'"),
+    "servo": ({"robot": "servo_pendulum"}, {}, "is servo, this world is for wheeled"),
     "table": ({"sensors": "mine"}, {}, "public, thesis"),
     "supervisor": ({"supervisor": {"saftey": 1}}, {}, "Did you mean 'safety'"),
     "no supervisor": ({"supervisor": 3}, {}, "3 is no supervisor"),
