@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bns.errors import BnsError
-from bns.models import drive, edits, legs, light_sites, numbers
+from bns.models import drive, edits, legs, light_sites, numbers, servo_numbers
 from bns.models.robot_model import RobotModel
 
 KINDS = ("wheeled", "legged", "servo")
@@ -111,15 +111,27 @@ def _legs(robot: RobotModel, model: Any) -> list[str]:
     if robot.kind != "legged":
         return []
     names = {command.name for command in robot.commands}
-    own = legs.names(names)
+    own, faults = legs.names(names), _servo(robot)
     if not own:
         return [f"no command is called after a leg and a part, as {legs.JOINTS[0]}"]
     joints = [f"{leg}_{part}" for leg in own for part in legs.PARTS]
-    faults = [f"no command is called {name!r}" for name in joints if name not in names]
+    faults += [f"no command is called {name!r}" for name in joints if name not in names]
     faults += [f"command {name!r} is no joint of a leg" for name in names - {*joints}]
     wanted = [(kind, joint) for joint in joints for kind in ("body", "joint")]
     wanted += [("geom", f"{leg}_{part}") for leg in own for part in HIT]
     return faults + _absent(model, [*wanted, ("geom", "belly"), ("sensor", "own")])
+
+
+def _servo(robot: RobotModel) -> list[str]:
+    if robot.servo == "ax12a":
+        return []
+    if robot.servo != servo_numbers.LAW:
+        return [f"servo {robot.servo!r} is neither 'ax12a' nor {servo_numbers.LAW!r}"]
+    try:
+        servo_numbers.law(robot.directory)
+    except BnsError as error:
+        return [str(error)]
+    return []
 
 
 def _eyes(robot: RobotModel, model: Any) -> list[str]:

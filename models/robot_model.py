@@ -82,7 +82,8 @@ class RobotModel:
         wheels: driven wheels by side, "left" and "right".
         caster_geom: "" where there is none.
         options: what else `models.spec` takes.
-        servo: module of `bns.models` with the numbers of its servos; "" = it has none.
+        servo: module of `bns.models` with the numbers of its servos, "law.toml" where
+            they are in its directory; "" = it has none.
     """
 
     name: str

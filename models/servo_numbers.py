@@ -25,7 +25,9 @@ def _tables(directory: Path) -> dict[str, Mapping[str, Any]]:
             if table["basis"] not in BASES or not (table["source"] and table["unit"]):
                 raise FormatError(f"{file}: {name} lacks a basis, source or unit.")
             float(table["value"])
-    except (tomllib.TOMLDecodeError, KeyError, TypeError) as error:
+    except FormatError:
+        raise
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise FormatError(f"{file} is not a table of numbers: {error}.") from error
     return tables
 

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from bns import models
-from bns.worlds import control
+from bns.worlds import control, servo_joint
 from bns.worlds.active import Placed
 from bns.worlds.effects.base import BodyEffect
 from bns.worlds.physics import STATE, Compiled, Job, Segment, run
@@ -28,6 +28,7 @@ def compiled(robot: str, effects: tuple[BodyEffect, ...] = ()) -> Compiled:
         effects: edits, in order.
     """
     spec = models.spec(robot, visuals=False)
+    servo_joint.fit(spec, models.robot(robot))
     for effect in effects:
         effect.edit(spec)
     if spec.memory < 0:  # not said in the model

@@ -7,21 +7,23 @@ torque-speed line, as a motor does. What a joint can not hold acts on the goals 
 lag, offset, quantisation) or is not represented (`REFUSED`).
 
 A model that an effect has changed carries the whole law of each servo in the actuator's
-user data, so that effects compose; where there is none, the nominal law holds.
+user data, so that effects compose, and so does that of a robot with servos of its own;
+where there is none, the law of the AX-12A holds.
 """
 
 from collections.abc import Mapping
-from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from bns.errors import BnsError
+from bns.models import ax12a, servo_numbers
+from bns.models.robot_model import RobotModel
+from bns.models.servo_numbers import LAW
 from bns.worlds.servo_law import NUMBERS, Law, law
 
 STANCE_TORQUE = 0.38  # [N m] mean load of femur and tibia in the home stance
 REFUSED = ("stribeck", "current_limit", "backlash", "dead_zone", "mass", "lever")
-_SERVO = "ax12a"  # what walking robots have; an effect sees the model alone
 _STORED = (*NUMBERS, "powered")
 
 
@@ -62,16 +64,29 @@ def joint_numbers(values: Mapping[str, Any], powered: float = 1.0) -> JointNumbe
     )
 
 
-def nominal(servo: str = _SERVO) -> dict[str, float]:
-    """The law of a servo of `bns.models`."""
-    return import_module(f"bns.models.{servo}").law()
+def fit(spec: Any, robot: RobotModel) -> None:
+    """Give a walking robot with servos of its own their law, see `RobotModel.servo`.
+
+    Numbers that its `law.toml` does not have are the AX-12A's.
+
+    Raises:
+        FormatError: the file is not as it should be.
+        BnsError: a number that is none of the law's, beyond its bounds, or that a joint
+            can not represent.
+    """
+    if robot.kind != "legged" or robot.servo != LAW:
+        return
+    own = law(ax12a.law() | servo_numbers.law(robot.directory))
+    spec.nuser_actuator = len(_STORED)
+    for command in robot.commands:
+        write(spec, spec.actuator(command.actuator), own)
 
 
 def read(actuator: Any) -> tuple[Law, float]:
     """The law of a servo in an `MjSpec`, and how much of its motor is connected."""
     stored = np.array(actuator.userdata)
     if not stored.any():
-        return law(nominal()), 1.0
+        return law(ax12a.law()), 1.0
     named = dict(zip(_STORED, stored, strict=True))
     powered = named.pop("powered")
     return law(named), float(powered)
@@ -105,7 +120,7 @@ def laws(model: Any) -> dict[str, np.ndarray]:
 
     "powered" is among them.
     """
-    base = {**nominal(), "powered": 1.0}
+    base = {**ax12a.law(), "powered": 1.0}
     table = np.tile([base[name] for name in _STORED], (model.nu, 1))
     if model.nuser_actuator >= len(_STORED):
         given = model.actuator_user[:, : len(_STORED)]
