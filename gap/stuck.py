@@ -21,7 +21,12 @@ def dropped(trial: Trial, model: GapModel) -> tuple[Trial, list[str]]:
     Returns:
         the trial; a note per channel.
     """
-    runs = {c: _runs(trial.observed[:, c]) for c in range(len(model.channels))}
+    held = model.held([trial]) if hasattr(model, "held") else {}  # so is the robot
+    runs = {
+        column: _runs(trial.observed[:, column])
+        for column, channel in enumerate(model.channels)
+        if channel.name.removesuffix("_position") not in held
+    }
     if not any(runs.values()):
         return trial, []
     ((predicted,),) = model.simulate([trial], [()])

@@ -1,6 +1,6 @@
 """Candidate explanations for a walking robot, from the library of effects."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,15 +45,19 @@ EXCITE = {
 
 
 def candidates(
-    found: Suspects, joints: Sequence[str] = JOINTS
+    found: Suspects,
+    joints: Sequence[str] = JOINTS,
+    held: Mapping[str, float] | None = None,
 ) -> tuple[Candidate, ...]:
     """All candidates, in a fixed order.
 
     Args:
         found: joints and legs that are suspected beside all of them.
         joints: that the robot has.
+        held: joints that keep their place whatever they are told, and where [rad]: they
+            may be locked there, and a leg of which all are may be raised.
     """
-    return (*_servos(found, joints), *_legs(joints), *_body())
+    return (*_servos(found, joints), *_legs(joints), *_body(), *_held(held or {}))
 
 
 def _servos(found: Suspects, joints: Sequence[str]) -> Iterable[Candidate]:
@@ -96,6 +100,25 @@ def _legs(joints: Sequence[str]) -> Iterable[Candidate]:
             part=leg,
             fixed={"legs": number},
             slack=0.1 if leg == "all" else 0.0,
+        )
+
+
+def _held(held: Mapping[str, float]) -> Iterable[Candidate]:
+    for leg in names(held):
+        if all(f"{leg}_{part}" in held for part in PARTS):
+            fixed = {"legs": str(LEGS.index(leg) + 1)}
+            yield _candidate(
+                "leg_raised", "blend", (0.5, 1.0), 0, 1, part=leg, fixed=fixed
+            )
+    for joint, angle in held.items():
+        yield _candidate(
+            "joint_locked",
+            "loss",
+            (0.5, 1.0),
+            0,
+            1,
+            part=joint,
+            fixed={"joint": joint, "angle": float(np.clip(angle, -1.5, 1.5))},
         )
 
 

@@ -84,7 +84,11 @@ class WalkModel:
             rest = trial.observed[:, 3:] - path[:, 3:]
             rests.append(rest / np.sqrt(1 + np.nan_to_num(scatter) / READING**2))
         found = walk_where.suspects(rests, self.joints, READING)
-        return walk_library.candidates(found, self.joints)
+        return walk_library.candidates(found, self.joints, self.held(trials))
+
+    def held(self, trials: Sequence[Trial]) -> Mapping[str, float]:
+        """Joints that keep their place whatever they are told, and where [rad]."""
+        return walk_where.held(trials, self.joints)
 
     def unsure(self, problem: Problem, uncertain: Sequence[Candidate]) -> Whitener:
         """The whitener that knows what walking scatters, see `walk_floor`."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bns.gap import diagnose, walk_cases, walk_library, walk_where
+from bns.gap import check, diagnose, walk_cases, walk_library, walk_where
 from bns.gap.problem import Problem
 from bns.gap.walk_model import READING, WalkModel
 from bns.gap.walk_where import Suspects
@@ -11,6 +11,7 @@ from bns.worlds import legged_plan
 from bns.worlds.active import Stages
 from bns.worlds.damage import Damage
 from bns.worlds.effects import registry
+from bns.worlds.trial import Commands
 from tests.sources import ROOT
 
 KEPT = ("servo_gain[right_front]", "servo_delay[right_front]", "payload")
@@ -116,3 +117,35 @@ def test_cases_hide_an_effect_and_say_which(model):
         np.array_equal(a.observed, b.observed)
         for a, b in zip(case.trials, again.trials, strict=True)
     )
+
+
+@pytest.mark.parametrize(
+    "damage, held, named",
+    [
+        ("leg_raised:legs=3,blend=1", 3, "leg_raised[left_rear]"),
+        (
+            "joint_locked:joint=left_rear_femur,loss=1,angle=0.3",
+            1,
+            "joint_locked[left_rear_femur]",
+        ),
+    ],
+)
+def test_what_holds_still_whatever_it_is_told_is_named(
+    model, told, damage, held, named
+):
+    trials = walk_cases.record(told, [registry.parse(damage)], 1)
+    found = model.held(trials)
+    assert len(found) == held and all("left_rear" in joint for joint in found)
+    usable, notes = check.check(trials, model)
+    assert not any("dropped" in note for note in notes)  # no channel is at fault
+    wanted = (named, "joint_locked[left_rear_femur]", "servo_gain[left_rear_femur]")
+    kept = [item for item in model.suspected(usable) if item.name in wanted]
+    made = diagnose.analyse(trials, model, candidates=kept, most=1)
+    assert made.verdict.named == ((named,),)
+    assert made.choice.best.terms[0].magnitude == pytest.approx(1.0, abs=0.02)
+
+
+def test_joints_that_follow_or_are_told_nothing_else_are_not_held(model, told):
+    assert model.held(walk_cases.record(told, [], 1)) == {}
+    still = [Commands(np.zeros((2, 18)), [0.5, 0.5], told[0].channels)]
+    assert model.held(walk_cases.record(still, [], 1)) == {}
