@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from bns import models, seeding
-from bns.gap import fit, signatures
+from bns.gap import excite, fit, signatures
 from bns.gap.aliases import likeness
 from bns.gap.faults import faulty
 from bns.gap.model import GapModel
@@ -31,8 +31,6 @@ from bns.worlds.trial import Commands, Trial
 
 KINDS = ("single", "pair", "none", "off-library", "fault")
 TRIALS, LENGTH = 5, 8.0  # recordings of a case, and how long each is [s]
-FASTEST = 0.14  # [m/s] largest wheel speed told
-SHARE = 0.95  # at most of what a slow robot takes
 SIZES = 0.5, 8.0  # magnitudes over what is detected, drawn evenly in the logarithm
 PAIR_SIZES = 2.0, 8.0  # of each of two
 LEAST = 0.4  # size below which an effect counts as not excited, and is drawn again
@@ -90,7 +88,7 @@ def commands(
     rng: np.random.Generator, count: int = TRIALS, *, robot: str = "khepera3"
 ) -> list[Commands]:
     """Random wheel speeds that a robot takes, each held for 0.4 to 1.6 s."""
-    fastest = min(FASTEST, SHARE * float(models.robot(robot).limits.min()))
+    fastest = excite.fastest(float(models.robot(robot).limits.min()))
     made = []
     for _ in range(count):
         number = int(rng.integers(5, 10))

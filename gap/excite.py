@@ -16,6 +16,7 @@ from bns.worlds.trial import WHEEL_CHANNELS, Channel, Commands
 LENGTH = 10.0  # [s] of each
 HELD = 0.005  # [s] durations are multiples of it
 FAST, SLOW = 0.14, 0.03  # [m/s] wheels; below the robot's 0.17
+SHARE = 0.95  # at most, of what a slower robot takes
 SWEEP = 0.1  # [s] between the values of a sweep
 
 
@@ -32,6 +33,11 @@ class Excitation:
     name: str
     commands: Commands
     conditions: Mapping[str, float] = field(default_factory=dict)
+
+
+def fastest(top: float) -> float:
+    """Largest wheel speed that a robot is told [m/s], by the largest that it takes."""
+    return min(FAST, SHARE * top)
 
 
 def wheeled(*, seed: int = 0, fastest: float = FAST) -> tuple[Excitation, ...]:

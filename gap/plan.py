@@ -175,7 +175,7 @@ def _family(
         )
     if set(limits) == {"left_speed", "right_speed"}:
         top = min(high for _, high, _ in limits.values())
-        return excite.wheeled(seed=seed, fastest=min(excite.FAST, 0.95 * top))
+        return excite.wheeled(seed=seed, fastest=excite.fastest(top))
     return excite.general(limits, seed=seed)
 
 

@@ -41,6 +41,7 @@ FILES = {
     "robot.toml": "wheeled_robot.toml.jinja",
     "numbers.toml": "wheeled_numbers.toml.jinja",
 }
+NEEDED = ("wheel_radius", "axle_length", "mass", "top_speed")
 OPTIONAL = ("length", "width", "height")
 
 
@@ -71,9 +72,8 @@ class Wheeled:
     """eight of them around the body, for the world `light`"""
 
     def __post_init__(self):
-        for name, value in asdict(self).items():
-            if name == "light_sensors":
-                continue
+        for name in (*NEEDED, *OPTIONAL):
+            value = getattr(self, name)
             if not math.isfinite(value) or value < 0 or not (value or name in OPTIONAL):
                 raise BnsError(
                     f"{name} = {value} is not possible: give a number above 0, in m, "

@@ -21,14 +21,17 @@ def _tables(directory: Path) -> dict[str, Mapping[str, Any]]:
     file = directory / LAW
     try:
         tables = tomllib.loads(file.read_text(encoding="utf-8"))
-        for name, table in tables.items():
-            if table["basis"] not in BASES or not (table["source"] and table["unit"]):
-                raise FormatError(f"{file}: {name} lacks a basis, source or unit.")
+        bare = [
+            name
+            for name, table in tables.items()
+            if table["basis"] not in BASES or not (table["source"] and table["unit"])
+        ]
+        for table in tables.values():
             float(table["value"])
-    except FormatError:
-        raise
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise FormatError(f"{file} is not a table of numbers: {error}.") from error
+    if bare:
+        raise FormatError(f"{file}: {bare[0]} lacks a basis, source or unit.")
     return tables
 
 

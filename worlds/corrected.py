@@ -121,6 +121,7 @@ def factory(world: Corrected, make: Callable[..., Any]) -> Callable[..., Any]:
         named = {"name": world.name, **settings}
         return make(world.base, robot=robot, reality=reality, **named)
 
+    made.made_of = world.base  # type: ignore[attr-defined]
     made.__doc__ = f"{world.base} with {', '.join(world.reality) or 'nothing'}"
     if world.note:
         made.__doc__ += f" ({world.note})"

@@ -112,7 +112,7 @@ class LightSensors:
         Returns:
             Shape ``(..., 2)`` [counts].
         """
-        sides = [counts[..., columns].mean(-1) for columns in self.sides]
+        sides = [counts[..., side].mean(-1) for side in self.sides]
         return np.stack(sides, axis=-1)
 
     @property
@@ -158,19 +158,22 @@ def of(robot: str, headings: str = "") -> LightSensors:
             f"The light sensors of robot {robot!r}: {'; '.join(faults)} "
             "(docs/your_robot.md)."
         )
-    if not can_see(robot):
+    placed = light_sites.placed(model)
+    if not placed:
         raise BnsError(
             f"Robot {robot!r} has no light sensors; 'khepera3' has, and one of your "
             "own may (docs/your_robot.md)."
         )
-    placed, turned = light_sites.placed(model), _table(model, headings)
-    own = {name: float(model.light.get(name, 0)) for name in light_sites.NUMBERS}
+    turned = _table(model, headings)
+    own = {
+        name: model.light[name] for name in light_sites.NUMBERS if name in model.light
+    }
     return LightSensors(
         names=tuple(placed),
         position=np.array([site.position for site in placed.values()]),
         heading=np.radians([turned.get(n, site.heading) for n, site in placed.items()]),
         sight=sight.kept(robot, tuple(placed)),
-        **{name: value for name, value in own.items() if value},
+        **own,  # type: ignore[arg-type]
     )
 
 

@@ -102,9 +102,10 @@ def lacking(name: str, wanted: Iterable[str]) -> list[str]:
 
 def _parameters(name: str) -> Mapping[str, inspect.Parameter]:
     """What a world takes; one that a user keeps takes what its base does."""
-    kept = corrected.known()
-    base = kept[name].base if name in kept else name
-    return inspect.signature(get(base)).parameters
+    found = get(name)
+    while base := getattr(found, "made_of", ""):
+        found = get(base)
+    return inspect.signature(found).parameters
 
 
 def make(name: str, /, **settings: Any) -> World:

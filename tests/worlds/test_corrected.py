@@ -63,3 +63,12 @@ def test_the_nearer_file_wins(tmp_path, monkeypatch):
         corrected.keep(Corrected("a", "mujoco", robot, ()), user=user)
     assert corrected.known()["a"].robot == "servo_pendulum"
     assert (tmp_path / "home" / "bns" / "worlds.toml").is_file()
+
+
+def test_worlds_that_nobody_keeps_do_not_read_what_is_kept(tmp_path, monkeypatch):
+    monkeypatch.setenv(corrected.VARIABLE, str(tmp_path / corrected.FILE))
+    corrected.keep(corrected.Corrected("den", "light", "khepera3", ()))
+    assert registry.lacking("den", ["lights", "nets"]) == ["nets"]
+    (tmp_path / corrected.FILE).write_text("not TOML")
+    assert registry.lacking("mujoco", ["lights"]) == ["lights"]
+    assert registry.make("mujoco").name == "mujoco"
