@@ -81,5 +81,6 @@ def _one_line(box: str) -> str:
     said = " ".join(parts[0]).rstrip(".") + "."
     for part in parts[1:]:
         if len(part) > 1 and part[0].startswith("Perhaps you meant"):
-            said += f" Did you mean {part[1].split()[0]}?"
+            option = part[1].split()[0].rstrip(",")  # of a flag and its opposite
+            said += f" Did you mean {option}?"
     return said

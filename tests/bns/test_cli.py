@@ -98,6 +98,7 @@ WRONG = {
         ["run", "demo", "--evolution.populatoin", "3"],
         "Unrecognized options: --evolution.populatoin, 3. Did you mean --evolution.",
     ),
+    "flag": (["run", "demo", "--resum"], "--resum. Did you mean --resume? See"),
     "choice": (["run", "demo", "--evolution.selection", "x"], "('tournament',"),
     "type": (["run", "demo", "--trials", "abc"], "Error parsing --trials"),
     "bound": (
