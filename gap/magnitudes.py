@@ -9,6 +9,7 @@ from bns.gap.signatures import levels_of
 from bns.gap.verdict import Calibration
 
 LEVEL = 1.6449  # 90 % interval
+FLAT = 1e-9  # of a slope: a whole magnitude (a leg is there or not) has none
 
 
 def intervals(
@@ -59,7 +60,9 @@ def spreads(problem: Problem, point: Point) -> tuple[tuple[float, ...], float]:
     size = np.linalg.norm(point.slopes, axis=1) + 1e-12
     scaled = point.slopes / size[:, None]
     normal = scaled @ scaled.T
-    condition = float(np.linalg.cond(normal))
+    sloping = size > FLAT
+    part = normal[np.ix_(sloping, sloping)]
+    condition = float(np.linalg.cond(part)) if len(part) else 1.0
     spread = np.sqrt(np.abs(np.diag(np.linalg.pinv(normal)))) / size
     widths = [1 + len(term.extras) for term in point.terms]
     places = np.cumsum([0, *widths[:-1]])

@@ -21,17 +21,19 @@ def dropped(trial: Trial, model: GapModel) -> tuple[Trial, list[str]]:
     Returns:
         the trial; a note per channel.
     """
-    held = model.held([trial]) if hasattr(model, "held") else {}  # so is the robot
     runs = {
-        column: _runs(trial.observed[:, column])
-        for column, channel in enumerate(model.channels)
-        if channel.name.removesuffix("_position") not in held
+        column: found
+        for column in range(len(model.channels))
+        if (found := _runs(trial.observed[:, column]))
     }
-    if not any(runs.values()):
+    if not runs:
         return trial, []
     ((predicted,),) = model.simulate([trial], [()])
+    explained = _explained(trial, predicted, model)
     observed, notes = trial.observed.copy(), []
     for column, found in runs.items():
+        if model.channels[column].name in explained:
+            continue
         least = _least(trial.observed[:, column], float(model.resolution[column]))
         for first, last in found:
             moved = np.ptp(predicted[first : last + 1, column])
@@ -47,6 +49,13 @@ def dropped(trial: Trial, model: GapModel) -> tuple[Trial, list[str]]:
                 f"by {moved:.2g} {unit}; these samples dropped"
             )
     return (trial.replace(observed=observed) if notes else trial), notes
+
+
+def _explained(trial: Trial, predicted: np.ndarray, model: GapModel) -> set[str]:
+    """Channels that stand still because of what they measure does."""
+    if not hasattr(model, "signs"):
+        return set()
+    return {f"{name}_position" for name in model.signs([trial], [predicted]).joints}
 
 
 def _others_move(values: np.ndarray, column: int, model: GapModel) -> bool:

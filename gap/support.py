@@ -11,6 +11,9 @@ from bns.gap.records import Candidate
 from bns.gap.whiten import loss
 from bns.worlds.effects.base import Effect
 
+SHARE = (0.0, 0.0, 1.0, "1")
+"""nominal, bounds and unit of a magnitude that is a share of the whole effect"""
+
 
 @dataclass(frozen=True)
 class Term:
@@ -35,8 +38,13 @@ class Term:
 
     @property
     def at_bound(self) -> bool:
-        """Whether the magnitude sits on a bound that is not the nominal."""
+        """Whether the magnitude sits on a bound that is not the nominal.
+
+        The whole of an effect whose magnitude is a share of it is no such bound.
+        """
         item, near = self.candidate, 1e-6 * (self.candidate.high - self.candidate.low)
+        if (item.nominal, item.low, item.high, item.unit) == SHARE:
+            return False
         ends = [end for end in (item.low, item.high) if end != item.nominal]
         return any(abs(self.magnitude - end) <= near for end in ends)
 

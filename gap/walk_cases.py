@@ -19,8 +19,9 @@ from bns.gap.diagnose import Analysis
 from bns.gap.problem import Problem
 from bns.gap.support import Term
 from bns.gap.walk_model import TRACKER, WalkModel
+from bns.gap.walk_signs import Signs
 from bns.gap.walk_where import Suspects
-from bns.models.legs import JOINTS, LEGS
+from bns.models.legs import JOINTS, LEGS, PARTS
 from bns.models.phantomx import gait
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect
@@ -35,6 +36,7 @@ SEEN = 5.5  # whitened length that is found nine times in ten, about
 # have to be named.
 SIZES = {"single": (0.7, 10.0), "large": (3.3, 10.0)}
 TRIES = 40
+REST = (-0.4, 0.4)  # [rad] where a joint is locked
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +94,7 @@ def build(seed: int, kind: str, model: WalkModel) -> WalkCase:
 
     Args:
         seed: of everything in it.
-        kind: of `SIZES`, or "none".
+        kind: of `SIZES`; "lost" (a leg, or a joint, as a whole); or "none".
         model: nominal model.
     """
     rng = seeding.generator(seed, "walk case", kind)
@@ -103,7 +105,7 @@ def build(seed: int, kind: str, model: WalkModel) -> WalkCase:
     plain = record(told, reality, seed)
     problem = Problem.of(plain, model, candidates=model.candidates())
     for _ in range(TRIES):
-        term = _drawn(rng, problem, SIZES[kind])
+        term = _lost(rng) if kind == "lost" else _drawn(rng, problem, SIZES[kind])
         if term is None:
             continue
         try:
@@ -113,6 +115,18 @@ def build(seed: int, kind: str, model: WalkModel) -> WalkCase:
         if not any(trial.outcome.diverged or trial.outcome.fell for trial in trials):
             return WalkCase(trials, term, tuple(reality))
     raise BnsError(f"No effect could be hidden in case {seed}.")
+
+
+def _lost(rng: np.random.Generator) -> Term:
+    """A leg that is held up, limp or gone, or a joint that is locked, as a whole."""
+    leg = LEGS[int(rng.integers(len(LEGS)))]
+    joints = [f"{leg}_{part}" for part in PARTS]
+    held = {joint: float(rng.uniform(*REST)) for joint in joints}
+    pool = walk_library.lost(Signs(held, (leg,), (leg,)))
+    effects = sorted({item.effect for item in pool})
+    effect = effects[int(rng.integers(len(effects)))]
+    pool = [item for item in pool if item.effect == effect]
+    return Term.at(pool[int(rng.integers(len(pool)))], 0, 1.0)
 
 
 def _drawn(

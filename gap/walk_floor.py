@@ -34,19 +34,25 @@ def robots(uncertain: Sequence[Candidate], count: int = WALKS) -> list[list[Effe
     return [_drawn(rng, uncertain) for _ in range(count)]
 
 
-def whitener(problem: Problem, paths: Sequence[Sequence[np.ndarray]]) -> Whitener:
+def whitener(
+    problem: Problem,
+    paths: Sequence[Sequence[np.ndarray]],
+    centre: Sequence[np.ndarray],
+) -> Whitener:
     """The whitener of a recording of a walking robot.
 
     Args:
         problem: the recording, whitened by the noise alone.
         paths: what would have been observed of each of `robots`, by trial.
+        centre: the same of the one in their midst, of which all is as it is told.
     """
-    parts = []
-    for number, (trial, windows, nominal) in enumerate(
-        zip(problem.trials, problem.windows, problem.nominal, strict=True)
+    parts, compare = [], problem.model.compare
+    for number, (trial, windows) in enumerate(
+        zip(problem.trials, problem.windows, strict=True)
     ):
         seen = np.stack([walk[number] for walk in paths])
-        parts.append(problem.model.compare(trial, seen, windows) - nominal)
+        midst = compare(trial, centre[number], windows)
+        parts.append(compare(trial, seen, windows) - midst)
     walks = np.clip(np.nan_to_num(problem.whiten.many(parts)), -MOST, MOST)
     own = _smooth(problem, (_unforeseen(walks) ** 2).mean(axis=0))
     scale = np.sqrt(1 + own)

@@ -6,10 +6,12 @@ from typing import Any
 import numpy as np
 
 from bns.gap.records import Candidate
+from bns.gap.walk_signs import Signs
 from bns.gap.walk_where import Suspects
 from bns.models.legs import JOINTS, LEGS, PARTS, names
 from bns.worlds.effects import registry
 
+NO_SIGNS = Signs()
 UPHILL = tuple({"direction": k * np.pi / 2} for k in (-1, 0, 1, 2))
 
 # effect, parameter, grid, low, high, slack if on all legs. Bounds narrower than the
@@ -47,17 +49,34 @@ EXCITE = {
 def candidates(
     found: Suspects,
     joints: Sequence[str] = JOINTS,
-    held: Mapping[str, float] | None = None,
+    signs: Signs = NO_SIGNS,
 ) -> tuple[Candidate, ...]:
     """All candidates, in a fixed order.
 
     Args:
         found: joints and legs that are suspected beside all of them.
         joints: that the robot has.
-        held: joints that keep their place whatever they are told, and where [rad]: they
-            may be locked there, and a leg of which all are may be raised.
+        signs: what the servos say of legs that hold, hang or are gone.
     """
-    return (*_servos(found, joints), *_legs(joints), *_body(), *_held(held or {}))
+    return (
+        *_servos(found, joints),
+        *_legs(joints),
+        *_horns(joints),
+        *_body(),
+        *lost(signs),
+    )
+
+
+def lost(signs: Signs) -> tuple[Candidate, ...]:
+    """Legs and joints that may be lost, by what servos say of them."""
+    held = signs.held
+    raised = [leg for leg in names(held) if all(f"{leg}_{p}" in held for p in PARTS)]
+    return (
+        *_legwise("leg_raised", "blend", (0.5, 1.0), raised),
+        *_locked(held),
+        *_legwise("leg_limp", "loss", (0.5, 1.0), signs.limp),
+        *_legwise("leg_missing", "loss", (1.0,), signs.unloaded),
+    )
 
 
 def _servos(found: Suspects, joints: Sequence[str]) -> Iterable[Candidate]:
@@ -103,13 +122,20 @@ def _legs(joints: Sequence[str]) -> Iterable[Candidate]:
         )
 
 
-def _held(held: Mapping[str, float]) -> Iterable[Candidate]:
-    for leg in names(held):
-        if all(f"{leg}_{part}" in held for part in PARTS):
-            fixed = {"legs": str(LEGS.index(leg) + 1)}
-            yield _candidate(
-                "leg_raised", "blend", (0.5, 1.0), 0, 1, part=leg, fixed=fixed
-            )
+def _horns(joints: Sequence[str]) -> Iterable[Candidate]:
+    for joint in joints:
+        yield _candidate(
+            "loose_horn",
+            "angle",
+            (0.1, 0.3),
+            0,
+            0.6,
+            part=joint,
+            fixed={"joint": joint},
+        )
+
+
+def _locked(held: Mapping[str, float]) -> Iterable[Candidate]:
     for joint, angle in held.items():
         yield _candidate(
             "joint_locked",
@@ -120,6 +146,14 @@ def _held(held: Mapping[str, float]) -> Iterable[Candidate]:
             part=joint,
             fixed={"joint": joint, "angle": float(np.clip(angle, -1.5, 1.5))},
         )
+
+
+def _legwise(
+    effect: str, parameter: str, grid: tuple[float, ...], legs: Sequence[str]
+) -> Iterable[Candidate]:
+    for leg in legs:
+        fixed = {"legs": str(LEGS.index(leg) + 1)}
+        yield _candidate(effect, parameter, grid, 0, 1, part=leg, fixed=fixed)
 
 
 def _body() -> Iterable[Candidate]:

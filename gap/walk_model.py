@@ -9,11 +9,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from bns.gap import pieces, walk_floor, walk_library, walk_where
+from bns.gap import pieces, walk_floor, walk_library, walk_lost, walk_signs, walk_where
 from bns.gap.floor import Floor
 from bns.gap.model import Windows
 from bns.gap.problem import Problem
 from bns.gap.records import Candidate
+from bns.gap.walk_signs import Signs
 from bns.gap.walk_where import Suspects
 from bns.gap.whiten import Whitener
 from bns.worlds import legged_plan, observe
@@ -84,25 +85,34 @@ class WalkModel:
             rest = trial.observed[:, 3:] - path[:, 3:]
             rests.append(rest / np.sqrt(1 + np.nan_to_num(scatter) / READING**2))
         found = walk_where.suspects(rests, self.joints, READING)
-        return walk_library.candidates(found, self.joints, self.held(trials))
+        signs = self.signs(trials, predicted)
+        return walk_library.candidates(found, self.joints, signs)
 
-    def held(self, trials: Sequence[Trial]) -> Mapping[str, float]:
-        """Joints that keep their place whatever they are told, and where [rad]."""
-        return walk_where.held(trials, self.joints)
+    def signs(self, trials: Sequence[Trial], predicted: Sequence[np.ndarray]) -> Signs:
+        """What the servos say of joints and legs that hold, hang or are gone."""
+        return walk_signs.signs(trials, predicted, self.joints)
 
     def unsure(self, problem: Problem, uncertain: Sequence[Candidate]) -> Whitener:
         """The whitener that knows what walking scatters, see `walk_floor`."""
-        return walk_floor.whitener(problem, self._robots(problem.trials))
+        trials = problem.trials
+        (nominal,) = self.simulate(trials, [()])
+        losses = walk_library.lost(self.signs(trials, nominal))
+        lost = walk_lost.likely(trials, losses, self.simulate)
+        (centre,) = self.simulate(trials, [lost]) if lost else (nominal,)
+        return walk_floor.whitener(problem, self._robots(trials, lost), centre)
 
-    def _robots(self, trials: Sequence[Trial]) -> list[list[np.ndarray]]:
+    def _robots(
+        self, trials: Sequence[Trial], lost: Sequence[Effect] = ()
+    ) -> list[list[np.ndarray]]:
         """What would have been observed of each of the robots this one may be."""
-        key = b"".join(
+        key = "".join(map(str, lost)).encode() + b"".join(
             t.commands.values.tobytes() + t.times.tobytes() + t.boundaries.tobytes()
             for t in trials
         )
         if key != self._walks[0]:
             uncertain = [item for item in self.candidates() if item.slack > 0]
-            made = self.simulate(trials, walk_floor.robots(uncertain))
+            drawn = walk_floor.robots(uncertain)
+            made = self.simulate(trials, [(*robot, *lost) for robot in drawn])
             self._walks = key, made
         return self._walks[1]
 

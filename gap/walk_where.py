@@ -6,13 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns.models.legs import names as legs_of
-from bns.worlds.trial import Trial
 
 MOST, LEAST = 0.6, 0.3  # share of the worst leg: beyond it alone, below it all alike
 NEARLY = 0.6  # of the worst leg's share: the second is suspected as well
-TOLD = 0.1  # [rad] from its place that a joint has to be told, to be held; assumed
-HELD = 0.15  # of that, by which a joint that is held moves mostly; assumed
-MOSTLY = (0.1, 0.9)  # but for the time in which an impact shakes it; assumed
 
 
 @dataclass(frozen=True)
@@ -43,29 +39,6 @@ def shares(
     square = np.nanmean(np.vstack(rests) ** 2, axis=0) - sigma**2
     square = np.maximum(square, 0.0) + 1e-3 * sigma**2
     return dict(zip(names, (square / square.sum()).tolist(), strict=True))
-
-
-def held(trials: Sequence[Trial], names: Sequence[str]) -> dict[str, float]:
-    """Joints that keep their place although they are told others.
-
-    Args:
-        trials: recordings, the joints' positions after the pose.
-        names: of the joints, as the commands have them.
-
-    Returns:
-        By name, where they are kept [rad].
-    """
-    found = {}
-    for at, name in enumerate(names):
-        seen = np.concatenate([trial.observed[:, 3 + at] for trial in trials])
-        if not np.isfinite(seen).any():
-            continue
-        place = float(np.nanmedian(seen))
-        told = np.concatenate([trial.commands.values[:, at] for trial in trials])
-        away = float(np.abs(told - place).max(initial=0.0))
-        if away > TOLD and np.ptp(np.nanquantile(seen, MOSTLY)) < HELD * away:
-            found[name] = place
-    return found
 
 
 def suspects(

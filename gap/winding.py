@@ -42,7 +42,7 @@ class _Side:
             return None
         ends = [(self.item.nominal, 0.0), *((value, far) for _, value, far in own)]
         for (a, near), (b, far) in pairwise(ends):
-            if near < length <= far:
+            if near < length <= far and not self.item.whole:
                 self.tries += 1
                 share = (length - near) / (far - near)
                 return a + share * (b - a) if self.tries <= TRIES else None

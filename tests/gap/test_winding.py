@@ -48,7 +48,12 @@ def test_what_does_far_more_than_the_recording_shows_is_left_out():
     strong = (0.1, 0.5, 1.3, 1.7)
     problem = Turning(1.05)
     item = SimpleNamespace(
-        grid=strong, nominal=1.0, branches=({},), make=GRIP.make, name=GRIP.name
+        grid=strong,
+        nominal=1.0,
+        branches=({},),
+        make=GRIP.make,
+        name=GRIP.name,
+        whole=False,
     )
     winding.simulated(problem, [item])
     assert 1.3 in problem.asked

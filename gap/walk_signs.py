@@ -1,0 +1,111 @@
+"""What the servos of a walking robot say of legs that hold, hang or are gone: `Signs`.
+
+Each is looked for before anything is fitted; only what is found becomes a candidate.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bns.models.legs import PARTS
+from bns.models.legs import names as legs_of
+from bns.worlds.trial import Trial
+
+TOLD = 0.1  # [rad] from its place that a joint has to be told, to be held; assumed
+HELD = 0.15  # of that, by which a joint that is held moves mostly; assumed
+MOSTLY = (0.1, 0.9)  # but for the time in which an impact shakes it; assumed
+ASTRAY = 0.2  # [rad] off its goal (RMS) that a servo without power ends at least
+STRAYING = 2.0  # times what the model foresees, likewise; assumed
+MOST = 2  # joints of a leg that have to; the load may hold the third where it is told
+UNLOADED = 0.3  # of what the model foresees: a leg's servos are off by less; assumed
+
+
+@dataclass(frozen=True)
+class Signs:
+    """Joints and legs that do not do as the model has it.
+
+    Attributes:
+        held: joints that keep their place although they are told others, and the place
+            [rad]: they may be locked there, and a leg of which all are may be raised.
+        limp: legs most of whose servos end far from their goals.
+        unloaded: legs whose servos end at their goals as if nothing hung on them.
+    """
+
+    held: Mapping[str, float] = field(default_factory=dict)
+    limp: tuple[str, ...] = ()
+    unloaded: tuple[str, ...] = ()
+
+    @property
+    def joints(self) -> frozenset[str]:
+        """All of them, by the names of joints."""
+        legs = (*self.limp, *self.unloaded)
+        return frozenset(self.held) | {f"{leg}_{p}" for leg in legs for p in PARTS}
+
+
+def signs(
+    trials: Sequence[Trial], predicted: Sequence[np.ndarray], names: Sequence[str]
+) -> Signs:
+    """What recordings show.
+
+    Args:
+        trials: recordings, the joints' positions after the pose.
+        predicted: by the nominal model, in the same columns.
+        names: of the joints, as the commands have them.
+    """
+    seen = _ends(names, [(t, t.observed) for t in trials])
+    told = _ends(names, list(zip(trials, predicted, strict=True)))
+
+    def limp(leg: str) -> bool:
+        joints = [f"{leg}_{part}" for part in PARTS]
+        astray = [
+            _rms(seen[joint]) > max(ASTRAY, STRAYING * _rms(told[joint]))
+            for joint in joints
+        ]
+        return sum(astray) >= MOST
+
+    def unloaded(leg: str) -> bool:
+        own, model = (
+            _rms(np.concatenate([off[f"{leg}_{part}"] for part in PARTS]))
+            for off in (seen, told)
+        )
+        return own < UNLOADED * model
+
+    return Signs(held(trials, names), _legs(names, limp), _legs(names, unloaded))
+
+
+def held(trials: Sequence[Trial], names: Sequence[str]) -> dict[str, float]:
+    """Joints that keep their place although they are told others, see `Signs`."""
+    found = {}
+    for at, name in enumerate(names):
+        seen = np.concatenate([trial.observed[:, 3 + at] for trial in trials])
+        if not np.isfinite(seen).any():
+            continue
+        place = float(np.nanmedian(seen))
+        told = np.concatenate([trial.commands.values[:, at] for trial in trials])
+        away = float(np.abs(told - place).max(initial=0.0))
+        if away > TOLD and np.ptp(np.nanquantile(seen, MOSTLY)) < HELD * away:
+            found[name] = place
+    return found
+
+
+def _legs(names: Sequence[str], is_so: Callable[[str], bool]) -> tuple[str, ...]:
+    """Legs with all parts of which something holds."""
+    whole = [leg for leg in legs_of(names) if all(f"{leg}_{p}" in names for p in PARTS)]
+    return tuple(leg for leg in whole if is_so(leg))
+
+
+def _ends(
+    names: Sequence[str], paths: Sequence[tuple[Trial, np.ndarray]]
+) -> Mapping[str, np.ndarray]:
+    """How far each joint is from its goal where commands end [rad], by name."""
+    off = [
+        path[trial.boundaries[1:], 3:] - trial.commands.values for trial, path in paths
+    ]
+    return dict(zip(names, np.vstack(off).T, strict=True))
+
+
+def _rms(off: np.ndarray) -> float:
+    """NaN where nothing was seen: then nothing is said."""
+    known = off[np.isfinite(off)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
