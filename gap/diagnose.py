@@ -34,7 +34,8 @@ class _Clock:
     def __call__(self, stage: str):
         begin = time.perf_counter()
         yield
-        self.seconds[stage] = round(time.perf_counter() - begin, 3)
+        spent = self.seconds.get(stage, 0.0) + time.perf_counter() - begin
+        self.seconds[stage] = round(spent, 3)
 
 
 def diagnose(
@@ -124,11 +125,32 @@ def analyse(
     clock = _Clock()
     with clock("check"):
         trials, faults = _checked(trials, model)
-    if candidates is None:  # a model may name those that the recording calls for
-        suspected = getattr(model, "suspected", None)
-        candidates = suspected(trials) if suspected else model.candidates()
+    given = {"seed": seed, "most": most, "reference": reference, "clock": clock}
+    given |= {"faults": faults, "rules": rules or verdict.calibration()}
+    if candidates is not None:
+        return _explained(trials, model, candidates, **given)
+    suspected = getattr(model, "suspected", None)
+    if not suspected:
+        return _explained(trials, model, model.candidates(), **given)
+    made = _explained(trials, model, suspected(trials), **given)
+    if made.verdict.kind != "none of the library":
+        return made
+    return _explained(trials, model, suspected(trials, everywhere=True), **given)
+
+
+def _explained(
+    trials: Sequence[Trial],
+    model: GapModel,
+    candidates: Sequence[Candidate],
+    *,
+    seed: int,
+    most: int,
+    reference: Sequence[Trial],
+    clock: _Clock,
+    faults: tuple[str, ...],
+    rules: verdict.Calibration,
+) -> Analysis:
     candidates = tuple(candidates)
-    rules = rules or verdict.calibration()
     with clock("signatures"):
         if reference:
             usable, _ = check.check(reference, model)

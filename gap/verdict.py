@@ -181,7 +181,7 @@ def decide(
         second=second,
         margin=float(margin),
         sentence=words,
-        change=change(kind, tied, second, float(margin), excite),
+        change=change(kind, choice.best, tied, second, float(margin), excite),
     )
 
 

@@ -37,11 +37,12 @@ def sentence(
     if kind == "no gap":
         return f"No gap beyond what the recording scatters by itself (p = {p_gap:.3g})."
     if kind == "none of the library":
-        nearest = text(best) or "nothing"
+        found = f"There is a gap (p = {p_gap:.2g}), and no effect of the library "
+        if not best.terms:
+            return found + "that explains it holds on trials that it was not fitted to."
         return (
-            f"There is a gap (p = {p_gap:.2g}), and no effect of the library "
-            f"explains it: after the best, {nearest}, the rest still has structure "
-            f"(p = {p_misfit:.2g})."
+            found + f"explains it: after the best, {text(best)}, the rest still has "
+            f"structure (p = {p_misfit:.2g})."
         )
     if kind == "either":
         names = " or ".join(text(point) for point in tied[:LISTED])
@@ -57,6 +58,7 @@ def sentence(
 
 def change(
     kind: str,
+    best: Point,
     tied: Sequence[Point],
     second: tuple[str, ...],
     margin: float,
@@ -68,6 +70,8 @@ def change(
         return f"A recording with {' and '.join(wanted)} may separate them."
     if kind == "no gap":
         return "A longer or less noisy recording would show smaller effects."
+    if kind == "none of the library" and not best.terms:
+        return "More trials, so that what explains one is tested on others."
     if kind == "none of the library":
         return "An effect that the library lacks; see where and when the gap sits."
     if not second:

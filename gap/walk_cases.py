@@ -21,7 +21,7 @@ from bns.gap.support import Term
 from bns.gap.walk_model import TRACKER, WalkModel
 from bns.gap.walk_signs import Signs
 from bns.gap.walk_where import Suspects
-from bns.models.legs import JOINTS, LEGS, PARTS
+from bns.models.legs import LEGS, PARTS, names
 from bns.models.phantomx import gait
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect
@@ -36,6 +36,7 @@ SEEN = 5.5  # whitened length that is found nine times in ten, about
 # have to be named.
 SIZES = {"single": (0.7, 10.0), "large": (3.3, 10.0)}
 TRIES = 40
+POSTURE = 0.4  # [rad] from the middle that joints are told at random; assumed
 REST = (-0.4, 0.4)  # [rad] where a joint is locked
 
 
@@ -49,11 +50,20 @@ class WalkCase:
 
 
 def commands(rng: np.random.Generator, model: WalkModel) -> list[Commands]:
-    """Tripod gaits of other strides, lifts and heights, forward and backward."""
+    """Tripod gaits of other strides, lifts and heights, forward and backward.
+
+    Robots of one's own are told postures at random.
+    """
     channels = tuple(Channel(name, row[2]) for name, row in model.limits.items())
+    low, high = np.array([row[:2] for row in model.limits.values()]).T
     made: list[Commands] = []
     for number in range(TRIALS):
-        goals = gait.drawn(rng, commands=COMMANDS, heading=1 if number % 2 == 0 else -1)
+        heading = 1 if number % 2 == 0 else -1
+        if model.name == "phantomx":
+            goals = gait.drawn(rng, commands=COMMANDS, heading=heading)
+        else:
+            goals = rng.uniform(-POSTURE, POSTURE, (COMMANDS, len(channels)))
+            goals = np.clip(goals, low, high)
         made.append(Commands(goals, np.full(COMMANDS, LIMIT), channels))
     return made
 
@@ -75,14 +85,17 @@ def imperfection(rng: np.random.Generator) -> list[Effect]:
 
 
 def record(
-    told: Sequence[Commands], effects: Sequence[Effect], seed: int
+    told: Sequence[Commands],
+    effects: Sequence[Effect],
+    seed: int,
+    robot: str = "phantomx",
 ) -> tuple[Trial, ...]:
     """Let the robot walk, seen by a noisy tracker."""
     noise = registry.make(
         "tracker_noise", position_sd=TRACKER[0], heading_sd=TRACKER[2]
     )
     world = HexapodWorld(
-        reality=[*effects, noise], threads=1, sample_dt=SAMPLE, name="real"
+        robot, reality=[*effects, noise], threads=1, sample_dt=SAMPLE, name="real"
     )
     seeds = [seeding.integer(seed, "walk case", n) for n in range(len(told))]
     made = world.run(told, seeds=seeds)
@@ -101,15 +114,16 @@ def build(seed: int, kind: str, model: WalkModel) -> WalkCase:
     told = commands(rng, model)
     reality = imperfection(rng)
     if kind == "none":
-        return WalkCase(record(told, reality, seed), None, tuple(reality))
-    plain = record(told, reality, seed)
+        return WalkCase(record(told, reality, seed, model.name), None, tuple(reality))
+    plain = record(told, reality, seed, model.name)
     problem = Problem.of(plain, model, candidates=model.candidates())
     for _ in range(TRIES):
-        term = _lost(rng) if kind == "lost" else _drawn(rng, problem, SIZES[kind])
+        drawn = _lost if kind == "lost" else _drawn
+        term = drawn(rng, problem, kind)
         if term is None:
             continue
         try:
-            trials = record(told, [*reality, term.effect()], seed)
+            trials = record(told, [*reality, term.effect()], seed, model.name)
         except BnsError:  # it cannot stand with that
             continue
         if not any(trial.outcome.diverged or trial.outcome.fell for trial in trials):
@@ -117,9 +131,10 @@ def build(seed: int, kind: str, model: WalkModel) -> WalkCase:
     raise BnsError(f"No effect could be hidden in case {seed}.")
 
 
-def _lost(rng: np.random.Generator) -> Term:
+def _lost(rng: np.random.Generator, problem: Problem, kind: str) -> Term:
     """A leg that is held up, limp or gone, or a joint that is locked, as a whole."""
-    leg = LEGS[int(rng.integers(len(LEGS)))]
+    legs = names(problem.model.joints)
+    leg = legs[int(rng.integers(len(legs)))]
     joints = [f"{leg}_{part}" for part in PARTS]
     held = {joint: float(rng.uniform(*REST)) for joint in joints}
     pool = walk_library.lost(Signs(held, (leg,), (leg,)))
@@ -129,15 +144,15 @@ def _lost(rng: np.random.Generator) -> Term:
     return Term.at(pool[int(rng.integers(len(pool)))], 0, 1.0)
 
 
-def _drawn(
-    rng: np.random.Generator, problem: Problem, sizes: tuple[float, float]
-) -> Term | None:
+def _drawn(rng: np.random.Generator, problem: Problem, kind: str) -> Term | None:
     """A candidate, drawn evenly over effects, about as strong as drawn."""
-    joint = JOINTS[int(rng.integers(len(JOINTS)))]
-    leg = LEGS[int(rng.integers(len(LEGS)))]
+    joints = problem.model.joints
+    legs = names(joints)
+    joint = joints[int(rng.integers(len(joints)))]
+    leg = legs[int(rng.integers(len(legs)))]
     pool = tuple(
         item
-        for item in walk_library.candidates(Suspects((joint,), (leg,), True))
+        for item in walk_library.candidates(Suspects((joint,), (leg,), True), joints)
         if not any(other in item.name for other in LEGS if other != leg)
         or joint in item.name
     )
@@ -149,7 +164,7 @@ def _drawn(
     up = rng.random() < 0.5
     marks = [v for v in item.grid if (v > item.nominal) == up] or list(item.grid)
     marks = sorted(marks, key=lambda value: abs(value - item.nominal))
-    wanted = SEEN * float(np.exp(rng.uniform(*np.log(sizes))))
+    wanted = SEEN * float(np.exp(rng.uniform(*np.log(SIZES[kind]))))
     found = problem.signatures([[item.make(value, branch)] for value in marks])
     lengths = np.linalg.norm(found, axis=1)
     if not np.isfinite(lengths).all() or lengths.max() < 0.7 * wanted:

@@ -17,6 +17,7 @@ from bns.gap.records import Candidate
 from bns.gap.walk_signs import Signs
 from bns.gap.walk_where import Suspects
 from bns.gap.whiten import Whitener
+from bns.models.legs import names as legs_of
 from bns.worlds import legged_plan, observe
 from bns.worlds.active import Stages, as_damage
 from bns.worlds.damage import Damage
@@ -75,9 +76,21 @@ class WalkModel:
         """Effects on all legs together; `suspected` has those of single ones."""
         return walk_library.candidates(Suspects((), (), True), self.joints)
 
-    def suspected(self, trials: Sequence[Trial]) -> tuple[Candidate, ...]:
-        """Candidates on the joints and legs in which recordings depart, and on all."""
+    def suspected(
+        self, trials: Sequence[Trial], *, everywhere: bool = False
+    ) -> tuple[Candidate, ...]:
+        """Candidates on the joints and legs in which recordings depart, and on all.
+
+        Args:
+            trials: recordings.
+            everywhere: on every joint and leg; a push that the body passes on shows
+                where it does not act.
+        """
         (predicted,) = self.simulate(trials, [()])
+        signs = self.signs(trials, predicted)
+        if everywhere:
+            every = Suspects(self.joints, legs_of(self.joints), True)
+            return walk_library.candidates(every, self.joints, signs)
         walks = self._robots(trials)
         rests = []
         for number, (trial, path) in enumerate(zip(trials, predicted, strict=True)):
@@ -85,7 +98,6 @@ class WalkModel:
             rest = trial.observed[:, 3:] - path[:, 3:]
             rests.append(rest / np.sqrt(1 + np.nan_to_num(scatter) / READING**2))
         found = walk_where.suspects(rests, self.joints, READING)
-        signs = self.signs(trials, predicted)
         return walk_library.candidates(found, self.joints, signs)
 
     def signs(self, trials: Sequence[Trial], predicted: Sequence[np.ndarray]) -> Signs:

@@ -1,6 +1,6 @@
 """`bns gap bench`: blind cases made, diagnosed, and scored against sealed answers."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,7 +34,8 @@ class Make:
     count: int = 5
     """cases of each kind"""
     kinds: tuple[str, ...] = ("single", "none")
-    """single, pair, none, fault; off-library for models of your own"""
+    """single, none; pair, fault for robots on wheels and models of your own;
+    off-library for the latter; lost (a leg, or a joint) for walkers"""
     seed: int = 0
     """of the first case"""
 
@@ -81,24 +82,35 @@ def _make(given: Make) -> int:
     from bns.gap import casebook, inputs
 
     model = inputs.model(given.model, threads=2)
-    allowed = ("single", "pair", "none", "fault")
-    if hasattr(model, "parse"):
-        allowed = (*allowed, "off-library")
+    build, allowed = _builder(model)
     for kind in given.kinds:
         if kind not in allowed:
             raise UnknownNameError(f"kind of case of {model.name}", kind, allowed)
-    made = casebook.make(Path(given.cases), Path(given.answers), _cases(given, model))
+    made = casebook.make(
+        Path(given.cases), Path(given.answers), _cases(given, model, build)
+    )
     print(f"{made} cases in {given.cases}, answers in {given.answers}")
     return 0
 
 
-def _cases(given: Make, model: Any) -> Iterator[tuple[str, Any]]:
-    from bns.gap import cases, own_bench
+def _builder(model: Any) -> tuple[Callable[..., Any], tuple[str, ...]]:
+    """What makes cases of a model, and the kinds that it can make."""
+    from bns.gap import cases, own_bench, walk_bench
 
+    wheeled = ("single", "pair", "none", "fault")
+    if hasattr(model, "parse"):
+        return own_bench.build, (*wheeled, "off-library")
+    if getattr(model, "winding", False):
+        return walk_bench.build, walk_bench.KINDS
+    return cases.build, wheeled
+
+
+def _cases(
+    given: Make, model: Any, build: Callable[..., Any]
+) -> Iterator[tuple[str, Any]]:
     for place, kind in enumerate(given.kinds):
         for number in range(given.count):
             seed = given.seed + 1000 * place + number
-            build = own_bench.build if hasattr(model, "parse") else cases.build
             yield f"case_{seed:06d}", build(seed, kind, model)
 
 
@@ -134,7 +146,8 @@ def _figures(rows: list[dict]) -> list[list[str]]:
     from bns.gap import scoring
 
     made = []
-    for kind, smallest in (("single", 0.0), ("single", scoring.LARGE), ("pair", 0.0)):
+    large, others = ("single", scoring.LARGE), (("pair", 0.0), ("lost", 0.0))
+    for kind, smallest in (("single", 0.0), large, *others):
         found = scoring.of(rows, kind, smallest)
         if not found:
             continue

@@ -7,6 +7,7 @@ from bns.gap import (
     check,
     diagnose,
     magnitudes,
+    walk_bench,
     walk_cases,
     walk_library,
     walk_lost,
@@ -86,6 +87,25 @@ def test_candidates_are_on_legs_that_the_robot_has():
     names = [item.name for item in walk_library.candidates(found, model.joints)]
     assert "foot_slippery[right_rear]" in names and "link_length[tibia,all]" in names
     assert not any("middle" in name for name in (*names, *found.legs))
+
+
+def test_legs_that_were_not_suspected_are_tried_before_giving_up(
+    model, told, monkeypatch
+):
+    weak = registry.make("servo_gain", servo="right_front", factor=0.5)
+    trials, asked = walk_cases.record(told, [weak], 1), []
+
+    def suspected(found, *, everywhere=False):
+        asked.append(everywhere)
+        wanted = "servo_gain[right_front]" if everywhere else "payload"
+        every = WalkModel.suspected(model, found, everywhere=True)
+        return [item for item in every if item.name == wanted]
+
+    monkeypatch.setattr(model, "suspected", suspected)
+    made = diagnose.analyse(trials, model, most=1)
+    assert made.verdict.named == (("servo_gain[right_front]",),)
+    assert asked == [False, True]
+    assert made.clock.seconds["fits"] > 0
 
 
 def test_what_walking_scatters_is_found_by_walking(model, told):
@@ -181,6 +201,16 @@ def test_joints_that_follow_or_are_told_nothing_else_show_no_sign(model, told):
 def _signs(model, trials):
     (predicted,) = model.simulate(trials, [()])
     return model.signs(trials, predicted)
+
+
+def test_blind_cases_are_made_of_walkers_of_ones_own():
+    quad = WalkModel(str(ROOT / "examples" / "quad"))
+    plain = walk_bench.build(1, "none", quad)
+    assert plain.answer.names == () and len(plain.answer.nominal) == 4
+    assert len(plain.trials[0].channels) == 3 + len(quad.joints)
+    case = walk_cases.build(3, "lost", quad)
+    assert "middle" not in case.term.candidate.name
+    assert not any(trial.outcome.fell for trial in case.trials)
 
 
 def test_robots_that_lack_a_leg_scatter_as_such_robots_do(model):
