@@ -13,7 +13,7 @@ import torch
 from bns import seeding
 from bns.config import RunConfig
 from bns.draws import Draws
-from bns.models.legs import PARTS
+from bns.models.legs import parts
 from bns.snn.fitting import Patterns
 from bns.snn.network import Shape, forward
 from bns.snn.scaling import OUTPUTS
@@ -78,14 +78,14 @@ def commands(config: RunConfig, lists: int) -> list[Commands]:
     goals = Goals.of(config)
     rng = seeding.generator(config.seed, "static-snn", "goals")
     low, high = goals.low.numpy().astype(float), goals.high.numpy().astype(float)
-    pose = [RAISED[part] for part in PARTS]
+    pose = [RAISED[part] for part in parts(item.name for item in goals.channels)]
     ends = goals.ranges.T
     made = []
     for _ in range(lists):
         shape = (goals.max_commands, len(goals.channels))
         values = rng.uniform(low, high, shape) * rng.uniform(SMALLEST, 1.0)
         if rng.random() < RAISING:
-            legs = values.reshape(shape[0], -1, len(PARTS))
+            legs = values.reshape(shape[0], -1, len(pose))
             up = rng.choice(legs.shape[1], rng.integers(1, MOST_UP + 1), replace=False)
             legs[:, up] = pose
         limits = np.full(shape[0], goals.limit)

@@ -21,7 +21,7 @@ from bns.gap.support import Term
 from bns.gap.walk_model import TRACKER, WalkModel
 from bns.gap.walk_signs import Signs
 from bns.gap.walk_where import Suspects
-from bns.models.legs import LEGS, PARTS, names
+from bns.models.legs import LEGS, PARTS, names, parts
 from bns.models.phantomx import gait
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect
@@ -68,11 +68,16 @@ def commands(rng: np.random.Generator, model: WalkModel) -> list[Commands]:
     return made
 
 
-def imperfection(rng: np.random.Generator) -> list[Effect]:
-    """How a real hexapod departs from its model although nothing is wrong; assumed."""
+def imperfection(rng: np.random.Generator, shin: str = PARTS[-1]) -> list[Effect]:
+    """How a real walker departs from its model although nothing is wrong; assumed.
+
+    Args:
+        rng: the only source of randomness.
+        shin: the outermost part of its legs.
+    """
     rows = (
         ("servo_gain", {"factor": rng.normal(1, 0.03)}),
-        ("link_length", {"part": "tibia", "factor": rng.normal(1, 0.004)}),
+        ("link_length", {"part": shin, "factor": rng.normal(1, 0.004)}),
         ("foot_slippery", {"factor": float(np.clip(rng.normal(1, 0.1), 0.7, 1.3))}),
         ("payload", {"mass": abs(rng.normal(0, 0.02))}),
     )
@@ -112,7 +117,7 @@ def build(seed: int, kind: str, model: WalkModel) -> WalkCase:
     """
     rng = seeding.generator(seed, "walk case", kind)
     told = commands(rng, model)
-    reality = imperfection(rng)
+    reality = imperfection(rng, parts(model.joints)[-1])
     if kind == "none":
         return WalkCase(record(told, reality, seed, model.name), None, tuple(reality))
     plain = record(told, reality, seed, model.name)
@@ -135,9 +140,9 @@ def _lost(rng: np.random.Generator, problem: Problem, kind: str) -> Term:
     """A leg that is held up, limp or gone, or a joint that is locked, as a whole."""
     legs = names(problem.model.joints)
     leg = legs[int(rng.integers(len(legs)))]
-    joints = [f"{leg}_{part}" for part in PARTS]
+    joints = [name for name in problem.model.joints if name.startswith(f"{leg}_")]
     held = {joint: float(rng.uniform(*REST)) for joint in joints}
-    pool = walk_library.lost(Signs(held, (leg,), (leg,)))
+    pool = walk_library.lost(Signs(held, (leg,), (leg,), (leg,)))
     effects = sorted({item.effect for item in pool})
     effect = effects[int(rng.integers(len(effects)))]
     pool = [item for item in pool if item.effect == effect]

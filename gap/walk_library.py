@@ -8,7 +8,7 @@ import numpy as np
 from bns.gap.records import Candidate
 from bns.gap.walk_signs import Signs
 from bns.gap.walk_where import Suspects
-from bns.models.legs import JOINTS, LEGS, PARTS, names
+from bns.models.legs import JOINTS, LEGS, names, parts
 from bns.worlds.effects import registry
 
 NO_SIGNS = Signs()
@@ -69,11 +69,9 @@ def candidates(
 
 def lost(signs: Signs) -> tuple[Candidate, ...]:
     """Legs and joints that may be lost, by what servos say of them."""
-    held = signs.held
-    raised = [leg for leg in names(held) if all(f"{leg}_{p}" in held for p in PARTS)]
     return (
-        *_legwise("leg_raised", "blend", (0.5, 1.0), raised),
-        *_locked(held),
+        *_legwise("leg_raised", "blend", (0.5, 1.0), signs.raised),
+        *_locked(signs.held),
         *_legwise("leg_limp", "loss", (0.5, 1.0), signs.limp),
         *_legwise("leg_missing", "loss", (1.0,), signs.unloaded),
     )
@@ -99,7 +97,7 @@ def _servos(found: Suspects, joints: Sequence[str]) -> Iterable[Candidate]:
 def _legs(joints: Sequence[str]) -> Iterable[Candidate]:
     for leg in ("all", *names(joints)):
         number = "all" if leg == "all" else str(LEGS.index(leg) + 1)
-        for part in PARTS:
+        for part in parts(joints):
             yield _candidate(
                 "link_length",
                 "factor",
@@ -108,7 +106,7 @@ def _legs(joints: Sequence[str]) -> Iterable[Candidate]:
                 1.25,
                 part=f"{part},{leg}",
                 fixed={"part": part, "legs": number},
-                slack=0.005 if (part, leg) == ("tibia", "all") else 0.0,
+                slack=0.005 if (part, leg) == (parts(joints)[-1], "all") else 0.0,
             )
         yield _candidate(
             "foot_slippery",

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bns.models.legs import PARTS
 from bns.models.legs import names as legs_of
 from bns.worlds.trial import Trial
 
@@ -27,20 +26,18 @@ class Signs:
 
     Attributes:
         held: joints that keep their place although they are told others, and the place
-            [rad]: they may be locked there, and a leg of which all are may be raised.
+            [rad]: they may be locked there.
+        raised: legs of which all joints do.
         limp: legs most of whose servos end far from their goals.
         unloaded: legs whose servos end at their goals as if nothing hung on them.
+        joints: all whose readings that explains.
     """
 
     held: Mapping[str, float] = field(default_factory=dict)
+    raised: tuple[str, ...] = ()
     limp: tuple[str, ...] = ()
     unloaded: tuple[str, ...] = ()
-
-    @property
-    def joints(self) -> frozenset[str]:
-        """All of them, by the names of joints."""
-        legs = (*self.limp, *self.unloaded)
-        return frozenset(self.held) | {f"{leg}_{p}" for leg in legs for p in PARTS}
+    joints: frozenset[str] = frozenset()
 
 
 def signs(
@@ -55,23 +52,34 @@ def signs(
     """
     seen = _ends(names, [(t, t.observed) for t in trials])
     told = _ends(names, list(zip(trials, predicted, strict=True)))
+    still = held(trials, names)
 
-    def limp(leg: str) -> bool:
-        joints = [f"{leg}_{part}" for part in PARTS]
+    def limp(joints: Sequence[str]) -> bool:
         astray = [
             _rms(seen[joint]) > max(ASTRAY, STRAYING * _rms(told[joint]))
             for joint in joints
         ]
         return sum(astray) >= MOST
 
-    def unloaded(leg: str) -> bool:
+    def unloaded(joints: Sequence[str]) -> bool:
         own, model = (
-            _rms(np.concatenate([off[f"{leg}_{part}"] for part in PARTS]))
+            _rms(np.concatenate([off[joint] for joint in joints]))
             for off in (seen, told)
         )
         return own < UNLOADED * model
 
-    return Signs(held(trials, names), _legs(names, limp), _legs(names, unloaded))
+    by_leg = {
+        leg: tuple(name for name in names if name.startswith(f"{leg}_"))
+        for leg in legs_of(names)
+    }
+
+    def legs(is_so: Callable[[Sequence[str]], bool]) -> tuple[str, ...]:
+        return tuple(leg for leg, joints in by_leg.items() if is_so(joints))
+
+    lost = legs(limp), legs(unloaded)
+    joints = {joint for found in lost for leg in found for joint in by_leg[leg]}
+    raised = legs(lambda joints: still.keys() >= {*joints})
+    return Signs(still, raised, *lost, frozenset(joints | still.keys()))
 
 
 def held(trials: Sequence[Trial], names: Sequence[str]) -> dict[str, float]:
@@ -87,12 +95,6 @@ def held(trials: Sequence[Trial], names: Sequence[str]) -> dict[str, float]:
         if away > TOLD and np.ptp(np.nanquantile(seen, MOSTLY)) < HELD * away:
             found[name] = place
     return found
-
-
-def _legs(names: Sequence[str], is_so: Callable[[str], bool]) -> tuple[str, ...]:
-    """Legs with all parts of which something holds."""
-    whole = [leg for leg in legs_of(names) if all(f"{leg}_{p}" in names for p in PARTS)]
-    return tuple(leg for leg in whole if is_so(leg))
 
 
 def _ends(

@@ -50,6 +50,8 @@ def _facts(robot: RobotModel) -> list[str]:
     faults = []
     if robot.kind not in KINDS:
         faults.append(f"kind {robot.kind!r} is none of {', '.join(KINDS)}")
+    if not robot.xml.is_file():
+        faults.append(f"the robot alone is to be {robot.xml.name}, as its directory")
     if not robot.doc or "\n" in robot.doc:
         faults.append("doc is to be one line")
     if not robot.ctrl_per_command > 0:
@@ -114,11 +116,15 @@ def _legs(robot: RobotModel, model: Any) -> list[str]:
     own, faults = legs.names(names), _servo(robot)
     if not own:
         return [f"no command is called after a leg and a part, as {legs.JOINTS[0]}"]
-    joints = [f"{leg}_{part}" for leg in own for part in legs.PARTS]
+    parts = legs.parts(names)
+    if len(parts) < 2 or "femur" not in parts:
+        return [f"legs move by {', '.join(parts)}: a femur and one more are needed"]
+    joints = [f"{leg}_{part}" for leg in own for part in parts]
     faults += [f"no command is called {name!r}" for name in joints if name not in names]
     faults += [f"command {name!r} is no joint of a leg" for name in names - {*joints}]
     wanted = [(kind, joint) for joint in joints for kind in ("body", "joint")]
-    wanted += [("geom", f"{leg}_{part}") for leg in own for part in HIT]
+    hit = [part for part in HIT if part in (*parts, "foot")]
+    wanted += [("geom", f"{leg}_{part}") for leg in own for part in hit]
     return faults + _absent(model, [*wanted, ("geom", "belly"), ("sensor", "own")])
 
 

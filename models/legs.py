@@ -1,7 +1,8 @@
 """What the legs of a walking robot and their joints are called.
 
 Legs have numbers (the dissertation's, figure 7.2) and names; a robot with fewer than
-six has some of them. A joint is called after leg and part, "left_front_femur".
+six has some of them. A joint is called after leg and part, "left_front_femur". Legs of
+two joints have a coxa and a femur, or a femur and a tibia.
 """
 
 from collections.abc import Iterable
@@ -26,6 +27,12 @@ def names(joints: Iterable[str]) -> tuple[str, ...]:
     """The legs that a robot has, from the names of its joints."""
     legs = {joint.rpartition("_")[0] for joint in joints}
     return tuple(leg for leg in LEGS if leg in legs)
+
+
+def parts(joints: Iterable[str]) -> tuple[str, ...]:
+    """The parts that move in a robot's legs, from the names of its joints."""
+    moved = {joint.rpartition("_")[2] for joint in joints}
+    return tuple(part for part in PARTS if part in moved)
 
 
 def present(joints: Iterable[str]) -> tuple[int, ...]:

@@ -20,7 +20,7 @@ from bns.worlds import (
 from bns.worlds.active import Stages
 from bns.worlds.damage import Damage
 from bns.worlds.effects.base import ControlSignal
-from bns.worlds.effects.legs import named
+from bns.worlds.effects.legs import joints_named, named
 from bns.worlds.legged_physics import Piece, WalkJob
 from bns.worlds.physics import STATE, Compiled, Job, Segment, run
 from bns.worlds.trial import Commands
@@ -84,8 +84,8 @@ def refuse_legless(damage: Damage, robot: RobotModel) -> None:
     """Stop if at some time no leg is left.
 
     Raises:
-        BnsError: all legs are raised, limp or missing together, or one that the robot
-            does not have.
+        BnsError: all legs are raised, limp or missing together, or a leg or joint is
+            named that the robot does not have.
     """
     joints = [command.name for command in robot.commands]
     own = frozenset(legs.present(joints))
@@ -95,6 +95,12 @@ def refuse_legless(damage: Damage, robot: RobotModel) -> None:
             raise BnsError(
                 f"{effect}: {robot.name!r} has no leg {min(absent)}; it has "
                 f"{', '.join(legs.names(joints))}."
+            )
+        still = joints_named(effect) - {*joints, *legs.parts(joints)}
+        if still:
+            raise BnsError(
+                f"{effect}: nothing of {robot.name!r} is called {min(still)!r}; its "
+                f"legs move by {' and '.join(legs.parts(joints))}."
             )
     for onset in {event.onset_trial for event in damage.events}:
         held = [item.effect for item in damage.at(onset)]

@@ -226,7 +226,7 @@ def test_robots_that_lack_a_leg_scatter_as_such_robots_do(model):
 
 def test_nothing_is_lost_where_no_loss_explains_much(model, told):
     trials = walk_cases.record(told, [], 1)
-    every = walk_library.lost(Signs({}, LEGS, LEGS))
+    every = walk_library.lost(Signs({}, (), LEGS, LEGS))
     assert walk_lost.likely(trials, every, model.simulate) == ()
     assert walk_lost.likely(trials, (), model.simulate) == ()
 
@@ -234,6 +234,6 @@ def test_nothing_is_lost_where_no_loss_explains_much(model, told):
 def test_two_legs_are_lost_one_after_the_other(model, told):
     limp = registry.make("leg_limp", legs="1,5", loss=1.0)
     trials = walk_cases.record(told, [limp], 1)
-    every = walk_library.lost(Signs({}, LEGS, ()))
+    every = walk_library.lost(Signs({}, (), LEGS, ()))
     found = walk_lost.likely(trials, every, model.simulate)
     assert {effect["legs"] for effect in found} == {"1", "5"}

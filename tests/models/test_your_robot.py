@@ -39,6 +39,11 @@ def spoil(place, file: str, old: str, new: str) -> None:
     (place / file).write_text(text.replace(old, new))
 
 
+def test_a_robot_is_called_after_its_directory(mine):
+    (found,) = faults(mine.rename(mine.with_name("mine"))).values()
+    assert found == ("the robot alone is to be mine.xml, as its directory",)
+
+
 @pytest.mark.parametrize("place", [BURGER, QUAD], ids=lambda place: place.name)
 def test_every_point_holds(place):
     assert faults(place) == {}

@@ -4,8 +4,7 @@ from typing import Any
 
 from bns.worlds.effects import bodies
 from bns.worlds.effects.base import BodyEffect, Parameter
-from bns.worlds.effects.legs import LEGS_OR_ALL
-from bns.worlds.effects.legs import bodies as leg_bodies
+from bns.worlds.effects.legs import LEGS_OR_ALL, shins
 
 
 class FootSlippery(BodyEffect):
@@ -31,6 +30,6 @@ class FootSlippery(BodyEffect):
     def edit(self, spec: Any) -> None:
         if self.is_nominal:
             return
-        for body in leg_bodies(spec, self["legs"], "tibia"):
+        for body in shins(spec, self["legs"]):
             for geom in bodies.contact_geoms(body):
                 geom.friction[0] *= self["factor"]

@@ -37,7 +37,10 @@ class LegRaised(CommandEffect):
             return values
         for leg in read(self["legs"]):
             for part in PARTS:
-                column = signal.column(f"{LEGS[leg - 1]}_{part}")
+                joint = f"{LEGS[leg - 1]}_{part}"
+                if joint not in signal.channels:
+                    continue
+                column = signal.column(joint)
                 told = values[active, column]
                 values[active, column] += self["blend"] * (RAISED[part] - told)
         return values

@@ -37,6 +37,12 @@ def named(effect: Any) -> frozenset[int]:
     return frozenset(found)
 
 
+def joints_named(effect: Any) -> frozenset[str]:
+    """Parts and joints that an effect's choices name, "coxa" or "left_front_coxa"."""
+    values = (str(effect[choice.name]) for choice in effect.choices)
+    return frozenset(value for value in values if value in (*PARTS, *JOINTS))
+
+
 def text(legs: Iterable[int]) -> str:
     """A set of legs as text, ``1,5``."""
     return ",".join(str(leg) for leg in sorted(set(legs)))
@@ -152,3 +158,11 @@ def bodies(spec: Any, legs: str, part: str) -> Iterator[Any]:
         body = spec.body(f"{LEGS[leg - 1]}_{part}")
         if body is not None:
             yield body
+
+
+def shins(spec: Any, legs: str) -> Iterator[Any]:
+    """The outermost bodies of a set of legs (text), which the feet are part of."""
+    for leg in read(legs):
+        tibia, femur = (spec.body(f"{LEGS[leg - 1]}_{p}") for p in ("tibia", "femur"))
+        if tibia is not None or femur is not None:
+            yield tibia if tibia is not None else femur

@@ -1,0 +1,111 @@
+"""Walkers with two joints a leg: checked, driven, damaged, diagnosed, refused."""
+
+import re
+import shutil
+
+import mujoco
+import numpy as np
+import pytest
+
+from bns import models
+from bns.errors import BnsError
+from bns.gap import walk_cases
+from bns.gap.walk_model import WalkModel
+from bns.models import check, legs
+from bns.models.legs import PARTS
+from bns.worlds import registry
+from bns.worlds.trial import Commands
+from tests.sources import ROOT
+
+QUAD = ROOT / "examples" / "quad"
+DAMAGE = (
+    "leg_raised:legs=2",
+    "leg_limp:legs=1",
+    "leg_missing:legs=3",
+    "foot_slippery:legs=2,factor=0.1",
+    "servo_gain:servo=femur,factor=0.4",
+    "link_length:part=femur,factor=1.2",
+)
+
+
+def short(place, part: str):
+    """The four-legged example with one joint of each leg welded."""
+    shutil.copytree(QUAD, place)
+    at, text = PARTS.index(part), (place / "quad.xml").read_text()
+    text = re.sub(rf'\n *<(joint|position) name="\w+_{part}"[^>]*/>', "", text)
+    found = re.search(r'qpos="([^"]*)"', text)
+    values = found[1].split()
+    joints = [value for i, value in enumerate(values[7:]) if i % 3 != at]
+    text = text.replace(found[0], f'qpos="{" ".join(values[:7] + joints)}"')
+    text = text.replace(f'ctrl="{" ".join("0" * 12)}"', f'ctrl="{" ".join("0" * 8)}"')
+    (place / "quad.xml").write_text(text)
+    facts = (place / "robot.toml").read_text()
+    block = rf'\[\[commands\]\]\nname = "\w+_{part}"\n(?:.+\n)+\n?'
+    (place / "robot.toml").write_text(re.sub(block, "", facts))
+    numbers = (place / "numbers.toml").read_text()
+    line = rf'\n"(joint|actuator) \w+_{part}[^"\n]*" = .*'
+    (place / "numbers.toml").write_text(re.sub(line, "", numbers))
+    return _at_rest(place)
+
+
+def _at_rest(place):
+    """With a home position that the other legs have settled to."""
+    model = mujoco.MjModel.from_xml_path(str(place / "scene.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_step(model, data, 1500)
+    home = " ".join(map(repr, data.qpos.tolist()))
+    file = place / "quad.xml"
+    file.write_text(re.sub(r'qpos="[^"]*"', f'qpos="{home}"', file.read_text()))
+    return place
+
+
+@pytest.fixture(scope="module", params=["coxa", "tibia"])
+def robot(request, tmp_path_factory):
+    """Its directory; of legs that do not move by this part."""
+    return short(tmp_path_factory.mktemp(request.param) / "quad", request.param)
+
+
+def walked(robot, *damage: str) -> np.ndarray:
+    """Where everything is while the robot is told two postures, under damage."""
+    channels = models.robot(str(robot)).channels
+    goals = np.random.default_rng(1).uniform(-0.4, 0.4, (2, 8))
+    told = Commands(goals, [1.0, 1.0], channels)
+    (trial,) = registry.make("hexapod", robot=str(robot), damage=damage).run([told])
+    return trial.observed
+
+
+def test_every_point_holds(robot):
+    points = check.check(models.robot(str(robot)))
+    assert not [fault for point in points for fault in point.faults]
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_damage_moves_it_otherwise(robot, damage):
+    hurt = walked(robot, damage)
+    assert np.isfinite(hurt).all()
+    assert np.abs(hurt[-1] - walked(robot)[-1]).max() > 1e-3
+
+
+def test_joints_that_it_lacks_are_refused(robot):
+    moved = legs.parts(c.name for c in models.robot(str(robot)).commands)
+    (absent,) = set(PARTS) - set(moved)
+    for damage in (
+        f"link_length:part={absent},factor=1.1",
+        f"servo_gain:servo={absent},factor=0.5",
+        f"joint_locked:joint=left_rear_{absent},loss=1",
+    ):
+        with pytest.raises(BnsError, match=f"legs move by {' and '.join(moved)}"):
+            walked(robot, damage)
+
+
+def test_a_leg_that_is_held_up_is_seen_in_its_recordings(robot):
+    model = WalkModel(str(robot))
+    listed = [item.name for item in model.candidates()]
+    (absent,) = set(PARTS) - set(legs.parts(model.joints))
+    assert not [name for name in listed if absent in name]
+    case = walk_cases.build(2, "lost", model)
+    predicted = model.simulate(case.trials, [()])[0]
+    named = [item.name for item in model.suspected(case.trials)]
+    assert case.term.candidate.name in named
+    assert model.signs(case.trials, predicted).joints
