@@ -34,7 +34,6 @@ TRIALS, LENGTH = 5, 8.0  # recordings of a case, and how long each is [s]
 SIZES = 0.5, 8.0  # magnitudes over what is detected, drawn evenly in the logarithm
 PAIR_SIZES = 2.0, 8.0  # of each of two
 LEAST = 0.4  # size below which an effect counts as not excited, and is drawn again
-POWER = 1.2816  # standard normal: 90 %
 
 
 @dataclass(frozen=True)
@@ -201,7 +200,7 @@ def _hide(
     problem = Problem.of(plain, model, candidates=candidates)
     curves = signatures.trace(problem, candidates)
     null = Null.of(problem, curves)
-    seen = float(np.sqrt(null.threshold(0.05)) + POWER)
+    seen = null.seen
     low, high = SIZES if count == 1 else PAIR_SIZES
     terms: list[fit.Term] = []
     while len(terms) < count:

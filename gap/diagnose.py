@@ -21,7 +21,6 @@ from bns.gap.signatures import Curves
 from bns.worlds.trial import Trial
 
 ALPHA_MORE = 0.01  # chance that a further effect is added where there is none
-POWER = 1.2816  # standard normal: 90 % power
 LISTED = 8  # fits of each size that are reported
 LEAST = 2  # trials
 
@@ -108,7 +107,7 @@ class Analysis:
     @property
     def seen(self) -> float:
         """Whitened length of a signature that is found with 90 % power."""
-        return float(np.sqrt(self.null.threshold(0.05)) + POWER)
+        return self.null.seen
 
 
 def analyse(

@@ -33,7 +33,6 @@ KINDS = ("single", "motion", "none", "off-library")
 TRIALS, CYCLES = 3, 40  # recordings of a case, and commands of 0.4 s in each
 SIZES = 0.5, 8.0  # of an effect over what is detected, drawn evenly in the logarithm
 LEAST = 0.4  # size below which an effect counts as not excited, and is drawn again
-POWER = 1.2816  # standard normal: 90 %
 TRIES = 100
 NEAREST = 16  # candidates whose likelihood is compared with an effect's
 
@@ -144,7 +143,7 @@ def _hide(
     candidates = model.candidates()
     problem = Problem.of(plain, model, candidates=candidates)
     curves = signatures.trace(problem, candidates)
-    seen = float(np.sqrt(Null.of(problem, curves).threshold(0.05)) + POWER)
+    seen = Null.of(problem, curves).seen
     for _ in range(TRIES):
         size = float(np.exp(rng.uniform(*np.log(SIZES))))
         term = _draw(rng, curves, size * seen)

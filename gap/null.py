@@ -16,6 +16,7 @@ DRAWS = 1000
 LARGEST = 25.0  # square of a residual that counts in full
 QUIET = 0.5  # share of the assumed noise below which a rest counts as that much
 LAGS = 10  # windows over which a rest may be correlated with itself
+POWER = 1.2816  # standard normal: 90 %
 TAIL = 0.05  # share of the draws beyond which chance is taken to fall exponentially
 EXACT = 1.001  # times the resolution up to which noise counts as raised to it
 CLEAR = 3.0  # standard errors from which a correlation is counted
@@ -63,6 +64,11 @@ class Null:
     def threshold(self, alpha: float) -> float:
         """Improvement that chance exceeds with probability `alpha`."""
         return float(np.quantile(self.gains, 1 - alpha))
+
+    @property
+    def seen(self) -> float:
+        """Whitened length of a signature that is found with 90 % power."""
+        return float(np.sqrt(self.threshold(0.05)) + POWER)
 
     def misfit(self, problem: Problem, z: np.ndarray) -> tuple[float, float]:
         """Whether a whitened rest still has structure, and how much.

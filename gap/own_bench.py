@@ -14,7 +14,6 @@ from bns.gap.problem import Problem
 from bns.gap.signatures import Curves
 from bns.worlds.effects.base import Effect
 
-POWER = 1.2816  # standard normal: 90 %
 SIZES = 1.0, 8.0  # of an effect over what is detected, drawn evenly in the logarithm
 TRIES = 50
 
@@ -61,7 +60,7 @@ def _hide(
     problem = Problem.of(plain, model, candidates=model.candidates())
     curves = signatures.trace(problem, model.candidates())
     null = Null.of(problem, curves)
-    seen = float(np.sqrt(null.threshold(0.05)) + POWER)
+    seen = null.seen
     terms: list[Term] = []
     for _ in range(TRIES):
         term = _draw(rng, curves, seen, {t.candidate.name for t in terms})

@@ -4,7 +4,7 @@ import numpy as np
 
 from bns.gap import signatures, walk_cases
 from bns.gap.aliases import likeness
-from bns.gap.cases import POWER, Answer, Case
+from bns.gap.cases import Answer, Case
 from bns.gap.null import Null
 from bns.gap.problem import Problem
 from bns.gap.support import Term
@@ -45,7 +45,7 @@ def _answer(
     listed = model.suspected(trials, everywhere=True)
     problem = Problem.of(trials, model, candidates=listed)
     curves = signatures.trace(problem, listed)
-    seen = float(np.sqrt(Null.of(problem, curves).threshold(0.05)) + POWER)
+    seen = Null.of(problem, curves).seen
     (shown,) = problem.signatures([[term.effect()]])
     name = term.candidate.name
     alike = {other.name for other in likeness(problem, curves, term) if other.alike}
