@@ -1,5 +1,6 @@
 """`bns` and `python -m bns`."""
 
+import os
 import sys
 from collections.abc import Sequence
 
@@ -9,10 +10,16 @@ from bns.errors import BnsError
 WRONG_INPUT = 2
 INTERRUPTED = 130
 """as shells report a program stopped by Ctrl-C"""
+SPINS = "1000"
+"""turns for which a thread of PyTorch waits for the others before it sleeps. By default
+they are 300 times as many: where other programs run as well, those take the cores on
+which the others would work. Two threads on two cores that two programs kept busy
+needed 43 s for what took them more than 120; idle ones lose a tenth."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; what a user can cause gives one line and exit code 2."""
+    os.environ.setdefault("GOMP_SPINCOUNT", SPINS)  # read when PyTorch is imported
     try:
         return dispatch(list(sys.argv[1:] if argv is None else argv))
     except BnsError as error:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bns import presets
-from bns.__main__ import INTERRUPTED, WRONG_INPUT, main
+from bns.__main__ import INTERRUPTED, SPINS, WRONG_INPUT, main
 from bns.cli import VERBS
 from bns.cli.outputs import sentence
 from bns.cli.run import STOPPED, until_interrupted
@@ -53,6 +53,15 @@ def test_help_lists_every_verb(capsys, argv):
 
 def test_version(capsys):
     assert said(capsys, "--version") == "bns 0.1.0\n"
+
+
+def test_threads_that_wait_leave_the_cores_to_others(capsys, monkeypatch):
+    monkeypatch.delenv("GOMP_SPINCOUNT", raising=False)
+    said(capsys, "--version")
+    assert os.environ["GOMP_SPINCOUNT"] == SPINS
+    monkeypatch.setenv("GOMP_SPINCOUNT", "7")  # a user's own stays
+    said(capsys, "--version")
+    assert os.environ["GOMP_SPINCOUNT"] == "7"
 
 
 def test_help_of_a_preset_shows_its_values(capsys):
