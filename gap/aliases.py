@@ -79,3 +79,8 @@ def likeness(problem: Problem, curves: Curves, term: fit.Term) -> tuple[Likeness
         if name not in best or made.distance < best[name].distance:
             best[name] = made
     return tuple(sorted(best.values(), key=lambda item: item.distance))
+
+
+def accepted(term: fit.Term, found: tuple[Likeness, ...]) -> tuple[str, ...]:
+    """The candidates that may be named for an effect, itself included, sorted."""
+    return tuple(sorted({term.candidate.name, *(o.name for o in found if o.alike)}))

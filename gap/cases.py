@@ -17,7 +17,7 @@ import numpy as np
 
 from bns import models, seeding
 from bns.gap import excite, fit, signatures
-from bns.gap.aliases import likeness
+from bns.gap.aliases import accepted, likeness
 from bns.gap.faults import faulty
 from bns.gap.model import GapModel
 from bns.gap.null import Null
@@ -199,8 +199,7 @@ def _hide(
     candidates = model.candidates()
     problem = Problem.of(plain, model, candidates=candidates)
     curves = signatures.trace(problem, candidates)
-    null = Null.of(problem, curves)
-    seen = null.seen
+    seen = Null.of(problem, curves).seen
     low, high = SIZES if count == 1 else PAIR_SIZES
     terms: list[fit.Term] = []
     while len(terms) < count:
@@ -221,10 +220,7 @@ def _hide(
         effects=tuple(str(effect) for effect in effects),
         magnitudes=tuple(term.magnitude for term in terms),
         sizes=tuple((lengths / seen).tolist()),
-        aliases=tuple(
-            tuple(sorted({t.candidate.name, *(o.name for o in row if o.alike)}))
-            for t, row in zip(terms, found, strict=True)
-        ),
+        aliases=tuple(map(accepted, terms, found)),
         near=tuple(
             tuple((o.name, round(o.distance, 3), round(o.angle, 2)) for o in row)
             for row in found

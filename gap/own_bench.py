@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from bns import seeding
-from bns.gap import cases, own_cases, own_effects, signatures
+from bns.gap import own_cases, own_effects, signatures
+from bns.gap.aliases import accepted, likeness
 from bns.gap.cases import Answer, Case
 from bns.gap.fit import Term
 from bns.gap.null import Null
@@ -59,8 +60,7 @@ def _hide(
 ) -> tuple[Answer, list[Effect]]:
     problem = Problem.of(plain, model, candidates=model.candidates())
     curves = signatures.trace(problem, model.candidates())
-    null = Null.of(problem, curves)
-    seen = null.seen
+    seen = Null.of(problem, curves).seen
     terms: list[Term] = []
     for _ in range(TRIES):
         term = _draw(rng, curves, seen, {t.candidate.name for t in terms})
@@ -76,7 +76,9 @@ def _hide(
         effects=tuple(str(effect) for effect in effects),
         magnitudes=tuple(term.magnitude for term in terms),
         sizes=tuple((lengths / seen).tolist()),
-        aliases=tuple(cases.alike(problem, curves, null, term) for term in terms),
+        aliases=tuple(
+            accepted(term, likeness(problem, curves, term)) for term in terms
+        ),
         detected=seen,
     )
     return made, effects

@@ -3,7 +3,7 @@
 import numpy as np
 
 from bns.gap import signatures, walk_cases
-from bns.gap.aliases import likeness
+from bns.gap.aliases import accepted, likeness
 from bns.gap.cases import Answer, Case
 from bns.gap.null import Null
 from bns.gap.problem import Problem
@@ -47,15 +47,14 @@ def _answer(
     curves = signatures.trace(problem, listed)
     seen = Null.of(problem, curves).seen
     (shown,) = problem.signatures([[term.effect()]])
-    name = term.candidate.name
-    alike = {other.name for other in likeness(problem, curves, term) if other.alike}
+    alike = accepted(term, likeness(problem, curves, term))
     return Answer(
         kind,
-        names=(name,),
+        names=(term.candidate.name,),
         effects=(str(term.effect()),),
         magnitudes=(term.magnitude,),
         sizes=(float(np.linalg.norm(shown)) / seen,),
-        aliases=(tuple(sorted({name, *term.candidate.aliases, *alike})),),
+        aliases=(tuple(sorted({*alike, *term.candidate.aliases})),),
         nominal=nominal,
         detected=seen,
     )

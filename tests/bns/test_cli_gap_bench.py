@@ -35,6 +35,17 @@ def test_cases_hold_no_answers(made):
     assert hidden.partition(":")[0] not in listed
 
 
+def test_effects_are_hidden_in_a_robot_of_ones_own(tmp_path):
+    words = [str(tmp_path / "cases"), "--answers", str(tmp_path / "answers.json")]
+    kinds = ["--kinds", "single", "pair", "--count", "1", "--model", ARM]
+    assert main(["gap", "bench", "make", *words, *kinds]) == 0
+    known = json.loads((tmp_path / "answers.json").read_text())["cases"]
+    for answer, count in zip(known.values(), (1, 2), strict=True):
+        assert len(answer["names"]) == len(answer["sizes"]) == count
+        named = zip(answer["names"], answer["aliases"], strict=True)
+        assert all(name in accepted for name, accepted in named)
+
+
 def said(kind, named=()):
     """What a diagnosis says, as much of it as scores read."""
     verdict = {"kind": kind, "named": named, "sets": named or [[]]}
