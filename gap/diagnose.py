@@ -126,15 +126,14 @@ def analyse(
         trials, faults = _checked(trials, model)
     given = {"seed": seed, "most": most, "reference": reference, "clock": clock}
     given |= {"faults": faults, "rules": rules or verdict.calibration()}
-    if candidates is not None:
-        return _explained(trials, model, candidates, **given)
-    suspected = getattr(model, "suspected", None)
-    if not suspected:
-        return _explained(trials, model, model.candidates(), **given)
-    made = _explained(trials, model, suspected(trials), **given)
-    if made.verdict.kind != "none of the library":
-        return made
-    return _explained(trials, model, suspected(trials, everywhere=True), **given)
+    if candidates is None and hasattr(model, "suspected"):
+        made = _explained(trials, model, model.suspected(trials), **given)
+        if made.verdict.kind != "none of the library":
+            return made
+        candidates = model.suspected(trials, everywhere=True)
+    elif candidates is None:
+        candidates = model.candidates()
+    return _explained(trials, model, candidates, **given)
 
 
 def _explained(

@@ -21,7 +21,7 @@ from bns.gap.support import Term
 from bns.gap.walk_model import TRACKER, WalkModel
 from bns.gap.walk_signs import Signs
 from bns.gap.walk_where import Suspects
-from bns.models.legs import LEGS, PARTS, names, parts
+from bns.models.legs import LEGS, PARTS, joints_of, names, parts
 from bns.models.phantomx import gait
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect
@@ -123,8 +123,10 @@ def build(seed: int, kind: str, model: WalkModel) -> WalkCase:
     plain = record(told, reality, seed, model.name)
     problem = Problem.of(plain, model, candidates=model.candidates())
     for _ in range(TRIES):
-        drawn = _lost if kind == "lost" else _drawn
-        term = drawn(rng, problem, kind)
+        if kind == "lost":
+            term = _lost(rng, model.joints)
+        else:
+            term = _drawn(rng, problem, SIZES[kind])
         if term is None:
             continue
         try:
@@ -136,12 +138,11 @@ def build(seed: int, kind: str, model: WalkModel) -> WalkCase:
     raise BnsError(f"No effect could be hidden in case {seed}.")
 
 
-def _lost(rng: np.random.Generator, problem: Problem, kind: str) -> Term:
+def _lost(rng: np.random.Generator, joints: Sequence[str]) -> Term:
     """A leg that is held up, limp or gone, or a joint that is locked, as a whole."""
-    legs = names(problem.model.joints)
+    legs = names(joints)
     leg = legs[int(rng.integers(len(legs)))]
-    joints = [name for name in problem.model.joints if name.startswith(f"{leg}_")]
-    held = {joint: float(rng.uniform(*REST)) for joint in joints}
+    held = {joint: float(rng.uniform(*REST)) for joint in joints_of(leg, joints)}
     pool = walk_library.lost(Signs(held, (leg,), (leg,), (leg,)))
     effects = sorted({item.effect for item in pool})
     effect = effects[int(rng.integers(len(effects)))]
@@ -149,7 +150,9 @@ def _lost(rng: np.random.Generator, problem: Problem, kind: str) -> Term:
     return Term.at(pool[int(rng.integers(len(pool)))], 0, 1.0)
 
 
-def _drawn(rng: np.random.Generator, problem: Problem, kind: str) -> Term | None:
+def _drawn(
+    rng: np.random.Generator, problem: Problem, sizes: tuple[float, float]
+) -> Term | None:
     """A candidate, drawn evenly over effects, about as strong as drawn."""
     joints = problem.model.joints
     legs = names(joints)
@@ -169,7 +172,7 @@ def _drawn(rng: np.random.Generator, problem: Problem, kind: str) -> Term | None
     up = rng.random() < 0.5
     marks = [v for v in item.grid if (v > item.nominal) == up] or list(item.grid)
     marks = sorted(marks, key=lambda value: abs(value - item.nominal))
-    wanted = SEEN * float(np.exp(rng.uniform(*np.log(SIZES[kind]))))
+    wanted = SEEN * float(np.exp(rng.uniform(*np.log(sizes))))
     found = problem.signatures([[item.make(value, branch)] for value in marks])
     lengths = np.linalg.norm(found, axis=1)
     if not np.isfinite(lengths).all() or lengths.max() < 0.7 * wanted:

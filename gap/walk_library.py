@@ -95,9 +95,10 @@ def _servos(found: Suspects, joints: Sequence[str]) -> Iterable[Candidate]:
 
 
 def _legs(joints: Sequence[str]) -> Iterable[Candidate]:
+    moved = parts(joints)
     for leg in ("all", *names(joints)):
         number = "all" if leg == "all" else str(LEGS.index(leg) + 1)
-        for part in parts(joints):
+        for part in moved:
             yield _candidate(
                 "link_length",
                 "factor",
@@ -106,7 +107,7 @@ def _legs(joints: Sequence[str]) -> Iterable[Candidate]:
                 1.25,
                 part=f"{part},{leg}",
                 fixed={"part": part, "legs": number},
-                slack=0.005 if (part, leg) == (parts(joints)[-1], "all") else 0.0,
+                slack=0.005 if (part, leg) == (moved[-1], "all") else 0.0,
             )
         yield _candidate(
             "foot_slippery",

@@ -12,9 +12,7 @@ from bns.gap.records import Candidate
 from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Trial
 
-BETTER = (
-    0.7  # times the squared departure of the servos that a loss has to leave at most
-)
+BETTER = 0.7  # of the servos' squared departure, which a loss has to leave at most
 
 Simulate = Callable[[Sequence[Trial], Sequence[Sequence[Effect]]], list]
 

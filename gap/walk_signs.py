@@ -3,11 +3,12 @@
 Each is looked for before anything is fitted; only what is found becomes a candidate.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from bns.models.legs import joints_of
 from bns.models.legs import names as legs_of
 from bns.worlds.trial import Trial
 
@@ -18,6 +19,9 @@ ASTRAY = 0.2  # [rad] off its goal (RMS) that a servo without power ends at leas
 STRAYING = 2.0  # times what the model foresees, likewise; assumed
 MOST = 2  # joints of a leg that have to; the load may hold the third where it is told
 UNLOADED = 0.3  # of what the model foresees: a leg's servos are off by less; assumed
+
+Ends = Mapping[str, np.ndarray]
+"""by joint, how far it is from its goal where each command ends [rad]"""
 
 
 @dataclass(frozen=True)
@@ -54,32 +58,14 @@ def signs(
     told = _ends(names, list(zip(trials, predicted, strict=True)))
     still = held(trials, names)
 
-    def limp(joints: Sequence[str]) -> bool:
-        astray = [
-            _rms(seen[joint]) > max(ASTRAY, STRAYING * _rms(told[joint]))
-            for joint in joints
-        ]
-        return sum(astray) >= MOST
-
-    def unloaded(joints: Sequence[str]) -> bool:
-        own, model = (
-            _rms(np.concatenate([off[joint] for joint in joints]))
-            for off in (seen, told)
-        )
-        return own < UNLOADED * model
-
-    by_leg = {
-        leg: tuple(name for name in names if name.startswith(f"{leg}_"))
-        for leg in legs_of(names)
-    }
-
-    def legs(is_so: Callable[[Sequence[str]], bool]) -> tuple[str, ...]:
-        return tuple(leg for leg, joints in by_leg.items() if is_so(joints))
-
-    lost = legs(limp), legs(unloaded)
-    joints = {joint for found in lost for leg in found for joint in by_leg[leg]}
-    raised = legs(lambda joints: still.keys() >= {*joints})
-    return Signs(still, raised, *lost, frozenset(joints | still.keys()))
+    by_leg = {leg: joints_of(leg, names) for leg in legs_of(names)}
+    raised = [leg for leg, joints in by_leg.items() if still.keys() >= {*joints}]
+    limp = [leg for leg, joints in by_leg.items() if _limp(joints, seen, told)]
+    free = [leg for leg, joints in by_leg.items() if _unloaded(joints, seen, told)]
+    explained = {joint for leg in (*limp, *free) for joint in by_leg[leg]}
+    return Signs(
+        still, tuple(raised), tuple(limp), tuple(free), frozenset(explained | {*still})
+    )
 
 
 def held(trials: Sequence[Trial], names: Sequence[str]) -> dict[str, float]:
@@ -97,9 +83,24 @@ def held(trials: Sequence[Trial], names: Sequence[str]) -> dict[str, float]:
     return found
 
 
-def _ends(
-    names: Sequence[str], paths: Sequence[tuple[Trial, np.ndarray]]
-) -> Mapping[str, np.ndarray]:
+def _limp(joints: Sequence[str], seen: Ends, told: Ends) -> bool:
+    """Whether most of a leg's servos end far from their goals."""
+    astray = [
+        _rms(seen[joint]) > max(ASTRAY, STRAYING * _rms(told[joint]))
+        for joint in joints
+    ]
+    return sum(astray) >= MOST
+
+
+def _unloaded(joints: Sequence[str], seen: Ends, told: Ends) -> bool:
+    """Whether a leg's servos end much nearer to their goals than foreseen."""
+    own, model = (
+        _rms(np.concatenate([off[j] for j in joints])) for off in (seen, told)
+    )
+    return own < UNLOADED * model
+
+
+def _ends(names: Sequence[str], paths: Sequence[tuple[Trial, np.ndarray]]) -> Ends:
     """How far each joint is from its goal where commands end [rad], by name."""
     off = [
         path[trial.boundaries[1:], 3:] - trial.commands.values for trial, path in paths

@@ -35,6 +35,11 @@ def parts(joints: Iterable[str]) -> tuple[str, ...]:
     return tuple(part for part in PARTS if part in moved)
 
 
+def joints_of(leg: str, joints: Iterable[str]) -> tuple[str, ...]:
+    """Those joints that are a leg's, in their order."""
+    return tuple(joint for joint in joints if joint.rpartition("_")[0] == leg)
+
+
 def present(joints: Iterable[str]) -> tuple[int, ...]:
     """The same by number."""
     return tuple(LEGS.index(leg) + 1 for leg in names(joints))

@@ -96,10 +96,10 @@ def refuse_legless(damage: Damage, robot: RobotModel) -> None:
                 f"{effect}: {robot.name!r} has no leg {min(absent)}; it has "
                 f"{', '.join(legs.names(joints))}."
             )
-        still = joints_named(effect) - {*joints, *legs.parts(joints)}
-        if still:
+        lacking = joints_named(effect) - {*joints, *legs.parts(joints)}
+        if lacking:
             raise BnsError(
-                f"{effect}: nothing of {robot.name!r} is called {min(still)!r}; its "
+                f"{effect}: nothing of {robot.name!r} is called {min(lacking)!r}; its "
                 f"legs move by {' and '.join(legs.parts(joints))}."
             )
     for onset in {event.onset_trial for event in damage.events}:

@@ -146,8 +146,8 @@ def _figures(rows: list[dict]) -> list[list[str]]:
     from bns.gap import scoring
 
     made = []
-    large, others = ("single", scoring.LARGE), (("pair", 0.0), ("lost", 0.0))
-    for kind, smallest in (("single", 0.0), large, *others):
+    kinds = ("single", 0.0), ("single", scoring.LARGE), ("pair", 0.0), ("lost", 0.0)
+    for kind, smallest in kinds:
         found = scoring.of(rows, kind, smallest)
         if not found:
             continue

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bns.models.legs import LEGS, PARTS
+from bns.models.legs import LEGS, parts
 from bns.worlds.effects.base import CommandEffect, ControlSignal, Parameter
 from bns.worlds.effects.legs import LEG_SET, read
 
@@ -36,11 +36,8 @@ class LegRaised(CommandEffect):
         if self.is_nominal:
             return values
         for leg in read(self["legs"]):
-            for part in PARTS:
-                joint = f"{LEGS[leg - 1]}_{part}"
-                if joint not in signal.channels:
-                    continue
-                column = signal.column(joint)
+            for part in parts(signal.channels):
+                column = signal.column(f"{LEGS[leg - 1]}_{part}")
                 told = values[active, column]
                 values[active, column] += self["blend"] * (RAISED[part] - told)
         return values

@@ -162,7 +162,5 @@ def bodies(spec: Any, legs: str, part: str) -> Iterator[Any]:
 
 def shins(spec: Any, legs: str) -> Iterator[Any]:
     """The outermost bodies of a set of legs (text), which the feet are part of."""
-    for leg in read(legs):
-        tibia, femur = (spec.body(f"{LEGS[leg - 1]}_{p}") for p in ("tibia", "femur"))
-        if tibia is not None or femur is not None:
-            yield tibia if tibia is not None else femur
+    for leg in map(str, read(legs)):
+        yield from list(bodies(spec, leg, "tibia")) or bodies(spec, leg, "femur")
