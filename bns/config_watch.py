@@ -18,7 +18,7 @@ class WatchConfig:
     """trials before this one that an innovation is compared with"""
     floor: float = 0.03
     """an SNN is believed no better than this share of the largest motion or reading;
-    what a damage changes less is not looked for"""
+    what a damage changes less is not looked for, and no reason to forget"""
     grow: float = 0.3
     """by this share more for each unit of distance to the `near` nearest learned
     patterns (scaled inputs)"""
@@ -30,12 +30,12 @@ class WatchConfig:
     largest: int = 5
     """a trial is judged by so many of its patterns, those that stand out most"""
     forget: bool = False
-    """drop old trials whose patterns the newest trial contradicts; a walker drops all
-    that came before a change of the robot (bns/walk/forgetting.py), and the settings
-    below are not for it"""
+    """drop all that came before a change of the robot: the last trial that the newest
+    one contradicts, and those before it; for a walker the settings below do nothing
+    (bns/walk/forgetting.py)"""
     forget_factor: float = 3.0
     """an old trial is contradicted when it differs from the newest one by so many
-    times what the newest one differs from itself"""
+    times what either differs from itself (navigation: by which the SNNs err)"""
     forget_reach: float = 0.2
     """patterns are compared where their scaled inputs lie no further apart"""
     forget_least: int = 8

@@ -1,18 +1,40 @@
-"""Forgetting by evidence: drop the old trials that the newest one contradicts.
+"""Forgetting by evidence: drop what was learned of the robot before it changed.
 
 An alternative to a sliding window, which forgets by age. Patterns of an old trial are
-compared with the nearest ones of the newest trial; what the patterns of either trial
-differ by among each other, at their distances, is the yardstick, whichever is less: a
-wheel that stops now and then makes the newest trial differ from itself as well. So
-noise alone is no contradiction, and neither is ground that the newest trial did not
-see.
+compared with the nearest ones of the newest trial, and what patterns of one trial
+differ by among each other is the yardstick: their noise, and more with their distance.
+The slope is that of both trials together; the noise that of the trial that has less, as
+a wheel that stops now and then makes a trial differ from itself. So noise is no
+contradiction, and neither is ground that the newest trial did not see. But a robot
+changes at some time: what is older than a contradicted trial is of the robot before,
+comparable or not, and goes with it.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
 from bns.config_watch import WatchConfig
 
-FLOOR = 1e-3  # scaled outputs; differences below do not matter; assumed
+KEPT = 0.9  # share of differences that count, the smallest; assumed
+
+
+class Pairs(NamedTuple):
+    """Patterns compared: squared distances ``(n,)``, squared differences ``(n, O)``."""
+
+    far: np.ndarray
+    apart: np.ndarray
+
+
+class Law(NamedTuple):
+    """Squares of what patterns of one robot differ by: noise + slope x distance^2."""
+
+    noise: np.ndarray
+    slope: np.ndarray
+
+    def expected(self, far: np.ndarray, least: float) -> np.ndarray:
+        """At squared distances ``(n,)``, no less than `least`: ``(n, O)``."""
+        return np.maximum(self.noise + self.slope * far[:, None], least)
 
 
 def contradicted(
@@ -22,14 +44,16 @@ def contradicted(
     config: WatchConfig,
     usual: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Old trials that the newest one contradicts.
+    """Old trials of another robot: the last that the newest contradicts, and before.
 
     Args:
         inputs, targets: all patterns, scaled, ``(N, I)`` and ``(N, O)``.
         trials: the trial each pattern is of, ``(N,)``.
         config: thresholds.
         usual: the yardstick, ``(O,)``, where trials are too short to be compared with
-            themselves; None = what the patterns of a trial differ by.
+            themselves: what SNNs usually err by; `targets` are their misses then,
+            which change little over a distance. None: what a trial's patterns differ
+            by among each other.
 
     Returns:
         Numbers of these trials, sorted.
@@ -38,57 +62,80 @@ def contradicted(
         return np.empty(0, dtype=np.int64)
     newest = trials == trials.max()
     new, told = inputs[newest], targets[newest]
-    if len(new) < 2:
-        return np.empty(0, dtype=np.int64)
-    own = _scatter(new, told, config) if usual is None else usual
-    if own is None:
-        return np.empty(0, dtype=np.int64)
-    found = []
-    for trial in np.unique(trials[~newest]):
-        seen, was = inputs[trials == trial], targets[trials == trial]
-        rows, apart = _differences(seen, was, new, told, config.forget_reach)
-        if len(rows) < config.forget_least:
+    own = within(new, told, config.forget_reach)
+    old = np.unique(trials[~newest])
+    for index in range(len(old))[::-1]:
+        seen, was = inputs[trials == old[index]], targets[trials == old[index]]
+        across = _across(seen, was, new, told, config.forget_reach)
+        if len(across.far) < config.forget_least:
             continue
-        its = _scatter(seen[rows], was[rows], config) if usual is None else None
-        least = own if its is None else np.minimum(own, its)
-        least = np.maximum(least, FLOOR)
-        if (_typical(apart) > config.forget_factor * least).any():
-            found.append(trial)
-    return np.array(found, dtype=np.int64)
+        if usual is None:
+            law = law_of([own, within(seen, was, config.forget_reach)], config)
+        else:
+            law = Law(usual**2, np.zeros_like(usual))
+        if law is not None and _differs(across, law, config):
+            return old[: index + 1]
+    return old[:0]
 
 
-def _scatter(
-    inputs: np.ndarray, targets: np.ndarray, config: WatchConfig
-) -> np.ndarray | None:
-    """What patterns of a trial differ by among each other, ``(O,)``; None: too few."""
-    reach = config.forget_reach
-    rows, apart = _differences(inputs, targets, inputs, targets, reach, itself=True)
-    return None if len(rows) < config.forget_least else _typical(apart)
+def _differs(across: Pairs, law: Law, config: WatchConfig) -> bool:
+    """Whether patterns of two trials differ by more than those of one robot do."""
+    least = (config.floor / config.forget_factor) ** 2
+    off = _smallest(across.apart / law.expected(across.far, least)).mean(0)
+    return bool((off > config.forget_factor**2).any())
 
 
-def _differences(
-    inputs: np.ndarray,
-    targets: np.ndarray,
-    new: np.ndarray,
-    told: np.ndarray,
-    reach: float,
-    *,
-    itself: bool = False,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Patterns with a near one in the newest trial, and how far their outputs are off.
+def law_of(trials: list[Pairs], config: WatchConfig) -> Law | None:
+    """One slope for all trials, and the least noise; None: too few pairs.
 
-    Returns:
-        indices ``(n,)``, absolute differences ``(n, O)``.
+    Args:
+        trials: what patterns of each trial differ by among each other.
+        config: its `forget_least` says how many pairs a trial needs to be heard.
     """
-    square = (inputs**2).sum(1)[:, None] + (new**2).sum(1) - 2 * inputs @ new.T
-    if itself:
-        np.fill_diagonal(square, np.inf)
-    near = square.argmin(1)
-    rows = np.flatnonzero(square[np.arange(len(inputs)), near] <= reach**2)
-    return rows, np.abs(targets[rows] - told[near[rows]])
+    told = [pairs for pairs in trials if len(pairs.far) >= config.forget_least]
+    if not told:
+        return None
+    apart = np.concatenate([pairs.apart for pairs in told])
+    far = np.concatenate([pairs.far for pairs in told])[:, None]
+    count = len(apart)
+    kept = apart <= np.partition(apart, _whole(count) - 1, axis=0)[_whole(count) - 1]
+    middle = (far * kept).sum(0) / kept.sum(0)
+    aside = (far - middle) * kept
+    slope = (aside * apart).sum(0) / np.maximum((aside**2).sum(0), 1e-12)
+    slope = np.maximum(slope, 0.0)
+    noises = [_smallest(p.apart - slope * p.far[:, None]).mean(0) for p in told]
+    return Law(np.maximum(np.min(noises, axis=0), 0.0), slope)
 
 
-def _typical(apart: np.ndarray) -> np.ndarray:
-    """RMS of differences, the largest tenth left out, ``(O,)``."""
-    kept = np.sort(apart, axis=0)[: max(1, int(np.ceil(0.9 * len(apart))))]
-    return np.sqrt(np.mean(kept**2, axis=0))
+def within(inputs: np.ndarray, targets: np.ndarray, reach: float) -> Pairs:
+    """All pairs of a trial's patterns that lie no further apart than `reach`."""
+    one, other = np.triu_indices(len(inputs), 1)
+    far = _squares(inputs, inputs)[one, other]
+    near = far <= reach**2
+    return Pairs(far[near], (targets[one[near]] - targets[other[near]]) ** 2)
+
+
+def _across(
+    seen: np.ndarray, was: np.ndarray, new: np.ndarray, told: np.ndarray, reach: float
+) -> Pairs:
+    """Each pattern of an old trial that has a near one in the newest, and that one."""
+    square = _squares(seen, new)
+    nearest = square.argmin(1)
+    far = square[np.arange(len(seen)), nearest]
+    near = far <= reach**2
+    return Pairs(far[near], (was[near] - told[nearest[near]]) ** 2)
+
+
+def _squares(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    square = (one**2).sum(1)[:, None] + (other**2).sum(1) - 2 * one @ other.T
+    return np.maximum(square, 0.0)
+
+
+def _smallest(values: np.ndarray) -> np.ndarray:
+    """`KEPT` of each column."""
+    count = _whole(len(values))
+    return np.partition(values, count - 1, axis=0)[:count]
+
+
+def _whole(count: int) -> int:
+    return max(1, int(np.ceil(KEPT * count)))

@@ -125,8 +125,9 @@ class WatchedLearner(Learner):
         joined = np.concatenate([self.marks[run], np.full(count, trial)])
         marks = joined[len(joined) - len(buffer.inputs[run]) :]
         if watch.forget and count and self.spread[run].any():
+            misses = self._said(run, buffer.inputs[run]).mean(0) - buffer.targets[run]
             gone = contradicted(
-                buffer.inputs[run], buffer.targets[run], marks, watch, self.spread[run]
+                buffer.inputs[run], misses, marks, watch, self.spread[run]
             )
             kept = ~np.isin(marks, gone)
             buffer.inputs[run] = buffer.inputs[run][kept]

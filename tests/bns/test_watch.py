@@ -191,11 +191,41 @@ class TestForgetting:
         targets[last[::5]] = -1.0
         assert contradicted(inputs, targets, trials, WATCH).tolist() == [0, 1, 2, 3, 4]
 
+    @pytest.mark.parametrize("same", [2, 5])
+    def test_what_is_older_than_a_change_goes_seen_again_or_not(self, same):
+        inputs, targets, trials = self.data(gain=0.2)
+        inputs[trials == 0] += 5.0
+        kept = trials >= same  # trials of the robot as it is now
+        targets[kept] = 0.2 * inputs[kept] @ np.array([[0.5], [0.3]])
+        got = contradicted(inputs, targets, trials, WATCH)
+        assert got.tolist() == list(range(same))
+
     def test_ground_that_was_not_seen_again_is_kept(self):
         inputs, targets, trials = self.data(gain=0.2)
-        far = trials == 1
-        inputs[far] += 5.0
-        assert contradicted(inputs, targets, trials, WATCH).tolist() == [0, 2, 3, 4]
+        inputs[trials < 5] += 5.0
+        assert len(contradicted(inputs, targets, trials, WATCH)) == 0
+
+    @pytest.mark.parametrize("seed", range(5))
+    def test_a_robot_that_settled_elsewhere_is_the_same(self, seed):
+        inputs, targets, trials = self.data(noise=0.0, seed=seed)
+        last = trials == trials.max()
+        inputs[last] = 0.3 + 0.01 * inputs[last]  # one command, nearly, for a trial
+        targets[last] = inputs[last] @ np.array([[0.5], [0.3]])
+        assert len(contradicted(inputs, targets, trials, WATCH)) == 0
+
+    def test_changes_below_the_floor_do_not_count(self):
+        inputs, _, trials = self.data()
+        changed = (trials == trials.max())[:, None].astype(float)
+        for size, gone in ((0.9, 0), (1.1, 5)):
+            targets = size * WATCH.floor * changed
+            assert len(contradicted(inputs, targets, trials, WATCH)) == gone
+
+    def test_misses_are_held_against_what_networks_err_by(self):
+        inputs, targets, trials = self.data(gain=0.2)
+        misses = targets - inputs @ np.array([[0.5], [0.3]])
+        got = contradicted(inputs, misses, trials, WATCH, np.array([0.02]))
+        assert got.tolist() == [0, 1, 2, 3, 4]
+        assert len(contradicted(inputs, misses, trials, WATCH, np.array([0.3]))) == 0
 
     @pytest.mark.parametrize("count", [0, 1])
     def test_too_little_to_judge(self, count):
