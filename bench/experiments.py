@@ -35,6 +35,7 @@ NEWER = (
     ("light", "renewed"),
     ("walk", "repeat"),
     ("walk", "repeat_after"),
+    ("watch", "forget_floor"),
 )
 """settings newer than some stored runs of their sections"""
 QUICK = {"replicates": 6, "trials": 12}
@@ -103,6 +104,8 @@ def known(config: RunConfig) -> dict[str, Any]:
     if not config.watch.detect:
         for name in ("floor", "grow", "reach", "near", "largest"):
             del settings["watch"][name]
+    if not config.watch.forget or config.learner == "walk":
+        settings["watch"]["forget_factor"] = 3.0  # does nothing; as stored runs have it
     return settings
 
 

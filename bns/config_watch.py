@@ -18,7 +18,7 @@ class WatchConfig:
     """trials before this one that an innovation is compared with"""
     floor: float = 0.03
     """an SNN is believed no better than this share of the largest motion or reading;
-    what a damage changes less is not looked for, and no reason to forget"""
+    what a damage changes less is not looked for"""
     grow: float = 0.3
     """by this share more for each unit of distance to the `near` nearest learned
     patterns (scaled inputs)"""
@@ -33,9 +33,11 @@ class WatchConfig:
     """drop all that came before a change of the robot: the last trial that the newest
     one contradicts, and those before it; for a walker the settings below do nothing
     (bns/walk/forgetting.py)"""
-    forget_factor: float = 3.0
+    forget_factor: float = 4.0
     """an old trial is contradicted when it differs from the newest one by so many
     times what either differs from itself (navigation: by which the SNNs err)"""
+    forget_floor: float = 0.02
+    """what differs by less of the largest motion or reading is no contradiction"""
     forget_reach: float = 0.2
     """patterns are compared where their scaled inputs lie no further apart"""
     forget_least: int = 8

@@ -32,9 +32,9 @@ class Law(NamedTuple):
     noise: np.ndarray
     slope: np.ndarray
 
-    def expected(self, far: np.ndarray, least: float) -> np.ndarray:
-        """At squared distances ``(n,)``, no less than `least`: ``(n, O)``."""
-        return np.maximum(self.noise + self.slope * far[:, None], least)
+    def expected(self, far: np.ndarray) -> np.ndarray:
+        """At squared distances ``(n,)``, of each output: ``(n, O)``."""
+        return self.noise + self.slope * far[:, None]
 
 
 def contradicted(
@@ -80,9 +80,9 @@ def contradicted(
 
 def _differs(across: Pairs, law: Law, config: WatchConfig) -> bool:
     """Whether patterns of two trials differ by more than those of one robot do."""
-    least = (config.floor / config.forget_factor) ** 2
-    off = _smallest(across.apart / law.expected(across.far, least)).mean(0)
-    return bool((off > config.forget_factor**2).any())
+    usual = config.forget_factor**2 * law.expected(across.far)
+    limit = np.maximum(usual, config.forget_floor**2)
+    return bool((_smallest(across.apart / limit).mean(0) > 1.0).any())
 
 
 def law_of(trials: list[Pairs], config: WatchConfig) -> Law | None:

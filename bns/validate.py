@@ -94,6 +94,7 @@ BOUNDS = {
     "watch.near": Bound(1, 1000, "patterns"),
     "watch.largest": Bound(1, 1000, "patterns"),
     "watch.forget_factor": Bound(0, 1000),
+    "watch.forget_floor": Bound(1e-6, 1),
     "watch.forget_reach": Bound(0, 100),
     "watch.forget_least": Bound(1, 100_000, "patterns"),
     "world.sample_dt": Bound(0.005, 10, "s"),

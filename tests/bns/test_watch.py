@@ -218,7 +218,7 @@ class TestForgetting:
         inputs, _, trials = self.data()
         changed = (trials == trials.max())[:, None].astype(float)
         for size, gone in ((0.9, 0), (1.1, 5)):
-            targets = size * WATCH.floor * changed
+            targets = size * WATCH.forget_floor * changed
             assert len(contradicted(inputs, targets, trials, WATCH)) == gone
 
     def test_misses_are_held_against_what_networks_err_by(self):
