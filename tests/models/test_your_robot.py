@@ -80,6 +80,8 @@ def test_what_is_wrong_is_said(mine, file, old, new, expected):
         ("quad.xml", 'geom name="left_front_foot"', 'geom name="left_front_toe"',
          "no geom called 'left_front_foot'"),
         ("quad.xml", 'contact name="own"', 'contact name="other"', "called 'own'"),
+        ("scene.xml", 'conaffinity="1"', 'conaffinity="2"', "not touch the floor"),
+        ("quad.xml", 'geom contype="1"', 'geom contype="0"', "without what only shows"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_with_a_walker_is_said(walker, file, old, new, expected):
