@@ -6,11 +6,11 @@ Where an assumption is off, a recording of the robot and the gap diagnosis tell.
 """
 
 import math
-import re
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from bns.errors import BnsError
+from bns.models.directory import make, named, short, text
 
 GRAVITY = 9.81  # [m/s2]
 FRICTION = 0.8  # rubber on a board; assumed
@@ -34,7 +34,6 @@ HEADINGS = {
 }
 """[deg] of light sensors, around the body; those of a Khepera III, assumed"""
 
-DIGITS = 5  # of what is computed
 FILES = {
     "{name}.xml": "wheeled.xml.jinja",
     "scene.xml": "wheeled_scene.xml.jinja",
@@ -102,31 +101,14 @@ def write(directory: Path, known: Wheeled) -> None:
     Raises:
         BnsError: a name that no model can have; something is there already.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    name = directory.name
-    if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
-        raise BnsError(
-            f"{name!r} cannot be a robot's name: give a directory whose name is made "
-            "of letters, digits and underscores."
-        )
-    if directory.exists():
-        raise BnsError(f"{directory} is there already: give another name.")
-    environment = Environment(
-        loader=PackageLoader("bns.models", "templates"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        keep_trailing_newline=True,
-    )
+    name = named(directory)
     content = {"name": name, **asdict(known), **_numbers(known), **_looks(known)}
     content["eyes"] = _eyes(known) if known.light_sensors else {}
-    try:
-        directory.mkdir(parents=True)
-        for file, template in FILES.items():
-            text = environment.get_template(template).render(content)
-            (directory / file.format(name=name)).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise BnsError(f"{directory} cannot be written: {error.strerror}.") from error
+    files = {
+        file.format(name=name): text(template, content)
+        for file, template in FILES.items()
+    }
+    make(directory, files)
 
 
 def _numbers(known: Wheeled) -> dict[str, float | list[float]]:
@@ -160,7 +142,7 @@ def _numbers(known: Wheeled) -> dict[str, float | list[float]]:
         "wheel_friction": FRICTION,
         "half_axle": known.axle_length / 2,
     }
-    return {name: _short(value) for name, value in made.items()} | exact
+    return {name: short(value) for name, value in made.items()} | exact
 
 
 def _eyes(known: Wheeled) -> dict[str, dict[str, list[float]]]:
@@ -171,7 +153,7 @@ def _eyes(known: Wheeled) -> dict[str, dict[str, list[float]]]:
         ahead = math.cos(math.radians(heading)), math.sin(math.radians(heading))
         way = min(length / 2 / abs(ahead[0]), width / 2 / abs(ahead[1]))
         place = [way * ahead[0], way * ahead[1], EYES * height]
-        found[name] = {"position": _short(place), "ahead": [*ahead, 0.0]}
+        found[name] = {"position": short(place), "ahead": [*ahead, 0.0]}
     return found
 
 
@@ -190,11 +172,4 @@ def _looks(known: Wheeled) -> dict[str, float | list[float]]:
         "extent": 2 * size,
         "camera": [2.8 * size, -2.3 * size, 1.6 * size],
     }
-    return {name: _short(value) for name, value in made.items()}
-
-
-def _short(value: float | list[float]) -> float | list[float]:
-    """Rounded to a few digits."""
-    if isinstance(value, list):
-        return [float(f"{each:.{DIGITS}g}") for each in value]
-    return float(f"{value:.{DIGITS}g}")
+    return {name: short(value) for name, value in made.items()}

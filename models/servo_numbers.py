@@ -17,8 +17,7 @@ LAW = "law.toml"
 
 
 @cache
-def _tables(directory: Path) -> dict[str, Mapping[str, Any]]:
-    file = directory / LAW
+def _tables(file: Path) -> dict[str, Mapping[str, Any]]:
     try:
         tables = tomllib.loads(file.read_text(encoding="utf-8"))
         bare = [
@@ -44,7 +43,16 @@ def law(directory: Path) -> dict[str, float]:
     Raises:
         FormatError: the file is not as it should be.
     """
-    return {name: float(table["value"]) for name, table in _tables(directory).items()}
+    return read(directory / LAW)
+
+
+def read(file: Path) -> dict[str, float]:
+    """The same of a file that may be called otherwise, and lie elsewhere.
+
+    Raises:
+        FormatError: the file is not as it should be.
+    """
+    return {name: float(table["value"]) for name, table in _tables(file).items()}
 
 
 def uncertain(directory: Path) -> dict[str, tuple[float, float]]:
@@ -55,6 +63,6 @@ def uncertain(directory: Path) -> dict[str, tuple[float, float]]:
     """
     return {
         name: (float(table["low"]), float(table["high"]))
-        for name, table in _tables(directory).items()
+        for name, table in _tables(directory / LAW).items()
         if "low" in table
     }

@@ -12,56 +12,19 @@ where there is none, the law of the AX-12A holds.
 """
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from bns.errors import BnsError
 from bns.models import ax12a, servo_numbers
+from bns.models.joint_numbers import joint_numbers
 from bns.models.robot_model import RobotModel
 from bns.models.servo_numbers import LAW
 from bns.worlds.servo_law import NUMBERS, Law, law
 
-STANCE_TORQUE = 0.38  # [N m] mean load of femur and tibia in the home stance
 REFUSED = ("stribeck", "current_limit", "backlash", "dead_zone", "mass", "lever")
 _STORED = (*NUMBERS, "powered")
-
-
-class JointNumbers(NamedTuple):
-    """What of a servo law a joint and its actuator hold.
-
-    Attributes:
-        stiffness: torque per error [N m/rad].
-        torque_limit: of the motor at rest [N m].
-        damping: back-EMF and viscous friction [N m s/rad].
-        friction: dry friction [N m].
-        armature: rotor and gears [kg m2].
-    """
-
-    stiffness: float
-    torque_limit: float
-    damping: float
-    friction: float
-    armature: float
-
-
-def joint_numbers(values: Mapping[str, Any], powered: float = 1.0) -> JointNumbers:
-    """A servo law as numbers of a joint.
-
-    Args:
-        values: every number of the law.
-        powered: share of the motor that is connected; 0 = an open bridge, which does
-            not brake either.
-    """
-    stall = values["torque_constant"] * values["voltage"] / values["resistance"]
-    brake = values["torque_constant"] ** 2 / values["resistance"]
-    return JointNumbers(
-        stiffness=float(powered * stall * values["gain"] * values["error_gain"]),
-        torque_limit=float(powered * stall * values["duty_limit"]),
-        damping=float(powered * brake + values["viscous"]),
-        friction=float(values["coulomb"] + values["load_friction"] * STANCE_TORQUE),
-        armature=float(values["armature"]),
-    )
 
 
 def fit(spec: Any, robot: RobotModel) -> None:
@@ -76,10 +39,23 @@ def fit(spec: Any, robot: RobotModel) -> None:
     """
     if robot.kind != "legged" or robot.servo != LAW:
         return
-    own = law(ax12a.law() | servo_numbers.law(robot.directory))
+    made = own(servo_numbers.law(robot.directory))
     spec.nuser_actuator = len(_STORED)
     for command in robot.commands:
-        write(spec, spec.actuator(command.actuator), own)
+        write(spec, spec.actuator(command.actuator), made)
+
+
+def own(numbers: Mapping[str, float]) -> Law:
+    """The law of a robot's own servos; what is not given is the AX-12A's.
+
+    Raises:
+        UnknownNameError: a number that is none of the law's.
+        OutOfBoundsError: one beyond its bounds.
+        BnsError: one that a joint can not represent.
+    """
+    made, usual = law(ax12a.law() | dict(numbers)), law(ax12a.law())
+    _represented(made, usual)
+    return made
 
 
 def read(actuator: Any) -> tuple[Law, float]:
@@ -99,12 +75,7 @@ def write(spec: Any, actuator: Any, values: Law, powered: float = 1.0) -> None:
         BnsError: a number that a joint can not represent differs from nominal.
     """
     before, _ = read(actuator)
-    for name in REFUSED:
-        if values[name] != before[name]:
-            raise BnsError(
-                f"A walking robot's servos can not represent {name!r} of the servo "
-                "law; take another effect (for play: loose_horn)."
-            )
+    _represented(values, before)
     made, joint = joint_numbers(values, powered), spec.joint(actuator.target)
     actuator.gainprm[0] = made.stiffness
     actuator.biasprm[1] = -made.stiffness
@@ -113,6 +84,15 @@ def write(spec: Any, actuator: Any, values: Law, powered: float = 1.0) -> None:
     joint.frictionloss = made.friction
     joint.armature = made.armature
     actuator.userdata = [*(float(values[name]) for name in NUMBERS), powered]
+
+
+def _represented(values: Law, before: Law) -> None:
+    for name in REFUSED:
+        if values[name] != before[name]:
+            raise BnsError(
+                f"A walking robot's servos can not represent {name!r} of the servo "
+                "law; take another effect (for play: loose_horn)."
+            )
 
 
 def laws(model: Any) -> dict[str, np.ndarray]:

@@ -1,0 +1,60 @@
+"""Directories of robots that are made of a few numbers: names, templates, files."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from bns.errors import BnsError
+
+DIGITS = 5  # of what is computed
+
+
+def named(directory: Path) -> str:
+    """The name that a robot gets from its directory, which is to be made.
+
+    Raises:
+        BnsError: a name that no model can have; something is there already.
+    """
+    if not re.fullmatch(r"[A-Za-z]\w*", directory.name, re.ASCII):
+        raise BnsError(
+            f"{directory.name!r} cannot be a robot's name: give a directory whose name "
+            "is made of letters, digits and underscores."
+        )
+    if directory.exists():
+        raise BnsError(f"{directory} is there already: give another name.")
+    return directory.name
+
+
+def text(template: str, content: Mapping[str, Any]) -> str:
+    """A template of `bns/models/templates` with its content put in."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("bns.models", "templates"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        keep_trailing_newline=True,
+    )
+    return environment.get_template(template).render(content)
+
+
+def make(directory: Path, files: Mapping[str, str]) -> None:
+    """Make the directory, with files of some text in it.
+
+    Raises:
+        BnsError: it cannot be written.
+    """
+    try:
+        directory.mkdir(parents=True)
+        for name, content in files.items():
+            (directory / name).write_text(content, encoding="utf-8")
+    except OSError as error:
+        raise BnsError(f"{directory} cannot be written: {error.strerror}.") from error
+
+
+def short(value: float | list[float]) -> float | list[float]:
+    """Rounded to a few digits."""
+    if isinstance(value, list):
+        return [float(f"{each:.{DIGITS}g}") for each in value]
+    return float(f"{value:.{DIGITS}g}")
