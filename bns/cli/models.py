@@ -9,15 +9,19 @@ import tyro
 
 from bns.cli.parse import dispatch
 from bns.errors import BnsError
+from bns.models import legged_files
 from bns.models.new import Wheeled, write
+from bns.models.new_legged import Legged
 
 MANUAL = """usage: bns models view ROBOT [--png FILE]
        bns models check ROBOT
        bns models new DIRECTORY --wheel-radius M --axle-length M --mass KG ...
+       bns models new-legged DIRECTORY --legs 4 --mass KG --body-length M ...
 
-  view   open a robot model in MuJoCo's viewer, or draw it to a file
-  check  see whether a robot's directory is what the worlds and the learner need
-  new    make the directory of a robot with two driven wheels from its numbers
+  view        open a robot model in MuJoCo's viewer, or draw it to a file
+  check       see whether a robot's directory is what the worlds and the learner need
+  new         make the directory of a robot with two driven wheels from its numbers
+  new-legged  make the directory of a robot that walks on four or six legs
 
 ROBOT is a name that `bns robots` lists, or a directory of your own that holds a
 robot.toml (docs/your_robot.md). `bns models VERB --help` is the manual of each."""
@@ -57,13 +61,30 @@ class New:
     robot: tyro.conf.OmitArgPrefixes[Wheeled]
 
 
+@dataclass(frozen=True, kw_only=True)
+class NewLegged:
+    """Make the directory of a robot that walks from a handful of its numbers: a box on
+    four or six legs of two or three servos each, that learns to walk, can be damaged
+    and is diagnosed at once. numbers.toml lists what was assumed.
+    """
+
+    directory: tyro.conf.Positional[str]
+    """to be made; its name is the robot's"""
+    robot: tyro.conf.OmitArgPrefixes[Legged]
+
+
 def main(verb: str, argv: list[str]) -> int:
     """Run a verb on robot models; gives the exit code.
 
     Raises:
         BnsError: what the user gave cannot be used.
     """
-    does = {"view": (View, view), "check": (Check, check), "new": (New, new)}
+    does = {
+        "view": (View, view),
+        "check": (Check, check),
+        "new": (New, new),
+        "new-legged": (NewLegged, new_legged),
+    }
     return dispatch(verb, argv, does, MANUAL)
 
 
@@ -107,14 +128,34 @@ def new(given: New) -> int:
     """
     place = given.directory
     write(Path(place), given.robot)
+    preset = "khepera-light" if given.robot.light_sensors else "khepera-simple"
+    return _told(place, f"{preset} --world.robot {place}", "a Khepera III")
+
+
+def new_legged(given: NewLegged) -> int:
+    """Write the directory, then check it; 2 if it is not what is needed.
+
+    Raises:
+        BnsError: numbers or a name that no robot can have; a directory that is there; a
+            robot that does not stand; servos that the world cannot have.
+        FormatError: a file of servos that is not as it should be.
+    """
+    from bns.worlds import servo_joint
+
+    place = given.directory
+    servo_joint.own(legged_files.law(given.robot))
+    legged_files.write(Path(place), given.robot)
+    run = f"hexapod-walk --world.robot {place} --damage leg_raised:legs=2@100"
+    return _told(place, run, "a PhantomX")
+
+
+def _told(place: str, run: str, usual: str) -> int:
+    """Check a robot that was made, and say what to do with it; 2 if it has faults."""
     code = check(Check(robot=place))
     print(f"{place} is made. What is assumed stands in {Path(place) / 'numbers.toml'}.")
     print(f"  bns models view {place} --png {Path(place).name}.png")
-    preset = "khepera-light" if given.robot.light_sensors else "khepera-simple"
-    print(f"  bns run {preset} --world.robot {place} --out runs/mine")
-    print(
-        "Presets are made for a Khepera III: docs/your_robot.md says what to look at."
-    )
+    print(f"  bns run {run} --out runs/mine")
+    print(f"Presets are made for {usual}: docs/your_robot.md says what to look at.")
     return code
 
 

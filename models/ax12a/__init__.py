@@ -15,6 +15,7 @@ UNIT = 2 * np.pi / UNITS_PER_TURN  # [rad]
 HALFWAY = 512  # [units] the middle of the goal register
 SPEED_UNIT = 0.111 * 2 * np.pi / 60  # [rad/s] of the moving speed register (e-manual)
 NO_LOAD_SPEED = 59 * 2 * np.pi / 60  # [rad/s] at 12 V (e-manual)
+MASS = 0.0546  # [kg] (e-manual)
 HOTTEST = 70.0  # [deg C] at which it shuts down (e-manual, address 11)
 
 _HERE = Path(__file__).parent

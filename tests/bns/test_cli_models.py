@@ -1,5 +1,6 @@
 """`bns models` as a user drives it."""
 
+import re
 import shutil
 
 import pytest
@@ -86,6 +87,39 @@ def test_what_no_robot_can_be_is_not_made(capsys, tmp_path, place, changed, expe
     code, text = said(capsys, "models", "new", tmp_path / place, *SIZES, *changed)
     assert code == 2 and expected in text and text.count("\n") == 1
     assert not any(tmp_path.iterdir())
+
+
+LEGS = ["--legs=4", "--mass=1.5", "--body-length=0.16", "--body-width=0.1",
+        "--coxa-length=0.05", "--femur-length=0.07", "--tibia-length=0.13"]  # fmt: skip
+
+
+def test_a_walker_is_made_of_its_numbers(capsys, tmp_path):
+    mine = tmp_path / "mine"
+    code, text = said(capsys, "models", "new-legged", mine, *LEGS)
+    assert code == 0 and "14 of 14 points hold." in text
+    told = re.search(r"bns (run hexapod-walk .*) --out", text)[1].split()
+    small = ("--trials=1", "--replicates=1", "--rerun=off", "--no-report")
+    code, text = said(capsys, *told, *small, "--out", tmp_path / "run")
+    assert code == 0
+
+
+@pytest.mark.parametrize(
+    "place, changed, expected",
+    [
+        ("my robot", (), "cannot be a robot's name"),
+        ("mine", ("--legs", "5"), "Give 4 or 6."),
+        ("mine", ("--mass", "9"), "too weak for this robot"),
+        ("mine", ("--servo", "ax12"), "neither ax12a nor a file"),
+        ("mine", ("--servo", "{law}"), "servo voltage = 100.0 V is not allowed"),
+    ],
+)
+def test_what_no_walker_can_be_is_not_made(capsys, tmp_path, place, changed, expected):
+    law = tmp_path / "law.toml"
+    law.write_text('[voltage]\nvalue=100\nunit="V"\nbasis="assumed"\nsource="test"\n')
+    words = [word.format(law=law) for word in changed]
+    code, text = said(capsys, "models", "new-legged", tmp_path / place, *LEGS, *words)
+    assert code == 2 and expected in text and text.count("\n") == 1
+    assert list(tmp_path.iterdir()) == [law]
 
 
 def test_without_a_display_it_says_what_to_do(capsys, monkeypatch):
