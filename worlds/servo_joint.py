@@ -37,12 +37,23 @@ def fit(spec: Any, robot: RobotModel) -> None:
         BnsError: a number that is none of the law's, beyond its bounds, or that a joint
             can not represent.
     """
-    if robot.kind != "legged" or robot.servo != LAW:
+    made = law_of(robot)
+    if made is None:
         return
-    made = own(servo_numbers.law(robot.directory))
     spec.nuser_actuator = len(_STORED)
     for command in robot.commands:
         write(spec, spec.actuator(command.actuator), made)
+
+
+def law_of(robot: RobotModel) -> Law | None:
+    """The law of a walking robot with servos of its own, see `own`; None: it has none.
+
+    Raises:
+        FormatError: its `law.toml` is not as it should be.
+    """
+    if robot.kind != "legged" or robot.servo != LAW:
+        return None
+    return own(servo_numbers.law(robot.directory))
 
 
 def own(numbers: Mapping[str, float]) -> Law:

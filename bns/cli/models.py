@@ -103,12 +103,16 @@ def check(given: Check) -> int:
 
     Raises:
         UnknownNameError: no such robot.
-        FormatError: its `robot.toml` cannot be read.
+        FormatError: its `robot.toml` or `law.toml` cannot be read.
+        BnsError: servos that the world cannot have.
     """
     from bns import models
     from bns.models import check as points
+    from bns.worlds import servo_joint
 
-    done = points.check(models.robot(given.robot))
+    robot = models.robot(given.robot)
+    servo_joint.law_of(robot)
+    done = points.check(robot)
     for point in done:
         print(f"  {'fault' if point.faults else 'ok   '}  {point.says}")
         for fault in point.faults:

@@ -122,6 +122,20 @@ def test_what_no_walker_can_be_is_not_made(capsys, tmp_path, place, changed, exp
     assert list(tmp_path.iterdir()) == [law]
 
 
+@pytest.mark.parametrize(
+    "table, expected", [("voltage", "servo voltage = 100.0 V"), ("volts", "'volts'")]
+)
+def test_servos_that_no_world_can_have_are_found(capsys, tmp_path, table, expected):
+    mine = tmp_path / "quad"
+    shutil.copytree(ROOT / "examples" / "quad", mine)
+    text = (mine / "robot.toml").read_text()
+    (mine / "robot.toml").write_text(text.replace('"ax12a"', '"law.toml"'))
+    law = f'[{table}]\nvalue=100\nunit="V"\nbasis="assumed"\nsource="test"\n'
+    (mine / "law.toml").write_text(law)
+    code, text = said(capsys, "models", "check", mine)
+    assert code == 2 and expected in text and text.count("\n") == 1
+
+
 def test_without_a_display_it_says_what_to_do(capsys, monkeypatch):
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
