@@ -11,6 +11,7 @@ BAR = "<= 1.05 on every damage"
 LIMIT = 1.05
 WINDOWS = (0, 150, 300, 600)
 RUNS = 30  # a side
+DRAWS = 4000  # of runs, to tell what chance alone does
 
 
 def run(quick: bool) -> Result:
@@ -19,7 +20,7 @@ def run(quick: bool) -> Result:
     wanted = [config for side in sides.values() for config in side.values()]
     records = forking.records(wanted, quick=quick)
     found: dict[str, dict[str, object]] = {}
-    worst = 0.0
+    worst, chance = 0.0, np.zeros(DRAWS)
     for damage, configs in sides.items():
         costs = {
             name: stats.observation_after(records[config.preset])
@@ -29,14 +30,45 @@ def run(quick: bool) -> Result:
         best = min((n for n in medians if n != "evidence"), key=medians.get)
         ratio = solving.ratio(costs["evidence"], costs[best])
         worst = max(worst, ratio["ratio"])
-        found[damage] = {**ratio, "best window": best, **medians}
+        windows = {name: cost for name, cost in costs.items() if name != "evidence"}
+        equal = _of_equals(windows, best)
+        chance = np.maximum(chance, equal)
+        found[damage] = {
+            **ratio,
+            "best window": best,
+            **medians,
+            "above by chance, if as good": round(float(np.mean(equal > LIMIT)), 3),
+        }
     return Result(
         figure=worst,
         unit="x",
         holds=None if quick else worst <= LIMIT,
         n=records[wanted[0].preset].replicates,
-        details=found,
+        details={
+            **found,
+            "all within, if as good": round(float(np.mean(chance <= LIMIT)), 3),
+        },
     )
+
+
+def _of_equals(windows: dict[str, np.ndarray], best: str) -> np.ndarray:
+    """Ratios of a rule whose costs are those of the best window, in drawn runs.
+
+    Args:
+        windows: costs with each window, ``(R,)``.
+        best: the one with the least median.
+
+    Returns:
+        ``(DRAWS,)``: median of R drawn runs over the least median of R drawn runs of
+        each window.
+    """
+    rng = np.random.default_rng(0)
+
+    def medians(costs: np.ndarray) -> np.ndarray:
+        return np.median(rng.choice(costs, (DRAWS, len(costs))), axis=1)
+
+    least = np.min([medians(costs) for costs in windows.values()], axis=0)
+    return medians(windows[best]) / least
 
 
 def _sides(damage: str):
