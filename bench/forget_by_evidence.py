@@ -27,11 +27,11 @@ def run(quick: bool) -> Result:
             for name, config in configs.items()
         }
         medians = {name: float(np.median(cost)) for name, cost in costs.items()}
-        best = min((n for n in medians if n != "evidence"), key=medians.get)
-        ratio = solving.ratio(costs["evidence"], costs[best])
+        evidence = costs.pop("evidence")  # what stays are the windows
+        best = min(costs, key=medians.get)
+        ratio = solving.ratio(evidence, costs[best])
         worst = max(worst, ratio["ratio"])
-        windows = {name: cost for name, cost in costs.items() if name != "evidence"}
-        equal = _of_equals(windows, best)
+        equal = _of_equals(costs, best)
         chance = np.maximum(chance, equal)
         found[damage] = {
             **ratio,

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bns.config_watch import WatchConfig
+from bns.patterns import PatternBuffer
 
 KEPT = 0.9  # share of differences that count, the smallest; assumed
 
@@ -35,6 +36,25 @@ class Law(NamedTuple):
     def expected(self, far: np.ndarray) -> np.ndarray:
         """At squared distances ``(n,)``, of each output: ``(n, O)``."""
         return self.noise + self.slope * far[:, None]
+
+
+def drop(
+    buffer: PatternBuffer, run: int, trials: np.ndarray, gone: np.ndarray
+) -> np.ndarray:
+    """Forget the patterns of a run's oldest trials.
+
+    Args:
+        buffer: has the patterns.
+        run: which.
+        trials: the trial each pattern of the run is of, ``(N,)``.
+        gone: the oldest of them, see `contradicted`.
+
+    Returns:
+        The trial each pattern that stays is of.
+    """
+    kept = trials[~np.isin(trials, gone)]
+    buffer.keep(run, len(kept))
+    return kept
 
 
 def contradicted(
@@ -62,17 +82,19 @@ def contradicted(
         return np.empty(0, dtype=np.int64)
     newest = trials == trials.max()
     new, told = inputs[newest], targets[newest]
-    own = within(new, told, config.forget_reach)
+    if usual is None:
+        own, known = _within(new, told, config.forget_reach), None
+    else:
+        own, known = None, Law(usual**2, np.zeros_like(usual))
     old = np.unique(trials[~newest])
     for index in range(len(old))[::-1]:
         seen, was = inputs[trials == old[index]], targets[trials == old[index]]
         across = _across(seen, was, new, told, config.forget_reach)
         if len(across.far) < config.forget_least:
             continue
-        if usual is None:
-            law = law_of([own, within(seen, was, config.forget_reach)], config)
-        else:
-            law = Law(usual**2, np.zeros_like(usual))
+        law = known
+        if law is None:
+            law = _law([own, _within(seen, was, config.forget_reach)], config)
         if law is not None and _differs(across, law, config):
             return old[: index + 1]
     return old[:0]
@@ -85,7 +107,7 @@ def _differs(across: Pairs, law: Law, config: WatchConfig) -> bool:
     return bool((_smallest(across.apart / limit).mean(0) > 1.0).any())
 
 
-def law_of(trials: list[Pairs], config: WatchConfig) -> Law | None:
+def _law(trials: list[Pairs], config: WatchConfig) -> Law | None:
     """One slope for all trials, and the least noise; None: too few pairs.
 
     Args:
@@ -97,8 +119,7 @@ def law_of(trials: list[Pairs], config: WatchConfig) -> Law | None:
         return None
     apart = np.concatenate([pairs.apart for pairs in told])
     far = np.concatenate([pairs.far for pairs in told])[:, None]
-    count = len(apart)
-    kept = apart <= np.partition(apart, _whole(count) - 1, axis=0)[_whole(count) - 1]
+    kept = apart <= _smallest(apart).max(0)
     middle = (far * kept).sum(0) / kept.sum(0)
     aside = (far - middle) * kept
     slope = (aside * apart).sum(0) / np.maximum((aside**2).sum(0), 1e-12)
@@ -107,7 +128,7 @@ def law_of(trials: list[Pairs], config: WatchConfig) -> Law | None:
     return Law(np.maximum(np.min(noises, axis=0), 0.0), slope)
 
 
-def within(inputs: np.ndarray, targets: np.ndarray, reach: float) -> Pairs:
+def _within(inputs: np.ndarray, targets: np.ndarray, reach: float) -> Pairs:
     """All pairs of a trial's patterns that lie no further apart than `reach`."""
     one, other = np.triu_indices(len(inputs), 1)
     far = _squares(inputs, inputs)[one, other]
@@ -133,9 +154,5 @@ def _squares(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 def _smallest(values: np.ndarray) -> np.ndarray:
     """`KEPT` of each column."""
-    count = _whole(len(values))
+    count = max(1, int(np.ceil(KEPT * len(values))))
     return np.partition(values, count - 1, axis=0)[:count]
-
-
-def _whole(count: int) -> int:
-    return max(1, int(np.ceil(KEPT * count)))

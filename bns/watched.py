@@ -8,7 +8,7 @@ from torch import Tensor
 
 from bns.config import RunConfig
 from bns.detection import Detector, Ground, Misses, innovation
-from bns.forgetting import contradicted
+from bns.forgetting import contradicted, drop
 from bns.learner import Learner
 from bns.snn.network import forward
 from bns.snn.scaling import AXLE
@@ -92,6 +92,11 @@ class WatchedLearner(Learner):
         said = ways(self._said(run, inputs[mild]) * output)
         return mild, said, said.mean(0) - ways(moved[mild] * output)
 
+    def _off(self, run: int) -> np.ndarray:
+        """How far the networks are off on what a run learned, scaled, ``(N, 3)``."""
+        buffer = self.buffer
+        return self._said(run, buffer.inputs[run]).mean(0) - buffer.targets[run]
+
     def _said(self, run: int, inputs: np.ndarray) -> np.ndarray:
         """Scaled outputs of each network with all of them, ``(G, N, 3)``."""
         seen = torch.from_numpy(inputs.T.astype(np.float32)).to(self.config.device)
@@ -106,7 +111,7 @@ class WatchedLearner(Learner):
             inputs = self.buffer.inputs[run]
             if len(inputs):
                 moved = self.buffer.targets[run]
-                self.spread[run] = _rms(self._said(run, inputs).mean(0) - moved)
+                self.spread[run] = _rms(self._off(run))
                 mild, _, far = self._missed(run, inputs, moved)
                 self.rolled[run] = _rms(far) if mild.any() else 1.0
         return row
@@ -125,14 +130,10 @@ class WatchedLearner(Learner):
         joined = np.concatenate([self.marks[run], np.full(count, trial)])
         marks = joined[len(joined) - len(buffer.inputs[run]) :]
         if watch.forget and count and self.spread[run].any():
-            misses = self._said(run, buffer.inputs[run]).mean(0) - buffer.targets[run]
             gone = contradicted(
-                buffer.inputs[run], misses, marks, watch, self.spread[run]
+                buffer.inputs[run], self._off(run), marks, watch, self.spread[run]
             )
-            kept = ~np.isin(marks, gone)
-            buffer.inputs[run] = buffer.inputs[run][kept]
-            buffer.targets[run] = buffer.targets[run][kept]
-            marks = marks[kept]
+            marks = drop(buffer, run, marks, gone)
             self._forgotten[run] = len(gone)
         self.marks[run] = marks
 

@@ -39,6 +39,16 @@ def text(template: str, content: Mapping[str, Any]) -> str:
     return environment.get_template(template).render(content)
 
 
+def texts(
+    name: str, templates: Mapping[str, str], content: Mapping[str, Any]
+) -> dict[str, str]:
+    """A robot's files by their names, of templates by those (`{name}`: the robot's)."""
+    return {
+        file.format(name=name): text(template, content)
+        for file, template in templates.items()
+    }
+
+
 def make(directory: Path, files: Mapping[str, str]) -> None:
     """Make the directory, with files of some text in it.
 

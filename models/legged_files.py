@@ -11,7 +11,7 @@ from typing import Any
 
 from bns.errors import BnsError
 from bns.models import ax12a, servo_numbers, stance
-from bns.models.directory import make, named, short, text
+from bns.models.directory import make, named, short, text, texts
 from bns.models.joint_numbers import joint_numbers
 from bns.models.legged_masses import masses
 from bns.models.legged_shapes import looks, pairs, shapes
@@ -72,10 +72,7 @@ def write(directory: Path, known: Legged) -> None:
         "servo": AX12A if known.servo == AX12A else servo_numbers.LAW,
     }
     content["home"] = _home(known, content)
-    files = {
-        file.format(name=name): text(template, content)
-        for file, template in FILES.items()
-    }
+    files = texts(name, FILES, content)
     if known.servo != AX12A:
         files[servo_numbers.LAW] = Path(known.servo).read_text(encoding="utf-8")
     make(directory, files)

@@ -5,6 +5,7 @@ A shin is its servo, at the knee, and a rod; a part before it a box; so is the b
 
 from typing import Any
 
+from bns.models import solids
 from bns.models.directory import short
 from bns.models.new_legged import Legged
 
@@ -30,22 +31,21 @@ def masses(known: Legged) -> dict[str, Any]:
     }
     body = known.mass - known.legs * sum(item["mass"] for item in made.values())
     size = known.body_length, known.body_width, known.height
-    around = [body / 12 * (sum(s * s for s in size) - side**2) for side in size]
-    return {"masses": made, "body_mass": short(body), "body_inertia": short(around)}
+    around = short(solids.box(body, size))
+    return {"masses": made, "body_mass": short(body), "body_inertia": around}
 
 
 def _part(known: Legged, part: str, share: float) -> dict[str, Any]:
     mass, length, thick = share * known.each_leg, known.lengths[part], known.thick
     if part != known.outer:
-        across = mass / 12 * (length**2 + thick**2)
         return {
             "mass": short(mass),
             "centre": short(length / 2),
-            "inertia": short([mass / 6 * thick**2, across, across]),
+            "inertia": short(solids.box(mass, (length, thick, thick))),
             "where": "half-way",
             "like": "of a box of that mass, as long and thick as the part",
         }
-    cube = SERVO * mass * thick**2 / 6
+    cube = solids.box(SERVO * mass, (thick, thick, thick))[0]
     apart = SERVO * (KNEE - CENTRE) ** 2 + (1 - SERVO) * (ROD - CENTRE) ** 2
     across = cube + mass * length**2 * (apart + (1 - SERVO) / 12)
     return {

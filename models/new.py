@@ -10,7 +10,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from bns.errors import BnsError
-from bns.models.directory import make, named, short, text
+from bns.models import solids
+from bns.models.directory import make, named, short, texts
 
 GRAVITY = 9.81  # [m/s2]
 FRICTION = 0.8  # rubber on a board; assumed
@@ -104,27 +105,19 @@ def write(directory: Path, known: Wheeled) -> None:
     name = named(directory)
     content = {"name": name, **asdict(known), **_numbers(known), **_looks(known)}
     content["eyes"] = _eyes(known) if known.light_sensors else {}
-    files = {
-        file.format(name=name): text(template, content)
-        for file, template in FILES.items()
-    }
-    make(directory, files)
+    make(directory, texts(name, FILES, content))
 
 
 def _numbers(known: Wheeled) -> dict[str, float | list[float]]:
     """What numbers.toml lists, beside what is known."""
-    length, width, height = known.box
+    length, _, height = known.box
     radius, wheel = known.wheel_radius, WHEEL * known.mass
     body, spin = known.mass - 2 * wheel, wheel * radius**2 / 2
     felt = known.mass / 2 * radius**2  # by one wheel, when the robot speeds up
     ball = BALL * radius
     made = {
         "body_mass": body,
-        "inertia": [
-            body / 12 * (width**2 + height**2),
-            body / 12 * (length**2 + height**2),
-            body / 12 * (length**2 + width**2),
-        ],
+        "inertia": solids.box(body, known.box),
         "centre_of_mass": [-BACK * length, 0.0, UP * height],
         "wheel_mass": wheel,
         "wheel_spin_inertia": spin,

@@ -6,7 +6,7 @@ from torch import Tensor
 
 from bns.config_watch import WatchConfig
 from bns.draws import Draws, whole_below
-from bns.forgetting import contradicted
+from bns.forgetting import contradicted, drop
 from bns.light.loops import LightLoops
 from bns.light.patterns import Patterns
 from bns.patterns import PatternBuffer
@@ -83,10 +83,7 @@ class Learned:
         """Drop the old trials that the newest one contradicts; how many there were."""
         buffer, trials = self.buffer, self.trials[run]
         gone = contradicted(buffer.inputs[run], buffer.targets[run], trials, config)
-        kept = ~np.isin(trials, gone)
-        buffer.inputs[run] = buffer.inputs[run][kept]
-        buffer.targets[run] = buffer.targets[run][kept]
-        self.trials[run] = trials[kept]
+        self.trials[run] = drop(buffer, run, trials, gone)
         return len(gone)
 
     def train(self, loops: LightLoops, which: np.ndarray) -> None:

@@ -89,6 +89,13 @@ def test_what_no_robot_can_be_is_not_made(capsys, tmp_path, place, changed, expe
     assert not any(tmp_path.iterdir())
 
 
+def law(file, table):
+    """Write servos' law of one number that is 100 V."""
+    rest = 'value = 100\nunit = "V"\nbasis = "assumed"\nsource = "a test"\n'
+    file.write_text(f"[{table}]\n{rest}")
+    return file
+
+
 LEGS = ["--legs=4", "--mass=1.5", "--body-length=0.16", "--body-width=0.1",
         "--coxa-length=0.05", "--femur-length=0.07", "--tibia-length=0.13"]  # fmt: skip
 
@@ -114,12 +121,11 @@ def test_a_walker_is_made_of_its_numbers(capsys, tmp_path):
     ],
 )
 def test_what_no_walker_can_be_is_not_made(capsys, tmp_path, place, changed, expected):
-    law = tmp_path / "law.toml"
-    law.write_text('[voltage]\nvalue=100\nunit="V"\nbasis="assumed"\nsource="test"\n')
-    words = [word.format(law=law) for word in changed]
+    file = law(tmp_path / "law.toml", "voltage")
+    words = [word.format(law=file) for word in changed]
     code, text = said(capsys, "models", "new-legged", tmp_path / place, *LEGS, *words)
     assert code == 2 and expected in text and text.count("\n") == 1
-    assert list(tmp_path.iterdir()) == [law]
+    assert list(tmp_path.iterdir()) == [file]
 
 
 @pytest.mark.parametrize(
@@ -130,8 +136,7 @@ def test_servos_that_no_world_can_have_are_found(capsys, tmp_path, table, expect
     shutil.copytree(ROOT / "examples" / "quad", mine)
     text = (mine / "robot.toml").read_text()
     (mine / "robot.toml").write_text(text.replace('"ax12a"', '"law.toml"'))
-    law = f'[{table}]\nvalue=100\nunit="V"\nbasis="assumed"\nsource="test"\n'
-    (mine / "law.toml").write_text(law)
+    law(mine / "law.toml", table)
     code, text = said(capsys, "models", "check", mine)
     assert code == 2 and expected in text and text.count("\n") == 1
 
