@@ -1,8 +1,8 @@
 """Adaptations triggered by what was detected, against told when damaged.
 
-Both sides have one seed: where all runs of a side raise their only alarm in the trial
-of the damage, the two are the same to the byte, and what is compared is what is found
-late, never or falsely. Any other alarm draws anew for all runs that follow it.
+Both sides have one seed, and what a reset draws moves no draw of other runs: a run
+whose only alarm is in the trial of the damage is the same to the byte on both sides.
+What is compared is what is found late, never or falsely.
 """
 
 from dataclasses import replace

@@ -5,10 +5,14 @@ torch's generator of that device is used. The record says which device ran.
 """
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import torch
 from torch import Tensor
+
+from bns import seeding
 
 
 class Draws:
@@ -20,12 +24,32 @@ class Draws:
     """
 
     def __init__(self, seed: int, device: str = "cpu"):
-        self.device = torch.device(device)
-        self._numpy = np.random.Generator(np.random.SFC64(seed))
+        self.device, self.seed = torch.device(device), seed
         self._torch: torch.Generator | None = None
+        self._begin(seed)
+
+    def _begin(self, seed: int) -> None:
+        self._numpy = np.random.Generator(np.random.SFC64(seed))
         if self.device.type != "cpu":
             self._torch = torch.Generator(device=self.device)
             self._torch.manual_seed(seed)
+
+    @contextmanager
+    def aside(self, *names: str | int) -> Iterator[None]:
+        """Draw from a stream of its own for a while; this one stays where it was.
+
+        What only some runs of a batch draw, at times of their own, then moves nothing
+        that the others draw, nor what the same run draws in a twin without it.
+
+        Args:
+            names: the other stream's identity under this one's seed.
+        """
+        before = self.state()
+        self._begin(seeding.integer(self.seed, *names))
+        try:
+            yield
+        finally:
+            self.restore(before)
 
     def uniform(self, *shape: int) -> Tensor:
         """Numbers uniform in [0, 1), float32."""

@@ -97,7 +97,8 @@ class Learner:
 
     def propose(self, trial: int) -> Proposal:
         """Adapt, evolve inside the SNN, and choose what to try in trial `trial`."""
-        self._reset(trial)
+        with self.draws.aside("resets", trial):
+            self._reset(trial)
         self.cost = self.inner.cost(self.theta, self.population)
         if trial >= self.config.evolve_from:
             self.population, self.cost = self.inner.evolve(

@@ -103,7 +103,8 @@ class LightLearner:
 
     def propose(self, trial: int) -> Proposal[Attempt]:
         """Adapt, evolve inside the SNNs, and choose what to try in trial `trial`."""
-        self._reset(trial)
+        with self.draws.aside("resets", trial):
+            self._reset(trial)
         cost = self.loops.cost_of(self.snns, self.population)
         if trial >= self.config.evolve_from:
             cost = self._settle(trial, cost)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bns import presets, store
+from bns.config import AdaptationConfig
 from bns.errors import UnknownNameError
 from bns.learners import registry
 from bns.run import train
@@ -46,6 +47,21 @@ class TestEveryLearner:
         assert set(read.extra) == set(first.extra)
         for array in read.extra:
             np.testing.assert_array_equal(read.extra[array], first.extra[array])
+
+    def test_what_a_run_resets_moves_no_draw_of_the_others(self, name):
+        config = replace(small(name), evolve_from=0)
+        resets = replace(config, adaptation=AdaptationConfig(restart=True))
+        told = {"replicates": [0, 1], "onsets": [0, 0]}
+        sound, mine = (
+            registry.get(name).make([config, side], **told) for side in (config, resets)
+        )
+        for trial in range(3):
+            sound.propose(trial)
+            mine.propose(trial)
+        one, other = (made.population.genes.numpy() for made in (sound, mine))
+        half = len(one) // 2
+        np.testing.assert_array_equal(one[:half], other[:half])
+        assert not np.array_equal(one[half:], other[half:])
 
 
 def test_unknown_learner_is_refused():
