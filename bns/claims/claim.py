@@ -1,13 +1,13 @@
 """Claims and their cells, read from the data files."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from bns.errors import UnknownNameError
+from bns.errors import BnsError
 
 INVESTIGATIONS = ("A", "B", "C", "D")
 KINDS = {
@@ -112,9 +112,31 @@ def find(name: str) -> Claim:
     """The claim called `name`, in capitals or not.
 
     Raises:
-        UnknownNameError: there is none.
+        BnsError: there is none.
     """
     known = claims()
     if name.upper() not in known:
-        raise UnknownNameError("claim", name, known)
+        last = {claim.investigation: claim.id for claim in known.values()}
+        ranges = ", ".join(f"{letter}1 to {name}" for letter, name in last.items())
+        raise BnsError(
+            f"Unknown claim {name!r}. Available: {ranges}; "
+            "a letter alone means all claims of that investigation."
+        )
     return known[name.upper()]
+
+
+def chosen(names: Iterable[str]) -> list[Claim]:
+    """The claims of some names, each once; of none, all.
+
+    Args:
+        names: of claims or of investigations, as in "A15" or "A", in capitals or not.
+
+    Raises:
+        BnsError: there is no such claim.
+    """
+    known = claims()
+    found: dict[str, Claim] = {}
+    for name in names:
+        whole = [c for c in known.values() if c.investigation == name.upper()]
+        found |= {claim.id: claim for claim in whole or [find(name)]}
+    return list((found or known).values())

@@ -14,6 +14,7 @@ MANUAL = """usage: bns claims {list,run,take,table} [...]
 
   list           all 157 claims: where, what is compared, what the dissertation says
   run ID ...     run what a claim needs and is missing, then say what it says
+  run C ...      the same for all claims of an investigation
   run --all      the same for every claim whose preset exists
   take DIR ...   use finished `bns run` directories below DIR
   table          holds / direction only / null / reversed, with effect sizes: by
@@ -42,7 +43,7 @@ class Run:
     """
 
     ids: tyro.conf.Positional[tuple[str, ...]] = ()
-    """claims, as in `bns claims run A15 C22`"""
+    """claims, as in `bns claims run A15 C22`, or investigations: A, B, C, D"""
     all: bool = False
     """every claim"""
     world: Literal["mujoco", "static-snn"] = "mujoco"
@@ -86,7 +87,7 @@ class Table:
     """
 
     ids: tyro.conf.Positional[tuple[str, ...]] = ()
-    """claims; none means all"""
+    """claims or investigations, as in `A15 C`; none means all"""
     world: Literal["mujoco", "static-snn"] = "mujoco"
     """which runs"""
     quick: bool = False
@@ -114,19 +115,14 @@ def main(verb: str, argv: list[str]) -> int:
     return dispatch(verb, argv, does, MANUAL)
 
 
-def _chosen(ids: tuple[str, ...]) -> list:
-    from bns.claims.claim import claims, find
-
-    return [find(name) for name in ids] or list(claims().values())
-
-
 def _list(given: List) -> int:
+    from bns.claims.claim import chosen
     from bns.claims.report import kind
 
-    chosen = _chosen(given.ids)
+    wanted = chosen(given.ids)
     head = ["id", "where", "kind", "the dissertation says", "comparisons"]
     rows = []
-    for claim in chosen:
+    for claim in wanted:
         compared = "; ".join(f"{c.text} (p {c.p})" for c in claim.cells)
         short = f"{len(claim.cells)}" if claim.cells else "not tested"
         full = compared or f"not tested: {claim.untested}"
@@ -139,6 +135,7 @@ def _list(given: List) -> int:
 def _run(given: Run) -> int:
     from bns.campaign.engines import registry
     from bns.claims import runner
+    from bns.claims.claim import chosen
     from bns.cli.run import STOPPED, until_interrupted
 
     if bool(given.ids) == given.all:
@@ -147,8 +144,8 @@ def _run(given: Run) -> int:
         )
     if not 0 <= given.runs <= 10_000:
         raise BnsError(f"--runs {given.runs} is not allowed: give 1 to 10000.")
-    chosen = _chosen(given.ids)
-    need = runner.needed(chosen, world=given.world, quick=given.quick, runs=given.runs)
+    wanted = chosen(given.ids)
+    need = runner.needed(wanted, world=given.world, quick=given.quick, runs=given.runs)
     for name, why in list(need.impossible.items())[: None if given.ids else 3]:
         print(f"{name} cannot run yet: {why}.")
     engine = registry.make(
@@ -156,7 +153,7 @@ def _run(given: Run) -> int:
     )
     with until_interrupted() as stop:
         sessions = runner.run(
-            chosen,
+            wanted,
             engine,
             world=given.world,
             quick=given.quick,
@@ -185,11 +182,12 @@ def _run(given: Run) -> int:
 
 def _take(given: Take) -> int:
     from bns.claims import runner
+    from bns.claims.claim import chosen
 
     if not given.folders:
         raise BnsError("Give folders of run directories, as in `bns claims take runs`.")
     taken = runner.take(
-        _chosen(()),
+        chosen(()),
         [Path(folder) for folder in given.folders],
         world=given.world,
         root=Path(given.root),
@@ -202,14 +200,15 @@ def _take(given: Take) -> int:
 
 def _table(given: Table) -> int:
     from bns.claims import report, runner
+    from bns.claims.claim import chosen
 
-    chosen = _chosen(given.ids)
+    wanted = chosen(given.ids)
     root = Path(given.root)
 
     def judged(world: str) -> list:
         place = runner.directory(world, quick=given.quick, root=root)
         return report.judged(
-            chosen, place, world=world, quick=given.quick, own=given.own
+            wanted, place, world=world, quick=given.quick, own=given.own
         )
 
     if given.write or given.publish:

@@ -93,6 +93,7 @@ def test_a_wrong_file_is_one_line(capsys, tiny, text, words):
         (["claims", "run"], "or --all"),
         (["claims", "run", "A15", "--all"], "or --all"),
         (["claims", "run", "A199"], "Unknown claim"),
+        (["claims", "table", "E"], "a letter alone"),
         (["claims", "run", "A15", "--runs", "-1"], "--runs"),
         (["claims", "take"], "folders"),
         (["claims", "take", "nowhere"], "no folder"),
@@ -143,6 +144,8 @@ def test_claims_are_listed_and_judged_without_runs(capsys, tiny):
     assert "p 0.05543" in " ".join(said(capsys, "claims", "list", "a15").split())
     text = said(capsys, "claims", "table", "A15", "B1")
     assert "published" in text and "not tested" in text
+    rows = json.loads(said(capsys, "claims", "list", "--json", "A3", "c", "A3"))
+    assert [row["id"] for row in rows] == ["A3"] + [f"C{n}" for n in range(1, 42)]
     assert "not run" in said(capsys, "claims", "table", "A15", "--own")
     said(capsys, "claims", "table", "--write", "claims.md", "--publish", "all.json")
     assert (tiny.parent / "claims.md").read_text().startswith("# Claims")
