@@ -4,9 +4,12 @@ All four once more with the preset `khepera-light-recover`, whose islands start 
 table 6.7 does not have these, so they judge no bar.
 """
 
+import numpy as np
+
 from bench import forking, light_runs, solving
 from bench.result import Result
 from bns import stats
+from bns.light.task import LightTask
 from bns.record import RunRecord
 
 DOC = "most trials to recover (median, over four damages) in light following, T6.7"
@@ -56,7 +59,28 @@ def _row(record: RunRecord) -> dict[str, object]:
         "solved trials, five before the damage": _share(solved[:, onset - 5 : onset]),
         "solved in the onset trial": _share(solved[:, onset]),
         "solved trials, last five": _share(solved[:, -5:]),
+        **_circling(record),
         **solving.waits(stats.trials_to_recover(record)),
+    }
+
+
+def _circling(record: RunRecord) -> dict[str, object]:
+    """Where robots are in the last five trials, and how fast they go round the lamp.
+
+    `circle_sweep` is what the slowest robot makes that has nothing wrong.
+    """
+    task = LightTask.of(record.config.light)
+    off, sweep = task.circling(record.poses[:, -5:, :, :2])
+    there = off <= record.config.light.circle_within
+    round_it = np.degrees(sweep[there])
+    ways = {"left": round_it[round_it > 0], "right": -round_it[round_it <= 0]}
+    return {"at the goal radius, last five": _share(there)} | {
+        f"with the lamp on the {side}": {
+            "trials": len(way),
+            "degrees round it (median)": round(float(np.median(way)), 1),
+        }
+        for side, way in ways.items()
+        if len(way)
     }
 
 

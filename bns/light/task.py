@@ -83,24 +83,35 @@ class LightTask:
 
         The dissertation judges by eye ("circling the light", figures 5.1 and 5.33).
         Read here: in the last `circle_cycles` cycles its distance from the goal radius
-        is `circle_within` on average, it gets `circle_sweep` round the lamp, and
-        nobody stopped or turned it.
+        is `circle_within` on average, it gets `circle_sweep` round the lamp, see
+        `circling`, and nobody stopped or turned it.
 
         Args:
             places: ``(K + 1, 2)`` [m].
             handled: cycles in which somebody did, ``(K,)``.
         """
-        config = self.config
-        last = min(config.circle_cycles, len(handled))
-        way = places[-last - 1 :] - np.asarray(self.lamp)
-        off = np.abs(np.hypot(*way.T) - config.goal)[1:].mean()
-        azimuth = np.unwrap(np.arctan2(way[:, 1], way[:, 0]))
-        sweep = abs(azimuth[-1] - azimuth[0])
+        config, (off, sweep) = self.config, self.circling(places)
         return bool(
             off <= config.circle_within
-            and sweep >= np.radians(config.circle_sweep)
-            and not handled[-last:].any()
+            and abs(sweep) >= np.radians(config.circle_sweep)
+            and not handled[-config.circle_cycles :].any()
         )
+
+    def circling(self, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How robots go round the lamp in the last `circle_cycles` cycles.
+
+        Args:
+            places: ``(..., K + 1, 2)`` [m].
+
+        Returns:
+            Mean distance from the goal radius [m], and how far round they get [rad],
+            positive with the lamp on their left; each ``(...)``.
+        """
+        last = places[..., -self.config.circle_cycles - 1 :, :]
+        off = np.abs(self.distances(last) - self.config.goal)[..., 1:].mean(-1)
+        ahead, left = np.moveaxis(last - np.asarray(self.lamp), -1, 0)
+        azimuth = np.unwrap(np.arctan2(left, ahead))
+        return off, azimuth[..., -1] - azimuth[..., 0]
 
     def start_pool(self) -> np.ndarray:
         """Places of the lamp in the frames of robots that start anywhere.

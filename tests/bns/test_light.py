@@ -120,6 +120,12 @@ class TestTask:
         assert TASK.solved(self.circle(), none)
         assert TASK.solved(self.circle()[::-1], none)
 
+    def test_circling_has_a_side(self):
+        both = np.stack([self.circle(radius=0.35), self.circle()[::-1]])
+        off, sweep = TASK.circling(both)
+        np.testing.assert_allclose(off, [0.05, 0.0], atol=1e-12)
+        np.testing.assert_allclose(sweep, [2.4 * np.pi, -2.4 * np.pi])
+
     def test_standing_far_circles_and_being_stopped_do_not(self):
         none = np.zeros(40, bool)
         assert not TASK.solved(np.tile([0.3, 0.0], (41, 1)), none)
