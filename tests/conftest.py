@@ -24,6 +24,18 @@ def root() -> Path:
     return ROOT
 
 
+@pytest.fixture(scope="session")
+def opengl() -> None:
+    """Skips where nothing can be drawn, as on a machine without OpenGL."""
+    from bns.errors import MissingDependencyError
+    from bns.models import arena, render
+
+    try:
+        render.picture(arena.spec(), camera="overhead", size=(16, 12))
+    except MissingDependencyError as error:
+        pytest.skip(str(error))
+
+
 @pytest.fixture
 def run_python(tmp_path):
     """Run Python in a process of its own, in an empty directory.

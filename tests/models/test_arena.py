@@ -53,16 +53,13 @@ def test_unknown_camera_is_refused():
 
 
 @pytest.fixture(scope="module")
-def pictures():
+def pictures(opengl):
     """Overhead pictures without and with objectives."""
     size = (150, 100)
-    try:
-        return [
-            render.picture(arena.spec(places), camera="overhead", size=size)
-            for places in ({}, PLACES)
-        ]
-    except MissingDependencyError as error:
-        pytest.skip(str(error))
+    return [
+        render.picture(arena.spec(places), camera="overhead", size=size)
+        for places in ({}, PLACES)
+    ]
 
 
 def test_objectives_are_seen_where_they_are(pictures):

@@ -27,7 +27,7 @@ def test_lamps_are_where_the_light_is(spec):
     assert model.geom("object_0").size[:2] == pytest.approx([0.05, 0.15])
 
 
-def test_bulbs_are_in_the_picture(spec):
+def test_bulbs_are_in_the_picture(spec, opengl):
     pixels = render.picture(spec, camera="overhead", size=(240, 160), shadows=False)
     yellow = (pixels[..., 0] > 200) & (pixels[..., 2] < 140)
     assert yellow.sum() >= 8
