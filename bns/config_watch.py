@@ -1,6 +1,6 @@
 """Settings of a learner that watches its data for a change of the robot."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,3 +42,17 @@ class WatchConfig:
     """patterns are compared where their scaled inputs lie no further apart"""
     forget_least: int = 8
     """patterns of an old trial that have to be comparable before it is judged"""
+
+    def idle(self, learner: str) -> set[str]:
+        """The settings that do nothing as `detect` and `forget` are.
+
+        Args:
+            learner: name of the learner.
+        """
+        names = {field.name for field in fields(self)} - {"detect", "forget"}
+        forgetting = {name for name in names if name.startswith("forget_")}
+        forgets = self.forget and learner != "walk"
+        detecting = names - forgetting
+        return (set() if forgets else forgetting) | (
+            set() if self.detect else detecting
+        )

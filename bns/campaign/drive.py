@@ -115,7 +115,8 @@ def replicates_done(store: CampaignStore, campaign: Campaign) -> dict[str, int]:
                 if changed:
                     raise BnsError(
                         f"{store.directory} was made with another default: {changed}. "
-                        "Set it in the campaign file, or give another --out."
+                        "Set it in the campaign file, or give another directory "
+                        "(--out, for claims --root)."
                     )
             found.setdefault(block.identity, []).append((block.start, block.count))
     return {identity: _reach(blocks) for identity, blocks in found.items()}

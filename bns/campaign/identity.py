@@ -1,10 +1,10 @@
 """What a configuration is, whatever it is called and wherever it stands in a file.
 
 The identity of a configuration is a digest of the settings in which it differs from
-the defaults. Replicates, seed, threads, device, the preset's name and the settings of
-other learners are no part of it. A setting that is added later therefore changes no
-identity; a default that is changed would leave them equal, so a store keeps whole
-configurations and refuses what does not match them.
+the defaults. Replicates, seed, threads, device, the preset's name, the settings of
+other learners and those of a watch that is not kept are no part of it. A setting that
+is added later therefore changes no identity; a default that is changed would leave
+them equal, so a store keeps whole configurations and refuses what does not match them.
 """
 
 import json
@@ -38,8 +38,9 @@ def foreign(config: RunConfig) -> list[str]:
 
 def _own(config: RunConfig) -> Iterator[tuple[str, Any]]:
     others = foreign(config)
+    idle = {f"watch.{name}" for name in config.watch.idle(config.learner)}
     for name, value in leaves(config):
-        if name.partition(".")[0] not in others:
+        if name.partition(".")[0] not in others and name not in idle:
             yield name, value
 
 

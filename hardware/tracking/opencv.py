@@ -20,6 +20,7 @@ def cv2() -> Any:
         ) from error
     if not hasattr(module, "aruco"):
         raise MissingDependencyError("tracking", "ArUco in OpenCV", INSTALL)
-    module.utils.logging.setLogLevel(module.utils.logging.LOG_LEVEL_SILENT)
+    logging = module if hasattr(module, "setLogLevel") else module.utils.logging
+    logging.setLogLevel(0)  # silent; OpenCV 4 has it at the top, 5 below
     module.setNumThreads(1)  # its threads would not share this one's precedence
     return module

