@@ -39,7 +39,7 @@ api: env
 
 env: $(STAMP)
 
-$(STAMP): pyproject.toml setup.py constraints.txt
+$(STAMP): pyproject.toml constraints.txt
 	@sh .ci/venv $(VENV) $(PYTHON)
 	@echo "Installing into $(VENV) (some minutes, once) ..."
 	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[dev]'

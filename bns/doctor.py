@@ -95,7 +95,7 @@ def pins(package: Callable[[str], str] = versions.package) -> list[Finding]:
                 "mujoco pin",
                 "bad",
                 "4.0.0: wrong accelerations with the sparse solver",
-                'pip install "mujoco[sysid]>=3.17,<4"',
+                'pip install "mujoco>=3.17,<4"',
             )
         )
     if mujoco.startswith("4.") and control:
@@ -104,7 +104,7 @@ def pins(package: Callable[[str], str] = versions.package) -> list[Finding]:
                 "dm-control pin",
                 "bad",
                 f"dm-control {control} does not work with mujoco {mujoco}",
-                'pip install "mujoco[sysid]>=3.17,<4"',
+                'pip install "mujoco>=3.17,<4"',
             )
         )
     return found or [Finding("known-bad versions", "ok", "none installed")]

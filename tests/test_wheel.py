@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.sources import ROOT, TREES
+from tests.sources import ROOT
 
 pytestmark = pytest.mark.skipif(
     not (find_spec("setuptools") and find_spec("pip")),
     reason="setuptools or pip is not installed",
 )
-BESIDE = ("pyproject.toml", "setup.py", "README.md", "LICENSE")
+BESIDE = ("pyproject.toml", "README.md", "LICENSE")
 NO_SOURCE = shutil.ignore_patterns("__pycache__", "*.pyc", ".*")
 
 USE = """
@@ -38,9 +38,7 @@ assert presets.names() and effects.names()
 def source(tmp_path_factory) -> Path:
     """A copy of what is packaged, so that the checkout stays clean."""
     copy = tmp_path_factory.mktemp("source")
-    for tree in TREES.values():
-        if (ROOT / tree).exists():
-            shutil.copytree(ROOT / tree, copy / tree, ignore=NO_SOURCE)
+    shutil.copytree(ROOT / "bns", copy / "bns", ignore=NO_SOURCE)
     for name in BESIDE:
         shutil.copy(ROOT / name, copy)
     return copy
@@ -58,11 +56,7 @@ def wheel(source, tmp_path_factory) -> Path:
 def test_the_wheel_holds_the_source_trees(source, wheel):
     names = zipfile.ZipFile(wheel).namelist()
     held = {name for name in names if not name.split("/")[0].endswith(".dist-info")}
-    wanted = set()
-    for root, tree in TREES.items():
-        if any((source / tree).glob("*.py")):
-            files = (p.relative_to(source / tree) for p in _files(source / tree))
-            wanted |= {f"{root.replace('.', '/')}/{p.as_posix()}" for p in files}
+    wanted = {p.relative_to(source).as_posix() for p in _files(source / "bns")}
     assert held - wanted == set(), "in the wheel alone"
     assert wanted - held == set(), "missing from the wheel: see package-data"
     assert {name.split("/")[0] for name in held} == {"bns"}
