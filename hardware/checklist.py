@@ -34,7 +34,7 @@ def report(rig: Rig, *, move: bool = False) -> Iterator[str]:
     yield f"proximity  {robot.proximity()}"
     yield f"ambient    {robot.ambient()}"
     yield from _tracking(rig)
-    yield "watchdog   running" if rig.leash else "watchdog   none (virtual time)"
+    yield "watchdog   running" if rig.watchdog else "watchdog   none (virtual time)"
     if move:
         yield from _motion(rig)
 

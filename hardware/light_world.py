@@ -103,7 +103,7 @@ class HardwareLight(HardwareWorld):
             try:
                 done = steering.perform(policy)
             except LinkError:
-                self._rig = None if rig.leash is not None else rig
+                self._rig = None if rig.watchdog is not None else rig
                 raise
             about = self._about(rig, volts, float(begin), stand, done)
             conditions = stages.conditions(trial, seed) | about | self._light()

@@ -9,7 +9,7 @@ from bns.hardware.errors import LinkError, Void
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera.driver import Drive, Khepera3
 from bns.hardware.limits import Limits, Operator
-from bns.hardware.lookout import Lookout
+from bns.hardware.safety_monitor import SafetyMonitor
 from bns.hardware.tracking.eyes import Eyes
 from bns.hardware.tracking.tracker import Sighting
 from bns.hardware.wheels import Following, Wheels
@@ -54,7 +54,7 @@ class Performed:
     notes: list[str] = field(default_factory=list)
 
 
-class Mover(Lookout):
+class Mover(SafetyMonitor):
     """Drives a robot under the limits.
 
     Args:
@@ -89,7 +89,7 @@ class Mover(Lookout):
         self._moving = False
 
     def look(self) -> list[Sighting]:
-        """New sightings, see `Lookout.look`; tells the watchdog that all is well."""
+        """New sightings, see `SafetyMonitor.look`; feeds the watchdog."""
         seen = self._seen(moving=self._moving)
         if self._moving and self.robot.guard is not None:
             self.robot.guard.feed(moving=True)

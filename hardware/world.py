@@ -76,7 +76,7 @@ class HardwareWorld(RealRobot[Rig]):
         try:
             done = mover.perform(points, given.duration)
         except LinkError:
-            self._rig = None if rig.leash is not None else rig
+            self._rig = None if rig.watchdog is not None else rig
             raise
         conditions = stages.conditions(trial, seed) | self._about(
             rig, volts, float(begin), stand, done

@@ -18,7 +18,7 @@ from bns.hardware.dynamixel.rest import Rest
 from bns.hardware.errors import LinkError, SafetyStop
 from bns.hardware.faults import FaultLog
 from bns.hardware.limits import Limits, Operator
-from bns.hardware.lookout import Lookout
+from bns.hardware.safety_monitor import SafetyMonitor
 from bns.hardware.tracking.eyes import Eyes
 from bns.hardware.tracking.tracker import Sighting
 from bns.models.ax12a import SPEED_UNIT
@@ -64,7 +64,7 @@ class Walked:
     unrested: bool = False
 
 
-class Walker(Lookout):
+class Walker(SafetyMonitor):
     """Moves a hexapod under the limits.
 
     Args:
@@ -102,7 +102,7 @@ class Walker(Lookout):
         self._rest = Rest()
 
     def look(self, done: Walked | None = None) -> list[Sighting]:
-        """New sightings, see `Lookout.look`."""
+        """New sightings, see `SafetyMonitor.look`."""
         seen = self._seen(moving=self.up)
         if seen:
             self._rest.pose(seen[-1].pose, self.clock.now())

@@ -8,7 +8,7 @@ from bns.hardware.clock import Clock
 from bns.hardware.errors import LinkError
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera import protocol
-from bns.hardware.khepera.strangers import stranger
+from bns.hardware.khepera.port_diagnosis import port_error
 from bns.hardware.line import Line
 from bns.models.khepera3.units import Firmware, firmware
 
@@ -99,7 +99,7 @@ class Khepera3:
         try:
             answer = self.ask(b"B\n", "b", heard=heard)
         except LinkError as error:
-            raise stranger(b"".join(heard)) from error
+            raise port_error(b"".join(heard)) from error
         self.version = (answer[0], answer[1])
         if not 1 <= self.version[0] <= NEWEST:
             raise BnsError(
@@ -117,7 +117,7 @@ class Khepera3:
         Args:
             command: the line, with its ending.
             letter: of the answer.
-            heard: collects every byte that came, for a look at a stranger.
+            heard: collects every byte that came, for a diagnosis of the port.
 
         Raises:
             LinkError: no proper answer in any of the tries, or the line is dead.

@@ -10,7 +10,7 @@ from bns.hardware.emulators.khepera_body import KheperaBody
 from bns.hardware.emulators.khepera_device import KheperaDevice
 from bns.hardware.emulators.pty_host import PtyHost
 from bns.hardware.errors import SafetyStop
-from bns.hardware.leash import Leash
+from bns.hardware.watchdog_client import WatchdogClient
 
 SLOW = 20.0  # s; a busy machine
 
@@ -53,42 +53,42 @@ def told_to_stand(device):
 def test_silence_stops_a_moving_robot_and_feeding_is_refused_then(robot):
     port, device, _ = robot
     fd = moving(port)
-    leash = Leash(fd, port, 115200, "khepera3", silence=0.2)
-    leash.feed(moving=True)
+    watchdog = WatchdogClient(fd, port, 115200, "khepera3", silence=0.2)
+    watchdog.feed(moving=True)
     assert told_to_stand(device)
     time.sleep(0.3)
     with pytest.raises(SafetyStop, match="watchdog fired"):
-        leash.feed(moving=True)
-    leash.forgive()
-    leash.feed(moving=False)
-    leash.release()
+        watchdog.feed(moving=True)
+    watchdog.forgive()
+    watchdog.feed(moving=False)
+    watchdog.release()
     os.close(fd)
 
 
 def test_the_end_of_the_driver_stops_it(robot):
     port, device, _ = robot
     fd = moving(port)
-    leash = Leash(fd, port, 115200, "khepera3")
-    leash.feed(moving=False)
-    leash._dog.stdin.close()  # as when the driving process is killed
+    watchdog = WatchdogClient(fd, port, 115200, "khepera3")
+    watchdog.feed(moving=False)
+    watchdog._dog.stdin.close()  # as when the driving process is killed
     assert told_to_stand(device)
-    assert leash._dog.wait(SLOW) == 0
-    leash._dog.stdout.close()
+    assert watchdog._dog.wait(SLOW) == 0
+    watchdog._dog.stdout.close()
     os.close(fd)
 
 
 def test_a_cable_that_comes_back_is_used_to_stop(robot):
     port, device, state = robot
     fd = moving(port)
-    leash = Leash(fd, port, 115200, "khepera3")
+    watchdog = WatchdogClient(fd, port, 115200, "khepera3")
     state["plugged"] = False
     while os.path.exists(port):
         time.sleep(0.01)
-    leash._dog.stdin.close()
+    watchdog._dog.stdin.close()
     time.sleep(0.3)
     assert device.log[-1][1:] == (9000, 9000)
     state["plugged"] = True
     assert told_to_stand(device)
-    leash._dog.wait(SLOW)
-    leash._dog.stdout.close()
+    watchdog._dog.wait(SLOW)
+    watchdog._dog.stdout.close()
     os.close(fd)

@@ -13,7 +13,7 @@ from bns.hardware.tracking.tracker import Sighting
 SIGHT = 3.0  # s to wait for the standing robot to be seen
 
 
-class Lookout(ABC):
+class SafetyMonitor(ABC):
     """Who moves a robot under the limits, as far as seeing it goes.
 
     Args:

@@ -15,7 +15,7 @@ START = 10.0  # s for the watchdog to be ready
 PATIENCE = 60.0  # s for which it goes on trying to stop a robot on a dead line
 
 
-class Leash:
+class WatchdogClient:
     """A watchdog process behind a robot; see `bns.hardware.watchdog`.
 
     Args:
