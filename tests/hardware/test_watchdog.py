@@ -9,7 +9,7 @@ import pytest
 from bns.hardware.emulators.khepera_body import KheperaBody
 from bns.hardware.emulators.khepera_device import KheperaDevice
 from bns.hardware.emulators.pty_host import PtyHost
-from bns.hardware.errors import SafetyStop
+from bns.hardware.errors import Void
 from bns.hardware.watchdog_client import WatchdogClient
 
 SLOW = 20.0  # s; a busy machine
@@ -57,9 +57,8 @@ def test_silence_stops_a_moving_robot_and_feeding_is_refused_then(robot):
     watchdog.feed(moving=True)
     assert told_to_stand(device)
     time.sleep(0.3)
-    with pytest.raises(SafetyStop, match="watchdog fired"):
+    with pytest.raises(Void, match="watchdog stopped"):
         watchdog.feed(moving=True)
-    watchdog.forgive()
     watchdog.feed(moving=False)
     watchdog.release()
     os.close(fd)
@@ -70,10 +69,9 @@ def test_the_end_of_the_driver_stops_it(robot):
     fd = moving(port)
     watchdog = WatchdogClient(fd, port, 115200, "khepera3")
     watchdog.feed(moving=False)
-    watchdog._dog.stdin.close()  # as when the driving process is killed
+    os.close(watchdog._writer)  # as when the driving process is killed
     assert told_to_stand(device)
-    assert watchdog._dog.wait(SLOW) == 0
-    watchdog._dog.stdout.close()
+    assert watchdog._process.wait(SLOW) == 0
     os.close(fd)
 
 
@@ -84,11 +82,10 @@ def test_a_cable_that_comes_back_is_used_to_stop(robot):
     state["plugged"] = False
     while os.path.exists(port):
         time.sleep(0.01)
-    watchdog._dog.stdin.close()
+    os.close(watchdog._writer)
     time.sleep(0.3)
     assert device.log[-1][1:] == (9000, 9000)
     state["plugged"] = True
     assert told_to_stand(device)
-    watchdog._dog.wait(SLOW)
-    watchdog._dog.stdout.close()
+    watchdog._process.wait(SLOW)
     os.close(fd)
