@@ -9,6 +9,7 @@ from bns.hardware.errors import LinkError, Void
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera.driver import Drive, Khepera3
 from bns.hardware.limits import Limits, Operator
+from bns.hardware.motion_check import MotionCheck
 from bns.hardware.safety_monitor import SafetyMonitor
 from bns.hardware.tracking.eyes import Eyes
 from bns.hardware.tracking.tracker import Sighting
@@ -87,10 +88,15 @@ class Mover(SafetyMonitor):
         self.robot, self.following = robot, following or Following()
         self.points: list[Drive] = []
         self._moving = False
+        self._check = MotionCheck()
 
     def look(self) -> list[Sighting]:
         """New sightings, see `SafetyMonitor.look`; feeds the watchdog."""
         seen = self._seen(moving=self._moving)
+        for sighting in seen:
+            stands = self._check.stands(sighting, self.following.shares)
+            if stands and self._moving:
+                self._unmoved()
         if self._moving and self.robot.guard is not None:
             self.robot.guard.feed(moving=True)
         return seen
@@ -103,9 +109,25 @@ class Mover(SafetyMonitor):
         """Set the speeds [m/s] and remember them."""
         self._moving = self._moving or bool(left or right)
         drive = self.robot.drive(left, right, times=times)
+        self._check.told(drive.at, left, right)
         self.points = self.points[-20:]
         self.points.append(drive)
         return drive
+
+    def _unmoved(self) -> None:
+        """Stop a robot that is seen to stand; where it does stand, let it try on.
+
+        Raises:
+            Void: its wheels turn, so that the picture does not show it as it is.
+        """
+        if self.robot.paused():
+            self.faults.note("seen to stand", "tag", "wheels turn")
+            raise Void("it drives and the picture does not change")
+        self.faults.note("stands", "told to move", str(self.points[-1].units))
+        units, robot = self.points[-1].units, self.robot
+        speeds = (robot.units.speed(float(u)) for u in units)
+        self.drive(*(v * f for v, f in zip(speeds, robot.wheels, strict=True)))
+        self._check.excuse()
 
     def halt(self) -> None:
         """Stop the robot, whatever happened; a dead line is left to the watchdog."""
@@ -117,6 +139,7 @@ class Mover(SafetyMonitor):
         finally:
             self._moving = False
             self.points.clear()
+            self._check.told(self.clock.now(), 0.0, 0.0)
 
     def perform(self, schedule: Sequence[Point], total: float) -> Performed:
         """Carry out a schedule and stop.
@@ -181,9 +204,12 @@ class Mover(SafetyMonitor):
                 done.sightings.append(sighting)
                 if ends(sighting):
                     return False
+            begin = self.clock.now()
             self._wheels.look(left)
-            left = moment - self.clock.now()
-            self.clock.sleep(min(TICK, max(left, 0.0)))
+            now = self.clock.now()
+            self.clock.sleep(
+                min(max(TICK - (now - begin), 0.0), max(moment - now, 0.0))
+            )
         return True
 
     def _inside(self, moment: float, done: Performed) -> bool:

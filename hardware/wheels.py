@@ -94,8 +94,9 @@ class Wheels:
         if now < self._next or left < ROOM or self.follow.lawless:
             return
         self._next = now + CHECK
-        first, second = self._off(), self._off()  # an answer may lose a digit as well
-        off = np.minimum(first, second)
+        off = self._off()
+        if off.any():  # an answer may have lost a digit
+            off = np.minimum(off, self._off())
         if off.any():
             self._wrong(off)
             return

@@ -3,10 +3,14 @@
 What is worked round of dynamixel-sdk 4.1: an exception inside a transaction leaves the
 port marked as in use, so that every later call fails; opening a missing port raises
 instead of saying no; only the first of several error bits is named; there is no bulk
-read on AX servos. It is not safe for several threads: neither is this.
+read on AX servos; a line that goes on talking is read without an end; time-outs are on
+the wall clock. It is not safe for several threads: neither is this.
 """
 
+import contextlib
+import os
 import select
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,15 +18,18 @@ from bns.errors import BnsError, MissingDependencyError
 from bns.hardware.clock import Clock
 from bns.hardware.dynamixel import packets
 from bns.hardware.dynamixel.joints import Joint
-from bns.hardware.errors import LinkError, SafetyStop
+from bns.hardware.errors import LinkError, SafetyStop, Void
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera.driver import Guard
-from bns.hardware.line import INSTALL, check_port
+from bns.hardware.line import INSTALL, check_port, claim
+from bns.hardware.stop_order import insist, phantomx
+from bns.hardware.watchdog import LARGEST, send
 from bns.worlds.legged_flags import OVERLOAD_TIME, SATURATED, STALLED
 
 TRIES = 4
 HOT, EMPTY = 65, 9.9  # C, V: beyond it the robot rests
 SLOWEST = STALLED / packets.SPEED_UNIT  # units; slower, a servo stands still
+STOPPING = 0.5  # s for a servo to acknowledge a stop
 LATENCY = 0.02  # s allowed for an answer beside its bytes
 
 
@@ -138,7 +145,21 @@ class Bus:
             if result == 0:
                 return bool(value)
             self.faults.note("no answer", str(servo))
+            if self.guard is not None and self._on:
+                self.guard.feed(moving=True)
         raise LinkError(f"Servo {servo} gives no proper answer in {TRIES} tries.")
+
+    def powered(self, count: int = 1) -> None:
+        """See that the next few servos still hold.
+
+        Raises:
+            Void: one does not: it was reset, or had no power for a moment.
+            LinkError: no proper answer.
+        """
+        for shift in range(count):
+            joint = self.joints[(self._next + shift) % len(self.joints)]
+            if not self.holds(joint.id):
+                raise Void(f"{joint.name} has lost its torque")
 
     def look(self, count: int = 2) -> list[tuple[Joint, packets.State]]:
         """Read the next few servos in turn and see that they are well.
@@ -204,18 +225,65 @@ class Bus:
         """The lowest voltage that a servo reads [V]."""
         return min(self.read(joint.id).voltage for joint in self.joints)
 
-    def torque(self, on: bool) -> None:
-        """Switch the torque of all servos; off is sent three times."""
-        self._on = on
-        for _ in range(1 if on else 3):
-            self._call("write1ByteTxOnly", packets.BROADCAST, packets.TORQUE, int(on))
-        if not on and self.guard is not None:
-            self.guard.feed(moving=False)
+    def power(self) -> None:
+        """Switch the torque of all servos on."""
+        self._on = True
+        self._call("write1ByteTxOnly", packets.BROADCAST, packets.TORQUE, 1)
+
+    def stop(self) -> None:
+        """Order the torque of all servos off, then see that it is.
+
+        The order is written before anything else is done, and nothing that fails
+        keeps it from being written again. A robot that does not confirm it is left to
+        the watchdog, which goes on.
+
+        Raises:
+            LinkError: the servo that is asked does not confirm it.
+        """
+        import termios
+
+        order = phantomx(self.joints[0].id)
+        try:
+            confirmed = insist(
+                order,
+                lambda data: send(self.fileno(), data),
+                self._heard,
+                self.clock.now,
+                patience=STOPPING,
+                meanwhile=self._calm,
+            )
+        except (OSError, termios.error, TypeError, ValueError) as error:  # closed
+            raise LinkError(f"The bus is dead ({error}): check it.") from error
+        if not confirmed:
+            raise LinkError(
+                "The servos do not confirm that their torque is off: check the bus; "
+                "the watchdog goes on trying."
+            )
+        self._on = False
+        self._calm()
+
+    def _heard(self, seconds: float) -> bytes:
+        """What has arrived within some time."""
+        if not select.select([self.fileno()], [], [], seconds)[0]:
+            return b""
+        try:
+            data = os.read(self.fileno(), LARGEST)
+        except BlockingIOError:  # the watchdog has read it
+            return b""
+        if not data:
+            raise OSError("the line is dead")
+        return data
+
+    def _calm(self) -> None:
+        """Feed the guard; whatever it says, the robot is being stopped already."""
+        if self.guard is not None:
+            with contextlib.suppress(SafetyStop, Void):
+                self.guard.feed(moving=self._on)
 
     def close(self) -> None:
         """Torque off, port given back."""
         try:
-            self.torque(False)
+            self.stop()
         finally:
             self.release()
 
@@ -260,7 +328,12 @@ def _port(sdk: Any, name: str, latency: float) -> Any:
             self.packet_start_time = self.getCurrentTime()
             self.packet_timeout = self.tx_time_per_byte * packet_length + latency * 1e3
 
+        def getCurrentTime(self) -> float:
+            return time.monotonic() * 1e3
+
         def readPort(self, length: int) -> bytes:
+            if self.isPacketTimeout():  # the SDK looks for it in a silent moment only
+                return b""
             # the SDK asks without a pause: one core busy, nobody else's turn
             select.select([self.ser.fileno()], [], [], 0.0005)
             return super().readPort(length)
@@ -269,6 +342,8 @@ def _port(sdk: Any, name: str, latency: float) -> Any:
     try:
         good = port.openPort() and port.setBaudRate(packets.BAUD)
         port.ser.exclusive = True
+        port.ser.write_timeout = 0.05
+        claim(port.ser.fileno())
     except (OSError, ValueError) as error:
         raise BnsError(
             f"Port {name} cannot be opened ({error}): end other programs on it, check "

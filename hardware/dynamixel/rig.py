@@ -1,5 +1,6 @@
 """A hexapod, a camera and a watchdog, connected and checked; nothing moves for that."""
 
+import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,6 +9,7 @@ from bns.hardware.clock import Clock, RealClock
 from bns.hardware.dynamixel import joints, packets
 from bns.hardware.dynamixel.bus import EMPTY, Bus
 from bns.hardware.dynamixel.walker import Walker
+from bns.hardware.errors import LinkError
 from bns.hardware.faults import FaultLog
 from bns.hardware.limits import Limits, Operator
 from bns.hardware.line import check_port
@@ -42,9 +44,10 @@ class HexapodRig:
     walker: Walker
 
     def close(self) -> None:
-        """Torque off; give port and camera back."""
+        """Torque off; give port and camera back; a dead line is the watchdog's."""
         try:
-            self.bus.close()
+            with contextlib.suppress(LinkError):
+                self.bus.close()
         finally:
             self.eyes.close()
             self.watchdog.release()
@@ -85,7 +88,13 @@ def connect(
         charged(bus)
         eyes = look(port, camera, calibration, "phantomx")
         try:
-            watchdog = WatchdogClient(bus.fileno(), port, packets.BAUD, "phantomx")
+            watchdog = WatchdogClient(
+                bus.fileno(),
+                port,
+                packets.BAUD,
+                "phantomx",
+                servo=table[0].id,
+            )
         except BnsError:
             eyes.close()
             raise

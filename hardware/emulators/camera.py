@@ -40,7 +40,7 @@ class PoseServer:
         body: LiveBody,
         port: Path | str,
         *,
-        rate: float = 15.0,
+        rate: float = 30.0,
         latency: float = 0.03,
     ):
         self.body, self.rate, self.latency = body, rate, latency

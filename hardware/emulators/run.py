@@ -29,7 +29,7 @@ def khepera3(
     battery: float = 7.9,
     lost: float = 0.0,
     corrupted: float = 0.0,
-    rate: float = 15.0,
+    rate: float = 30.0,
     seed: int = 0,
     log: str = "",
     baud: int = protocol.BAUD,

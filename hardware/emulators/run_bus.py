@@ -30,7 +30,7 @@ def phantomx(
     upset: float = 0.0,
     seed: int = 0,
     battery: float = 11.1,
-    rate: float = 15.0,
+    rate: float = 30.0,
     log: str = "",
     baud: int = packets.BAUD,
     stop: Callable[[], bool] | None = None,

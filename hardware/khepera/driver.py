@@ -23,6 +23,7 @@ SLICE = 0.03  # s between two looks after the watchdog while an answer is waited
 SILENT = 0.12  # s without a byte, after which a moving robot is stopped
 UNANSWERED = 0.3  # s without a proper answer, after which a moving robot is stopped
 BABBLE = 512  # bytes that are no answer, after which a moving robot is stopped
+TURNING = 1000  # speed units of a wheel that turned until a moment ago
 STOPPING = 1.0  # s for the robot to acknowledge a stop
 
 
@@ -207,6 +208,11 @@ class Khepera3:
             self._stopping = False
         self._moving = False
         self._calm()
+
+    def paused(self) -> bool:
+        """Order a stop and see whether the wheels have turned until then."""
+        self.ask(protocol.STOP, "d")
+        return max(map(abs, self.speeds())) > TURNING
 
     def _ordered(self) -> bool:
         """Write the order until the robot acknowledges it; whether it does."""

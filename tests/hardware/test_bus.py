@@ -56,7 +56,7 @@ def test_goals_reach_all_servos_and_states_come_back(served):
     port, bank = served()
     bus = opened(port, guard=Watching())
     bus.identify()
-    bus.torque(True)
+    bus.power()
     bus.write({joint.name: 0.2 for joint in bus.joints})
     RealClock().sleep(0.5)
     for joint in bus.joints:
