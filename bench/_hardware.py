@@ -1,14 +1,42 @@
 """What the benches of the hardware mode share."""
 
 import contextlib
+import json
 import os
 import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+
+from bench.runner import write
+from bench.versions import commit
+
+
+KEPT = Path("runs") / "bench"  # where parts of long benches are kept
+
+
+def resumed(name: str, key: str = "") -> Callable[[str, Callable[[], dict]], dict]:
+    """What measures a part of a long bench, or reads it where it was measured.
+
+    Args:
+        name: of the bench.
+        key: parts measured under another key are not taken; empty = the commit.
+    """
+    folder = KEPT / name / (key or commit())
+
+    def part(label: str, measure: Callable[[], dict]) -> dict:
+        path = folder / f"{label}.json"
+        if path.exists():
+            return json.loads(path.read_text())
+        row = measure()
+        folder.mkdir(parents=True, exist_ok=True)
+        write(path, json.dumps(row))
+        return row
+
+    return part
 
 
 @contextlib.contextmanager
