@@ -131,6 +131,7 @@ class Mover(SafetyMonitor):
 
     def halt(self) -> None:
         """Stop the robot, whatever happened; a dead line is left to the watchdog."""
+        self._check.told(self.clock.now(), 0.0, 0.0)  # from then on it need not move
         try:
             self.robot.stop()
         except LinkError:
@@ -139,7 +140,6 @@ class Mover(SafetyMonitor):
         finally:
             self._moving = False
             self.points.clear()
-            self._check.told(self.clock.now(), 0.0, 0.0)
 
     def perform(self, schedule: Sequence[Point], total: float) -> Performed:
         """Carry out a schedule and stop.
