@@ -14,7 +14,6 @@ from pathlib import Path
 from bench.runner import write
 from bench.versions import commit
 
-
 KEPT = Path("runs") / "bench"  # where parts of long benches are kept
 
 

@@ -33,7 +33,7 @@ class Limits:
     speed: float = 0.15
     arena: tuple[float, float] = (2.7, 1.8)
     rim: float = 0.10
-    blind: float = 0.16
+    blind: float = 0.15
     battery: float = 7.0
     lamps: tuple[tuple[float, float], ...] = ()
     lamp: float = 0.08

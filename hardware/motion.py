@@ -15,7 +15,7 @@ from bns.hardware.tracking.eyes import Eyes
 from bns.hardware.tracking.tracker import Sighting
 from bns.hardware.wheels import Following, Wheels
 
-TICK = 0.03  # s between two looks at everything
+TICK = 0.02  # s between two looks at everything
 ASTRAY = 0.018  # m that a wrong or mistimed set point may lead a wheel astray
 LATE = 0.25  # s by which a command may be late before the trial is void
 AFTER = 0.25  # s of looking on after the last command

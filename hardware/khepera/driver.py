@@ -22,7 +22,7 @@ QUIET = 0.02  # s without a byte after which the line counts as silent
 SLICE = 0.03  # s between two looks after the watchdog while an answer is waited for
 SILENT = 0.12  # s without a byte, after which a moving robot is stopped
 UNANSWERED = 0.3  # s without a proper answer, after which a moving robot is stopped
-BABBLE = 512  # bytes that are no answer, after which a moving robot is stopped
+BABBLE = 256  # bytes that are no answer, after which a moving robot is stopped
 TURNING = 1000  # speed units of a wheel that turned until a moment ago
 STOPPING = 1.0  # s for the robot to acknowledge a stop
 
