@@ -1,6 +1,7 @@
 """What the benches of the hardware mode share."""
 
 import contextlib
+import hashlib
 import json
 import os
 import signal
@@ -12,19 +13,19 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from bench.runner import write
-from bench.versions import commit
 
 KEPT = Path("runs") / "bench"  # where parts of long benches are kept
 
 
-def resumed(name: str, key: str = "") -> Callable[[str, Callable[[], dict]], dict]:
+def resumed(name: str) -> Callable[[str, Callable[[], dict]], dict]:
     """What measures a part of a long bench, or reads it where it was measured.
 
     Args:
         name: of the bench.
-        key: parts measured under another key are not taken; empty = the commit.
+
+    Parts that were measured with other code are not taken.
     """
-    folder = KEPT / name / (key or commit())
+    folder = KEPT / name / _code()
 
     def part(label: str, measure: Callable[[], dict]) -> dict:
         path = folder / f"{label}.json"
@@ -36,6 +37,13 @@ def resumed(name: str, key: str = "") -> Callable[[str, Callable[[], dict]], dic
         return row
 
     return part
+
+
+def _code() -> str:
+    """What the code of robots and of their benches is, in a few letters."""
+    files = [*Path("hardware").rglob("*.py"), *Path("bench").glob("*.py")]
+    texts = (path.read_bytes() for path in sorted(files))
+    return hashlib.sha256(b"".join(texts)).hexdigest()[:12]
 
 
 @contextlib.contextmanager

@@ -100,9 +100,12 @@ def _power(scene: Scene) -> float:
 
 def _flood_and(number: int) -> Callable[[Scene], float]:
     def happen(scene: Scene) -> float:
-        scene.mishap("flood")
+        begin = scene.mishap("flood")
         time.sleep(0.01)
-        return scene.signal(number)
+        at = scene.signal(number)
+        time.sleep(0.02)
+        stopped = scene.log.first("stop", begin)
+        return begin if stopped is not None and stopped < at else at
 
     return happen
 
@@ -111,7 +114,7 @@ def _opened(scene: Scene) -> float:
     """Somebody else reads the port; if the driver bears it, it hangs later."""
     at = time.monotonic()
     number = os.open(scene.port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    until = at + 2.0
+    until = at + 1.0
 
     def steal() -> None:
         while time.monotonic() < until:

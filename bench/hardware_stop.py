@@ -24,6 +24,7 @@ RAMP = (
 NEVER = 1e3  # s, where it does not stop at all
 REPEATS = 10
 SPARE = 3  # drives of a way that may end before anything happened
+SINKS, LASTS = 0.3, 0.1  # s until a hexapod sinks, s that rest lasts
 WATCHED = 3.0  # s for which a robot is watched after the event
 
 
@@ -140,7 +141,8 @@ def _once(
 
 def _over(log: Log, at: float) -> bool:
     order = log.first("stop", at)
-    return order is not None and _stood(log, order) is not None
+    settled = order is not None and time.monotonic() > order + SINKS + LASTS
+    return settled and _stood(log, order) is not None
 
 
 def _times(log: Log, at: float) -> dict[str, float]:
@@ -155,10 +157,21 @@ def _times(log: Log, at: float) -> dict[str, float]:
 
 
 def _stood(log: Log, order: float) -> float | None:
-    """When the robot stands after an order [s]; the order's time where it stood."""
-    if log.newest("stands", 0.0, order).get("stands", True):
+    """When the robot has come to rest after an order [s]; None: not yet.
+
+    A hexapod that stands when its torque goes sinks a moment later.
+    """
+    rows = [(row["at"], row["stands"]) for row in log.rows() if "stands" in row]
+    state = next((stands for at, stands in reversed(rows) if at <= order), True)
+    later = [row for row in rows if row[0] > order]
+    if state and not any(at < order + SINKS for at, stands in later if not stands):
         return order
-    return log.first("stands", order)
+    for (at, stands), (end, _) in zip(
+        later, [*later[1:], (NEVER**2, False)], strict=True
+    ):
+        if stands and end - at > LASTS:
+            return at
+    return None
 
 
 @contextlib.contextmanager

@@ -75,7 +75,7 @@ class HardwareHexapod(RealRobot[HexapodRig]):
             self.camera,
             calibration=self.calibration,
             servos=self.servos,
-            limits=Limits(arena=self.arena),
+            limits=Limits(arena=(self.arena[0], self.arena[1])),
             log=self.log or None,
         )
 
@@ -90,7 +90,7 @@ class HardwareHexapod(RealRobot[HexapodRig]):
                 volts = rigs.charged(rig.bus) if not walker.up else _lowest(rig)
                 stand = home.go(walker, self.start)
                 walker.go(before, 2.0)
-                done = walker.perform(goals, given.durations)
+                done = walker.perform(goals, given.durations.tolist())
                 walker.rest()
                 failed.pop_all()
         except Overload as error:  # on the way home; in a trial it ends the trial

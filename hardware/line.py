@@ -87,7 +87,7 @@ class SerialLine:
         """Send at once, see `Line.order`."""
         try:
             send(self._serial.fileno(), data)
-        except (*_errors(), TypeError, ValueError) as error:  # closed: no number
+        except _errors() as error:
             raise self._dead(error) from error
 
     def read(self, timeout: float) -> bytes:
@@ -192,4 +192,4 @@ def _pyserial() -> Any:
 def _errors() -> tuple[type[BaseException], ...]:
     import termios
 
-    return (OSError, termios.error)
+    return (OSError, termios.error, TypeError, ValueError)  # the last: closed

@@ -125,7 +125,7 @@ class Mover(SafetyMonitor):
             raise Void("it drives and the picture does not change")
         self.faults.note("stands", "told to move", str(self.points[-1].units))
         units, robot = self.points[-1].units, self.robot
-        speeds = (robot.units.speed(float(u)) for u in units)
+        speeds = map(robot.speed, units)
         self.drive(*(v * f for v, f in zip(speeds, robot.wheels, strict=True)))
         self._check.excuse()
 
@@ -156,7 +156,7 @@ class Mover(SafetyMonitor):
         stand = self.begin()
         done = Performed(sightings=[stand])
         try:
-            begin = None
+            begin: float | None = None
             for point in schedule:
                 lead = self.robot.lead(point.left, point.right)
                 if begin is not None and not self._inside(
@@ -171,6 +171,7 @@ class Mover(SafetyMonitor):
                 if point.command >= 0:
                     done.switched.append(drive.at)
             else:
+                begin = self.clock.now() if begin is None else begin
                 self._inside(begin + total - self.robot.lead(0.0, 0.0), done)
             done.switched.append(self.drive(0.0, 0.0).at)
         finally:

@@ -29,6 +29,7 @@ from bns.worlds.legged_flags import OVERLOAD_TIME, SATURATED, STALLED
 TRIES = 4
 HOT, EMPTY = 65, 9.9  # C, V: beyond it the robot rests
 SLOWEST = STALLED / packets.SPEED_UNIT  # units; slower, a servo stands still
+BABBLE = 64  # bytes to one question, after which a robot with torque is stopped
 STOPPING = 0.5  # s for a servo to acknowledge a stop
 LATENCY = 0.02  # s allowed for an answer beside its bytes
 
@@ -88,7 +89,9 @@ class Bus:
         Raises:
             BnsError: one is missing, doubled, or another model. Nothing has moved.
         """
-        missing, garbled, others = [], [], []
+        missing: list[int] = []
+        garbled: list[int] = []
+        others: list[int] = []
         for joint in self.joints:
             results = [self._call("ping", joint.id) for _ in range(3)]
             good = [value for value, result, _ in results if result == 0]
@@ -293,7 +296,11 @@ class Bus:
 
     def _call(self, name: str, *words: int) -> Any:
         function = getattr(self._protocol, name)
-        return self._guarded(lambda: function(self._port, *words))
+        self._port.came = 0
+        made = self._guarded(lambda: function(self._port, *words))
+        if self._on and self._port.came > BABBLE:
+            raise Void(f"the bus goes on talking ({self._port.came} bytes to {name})")
+        return made
 
     def _guarded(self, function: Any) -> Any:
         """A call of the SDK; the port is free afterwards, whatever happened."""
@@ -331,12 +338,16 @@ def _port(sdk: Any, name: str, latency: float) -> Any:
         def getCurrentTime(self) -> float:
             return time.monotonic() * 1e3
 
+        came = 0  # bytes of an answer and of what else came
+
         def readPort(self, length: int) -> bytes:
             if self.isPacketTimeout():  # the SDK looks for it in a silent moment only
                 return b""
             # the SDK asks without a pause: one core busy, nobody else's turn
             select.select([self.ser.fileno()], [], [], 0.0005)
-            return super().readPort(length)
+            data = super().readPort(length)
+            self.came += len(data)
+            return data
 
     port = Port(name)
     try:

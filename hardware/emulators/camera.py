@@ -174,4 +174,4 @@ class BodyPainter:
     def paint_at(self, at: float) -> np.ndarray:
         """The picture taken at a time [s]."""
         self.body.advance(at)
-        return self.painter.paint(self.body.pose(at), self.body.attitude(at))
+        return self.painter.paint([*self.body.pose(at)], [*self.body.attitude(at)])

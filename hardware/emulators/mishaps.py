@@ -92,8 +92,10 @@ class Mishaps:
 
     def _begin_or_end(self, word: str, now: float) -> None:
         on = word in self.going
-        if word == "cable":
-            _ = self.host.unplug() if on else self.host.plug()
+        if word == "cable" and on:
+            self.host.unplug()
+        elif word == "cable":
+            self.host.plug()
         elif word == "flood":
             self.host.flooded = on
         elif word in ("reset", "power"):

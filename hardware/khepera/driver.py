@@ -147,8 +147,7 @@ class Khepera3:
             BnsError: too fast, nobody guards, or the firmware is not known yet.
             LinkError: not acknowledged.
         """
-        if self.units is None:
-            raise BnsError("The firmware is not known yet: call identify() first.")
+        _ = self._known
         if max(abs(left), abs(right)) > self.limit * (1 + 1e-9):
             raise BnsError(
                 f"Speed {max(abs(left), abs(right)):.3g} m/s is above the limit of "
@@ -169,10 +168,26 @@ class Khepera3:
             self.ask(command, "d")
         return Drive(begin + (took + protocol.longer(command)) / 2, pair, took)
 
+    @property
+    def _known(self) -> Firmware:
+        """Units of the firmware.
+
+        Raises:
+            BnsError: it is not known yet.
+        """
+        if self.units is None:
+            raise BnsError("The firmware is not known yet: call identify() first.")
+        return self.units
+
+    def speed(self, units: float) -> float:
+        """Over the floor, with the nominal wheel [m/s], of a speed in device units."""
+        return float(self._known.speed(float(units)))
+
     def _device(self, left: float, right: float) -> tuple[int, int]:
         """Speeds over the floor [m/s] in device units."""
         a, b = self.wheels
-        return round(self.units.units(left / a)), round(self.units.units(right / b))
+        units = self._known.units
+        return round(units(left / a)), round(units(right / b))
 
     def lead(self, *pair: float) -> float:
         """How long before its moment a set point has to be sent [s].
