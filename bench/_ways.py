@@ -114,7 +114,7 @@ def _opened(scene: Scene) -> float:
     """Somebody else reads the port; if the driver bears it, it hangs later."""
     at = time.monotonic()
     number = os.open(scene.port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    until = at + 1.0
+    until = at + LATER + 0.3
 
     def steal() -> None:
         while time.monotonic() < until:

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 
 from bns.errors import BnsError, MissingDependencyError
 from bns.hardware.errors import LinkError
+from bns.hardware.openers import Openers
 from bns.hardware.watchdog import LARGEST, send
 
 INSTALL = 'pip install "bns-testbed[hardware]"'
@@ -43,6 +44,10 @@ class Line(Protocol):
         """Forget what has arrived."""
         ...
 
+    def intruder(self) -> bool:
+        """Whether another program has opened the line; told once for each."""
+        ...
+
     def close(self) -> None:
         """Give the port back."""
         ...
@@ -69,6 +74,7 @@ class SerialLine:
                 port, baud, timeout=0.1, write_timeout=0.05, exclusive=True
             )
             claim(self._serial.fileno())
+            self._openers = Openers(port)
         except (OSError, ValueError) as error:  # SerialException is an OSError
             raise _explained(port, error) from error
 
@@ -108,8 +114,13 @@ class SerialLine:
         except _errors() as error:
             raise self._dead(error) from error
 
+    def intruder(self) -> bool:
+        """See `Line.intruder`."""
+        return self._openers.intruder()
+
     def close(self) -> None:
         """Give the port back."""
+        self._openers.close()
         self._serial.close()
 
     def _dead(self, error: BaseException) -> LinkError:

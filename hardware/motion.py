@@ -97,8 +97,8 @@ class Mover(SafetyMonitor):
             stands = self._check.stands(sighting, self.following.shares)
             if stands and self._moving:
                 self._unmoved()
-        if self._moving and self.robot.guard is not None:
-            self.robot.guard.feed(moving=True)
+        if self._moving:
+            self.robot.alive()
         return seen
 
     def tick(self) -> None:

@@ -2,38 +2,62 @@
 
 A picture that stands still although its time stamps go on shows a robot that stands
 where it drives. How far the wheels must have come between two pictures follows from
-their set points. The wheels lag, and by how much is known within a factor, so that what
-they must have done at least is the least of several lags; below the smallest speed that
-the robot regulates they need not have done anything.
+their set points: they lag, by a time constant that is known within a factor, so their
+speeds lie between bounds, and the integrals of the bounds are bounds of the way. Below
+the smallest speed that the robot regulates a wheel need not turn at all.
 """
 
 from collections import deque
+from typing import NamedTuple
 
 import numpy as np
 
 from bns.hardware.tracking.tracker import Sighting
 
-LAGS = np.array([0.04, 0.13, 0.28])  # s, time constant of the wheels; see `wheels`
-DELAYS = (0.0, 0.05, 0.1)  # s by which a picture may be older than it says, for each
+LAGS = (0.04, 0.28)  # s, time constants of the wheels, least and most; see `wheels`
+DELAYS = np.array([0.0, 0.025, 0.05, 0.075, 0.1])
+"""s by which a picture may be older than its time stamp says"""
 MUST = 0.0015  # m that a wheel must have come before anything is concluded
 LEAST = 0.0003  # m that are seen of a robot at rest: 5 standard deviations; rendered
 SLOWEST = 0.014  # m/s; smallest regulated speed (manual 2.2, p. 14)
 AXLE = 0.0884  # m
 KEPT = 1.0  # s of sightings and set points
+FAR = 100.0  # m; no bound
+GRID = 0.01  # s; bounds are integrated on it
+
+
+class _Segment(NamedTuple):
+    """From one set point to the next; ``(2,)`` are left and right [m/s].
+
+    Attributes:
+        begin: when it began [s].
+        goals: lowest and highest speed that it may lead to, ``(2, 2)``.
+        speeds: bounds of the speeds when it began, ``(2, 2)``.
+    """
+
+    begin: float
+    goals: np.ndarray
+    speeds: np.ndarray
+
+    def bounds(self, at: float) -> np.ndarray:
+        """Lowest and highest speeds at a time, ``(2, 2)`` [m/s].
+
+        Between two lags a first-order response lies between those of either.
+        """
+        if not np.isfinite(self.begin):
+            return self.speeds
+        kept = np.exp([-(at - self.begin) / lag for lag in LAGS])[:, None, None]
+        ways = self.goals + (self.speeds - self.goals) * kept
+        return np.stack([ways[:, 0].min(0), ways[:, 1].max(0)])
 
 
 class MotionCheck:
-    """Compares sightings with set points.
-
-    The path of each wheel after a change of set point is that of a first-order lag:
-    ``x(t) = x0 + u t + (v0 - u) tau (1 - exp(-t / tau))``.
-    """
+    """Compares sightings with set points."""
 
     def __init__(self) -> None:
-        still = np.zeros((len(LAGS), 2))
-        self._segments: deque[tuple[float, np.ndarray, np.ndarray, np.ndarray]]
-        self._segments = deque([(-np.inf, np.zeros(2), still, still)])
-        self._seen: deque[Sighting] = deque()
+        still = np.zeros((2, 2))
+        self._segments = deque([_Segment(-np.inf, still, still)])
+        self._seen: deque[tuple[Sighting, np.ndarray]] = deque()
         self._excused = False
 
     def told(self, at: float, left: float, right: float) -> None:
@@ -44,10 +68,11 @@ class MotionCheck:
             left, right: speeds over the floor [m/s].
         """
         goal = np.array([left, right])
-        goal[np.abs(goal) < SLOWEST] = 0.0
-        speed, place = self._at(self._segments[-1], at)
-        self._segments.append((at, goal, speed, place))
-        while len(self._segments) > 2 and self._segments[1][0] < at - 2 * KEPT:
+        slow = np.abs(goal) < SLOWEST
+        goals = np.stack([np.where(slow, np.minimum(goal, 0), goal)] * 2)
+        goals[1, slow] = np.maximum(goal, 0)[slow]
+        self._segments.append(_Segment(at, goals, self._segments[-1].bounds(at)))
+        while len(self._segments) > 2 and self._segments[1].begin < at - 2 * KEPT:
             self._segments.popleft()
         self._excused = False
 
@@ -62,44 +87,42 @@ class MotionCheck:
             sighting: the newest.
             shares: of its set point that each wheel is known to reach, ``(2,)``.
         """
-        self._seen.append(sighting)
-        while self._seen[0].time < sighting.time - KEPT:
+        begin = self._seen[-1][0].time if self._seen else sighting.time
+        self._seen.append((sighting, self._ways(begin, sighting.time)))
+        while self._seen[0][0].time < sighting.time - KEPT:
             self._seen.popleft()
         if self._excused:
             return False
-        end = self._path(sighting.time)
-        for earlier in list(self._seen)[-2::-1]:
-            ways = (end - self._path(earlier.time)) * shares
-            least = np.where(
-                (ways > 0).all(0) | (ways < 0).all(0), np.abs(ways).min(0), 0.0
-            )
-            if least.max() >= MUST:
-                return _way(earlier.pose, sighting.pose) < LEAST
+        ways = np.zeros((2, 2))  # bounds from an earlier sighting on
+        for later in range(len(self._seen) - 1, 0, -1):
+            ways = ways + self._seen[later][1] * shares
+            if max(ways[0].max(), -ways[1].min()) >= MUST:
+                return _way(self._seen[later - 1][0].pose, sighting.pose) < LEAST
         return False
 
-    def _path(self, at: float) -> np.ndarray:
-        """Ways of the wheels until a time by each lag, ``(3, 2)`` [m]."""
-        rows = []
-        for row, delay in enumerate(DELAYS):
-            segments = reversed(self._segments)
-            segment = next(s for s in segments if s[0] <= at - delay)
-            rows.append(self._at(segment, at - delay)[1][row])
-        return np.array(rows)
-
-    @staticmethod
-    def _at(
-        segment: tuple[float, np.ndarray, np.ndarray, np.ndarray], at: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Speeds and ways within a segment, ``(3, 2)`` each [m/s, m]."""
-        begin, goal, speed, place = segment
-        if not np.isfinite(begin):
-            return speed, place
-        time, lags = at - begin, LAGS[:, None]
-        kept = np.exp(-time / lags)
+    def _ways(self, begin: float, end: float) -> np.ndarray:
+        """Least and most that the wheels came between two times, ``(2, 2)`` [m]."""
+        steps = max(round((end - begin) / GRID), 1)
+        if end <= begin:
+            return np.zeros((2, 2))
+        if steps > KEPT / GRID:  # nothing was seen for long: it may be anywhere
+            return np.array([[-FAR, -FAR], [FAR, FAR]])
+        width = (end - begin) / steps
         return (
-            goal + (speed - goal) * kept,
-            place + goal * time + (speed - goal) * lags * (1 - kept),
+            sum(
+                (self._shown(begin + (k + 0.5) * width) for k in range(steps)),
+                np.zeros((2, 2)),
+            )
+            * width
         )
+
+    def _shown(self, at: float) -> np.ndarray:
+        """Bounds of the speeds that a picture with a time stamp shows, ``(2, 2)``."""
+        found = np.stack([self._bounds(at - delay) for delay in DELAYS])
+        return np.stack([found[:, 0].min(0), found[:, 1].max(0)])
+
+    def _bounds(self, at: float) -> np.ndarray:
+        return next(s for s in reversed(self._segments) if s.begin <= at).bounds(at)
 
 
 def _way(before: np.ndarray, after: np.ndarray) -> float:

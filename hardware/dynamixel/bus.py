@@ -22,6 +22,7 @@ from bns.hardware.errors import LinkError, SafetyStop, Void
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera.driver import Guard
 from bns.hardware.line import INSTALL, check_port, claim
+from bns.hardware.openers import Openers
 from bns.hardware.stop_order import insist, phantomx
 from bns.hardware.watchdog import LARGEST, send
 from bns.worlds.legged_flags import OVERLOAD_TIME, SATURATED, STALLED
@@ -72,6 +73,7 @@ class Bus:
         self.clock, self.guard = clock, guard
         self.faults = faults if faults is not None else FaultLog(clock)
         self._port = _port(sdk, port, latency)
+        self._openers = Openers(port)
         self._protocol = sdk.PacketHandler(1.0)
         self._goals = sdk.GroupSyncWrite(self._port, self._protocol, packets.GOAL, 2)
         self._sdk = sdk
@@ -202,10 +204,13 @@ class Bus:
         Raises:
             BnsError: nobody guards.
             LinkError: the line is dead.
+            Void: another program has opened the port.
         """
         if self.guard is None:
             raise BnsError("Nobody guards the robot: it moves with a watchdog only.")
         self.guard.feed(moving=True)
+        if self._on and self._openers.intruder():
+            raise Void("another program has opened the port")
         self._goals.clearParam()
         for joint in self.joints:
             units = joint.units(angles[joint.name])
@@ -292,6 +297,7 @@ class Bus:
 
     def release(self) -> None:
         """Give the port back and send nothing."""
+        self._openers.close()
         self._port.closePort()
 
     def _call(self, name: str, *words: int) -> Any:

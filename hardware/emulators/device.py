@@ -124,6 +124,10 @@ class VirtualLine:
         self._check()
         self._arrived()
 
+    def intruder(self) -> bool:
+        """Nobody else can open it."""
+        return False
+
     def close(self) -> None:
         """Nothing to give back."""
 

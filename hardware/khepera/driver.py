@@ -246,12 +246,18 @@ class Khepera3:
             with contextlib.suppress(SafetyStop, Void):
                 self.guard.feed(moving=self._moving)
 
-    def _alive(self) -> None:
-        """Feed the guard of a robot that moves."""
+    def alive(self) -> None:
+        """Feed the guard of a robot that moves; see that the line is its own.
+
+        Raises:
+            SafetyStop, Void: from the guard, or another program has opened the port.
+        """
         if self._stopping:
             self._calm()
         elif self.guard is not None and self._moving:
             self.guard.feed(moving=True)
+            if self.line.intruder():
+                raise Void("another program has opened the port")
 
     def _standing(self) -> bool:
         """Whether the wheels slow down to a stand within a moment."""
@@ -303,7 +309,7 @@ class Khepera3:
     def _repeat(self, once: Callable, what: str):
         since, self._came = self.clock.now(), 0
         for _ in range(RETRIES + 1):
-            self._alive()
+            self.alive()
             begin = self.clock.now()
             answer = once()
             if answer is not None:
@@ -343,7 +349,7 @@ class Khepera3:
         until, buffer = self.clock.now() + self.patience, b""
         while (left := until - self.clock.now()) > 0:
             data = self.line.read(min(left, SLICE))
-            self._alive()
+            self.alive()
             self._came += len(data)
             if self._came > BABBLE and self._moving:
                 break
@@ -369,7 +375,7 @@ class Khepera3:
         size = protocol.FRAME.size
         while len(data) < size and (left := until - self.clock.now()) > 0:
             data += self.line.read(min(left, SLICE))
-            self._alive()
+            self.alive()
         reading = protocol.frame(data[:size])
         if reading is None:
             self.faults.note("broken frame", b"X", data[:size])
@@ -380,7 +386,7 @@ class Khepera3:
         self.line.write(b"\n")  # empty lines are ignored
         until = self.clock.now() + 0.2
         while self.clock.now() < until and self.line.read(QUIET):
-            self._alive()
+            self.alive()
             if self._moving and not self._stopping and self._came > BABBLE:
                 break
         self.line.discard()
