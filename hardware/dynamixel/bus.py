@@ -125,6 +125,7 @@ class Bus:
 
         Raises:
             LinkError: no proper answer in any of the tries.
+            Void: the same, of a robot whose torque is on; the caller stops it.
         """
         for _ in range(TRIES):
             values, result, error = self._call("readTxRx", servo, packets.PRESENT, 8)
@@ -137,7 +138,17 @@ class Bus:
             self.faults.note("no answer" if result else "bad state", str(servo))
             if self.guard is not None and self._on:
                 self.guard.feed(moving=True)
-        raise LinkError(f"Servo {servo} gives no proper answer in {TRIES} tries.")
+        raise self._mute(servo)
+
+    def _mute(self, servo: int) -> BnsError:
+        """What to raise about a servo that does not answer; one that holds is stopped.
+
+        The stop shows whether the bus is dead.
+        """
+        said = f"servo {servo} gave no proper answer in {TRIES} tries"
+        if self._on:
+            return Void(said)
+        return LinkError(f"{said.capitalize()}: check its cable.")
 
     def holds(self, servo: int) -> bool:
         """Whether the torque of a servo is on.
@@ -152,7 +163,7 @@ class Bus:
             self.faults.note("no answer", str(servo))
             if self.guard is not None and self._on:
                 self.guard.feed(moving=True)
-        raise LinkError(f"Servo {servo} gives no proper answer in {TRIES} tries.")
+        raise self._mute(servo)
 
     def powered(self, count: int = 1) -> None:
         """See that the next few servos still hold.

@@ -1,6 +1,7 @@
 """The watchdog stops the robot when its driver is silent, gone, or unplugged."""
 
 import os
+import signal
 import threading
 import time
 
@@ -9,7 +10,8 @@ import pytest
 from bns.hardware.emulators.khepera_body import KheperaBody
 from bns.hardware.emulators.khepera_device import KheperaDevice
 from bns.hardware.emulators.pty_host import PtyHost
-from bns.hardware.errors import Void
+from bns.hardware.emulators.servo_bank import ServoBank
+from bns.hardware.errors import SafetyStop, Void
 from bns.hardware.watchdog_client import WatchdogClient
 
 SLOW = 20.0  # s; a busy machine
@@ -89,3 +91,93 @@ def test_a_cable_that_comes_back_is_used_to_stop(robot):
     assert told_to_stand(device)
     watchdog._process.wait(SLOW)
     os.close(fd)
+
+
+def test_a_watchdog_that_is_killed_is_missed_at_once(robot):
+    port, _, _ = robot
+    fd = moving(port)
+    watchdog = WatchdogClient(fd, port, 115200, "khepera3")
+    watchdog.feed(moving=True)
+    os.kill(watchdog.pid, signal.SIGKILL)
+    watchdog._process.wait(SLOW)
+    with pytest.raises(SafetyStop, match="watchdog is gone"):
+        watchdog.feed(moving=True)
+    watchdog.release()
+    os.close(fd)
+
+
+def test_a_watchdog_that_hangs_is_noticed_and_nothing_moves_with_it(robot):
+    port, _, _ = robot
+    fd = moving(port)
+    watchdog = WatchdogClient(fd, port, 115200, "khepera3", silence=SLOW)
+    watchdog.feed(moving=True)
+    os.kill(watchdog.pid, signal.SIGSTOP)
+    begin = time.monotonic()
+    with pytest.raises(Void, match="did not answer"):
+        while time.monotonic() < begin + SLOW:
+            watchdog.feed(moving=True)
+            time.sleep(0.02)
+    with pytest.raises(Void):
+        watchdog.feed(moving=False)  # as `stop` does, which does not mind
+    with pytest.raises(SafetyStop, match="does not answer"):
+        watchdog.feed(moving=True)
+    os.kill(watchdog.pid, signal.SIGCONT)
+    watchdog.feed(moving=False)
+    watchdog.feed(moving=True)  # awake again
+    watchdog.feed(moving=False)
+    watchdog.release()
+    assert watchdog._process.poll() == 0
+    os.close(fd)
+
+
+def test_a_line_that_goes_on_talking_holds_up_no_stop(tmp_path):
+    device = KheperaDevice(KheperaBody(at=time.monotonic()), latency=0.002)
+    host, done = PtyHost(device, tmp_path / "port", baud=115200), threading.Event()
+    thread = threading.Thread(target=host.serve, args=(done.is_set,))
+    thread.start()
+    port = str(tmp_path / "port")
+    try:
+        fd = moving(port)
+        watchdog = WatchdogClient(fd, port, 115200, "khepera3", silence=0.2)
+        watchdog.feed(moving=True)
+        host.flooded = True
+        assert told_to_stand(device)
+        watchdog.release()
+        os.close(fd)
+    finally:
+        done.set()
+        thread.join()
+        host.unplug()
+
+
+def test_a_robot_whose_stop_was_not_confirmed_is_stopped_after_the_session(robot):
+    port, device, _ = robot
+    fd = moving(port)
+    watchdog = WatchdogClient(fd, port, 115200, "khepera3", silence=SLOW)
+    watchdog.feed(moving=True)
+    watchdog.release()
+    assert told_to_stand(device)
+    assert watchdog._process.wait(SLOW) == 0
+    os.close(fd)
+
+
+def test_servos_without_torque_acknowledge_the_stop(tmp_path):
+    bank = ServoBank(at=time.monotonic())
+    for table in bank.tables.values():
+        table[24] = 1
+    host, done = PtyHost(bank, tmp_path / "bus"), threading.Event()
+    thread = threading.Thread(target=host.serve, args=(done.is_set,))
+    thread.start()
+    port = str(tmp_path / "bus")
+    try:
+        fd = os.open(port, os.O_RDWR | os.O_NOCTTY)
+        watchdog = WatchdogClient(fd, port, 1000000, "phantomx", servo=5)
+        watchdog.feed(moving=True)
+        watchdog.release()
+        assert watchdog._process.wait(SLOW) == 0  # 1 where nothing acknowledges
+        assert not any(table[24] for table in bank.tables.values())
+        os.close(fd)
+    finally:
+        done.set()
+        thread.join()
+        host.unplug()
