@@ -122,7 +122,7 @@ def _once(
     clock = port.with_name("clock")
     env = {"PYTHONPATH": str(port.parent), "BENCH_CLOCK": str(clock)}
     driver = Driver(drive.script, port, {**os.environ, **env})
-    scene = Scene(driver, port, log, clock)
+    scene, at = Scene(driver, port, log, clock), 0.0
     try:
         if not _wait(lambda: drive.steady(log, driver), 60.0, driver):
             print(f"{way}: {[text for _, text in driver.said[-1:]]}", flush=True)
@@ -133,30 +133,31 @@ def _once(
             return None
         with _canary() as late:
             at = WAYS[way](scene)
-            _wait(lambda: _over(log, at), WATCHED)
-        return _times(log, at) | {"late": late[0]}
+            _wait(lambda: _over(drive, log, at), WATCHED)
+        return _times(drive, log, at) | {"late": late[0]}
     finally:
-        _clear(scene, way)
+        _clear(scene, way if at else "")
 
 
-def _over(log: Log, at: float) -> bool:
+def _over(drive: Drive, log: Log, at: float) -> bool:
     order = log.first("stop", at)
-    settled = order is not None and time.monotonic() > order + SINKS + LASTS
-    return settled and _stood(log, order) is not None
+    if order is None or time.monotonic() < order + SINKS + LASTS:
+        return False
+    return _stood(drive, log, order) is not None
 
 
-def _times(log: Log, at: float) -> dict[str, float]:
+def _times(drive: Drive, log: Log, at: float) -> dict[str, float]:
     order = log.first("stop", at)
     if order is None:
         return {"order": NEVER, "stands": NEVER, "ramp": NEVER}
-    stood = _stood(log, order)
+    stood = _stood(drive, log, order)
     stands = NEVER if stood is None else max(stood - at, 0.0)
     ramp = NEVER if stood is None else max(stood - order, 0.0)
     made = {"order": order - at, "stands": stands, "ramp": ramp}
     return {name: round(value, 4) for name, value in made.items()}
 
 
-def _stood(log: Log, order: float) -> float | None:
+def _stood(drive: Drive, log: Log, order: float) -> float | None:
     """When the robot has come to rest after an order [s]; None: not yet.
 
     A hexapod that stands when its torque goes sinks a moment later.
@@ -164,7 +165,10 @@ def _stood(log: Log, order: float) -> float | None:
     rows = [(row["at"], row["stands"]) for row in log.rows() if "stands" in row]
     state = next((stands for at, stands in reversed(rows) if at <= order), True)
     later = [row for row in rows if row[0] > order]
-    if state and not any(at < order + SINKS for at, stands in later if not stands):
+    sinks = drive.robot == "phantomx" and any(
+        at < order + SINKS for at, stands in later if not stands
+    )
+    if state and not sinks:
         return order
     for (at, stands), (end, _) in zip(
         later, [*later[1:], (NEVER**2, False)], strict=True
