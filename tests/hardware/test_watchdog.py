@@ -138,11 +138,14 @@ def test_a_line_that_goes_on_talking_holds_up_no_stop(tmp_path):
     port = str(tmp_path / "port")
     try:
         fd = moving(port)
-        watchdog = WatchdogClient(fd, port, 115200, "khepera3", silence=0.2)
+        words = {"silence": 0.2, "patience": 3.0}
+        watchdog = WatchdogClient(fd, port, 115200, "khepera3", **words)
         watchdog.feed(moving=True)
         host.flooded = True
         assert told_to_stand(device)
+        host.flooded = False
         watchdog.release()
+        watchdog._process.wait(SLOW)
         os.close(fd)
     finally:
         done.set()
