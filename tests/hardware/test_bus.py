@@ -199,3 +199,16 @@ def test_a_servo_that_falls_silent_makes_the_trial_void_where_torque_is_on(serve
     with pytest.raises(LinkError, match="check its cable"):
         bus.read(7)
     bus.close()
+
+
+def test_an_answer_is_not_waited_for_without_end_on_a_line_that_never_rests(served):
+    bus, _ = standing(served)
+    bus.stop()
+    begin = time.monotonic()
+    with open("/dev/zero", "rb", buffering=0) as garbage:
+        line, bus._port.ser = bus._port.ser, garbage
+        bus._port.setPacketTimeout(8)
+        _, result = bus._protocol.rxPacket(bus._port)
+        bus._port.ser = line
+    assert result != 0 and time.monotonic() - begin < 10.0
+    bus.close()
