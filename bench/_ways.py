@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from bench._drives import Driver, Log
-from bns.hardware.emulators.mishaps import BOOT
+from bns.errors import BnsError
 
 CLOCK = """
 import os, time
@@ -82,20 +82,25 @@ def _cable(scene: Scene) -> float:
     return scene.mishap("cable")
 
 
+def _hears(scene: Scene, begin: float) -> float:
+    """When a robot that starts anew hears again [s]."""
+    while not (row := scene.log.newest("hears", begin, time.monotonic())):
+        if time.monotonic() > begin + 10:
+            raise BnsError("The emulated robot does not start anew.")
+        time.sleep(0.01)
+    return row["hears"]
+
+
 def _reset(scene: Scene) -> float:
     """Time counts from when the robot hears again."""
-    begin = scene.mishap("reset")
-    time.sleep(BOOT / 2)
-    return scene.log.newest("hears", begin, begin + BOOT)["hears"]
+    return _hears(scene, scene.mishap("reset"))
 
 
 def _power(scene: Scene) -> float:
     """Time counts from when the robot hears again."""
     scene.mishap("power")
     time.sleep(0.5)
-    begin = scene.mishap("power")
-    time.sleep(BOOT / 2)
-    return scene.log.newest("hears", begin, begin + BOOT)["hears"]
+    return _hears(scene, scene.mishap("power"))
 
 
 def _flood_and(number: int) -> Callable[[Scene], float]:
