@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow.parquet as parquet
 
 Hashes = dict[str, str]
+Text = Callable[[str], str]
 
 DEPTH = 2
 """nested mappings are told apart by key so deep; what lies deeper is one hash"""
@@ -25,20 +26,26 @@ _FIGURE = re.compile(r"data:image/svg\+xml;base64,([A-Za-z0-9+/=]+)")
 _PATH = re.compile(r'\bd="([^"]*)"')
 
 
-def of_directory(directory: Path, root: Path) -> dict[str, Hashes]:
+def of_directory(directory: Path, *roots: Path) -> dict[str, Hashes]:
     """Hashes by file and part (column, array, key) of all that is read here.
 
     Args:
         directory: what a command wrote.
-        root: path that is left out of texts, as it differs from time to time.
+        roots: paths that are left out of texts, as they differ from place to place.
     """
+
+    def without(text: str) -> str:
+        for root in roots:
+            text = text.replace(str(root), "")
+        return text
+
     files = sorted(path for path in directory.rglob("*") if path.is_file())
     names = [str(path.relative_to(directory)) for path in files]
     found = {"(files)": {"names": digest("\n".join(names).encode())}}
     for name, path in zip(names, files, strict=True):
         read = READERS.get(path.suffix)
         if read and path.name not in SKIPPED:
-            found[name] = read(path, str(root))
+            found[name] = read(path, without)
     return found
 
 
@@ -47,9 +54,9 @@ def digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()[:10]
 
 
-def npz(path: Path, root: str) -> Hashes:
+def npz(path: Path, without: Text) -> Hashes:
     """A hash an array, of its type, shape and bytes."""
-    del root
+    del without
     with np.load(path, allow_pickle=False) as arrays:
         return {name: array(arrays[name]) for name in sorted(arrays)}
 
@@ -60,30 +67,30 @@ def array(values: np.ndarray) -> str:
     return digest(head + np.ascontiguousarray(values).tobytes())
 
 
-def table(path: Path, root: str) -> Hashes:
+def table(path: Path, without: Text) -> Hashes:
     """A hash a column, of its type and values."""
     content = parquet.read_table(path)
     found = {}
     for name in sorted(content.column_names):
         column = content.column(name)
-        values = repr(column.to_pylist()).replace(root, "")
+        values = without(repr(column.to_pylist()))
         found[name] = digest(f"{column.type} {values}".encode())
     return found
 
 
-def text(path: Path, root: str) -> Hashes:
+def text(path: Path, without: Text) -> Hashes:
     """One hash of the text."""
-    return {"text": digest(path.read_text().replace(root, "").encode())}
+    return {"text": digest(without(path.read_text()).encode())}
 
 
-def document(path: Path, root: str) -> Hashes:
+def document(path: Path, without: Text) -> Hashes:
     """A hash a key, of what JSON says; times, versions and places are left out."""
-    return mapping(json.loads(path.read_text().replace(root, "")))
+    return mapping(json.loads(without(path.read_text())))
 
 
-def settings(path: Path, root: str) -> Hashes:
+def settings(path: Path, without: Text) -> Hashes:
     """A hash a section, of what TOML says."""
-    return mapping(tomllib.loads(path.read_text().replace(root, "")), depth=1)
+    return mapping(tomllib.loads(without(path.read_text())), depth=1)
 
 
 def mapping(content: Mapping[str, object], *, depth: int = DEPTH) -> Hashes:
@@ -102,9 +109,9 @@ def mapping(content: Mapping[str, object], *, depth: int = DEPTH) -> Hashes:
     return found
 
 
-def page(path: Path, root: str) -> Hashes:
+def page(path: Path, without: Text) -> Hashes:
     """A hash a table and a figure, of the numbers in it; not of the prose."""
-    content = path.read_text().replace(root, "")
+    content = without(path.read_text())
     tables = [part for part in _TABLE.findall(content) if ">commit<" not in part]
     found = {f"table {n:02}": _numbers(part) for n, part in enumerate(tables)}
     for number, encoded in enumerate(_FIGURE.findall(content)):
@@ -114,7 +121,7 @@ def page(path: Path, root: str) -> Hashes:
     return found
 
 
-READERS: dict[str, Callable[[Path, str], Hashes]] = {
+READERS: dict[str, Callable[[Path, Text], Hashes]] = {
     ".npz": npz,
     ".parquet": table,
     ".json": document,
