@@ -18,7 +18,7 @@ from bns.hardware.errors import LinkError, SafetyStop
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera.driver import Guard
 from bns.hardware.line import INSTALL, check_port
-from bns.worlds.legged_flags import OVERLOAD_TIME, SATURATED, STALLED
+from bns.worlds.physics.legged_flags import OVERLOAD_TIME, SATURATED, STALLED
 
 TRIES = 4
 HOT, EMPTY = 65, 9.9  # C, V: beyond it the robot rests

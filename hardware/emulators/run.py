@@ -16,7 +16,7 @@ from bns.hardware.emulators.khepera_device import KheperaDevice
 from bns.hardware.emulators.pty_host import PtyHost
 from bns.hardware.khepera import protocol
 from bns.hardware.priority import urgent
-from bns.worlds.light_field import Lamp
+from bns.worlds.light.field import Lamp
 
 
 def khepera3(
