@@ -40,8 +40,8 @@ def run(quick: bool) -> Result:
 
 def _batch(size: int) -> tuple[Any, Any]:
     from bns import presets
-    from bns.batch import Batch, resolve
-    from bns.surroundings import make_world
+    from bns.experiment.batch import Batch, resolve
+    from bns.experiment.world_factory import make_world
 
     config = presets.load("khepera-simple")
     config = replace(config, replicates=size, threads=THREADS, compiled="yes")

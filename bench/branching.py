@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from bench import experiments
-from bns.config import RunConfig
 from bns.errors import BnsError
+from bns.experiment.config import RunConfig
 
 
 def begin(trunk: RunConfig, branch: RunConfig, *, idle: tuple[str, ...] = ()) -> None:
@@ -23,9 +23,9 @@ def begin(trunk: RunConfig, branch: RunConfig, *, idle: tuple[str, ...] = ()) ->
     Raises:
         BnsError: the two differ before the trunk's end.
     """
-    from bns.run import facts
-    from bns.step import Step
-    from bns.store import RunStore
+    from bns.experiment.run import facts
+    from bns.experiment.step import Step
+    from bns.storage.store import RunStore
     from bns.worlds.damage import Damage
 
     shared = replace(branch, **{name: getattr(trunk, name) for name in idle})

@@ -15,10 +15,10 @@ from bench import experiments
 from bench.result import Result
 from bns import seeding
 from bns.chromosome import Encoding, Population
-from bns.config import RunConfig
 from bns.draws import Draws
 from bns.evolution.generation import Breeder, Rates
-from bns.record import RunRecord
+from bns.experiment.config import RunConfig
+from bns.experiment.record import RunRecord
 from bns.tasks import NavigationTask
 from bns.tasks.trials import score_trials
 from bns.units import metres_per_second
@@ -78,7 +78,7 @@ def reached(damage: str) -> dict[str, object]:
 
 
 def _search(config: RunConfig) -> dict[str, object]:
-    from bns.surroundings import make_world
+    from bns.experiment.world_factory import make_world
 
     torch.set_num_threads(1)
     record = experiments.records([replace(config, threads=1)])[config.preset]

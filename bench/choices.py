@@ -10,7 +10,7 @@ from dataclasses import replace
 from bench import experiments, solving
 from bench.result import Result
 from bns import stats
-from bns.config import RunConfig
+from bns.experiment.config import RunConfig
 
 DOC = "sweep of the dissertation's silent settings: variants that beat the defaults"
 BAR = "none: the table behind docs/choices.md"
@@ -55,7 +55,7 @@ def run(quick: bool) -> Result:
 
 def _row(name: str, quick: bool) -> dict[str, dict[str, object]]:
     os.environ["OMP_NUM_THREADS"] = "1"
-    from bns.run import train
+    from bns.experiment.run import train
 
     record = train(_config(name, quick))
     return {

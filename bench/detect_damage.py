@@ -11,8 +11,8 @@ import numpy as np
 
 from bench import forking, light_runs
 from bench.result import Result
-from bns.config import RunConfig
-from bns.record import RunRecord
+from bns.experiment.config import RunConfig
+from bns.experiment.record import RunRecord
 
 DOC = "share of costly damages detected within 2 trials, and false alarms"
 BAR = ">= 95 % detected, <= 1 false alarm per 500 undamaged trials"

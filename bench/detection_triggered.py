@@ -12,7 +12,7 @@ import numpy as np
 from bench import detect_damage, forking, light_runs, solving
 from bench.result import Result
 from bns import stats
-from bns.config import RunConfig
+from bns.experiment.config import RunConfig
 
 DOC = "cost after damage (O), detected over told, worst of four damages"
 BAR = "<= 1.05"

@@ -16,8 +16,8 @@ from typing import Any
 
 from bench.versions import ROOT
 from bns import presets
-from bns.config import AdaptationConfig, RunConfig, WorldConfig
-from bns.record import RunRecord
+from bns.experiment.config import AdaptationConfig, RunConfig, WorldConfig
+from bns.experiment.record import RunRecord
 
 RUNS = ROOT / "runs" / "bench"
 WORKERS = 2
@@ -126,7 +126,7 @@ def records(
         waiting = {pool.submit(_train, config): config for config in wanted}
         for done in as_completed(waiting):
             done.result()
-    from bns.store import load
+    from bns.storage.store import load
 
     return {config.preset: load(directory(config)) for config in wanted}
 
@@ -154,6 +154,6 @@ def shortened(config: RunConfig) -> RunConfig:
 
 def _train(config: RunConfig) -> None:
     os.environ["OMP_NUM_THREADS"] = "1"
-    from bns.run import train
+    from bns.experiment.run import train
 
     train(config, directory(config), resume=True)

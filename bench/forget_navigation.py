@@ -11,9 +11,9 @@ import numpy as np
 from bench import experiments, solving
 from bench.result import Result
 from bns import stats
-from bns.config import RunConfig
-from bns.config_watch import WatchConfig
-from bns.record import RunRecord
+from bns.experiment.config import RunConfig
+from bns.experiment.config_watch import WatchConfig
+from bns.experiment.record import RunRecord
 
 DOC = "cost after damage (O) in navigation, evidence over window 150, worst of four"
 BAR = "none: printed beside recover-window"

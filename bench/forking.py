@@ -13,8 +13,8 @@ from pathlib import Path
 from shutil import copytree, rmtree
 
 from bench import experiments
-from bns.config import AdaptationConfig, RunConfig
-from bns.record import RunRecord
+from bns.experiment.config import AdaptationConfig, RunConfig
+from bns.experiment.record import RunRecord
 
 ON_DAMAGE = (
     "population_reset",
@@ -72,15 +72,15 @@ def records(
     with experiments.pool_of_workers() as pool:
         list(pool.map(grow, trunks.values()))
         list(pool.map(branch, wanted))
-    from bns.store import load
+    from bns.storage.store import load
 
     return {config.preset: load(_place(config)) for config in wanted}
 
 
 def grow(config: RunConfig) -> None:
     """Train the trunk of a side as far as its damage."""
-    from bns.run import train
-    from bns.store import RunStore
+    from bns.experiment.run import train
+    from bns.storage.store import RunStore
 
     base = trunk(config)
     place = _place(base)
@@ -91,7 +91,7 @@ def grow(config: RunConfig) -> None:
 
 def branch(config: RunConfig) -> None:
     """Train a side from its damage on."""
-    from bns.run import train
+    from bns.experiment.run import train
 
     place = _place(config)
     if not (place / "run.json").exists():
@@ -101,8 +101,8 @@ def branch(config: RunConfig) -> None:
 
 def _copy(config: RunConfig, place: Path) -> None:
     """The trunk as the beginning of a side; the damage is known or is not."""
-    from bns.run import facts
-    from bns.store import RunStore
+    from bns.experiment.run import facts
+    from bns.storage.store import RunStore
 
     source = RunStore.open(_place(trunk(config)))
     known = facts(config, source.mode)

@@ -9,7 +9,7 @@ BAR = ">= 0.95"
 
 def run(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     rows = ensure(quick)
     rows = [*scoring.of(rows, "single", 1.0), *scoring.of(rows, "alias", 1.0)]

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from bench.gap_runner import SEEN, rows
-from bns.gap.ladder import Rung, climb
-from bns.gap.verdict import calibration, quantile
+from bns.gap.core.model_order import Rung, climb
+from bns.gap.core.verdict import calibration, quantile
 
 FILE = Path(__file__).resolve().parent.parent / "gap" / "calibration.json"
 MISSED = 1e3  # score of a true support that was not among the fitted ones

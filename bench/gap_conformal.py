@@ -14,9 +14,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from bench._gap_cases import DIRECTORY
-from bns.gap import conformal, scoring
-from bns.gap.ladder import Rung, climb
-from bns.gap.verdict import calibration, quantile
+from bns.gap.bench import scoring
+from bns.gap.core import conformal
+from bns.gap.core.model_order import Rung, climb
+from bns.gap.core.verdict import calibration, quantile
 
 GAP = Path(__file__).resolve().parent.parent / "gap"
 FILES = ("gap2_calibrate_*.jsonl", "gap2_scored_*.jsonl")  # in the order of rounds

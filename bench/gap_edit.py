@@ -11,7 +11,7 @@ BAR = "<= 1.5 x"
 
 def run(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     rows = ensure(quick)
     edits = [r["said"]["edit"] for r in scoring.of(rows, "pair") if "edit" in r["said"]]

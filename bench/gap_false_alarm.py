@@ -9,7 +9,7 @@ BAR = "<= 0.03, >= 0.95 found at 3 x"
 
 def run(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     rows = ensure(quick)
     nothing = scoring.of(rows, "none")

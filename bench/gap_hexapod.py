@@ -28,10 +28,10 @@ SLOWEST = 300.0  # [s] a case on two cores
 
 def one(kind: str, seed: int) -> dict[str, Any]:
     """One case: what is true, what was said, and how long it took."""
-    from bns.gap import walk_cases
+    from bns.gap.bench import walk_cases
     from bns.gap.diagnose import analyse
+    from bns.gap.models.legged.model import WalkModel
     from bns.gap.records import plain
-    from bns.gap.walk_model import WalkModel
 
     model = WalkModel()
     case = walk_cases.build(seed, kind, model)
@@ -58,7 +58,7 @@ def one(kind: str, seed: int) -> dict[str, Any]:
 
 def run(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     found = CASES.produce(one, CASES.wanted(QUICK if quick else None))
     lost = [row for row in found if row["kind"] == "lost"]

@@ -9,7 +9,8 @@ BAR = "0.85 to 0.95"
 
 def run(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
-    from bns.gap import conformal, scoring
+    from bns.gap.bench import scoring
+    from bns.gap.core import conformal
 
     found = [row for row in ensure(quick) if "verdict" in row["said"]]
     known = [row for row in found if row["kind"] in ("single", "pair")]
@@ -36,7 +37,8 @@ def run(quick: bool) -> Result:
 
 def _about(row: dict, time: bool) -> bool:
     """Whether all of a row's effects are about time, or none of them."""
-    from bns.gap import conformal, scoring
+    from bns.gap.bench import scoring
+    from bns.gap.core import conformal
 
     groups = {
         conformal.group(*scoring.described(name)) for name in row["answer"]["names"]
@@ -45,6 +47,6 @@ def _about(row: dict, time: bool) -> bool:
 
 
 def _share(rows: list[dict]) -> dict[str, float]:
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     return {"n": len(rows), "held": scoring.parameter(rows)["intervals that hold"]}

@@ -11,14 +11,14 @@ TIED = {"axle", "both_diameters"}
 
 def run(quick: bool) -> Result:
     """One diagnosis of 4396 intervals; quick changes nothing."""
-    from bns.gap import odometry_diagnosis
-    from bns.gap.importing import khepera3_odometry
-    from bns.gap.odometry import Motions
+    from bns.gap.importers import khepera3_odometry
+    from bns.gap.models.odometry import diagnosis
+    from bns.gap.models.odometry.fit import Motions
 
     home = needed("khepera3_odometry")
     trial = khepera3_odometry.read(home)
     published = khepera3_odometry.published(home)
-    found = odometry_diagnosis.diagnose(Motions.of(trial, axle=khepera3_odometry.AXLE))
+    found = diagnosis.diagnose(Motions.of(trial, axle=khepera3_odometry.AXLE))
     verdict, supports = found.verdict, found.verdict.named
     best = found.fits[supports[0]] if supports else found.fits[()]
     mount = best.magnitudes.get("mount_x", 0.0)

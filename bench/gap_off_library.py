@@ -9,7 +9,7 @@ BAR = ">= 0.75"
 
 def run(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     rows = ensure(quick)
     strange = scoring.of(rows, "off-library")

@@ -25,7 +25,7 @@ FILE = DIRECTORY / "gap3_plan.jsonl"
 
 def run(quick: bool) -> Result:
     """Look for ties, plan, record, diagnose again."""
-    from bns.gap.wheeled import WheeledModel
+    from bns.gap.models.wheeled import WheeledModel
 
     model = WheeledModel("khepera3", threads=1)
     rows: list[dict] = []
@@ -91,11 +91,11 @@ def _keep(seed: int, row: dict | None) -> None:
 def _case(seed: int, model) -> dict | None:
     """One case; None where the poor recording left no tie that holds the truth."""
     from bns import seeding
-    from bns.gap import excite, plan
     from bns.gap.diagnose import diagnose
+    from bns.gap.planning import excitation, plan
 
     rng = seeding.generator(seed, "bench", "plan")
-    kinds = [e for e in excite.wheeled(seed=1) if any(p in e.name for p in POOR)]
+    kinds = [e for e in excitation.wheeled(seed=1) if any(p in e.name for p in POOR)]
     picked = kinds[int(rng.integers(len(kinds)))]
     told = [picked.commands] * 3
     name, effect, size = _hidden(rng, told, model)
@@ -144,9 +144,10 @@ def _hidden(rng, told, model):
     """A candidate's name, its effect as the poor recording shows it, and its size."""
     import numpy as np
 
-    from bns.gap import plan, signatures
-    from bns.gap.floor import Floor
-    from bns.gap.problem import Problem
+    from bns.gap.core import signatures
+    from bns.gap.core.floor import Floor
+    from bns.gap.core.problem import Problem
+    from bns.gap.planning import plan
 
     items = [c for c in model.candidates() if not c.whole]
     item = items[int(rng.integers(len(items)))]
@@ -165,7 +166,7 @@ def _hidden(rng, told, model):
 
 def _record(told, effect, seed: int):
     from bns import seeding
-    from bns.worlds.mujoco_world import MujocoWorld
+    from bns.worlds.physics.wheeled_world import MujocoWorld
 
     world = MujocoWorld("khepera3", reality=[effect, NOISE], threads=1)
     seeds = [seeding.integer(seed, "bench", "plan", n) for n in range(len(told))]

@@ -72,7 +72,8 @@ def ensure(quick: bool = False) -> list[dict]:
 
 def judged(found: list[dict]) -> list[dict]:
     """Rows with the verdicts that the package's calibration gives."""
-    from bns.gap import scoring, verdict
+    from bns.gap.bench import scoring
+    from bns.gap.core import verdict
 
     rules = verdict.calibration()
     return [scoring.judged(row, rules) for row in found]
@@ -87,10 +88,10 @@ def one(kind: str, seed: int) -> dict:
     """One case: what is true, what was said, and how long it took."""
     from bench.gap_effects import off_library, other_solver
     from bns.errors import BnsError
-    from bns.gap import cases, scoring
+    from bns.gap.bench import cases, scoring
     from bns.gap.diagnose import analyse
+    from bns.gap.models.wheeled import WheeledModel
     from bns.gap.records import plain
-    from bns.gap.wheeled import WheeledModel
 
     model = WheeledModel("khepera3", threads=1)
     case = cases.build(

@@ -30,10 +30,11 @@ QUICK = {"single": 2, "none": 1}
 
 def one(kind: str, seed: int) -> dict[str, Any]:
     """One case: what is true, what was said, and how long it took."""
-    from bns.gap import light_cases, light_diagnosis
-    from bns.gap.light_model import SightModel
+    from bns.gap.bench import light_cases
+    from bns.gap.models.light import diagnosis
+    from bns.gap.models.light.model import SightModel
+    from bns.gap.models.wheeled import WheeledModel
     from bns.gap.records import plain
-    from bns.gap.wheeled import WheeledModel
 
     model = WheeledModel("khepera3", threads=1)
     case = light_cases.build(
@@ -42,13 +43,13 @@ def one(kind: str, seed: int) -> dict[str, Any]:
     begin, busy = time.perf_counter(), time.process_time()
     whole = kind == "motion" or seed % WHOLE == 0
     if whole:
-        parts = light_diagnosis.analyse(case.trials, model, seed=seed)
+        parts = diagnosis.analyse(case.trials, model, seed=seed)
     else:
         sight = SightModel(case.trials, pose_sd=light_cases.pose_sd(case.reality))
-        parts = (light_diagnosis.look(case.trials, sight, seed=seed),)
+        parts = (diagnosis.look(case.trials, sight, seed=seed),)
     answer = parts[0].verdict
     if whole:
-        answer = light_diagnosis.merged(*(part.verdict for part in parts))
+        answer = diagnosis.merged(*(part.verdict for part in parts))
     said = asdict(answer) | {"verdict": answer.kind, "whole": whole}
     choice = parts[-1].choice
     said |= {"worth": choice.worth, "rungs": [rung.as_dict() for rung in choice.rungs]}
@@ -74,7 +75,7 @@ def off_library() -> tuple:
 
 def run(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     kept = CASES.produce(one, CASES.wanted(QUICK if quick else None))
     found = list(map(_twinned, map(_likened, kept)))
@@ -121,14 +122,14 @@ def run(quick: bool) -> Result:
 
 def _named(rows: Iterable[dict]) -> float:
     """Share of large effects that are named."""
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     return scoring.share(scoring.of(list(rows), "single", scoring.LARGE), scoring.right)
 
 
 def _likened(row: dict) -> dict:
     """A row whose aliases hold what the likelihood of its readings cannot tell."""
-    from bns.gap.aliases import ALIKE
+    from bns.gap.core.aliases import ALIKE
 
     answer = row["answer"]
     near = answer["near"] or [()] * len(answer["aliases"])
@@ -141,11 +142,9 @@ def _likened(row: dict) -> dict:
 
 def _twinned(row: dict) -> dict:
     """A row whose aliases hold what always looks alike as well."""
-    from bns.gap import light_library
+    from bns.gap.candidates import light
 
-    always = {
-        item.name: item.aliases for item in light_library.candidates(singles=True)
-    }
+    always = {item.name: item.aliases for item in light.candidates(singles=True)}
     answer = row["answer"]
     aliases = [
         sorted({*names, *(twin for name in names for twin in always.get(name, ()))})
@@ -155,14 +154,14 @@ def _twinned(row: dict) -> dict:
 
 
 def _of_recording(found: list[dict], singles: bool) -> dict[str, float]:
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     part = [row for row in found if _singles(row["seed"]) == singles]
     return {"n": len(part), "named": scoring.share(part, scoring.right)}
 
 
 def _wheels(found: list[dict]) -> dict[str, float]:
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     return {"n": len(found), "named": scoring.share(found, scoring.right)}
 
@@ -176,7 +175,7 @@ def _strange(row: dict) -> bool:
 
 
 def _alone_wrong(row: dict) -> bool:
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     alone = row["said"]["verdict"] in ("effect", "together")
     return alone and not scoring.right(row)

@@ -22,11 +22,11 @@ ERROR_BARS = {"payload": 0.08, "lever": 0.03, "gain": 0.04}
 
 def run(quick: bool) -> Result:
     """Four kinds of cases; quick takes 6 of each instead of 32 (of none: 9 of 48)."""
-    from bns.gap import servo
+    from bns.gap.models.servo import diagnosis
 
     every = servo_cases.load()
     law = servo_cases.nominal(every)
-    reference = servo.learn(every.take(every.where(lambda r: r > 0, "repeat")), law)
+    reference = diagnosis.learn(every.take(every.where(lambda r: r > 0, "repeat")), law)
     rng = np.random.default_rng(SEED)
     cases = list(servo_cases.draw(every, QUICK if quick else EACH, rng))
     rows = [_row(case, every, reference, FITTED) for case in cases]
@@ -55,11 +55,11 @@ def run(quick: bool) -> Result:
 
 def _harder(cases: list[Case], every, law) -> dict[str, object]:
     """The same cases from one repeat of the powered, smooth runs alone."""
-    from bns.gap import servo
+    from bns.gap.models.servo import diagnosis
 
     smooth = every.take(every.where(lambda kind: kind in SMOOTH, "trajectory"))
     past = smooth.take(smooth.where(lambda r: r > 0, "repeat"))
-    reference = servo.learn(past, law)
+    reference = diagnosis.learn(past, law)
     rows = [_row(case, smooth, reference, FITTED[:1]) for case in cases]
     sets = [row["truth"] in row["sets"] for row in rows]
     return {
@@ -75,11 +75,11 @@ def _harder(cases: list[Case], every, law) -> dict[str, object]:
 
 
 def _row(case: Case, every, reference, repeats) -> dict[str, object]:
-    from bns.gap import servo
+    from bns.gap.models.servo import diagnosis
 
     mine = servo_cases.of_cell(every, case.true, repeats)
     told = servo_cases.retold(mine, case.told)
-    found, scores = servo.diagnose(told, reference, without=[case.true])
+    found, scores = diagnosis.diagnose(told, reference, without=[case.true])
     truth = "none" if case.kind == "none" else f"servo_{case.kind}"
     best = scores.ranked[0]
     named = "none" if found.kind == "no gap" else CLASSES.get(best, best)

@@ -17,7 +17,7 @@ EDGES = ((0.0, 1.0), (1.0, 3.0), (3.0, float("inf")), (1.0, float("inf")))
 
 def run(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     cases = [("single", SEED + n) for n in range(2 if quick else CASES)]
     produce(cases, "sets")
@@ -43,13 +43,13 @@ def run(quick: bool) -> Result:
 
 
 def _named(found: list[dict], kind: str) -> list[dict]:
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     return [row for row in scoring.of(found, kind) if row["said"]["named"]]
 
 
 def _part(said: list[dict], low: float, high: float) -> dict[str, float | None]:
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     part = [row for row in said if low <= scoring.size(row) < high]
     return {
@@ -65,7 +65,7 @@ def _interval(said: list[dict]) -> list[float]:
     """In which the rate lies that this many cases show (Clopper and Pearson 1934)."""
     from scipy.stats import binomtest
 
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     held = sum(scoring.covered(row) for row in said)
     if not said:

@@ -10,7 +10,7 @@ ANGLE = 11.48  # [deg] whose cosine is 0.98
 
 def run(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     rows = ensure(quick)
     every = scoring.of(rows, "single")
@@ -45,7 +45,7 @@ def run(quick: bool) -> Result:
 
 def _by_angle(row: dict) -> bool:
     """With effects merged whose signatures are less than `ANGLE` apart."""
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     named = row["said"]["named"]
     return bool(named) and scoring.matches(named[0], row["answer"], angle=ANGLE)

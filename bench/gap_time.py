@@ -36,10 +36,10 @@ def _median(ordered: list[float]) -> float | None:
 
 def _cold() -> tuple[float, float]:
     from bench.gap_effects import other_solver
-    from bns.gap import cases
+    from bns.gap.bench import cases
     from bns.gap.diagnose import diagnose
-    from bns.gap.reduced import between, reduced
-    from bns.gap.wheeled import WheeledModel
+    from bns.gap.models.surrogate import between, reduced
+    from bns.gap.models.wheeled import WheeledModel
 
     case = cases.build(
         3, "single", WheeledModel(), extra=other_solver(), wanted="wheel_gain[left]"

@@ -64,9 +64,10 @@ def _case(number: int, text: str, quick: bool) -> dict:
     import numpy as np
 
     from bns import seeding
-    from bns.gap import cases, store
+    from bns.gap import store
+    from bns.gap.bench import cases
     from bns.gap.diagnose import diagnose
-    from bns.gap.wheeled import WheeledModel
+    from bns.gap.models.wheeled import WheeledModel
     from bns.worlds.effects import registry
 
     model = WheeledModel("khepera3", threads=1)
@@ -169,7 +170,7 @@ def _real(genes, reality, places) -> float:
     """Mean distance from the places in the real world [cm]."""
     import numpy as np
 
-    from bns.worlds.mujoco_world import MujocoWorld
+    from bns.worlds.physics.wheeled_world import MujocoWorld
 
     world = MujocoWorld("khepera3", reality=reality, threads=1)
     (trial,) = world.run([_commands(genes)])

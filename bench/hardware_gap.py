@@ -48,7 +48,7 @@ def run(quick: bool) -> Result:
 def _rehearsed(effects: Sequence[str], count: int):
     """Diagnosis, world and trials of an emulated robot that was recorded."""
     from bns.gap.diagnose import diagnose
-    from bns.gap.wheeled import WheeledModel
+    from bns.gap.models.wheeled import WheeledModel
     from bns.hardware.emulators import virtual
     from bns.hardware.excitation import START, commands
     from bns.hardware.world import HardwareWorld

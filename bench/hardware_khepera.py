@@ -39,8 +39,8 @@ def _learn(path: Path, trials: int, onset: int) -> str:
 
 
 def _result(directory: Path, onset: int, took: float, said: str) -> Result:
-    from bns.store import load
-    from bns.worlds import dataset
+    from bns.storage.store import load
+    from bns.worlds.data import dataset
 
     record = load(directory)
     solved = np.flatnonzero(record["solved"][0] > 0)

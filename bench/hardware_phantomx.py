@@ -37,8 +37,8 @@ def run(quick: bool) -> Result:
 
 
 def _result(directory: Path, onset: int, took: float, said: str) -> Result:
-    from bns.store import load
-    from bns.worlds import dataset
+    from bns.storage.store import load
+    from bns.worlds.data import dataset
 
     record = load(directory)
     ways = record["distance"][0]

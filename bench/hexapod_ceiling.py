@@ -14,7 +14,7 @@ from bench import experiments, hexapod_runs
 from bench.result import Result
 from bench.runner import write
 from bns import seeding
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 
 DOC = (
     "farthest walk that CMA-ES finds in the world itself, undamaged, and by damage type"

@@ -3,7 +3,7 @@
 import numpy as np
 import torch
 
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 from bns.walk import forgetting, scaling
 from bns.worlds.trial import body_displacements
 

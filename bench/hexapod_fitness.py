@@ -8,8 +8,8 @@ import numpy as np
 from bench import experiments, hexapod_runs
 from bench.hexapod_runs import spread
 from bench.result import Result
-from bns.config import RunConfig
-from bns.record import RunRecord
+from bns.experiment.config import RunConfig
+from bns.experiment.record import RunRecord
 
 if TYPE_CHECKING:
     from bns.walk.learner import WalkLearner
@@ -117,7 +117,7 @@ def _told(learner: "WalkLearner", run: int, goals: np.ndarray) -> float:
 
 def _at_the_end(config: RunConfig) -> "WalkLearner":
     """The learner of a batch that `experiments` has stored, after its last trial."""
-    from bns import files
+    from bns.storage import files
     from bns.walk.learner import WalkLearner
 
     count = config.replicates

@@ -5,7 +5,7 @@ import numpy as np
 from bench import hexapod_ceiling, hexapod_loads, hexapod_runs, solving
 from bench.hexapod_runs import spread
 from bench.result import Result
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 
 DOC = (
     "trials until the hexapod walks as far as the best tripod made by hand in its time"

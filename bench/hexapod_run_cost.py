@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from bench import hexapod_runs
 from bench.result import Result
-from bns.config import RunConfig
+from bns.experiment.config import RunConfig
 
 DOC = "processor time of one hexapod run of 200 trials, window 300"
 BAR = "<= 10 min on 2 cores"
@@ -46,8 +46,8 @@ def run(quick: bool) -> Result:
 
 def measure(config: RunConfig) -> dict[str, float]:
     """Seconds of evolution, world and training, start-up included in the total."""
-    from bns.batch import Batch, resolve
-    from bns.surroundings import make_world
+    from bns.experiment.batch import Batch, resolve
+    from bns.experiment.world_factory import make_world
 
     begun, wall = time.process_time(), time.perf_counter()
     config, mode = resolve(config)

@@ -14,10 +14,10 @@ import numpy as np
 
 from bench import branching, experiments, hexapod_evidence, solving
 from bns import presets
-from bns.config import RunConfig
 from bns.errors import BnsError
-from bns.record import RunRecord
-from bns.store import RunStore
+from bns.experiment.config import RunConfig
+from bns.experiment.record import RunRecord
+from bns.storage.store import RunStore
 from bns.worlds.trial import Trial
 
 Kind = Literal["window", "forget", "own"]  # of recovering, see `damaged`

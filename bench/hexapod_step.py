@@ -77,9 +77,9 @@ def _ends(lists: np.ndarray, step: float, cone: str, impratio: float) -> Any:
     from mujoco.rollout import Rollout
 
     from bns import models
-    from bns.worlds import legged_goals, legged_plan
-    from bns.worlds.hexapod_world import SPEED
-    from bns.worlds.physics import Compiled
+    from bns.worlds.physics import legged_goals, legged_plan
+    from bns.worlds.physics.legged_world import SPEED
+    from bns.worlds.physics.rollout import Compiled
 
     spec = models.spec("phantomx", visuals=False)
     spec.option.timestep, spec.option.impratio = step, impratio

@@ -5,7 +5,7 @@ import numpy as np
 from bench import forking, light_runs, solving
 from bench.result import Result
 from bns import stats
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 
 DOC = "cost of the last ten trials over the first ten with an intermittent wheel"
 BAR = "noise-aware: no decline (<= 1.0); the plain one beside it"

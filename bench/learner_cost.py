@@ -5,7 +5,7 @@ from dataclasses import replace
 from statistics import median
 
 from bench.result import Result
-from bns.config import RunConfig
+from bns.experiment.config import RunConfig
 
 DOC = "learner time against bare physics time of the same trials, window 150"
 BAR = "<= 1.5 x"
@@ -56,9 +56,9 @@ def measure(config: RunConfig, after: int = 0) -> dict[str, float]:
         config: the batch.
         after: trials not counted in "without start-up" beside the first one.
     """
-    from bns.batch import Batch, resolve
-    from bns.surroundings import make_world
-    from bns.worlds.physics import Pool
+    from bns.experiment.batch import Batch, resolve
+    from bns.experiment.world_factory import make_world
+    from bns.worlds.physics.rollout import Pool
 
     begin = time.perf_counter()
     config, _ = resolve(config)

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 from bench import experiments, forking
 from bns import presets
-from bns.config import AdaptationConfig, RunConfig, WorldConfig
-from bns.config_watch import WatchConfig
+from bns.experiment.config import AdaptationConfig, RunConfig, WorldConfig
+from bns.experiment.config_watch import WatchConfig
 
 ONSET = 20  # trial of the damage (dissertation, section 6.3.2)
 AFTER = 20  # trials from the damage on

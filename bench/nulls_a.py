@@ -8,7 +8,7 @@ import numpy as np
 
 from bench import experiments, solving
 from bench.result import Result
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 
 DOC = "nulls A9, A11-A13, A23, claims A8, A21 and A24's onset: nulls found null"
 BAR = "none: reported as they come out"

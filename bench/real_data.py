@@ -13,7 +13,7 @@ def directory(name: str) -> Path | None:
     """The directory of one set of real recordings, or None where it is absent.
 
     Args:
-        name: of the set, as its reader in `bns.gap.importing` is called.
+        name: of the set, as its reader in `bns.gap.importers` is called.
     """
     found = Path(os.environ.get(VARIABLE, _DEFAULT)) / name
     return found if found.is_dir() else None

@@ -5,7 +5,7 @@ import numpy as np
 from bench import hexapod_ceiling, hexapod_runs, solving
 from bench.hexapod_runs import spread
 from bench.result import Result
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 
 DOC = "worst median of trials until a damaged hexapod walks 90 % as far as before"
 BAR = "median <= 30 trials for types 0, 1, 3 and <= 46 for types 2, 5; window 300"

@@ -10,8 +10,8 @@ import numpy as np
 from bench import forking, light_runs, solving
 from bench.result import Result
 from bns import stats
+from bns.experiment.record import RunRecord
 from bns.light.task import LightTask
-from bns.record import RunRecord
 
 DOC = "most trials to recover (median, over four damages) in light following, T6.7"
 BAR = "slow wheel / noisy / minimum / maximum sensor: median <= 12 / 10 / 12 / 10"

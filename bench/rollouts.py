@@ -53,9 +53,9 @@ def run(quick: bool) -> Result:
 
 def _population() -> tuple[Any, Any, Any]:
     from bns.chromosome import Encoding
-    from bns.config import RunConfig
     from bns.draws import Draws
     from bns.evaluation import Evaluator
+    from bns.experiment.config import RunConfig
     from bns.snn.network import Shape
     from bns.snn.scaling import Scaling
     from bns.tasks import NavigationTask

@@ -58,7 +58,7 @@ def case(runs: int, threads: int, compiled: str) -> dict[str, float]:
         process's peak memory.
     """
     from bns import presets
-    from bns.run import train
+    from bns.experiment.run import train
 
     config = replace(
         presets.load("khepera-simple"),

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from bench.real_data import needed
-from bns.gap import servo_curves, servo_nominal
-from bns.gap.importing import kscale_sts3215
-from bns.gap.servo_curves import features
-from bns.gap.servo_nominal import Nominal
-from bns.gap.servo_runs import Runs, cells, merged, runs
+from bns.gap.importers import kscale_sts3215
+from bns.gap.models.servo import curves
+from bns.gap.models.servo import nominal as servo_nominal
+from bns.gap.models.servo.curves import features
+from bns.gap.models.servo.nominal import Nominal
+from bns.gap.models.servo.runs import Runs, cells, merged, runs
 from bns.worlds.effects import registry
 
 SET = "kscale_sts3215"
@@ -92,10 +93,10 @@ def error(every: Runs, law: Nominal, effect: str = "") -> float:
     """Root mean square error on runs, with an effect (as text) or without [rad]."""
     together = merged(every)
     if not effect:
-        rest = servo_curves.residuals(together, law)
+        rest = curves.residuals(together, law)
     else:
-        from bns.gap.servo_candidates import columns
-        from bns.worlds.servo_physics import simulate
+        from bns.gap.models.servo.candidates import columns
+        from bns.worlds.physics.servo_rollout import simulate
 
         made = columns(law.told(together), [[registry.parse(effect)]])
         angles = simulate(made, together.drive)[:, 0]

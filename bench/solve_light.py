@@ -10,8 +10,8 @@ import numpy as np
 from bench import experiments, light_runs, solving
 from bench.result import Result
 from bns import stats
+from bns.experiment.record import RunRecord
 from bns.light.task import LightTask
-from bns.record import RunRecord
 
 DOC = "median trials until the robot circles the lamp, undamaged, settings T5.19"
 BAR = "median <= 6 trials, >= 27 of 30 runs within 15"

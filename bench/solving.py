@@ -3,7 +3,7 @@
 import numpy as np
 
 from bns import stats
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 
 
 def waits(values: np.ndarray) -> dict[str, object]:

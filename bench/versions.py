@@ -6,7 +6,7 @@ import subprocess
 from pathlib import Path
 
 from bns import __version__
-from bns.versions import PACKAGES, package, processor
+from bns.experiment.versions import PACKAGES, package, processor
 
 ROOT = Path(__file__).resolve().parents[1]
 

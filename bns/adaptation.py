@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bns.adaptations import registry
-from bns.config import RunConfig
+from bns.experiment.config import RunConfig
 from bns.units import metres_per_second
 
 

@@ -6,11 +6,11 @@ import torch
 from torch import Tensor
 
 from bns.chromosome import Population
-from bns.config import RunConfig
 from bns.draws import Draws
 from bns.errors import UnknownNameError
 from bns.evolution import selection
-from bns.validate import check_choice
+from bns.experiment.config import RunConfig
+from bns.experiment.validate import check_choice
 
 
 class Judge(Protocol):

@@ -11,8 +11,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from bns.config import ControllerConfig
 from bns.draws import Draws, whole_below
+from bns.experiment.config import ControllerConfig
 from bns.units import metres_per_second
 from bns.worlds.trial import Commands
 

@@ -8,7 +8,7 @@ from ctypes.util import find_library
 from glob import glob
 from typing import Literal, NamedTuple
 
-from bns import versions
+from bns.experiment import versions
 
 State = Literal["ok", "missing", "bad", "note"]
 

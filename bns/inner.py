@@ -12,11 +12,11 @@ import torch
 from torch import Tensor
 
 from bns.chromosome import Population
-from bns.config import RunConfig
 from bns.draws import Draws
 from bns.errors import MissingDependencyError
 from bns.evaluation import Evaluator
 from bns.evolution.generation import Breeder, Coins, Rates
+from bns.experiment.config import RunConfig
 from bns.learners.registry import dearness
 from bns.snn import fitting
 

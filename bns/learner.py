@@ -16,12 +16,12 @@ from torch import Tensor
 from bns import choice, patterns, seeding
 from bns.adaptation import Adaptations
 from bns.chromosome import Encoding, Population
-from bns.config import RunConfig
 from bns.draws import Draws
 from bns.errors import BnsError
 from bns.evaluation import Evaluator
 from bns.evolution import diversity
 from bns.evolution.generation import Breeder, Rates
+from bns.experiment.config import RunConfig
 from bns.inner import InnerLoops
 from bns.snn.network import Shape, predict
 from bns.snn.scaling import Scaling

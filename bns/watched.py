@@ -6,8 +6,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from bns.config import RunConfig
 from bns.detection import Detector, Ground, Misses, innovation
+from bns.experiment.config import RunConfig
 from bns.forgetting import contradicted, drop
 from bns.learner import Learner
 from bns.snn.network import forward

@@ -8,7 +8,7 @@ import argparse
 from dataclasses import replace
 
 from bns import presets, stats
-from bns.run import train
+from bns.experiment.run import train
 
 parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
 parser.add_argument("--quick", action="store_true", help="three trials")

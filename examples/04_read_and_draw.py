@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from bns import presets, stats
-from bns.run import train
-from bns.store import load
+from bns.experiment.run import train
+from bns.storage.store import load
 from bns.viz import figures, report
 
 parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])

@@ -11,7 +11,8 @@ import argparse
 
 import numpy as np
 
-from bns import presets, static_snn
+from bns import presets
+from bns.experiment import static_snn
 from bns.worlds import registry
 from bns.worlds.trial import Commands, body_displacements
 

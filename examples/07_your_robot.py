@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from bns.gap import own_cases
+from bns.gap.bench import mjcf_cases
 from bns.gap.diagnose import diagnose
-from bns.gap.own_model import OwnModel
+from bns.gap.models.mjcf.model import OwnModel
 
 parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
 parser.add_argument("--quick", action="store_true", help="one hidden effect only")
@@ -23,9 +23,9 @@ if parser.parse_args().quick:
     hidden = hidden[:1]
 
 arm = OwnModel.read(Path(__file__).parent / "arm" / "arm.toml")
-commands = own_cases.commands(arm, np.random.default_rng(0), 4, seconds=3.0)
+commands = mjcf_cases.commands(arm, np.random.default_rng(0), 4, seconds=3.0)
 for text in hidden:
-    trials = own_cases.record(arm, commands, [arm.parse(text)], seed=1)
+    trials = mjcf_cases.record(arm, commands, [arm.parse(text)], seed=1)
     found = diagnose(trials, arm, full=False)
     print(f"hidden: {text}")
     print(f"found:  {found.verdict.sentence}")

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from bns import models, presets
+from bns.experiment.run import train
 from bns.models import check
-from bns.run import train
 from bns.worlds import registry
 from bns.worlds.trial import Commands
 

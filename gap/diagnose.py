@@ -8,16 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns.errors import BnsError
-from bns.gap import check, light_model, quantify, select, signatures, verdict, where
-from bns.gap.fit import Point
-from bns.gap.magnitudes import intervals
-from bns.gap.model import GapModel
-from bns.gap.null import Null
-from bns.gap.problem import Problem
+from bns.gap.core import gap_closure, select, signatures, verdict, where
+from bns.gap.core.fit import Point
+from bns.gap.core.null import Null
+from bns.gap.core.problem import Problem
+from bns.gap.core.reference import Reference
+from bns.gap.core.select import Search
+from bns.gap.core.signatures import Curves
+from bns.gap.core.uncertainty import intervals
+from bns.gap.models.base import GapModel
+from bns.gap.models.light import model as light_model
+from bns.gap.recordings import check
 from bns.gap.records import Candidate, Diagnosis, Fit, Verdict
-from bns.gap.reference import Reference
-from bns.gap.select import Search
-from bns.gap.signatures import Curves
 from bns.worlds.trial import Trial
 
 ALPHA_MORE = 0.01  # chance that a further effect is added where there is none
@@ -60,7 +62,7 @@ def diagnose(
         most: largest number of effects at once.
         full: with localisation and closed fractions; False = the verdict alone.
         reference: recordings of the same robot in which nothing was changed; they tell
-            how far the nominal model is off anyway (`gap/reference.py`).
+            how far the nominal model is off anyway (`gap/core/reference.py`).
 
     Raises:
         BnsError: too few trials, faults that cannot be repaired, channels that do not
@@ -74,10 +76,10 @@ def diagnose(
         "reference": reference,
     }
     if light_model.told_by(model, (*trials, *reference)):
-        from bns.gap import light_diagnosis
+        from bns.gap.models.light import diagnosis
 
-        parts = light_diagnosis.analyse(trials, model, **given)
-        return light_diagnosis.report(*parts, full=full)
+        parts = diagnosis.analyse(trials, model, **given)
+        return diagnosis.report(*parts, full=full)
     return report(analyse(trials, model, **given), full=full)
 
 
@@ -183,7 +185,7 @@ def report(made: Analysis, *, full: bool = True) -> Diagnosis:
         with clock("where"):
             where_found = where.where(problem, choice.best, seed=made.seed)
         with clock("closed"):
-            closed = quantify.quantify(
+            closed = gap_closure.quantify(
                 problem, made.null, made.search, choice.best, seed=made.seed
             )
     return Diagnosis(

@@ -10,11 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns.errors import UnknownNameError
-from bns.gap import check, residuals, store
-from bns.gap.model import GapModel
-from bns.gap.problem import Problem
+from bns.gap import store
+from bns.gap.core import residuals
+from bns.gap.core.problem import Problem
+from bns.gap.core.whitening import loss
+from bns.gap.models.base import GapModel
+from bns.gap.recordings import check
 from bns.gap.records import Diagnosis
-from bns.gap.whiten import loss
 from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Channel, Trial
 

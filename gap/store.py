@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from bns.errors import BnsError, FormatError, UnknownNameError
-from bns.gap.model import GapModel
+from bns.gap.models.base import GapModel
 from bns.gap.records import Candidate, Diagnosis, Fit
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect

@@ -15,11 +15,12 @@ from bns.hardware.dynamixel.walker import SPEED
 from bns.hardware.errors import Void
 from bns.hardware.limits import Limits
 from bns.hardware.real_robot import RealRobot
-from bns.worlds import active, control
+from bns.worlds import active
 from bns.worlds.active import Stages
 from bns.worlds.damage import Damage
 from bns.worlds.effects.base import ServoEffect
-from bns.worlds.legged_goals import planned
+from bns.worlds.physics import control
+from bns.worlds.physics.legged_goals import planned
 from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Trial
 
 GRID = 0.02  # s; effects are computed on it

@@ -14,16 +14,18 @@ from bns.hardware.rig import Rig, battery
 from bns.hardware.schedule import GRID
 from bns.hardware.steering import Rules, Steered, Steering
 from bns.hardware.world import HardwareWorld
-from bns.worlds import given, light_sensors, light_starts
+from bns.worlds import given
 from bns.worlds.active import Stages
 from bns.worlds.checks import bounded
 from bns.worlds.closed_loop import CYCLE, CYCLES, Policy
 from bns.worlds.damage import Damage
 from bns.worlds.effects.base import OpticsEffect
-from bns.worlds.light_field import Lamp, LightField
-from bns.worlds.loop_control import LoopSignal
-from bns.worlds.sensing import Changes
-from bns.worlds.supervisor import Supervisor
+from bns.worlds.light import sensors
+from bns.worlds.light import starts as light_starts
+from bns.worlds.light.field import Lamp, LightField
+from bns.worlds.light.sensing import Changes
+from bns.worlds.light.supervisor import Supervisor
+from bns.worlds.physics.loop_control import LoopSignal
 from bns.worlds.trial import POSE_CHANNELS, Commands, Trial
 
 KEEP = 0.10  # m beyond the safety boundary, kept on the way to a start; assumed
@@ -118,7 +120,7 @@ class HardwareLight(HardwareWorld):
                 self.arena,
                 channels,
                 self.model.limits,
-                light_sensors.of("khepera3"),
+                sensors.of("khepera3"),
             ),
             cycles=cycles,
             cycle=cycle,
@@ -149,11 +151,11 @@ class HardwareLight(HardwareWorld):
             world=self.name,
             conditions=conditions,
         )
-        read = light_sensors.of("khepera3").virtual(np.array(done.readings))
+        read = sensors.of("khepera3").virtual(np.array(done.readings))
         held = np.searchsorted(trial.boundaries, np.arange(len(trial.times)), "right")
         return trial.replace(
             observed=np.hstack([trial.observed, read[held - 1]]),
-            channels=POSE_CHANNELS + light_sensors.VIRTUAL,
+            channels=POSE_CHANNELS + sensors.VIRTUAL,
             handled=np.array(done.handled),
             outcome=trial.outcome._replace(
                 stopped=done.stopped, edge_turns=done.turns, lamp_stops=done.stops

@@ -11,10 +11,11 @@ from bns.hardware.errors import Void
 from bns.hardware.faults import FaultLog
 from bns.hardware.limits import Operator
 from bns.hardware.rig import EMULATED
-from bns.worlds import active, control
+from bns.worlds import active
 from bns.worlds.active import Stages
 from bns.worlds.checks import bounded, checked_start, shared
 from bns.worlds.damage import Damage
+from bns.worlds.physics import control
 from bns.worlds.trial import Commands, Trial
 
 TRIES = 20  # of a trial that is void

@@ -3,8 +3,8 @@
 import numpy as np
 
 from bns.hardware.motion import Point
-from bns.worlds import control
 from bns.worlds.active import Stages
+from bns.worlds.physics import control
 from bns.worlds.trial import Commands
 
 GRID = 0.02  # s; effects are computed on it

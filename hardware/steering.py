@@ -15,10 +15,10 @@ from bns.hardware.motion import Mover, Performed
 from bns.hardware.tracking.tracker import Sighting
 from bns.worlds import closed_loop
 from bns.worlds.closed_loop import Policy
-from bns.worlds.light_sensors import LightSensors
-from bns.worlds.loop_control import LoopSignal
-from bns.worlds.sensing import LEAD, Changes
-from bns.worlds.supervisor import Call, Supervisor
+from bns.worlds.light.sensing import LEAD, Changes
+from bns.worlds.light.sensors import LightSensors
+from bns.worlds.light.supervisor import Call, Supervisor
+from bns.worlds.physics.loop_control import LoopSignal
 from bns.worlds.trial import Channel
 
 LATE = 0.1  # s by which a command may be late before the trial is void; assumed

@@ -23,7 +23,7 @@ SIDES = {
 BEHIND = ("ir_back_left", "ir_back_right", "ir_back")
 NAMES = (*SIDES["left"], *SIDES["right"], *BEHIND)
 NUMBERS = ("exponent", "full_light", "light_noise", "count_noise")
-"""that a robot may have of its own, in `[light]`; `bns.worlds.light_sensors` says what
+"""that a robot may have of its own, in `[light]`; `bns.worlds.light.sensors` says what
 they are"""
 
 GROUND = "ground"  # in the name of a site that looks at the floor, no light sensor

@@ -78,7 +78,7 @@ class RobotModel:
         picture: camera of the scene for the portrait.
         sensor_sites: in the order of the robot's readings; they look along their z.
             Light sensors have the names of `bns.models.light_sites`.
-        light: what those do, where it is not as usual (`bns.worlds.light_sensors`).
+        light: what those do, where it is not as usual (`bns.worlds.light.sensors`).
         wheels: driven wheels by side, "left" and "right".
         caster_geom: "" where there is none.
         options: what else `models.spec` takes.

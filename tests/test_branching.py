@@ -6,8 +6,8 @@ import pytest
 
 from bench import branching, experiments
 from bns.errors import BnsError
-from bns.run import train
-from bns.store import RunStore
+from bns.experiment.run import train
+from bns.storage.store import RunStore
 from tests.bns.walkers import small
 
 ONSET = 6

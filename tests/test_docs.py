@@ -56,7 +56,7 @@ def test_python_in_the_page_runs(page, run_python, tmp_path):
 
 @pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "toml")], ids=ids)
 def test_toml_in_the_page_is_a_configuration(page, tmp_path):
-    from bns import loading
+    from bns.experiment import loading
 
     for number, text in enumerate(blocks(page, "toml")):
         path = tmp_path / f"{number}.toml"

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from bench import experiments, forking
-from bns.config import AdaptationConfig, WorldConfig
-from bns.config_watch import WatchConfig
-from bns.run import train
+from bns.experiment.config import AdaptationConfig, WorldConfig
+from bns.experiment.config_watch import WatchConfig
+from bns.experiment.run import train
 from tests.bns.contents import contents
 from tests.bns.light_fakes import small
 

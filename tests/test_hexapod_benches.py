@@ -14,7 +14,7 @@ from bench import (
     solving,
 )
 from bns import presets
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 from tests.bns.walkers import small
 
 

@@ -26,20 +26,22 @@ PROTOCOL = {
     "bns.worlds.trial",
     "bns.worlds.world",
     "bns.worlds.damage",
-    "bns.worlds.dataset",
+    "bns.worlds.data.dataset",
 }
 """all that the learner may know of worlds"""
 
 EXPERIMENT = {
-    "bns.run",
-    "bns.batch",
-    "bns.loading",
-    "bns.robots",
-    "bns.surroundings",
-    "bns.static_snn",
-    "bns.static_walk",
-    "bns.doctor",
-}
+    f"bns.experiment.{name}"
+    for name in (
+        "batch",
+        "loading",
+        "robots",
+        "run",
+        "static_snn",
+        "static_walk",
+        "world_factory",
+    )
+} | {"bns.doctor"}
 """modules around the learner that set experiments up: they make worlds by name"""
 
 

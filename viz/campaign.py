@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from bns import bootstrap
 from bns.campaign.results import Results
 from bns.campaign.settings import shortened, text
-from bns.compare import MEASURES, values
 from bns.errors import BnsError
+from bns.stats import bootstrap
+from bns.stats.compare import MEASURES, values
 from bns.viz import style
 
 MOST_CURVES = 7

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 from bns.viz import style
 from bns.viz.blueprint import TRIAL_TIMELINE
 from bns.viz.choices import Choice

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns.errors import OutOfBoundsError
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 from bns.viz import style
 
 

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from bns import stats
-from bns.loading import to_mapping
-from bns.record import RunRecord
+from bns.experiment.loading import to_mapping
+from bns.experiment.record import RunRecord
 from bns.viz.facts import Facts, interval
 
 

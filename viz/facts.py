@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns import stats
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 from bns.stats import Interval
 from bns.viz import scene
 from bns.viz.charts import DEGREES, MILLIMETRES

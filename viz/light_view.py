@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from bns.config import RunConfig
-from bns.record import RunRecord
+from bns.experiment.config import RunConfig
+from bns.experiment.record import RunRecord
 from bns.viz import series, style
 from bns.viz.blueprint import READINGS
 
@@ -24,7 +24,7 @@ def log_lamps(stream, config: RunConfig) -> None:
     import rerun as rr
 
     from bns.light.task import lamps
-    from bns.worlds.light_field import Lamp
+    from bns.worlds.light.field import Lamp
 
     places = np.array([Lamp(**fields).position for fields in lamps(config.light)])
     count, colour = len(places), (*style.rgb(style.YELLOW), 255)

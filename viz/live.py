@@ -11,8 +11,8 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from bns.config import RunConfig
-from bns.step import Step
+from bns.experiment.config import RunConfig
+from bns.experiment.step import Step
 from bns.viz import charts, moments, scene
 from bns.viz.blueprint import blueprint
 from bns.viz.picture import executable, free_port
@@ -38,7 +38,7 @@ def stream(
             one is started here.
 
     Yields:
-        What to call after every trial, as `bns.run.train` takes it for `on_trial`.
+        What to call after every trial, the `on_trial` of `bns.experiment.run.train`.
     """
     shown = Stream(config, replicate=replicate, url=url)
     try:

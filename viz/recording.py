@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from bns import loading
-from bns.config import RunConfig
-from bns.record import RunRecord
+from bns.experiment import loading
+from bns.experiment.config import RunConfig
+from bns.experiment.record import RunRecord
 from bns.viz import charts, moments, scene
 from bns.viz.blueprint import blueprint
 from bns.viz.choices import Choice, choose, typical

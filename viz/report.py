@@ -3,9 +3,10 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from bns import files, loading
 from bns.errors import BnsError
-from bns.record import RunRecord
+from bns.experiment import loading
+from bns.experiment.record import RunRecord
+from bns.storage import files
 from bns.viz import comparison, facts, figures, scene
 from bns.viz.captions import CAPTIONS, LIGHT, TITLES, WALK
 from bns.viz.page import picture, render
@@ -62,7 +63,7 @@ def _runs(sources) -> dict[str, RunRecord]:
 
 
 def _load(directory: str | Path) -> RunRecord:
-    from bns.store import load
+    from bns.storage.store import load
 
     return load(directory)
 

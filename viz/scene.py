@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bns.config import RunConfig
+from bns.experiment.config import RunConfig
 from bns.viz import geometry, light_view, style
 from bns.viz.paths import reached
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 from bns.viz import geometry
 from bns.worlds.trial import Trial
 

@@ -25,10 +25,10 @@ from bns.worlds.world import World
 GROUP = "bns.worlds"
 _BUILT_IN = {
     "hardware": "bns.hardware.world:HardwareWorld",
-    "hexapod": "bns.worlds.hexapod_world:HexapodWorld",
-    "mujoco": "bns.worlds.mujoco_world:MujocoWorld",
-    "light": "bns.worlds.light_world:LightWorld",
-    "static-snn": "bns.worlds.static_snn_world:StaticSnnWorld",
+    "hexapod": "bns.worlds.physics.legged_world:HexapodWorld",
+    "mujoco": "bns.worlds.physics.wheeled_world:MujocoWorld",
+    "light": "bns.worlds.light.world:LightWorld",
+    "static-snn": "bns.worlds.static_snn.world:StaticSnnWorld",
 }
 _registered: dict[str, Callable[..., World]] = {}
 

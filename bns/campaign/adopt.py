@@ -28,7 +28,7 @@ def adopt(
     Raises:
         FormatError: no such folder.
     """
-    from bns.store import RunStore
+    from bns.storage.store import RunStore
 
     if not folder.is_dir():
         raise FormatError(f"There is no folder {folder} to take runs from.")

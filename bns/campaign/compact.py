@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from bns import files
 from bns.campaign.part import META, Part, from_table
 from bns.errors import FormatError
+from bns.storage import files
 
 FORMAT, SCHEMA = "bns-campaign", 1
 RESULTS = "results.parquet"

@@ -5,8 +5,6 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from bns import files
-from bns.batch import check_device, check_world
 from bns.campaign.engines.base import Engine
 from bns.campaign.file import Campaign
 from bns.campaign.identity import changed_default
@@ -14,6 +12,8 @@ from bns.campaign.plan import Job, plan
 from bns.campaign.progress import Progress
 from bns.campaign.store import FILE, CampaignStore
 from bns.errors import BnsError
+from bns.experiment.batch import check_device, check_world
+from bns.storage import files
 
 
 @dataclass(frozen=True)

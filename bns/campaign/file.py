@@ -34,10 +34,10 @@ from typing import Any
 
 from bns.campaign import sample, settings
 from bns.campaign.identity import identity
-from bns.config import RunConfig
 from bns.errors import BnsError, UnknownNameError
-from bns.loading import read_toml
-from bns.validate import BOUNDS
+from bns.experiment.config import RunConfig
+from bns.experiment.loading import read_toml
+from bns.experiment.validate import BOUNDS
 
 TOP = ("name", "description", "preset", "replicates", "seed", "batch_runs")
 TABLES = ("settings", "grid", "list", "sample")

@@ -14,9 +14,9 @@ from hashlib import sha256
 from typing import Any
 
 from bns import seeding
-from bns.config import AdaptationConfig, RunConfig, WorldConfig
+from bns.experiment.config import AdaptationConfig, RunConfig, WorldConfig
+from bns.experiment.validate import leaves
 from bns.learners import registry
-from bns.validate import leaves
 
 NO_PART = {"preset", "seed", "replicates", "record_replicates", "threads", "device"}
 

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from bns.campaign.identity import foreign
-from bns.config import RunConfig
 from bns.errors import BnsError, FormatError
-from bns.loading import from_mapping, to_mapping
-from bns.record import RunRecord
+from bns.experiment.config import RunConfig
+from bns.experiment.loading import from_mapping, to_mapping
+from bns.experiment.record import RunRecord
 
 FORMAT, SCHEMA = "bns-campaign-part", 1
 META = b"bns"

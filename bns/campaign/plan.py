@@ -14,8 +14,8 @@ from typing import Any
 
 from bns.campaign.file import Campaign, Member
 from bns.campaign.identity import batch_seed, core, digest, world_seed
-from bns.config import RunConfig
-from bns.loading import from_mapping, to_mapping
+from bns.experiment.config import RunConfig
+from bns.experiment.loading import from_mapping, to_mapping
 
 
 @dataclass(frozen=True)

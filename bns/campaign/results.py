@@ -11,8 +11,8 @@ from bns.campaign.file import Campaign, Member, from_content
 from bns.campaign.part import Block
 from bns.campaign.store import FILE, CampaignStore
 from bns.errors import FormatError
-from bns.loading import read_toml
-from bns.record import RunRecord
+from bns.experiment.loading import read_toml
+from bns.experiment.record import RunRecord
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,10 +3,10 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from bns.config import RunConfig
 from bns.errors import BnsError, UnknownNameError
-from bns.loading import from_mapping
-from bns.validate import leaves
+from bns.experiment.config import RunConfig
+from bns.experiment.loading import from_mapping
+from bns.experiment.validate import leaves
 
 OWN = ("preset", "seed", "replicates", "record_replicates", "threads")
 """settings that the campaign decides itself"""

@@ -19,12 +19,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from bns import files, journal
 from bns.campaign.compact import FORMAT, SCHEMA, Compact, write
 from bns.campaign.part import Part, decode
 from bns.campaign.work import packages
-from bns.directory import Lock, read_head
 from bns.errors import BnsError, FormatError
+from bns.storage import files, journal
+from bns.storage.directory import Lock, read_head
 
 HEAD, FILE = "campaign.json", "campaign.toml"
 

@@ -6,14 +6,14 @@ from itertools import combinations
 
 import numpy as np
 
-from bns import bootstrap, stats
+from bns import stats
 from bns.campaign.file import Member
 from bns.campaign.results import Results
-from bns.compare import values
 from bns.errors import BnsError
-from bns.power import power
-from bns.stats import Interval
-from bns.validate import leaves
+from bns.experiment.validate import leaves
+from bns.stats import Interval, bootstrap
+from bns.stats.compare import values
+from bns.stats.power import power
 
 MOST_PAIRS = 500
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from bns.campaign.part import Block, Part, encode
 from bns.campaign.plan import Job
-from bns.config import RunConfig
+from bns.experiment.config import RunConfig
 
 Beat = Callable[[int], None]
 
@@ -22,8 +22,8 @@ def run(job: Job, beat: Beat = lambda trials: None) -> bytes:
     Raises:
         BnsError: a setting that is not allowed.
     """
-    from bns.run import facts, train_many
-    from bns.surroundings import make_world
+    from bns.experiment.run import facts, train_many
+    from bns.experiment.world_factory import make_world
 
     configs = list(job.configs.values())
     mode = _mode(configs)
@@ -49,7 +49,7 @@ def run(job: Job, beat: Beat = lambda trials: None) -> bytes:
 def packages() -> dict[str, str]:
     """Versions of what can move a result."""
     from bns import __version__
-    from bns.versions import package
+    from bns.experiment.versions import package
 
     moving = ("mujoco", "numpy", "torch")
     return {"bns": __version__} | {name: package(name) for name in moving}
@@ -61,7 +61,7 @@ def _mode(configs: list[RunConfig]) -> str:
     Without that, the compiler's cache fills over the batches of a process, and the
     last ones would silently run uncompiled.
     """
-    from bns.batch import resolve
+    from bns.experiment.batch import resolve
 
     modes = {resolve(config)[1] for config in configs}
     mode = modes.pop()

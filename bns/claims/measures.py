@@ -11,7 +11,7 @@ import numpy as np
 
 from bns import stats
 from bns.errors import BnsError, UnknownNameError
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 
 Values = Callable[[RunRecord], np.ndarray]
 LAST = 10  # trials

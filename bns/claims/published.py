@@ -14,8 +14,8 @@ from pathlib import Path
 from bns.claims import verdict
 from bns.claims.claim import Cell, Claim
 from bns.claims.verdict import Finding
-from bns.files import write_bytes
 from bns.stats import Interval
+from bns.storage.files import write_bytes
 
 FILE = "published.json"
 

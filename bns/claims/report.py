@@ -11,7 +11,7 @@ from bns.claims import published, sides, verdict
 from bns.claims.claim import KINDS, Cell, Claim
 from bns.claims.verdict import Finding
 from bns.errors import BnsError
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 
 NOT_RUN, NOT_TESTED = "not run", "not tested"
 VERDICTS = ("holds", "direction only", "null", "reversed", NOT_RUN, NOT_TESTED)

@@ -7,8 +7,8 @@ from bns import presets
 from bns.campaign.file import Member
 from bns.campaign.settings import flatten, with_settings
 from bns.claims.claim import Cell, content
-from bns.config import EvolutionConfig, RunConfig
 from bns.errors import BnsError, UnknownNameError
+from bns.experiment.config import EvolutionConfig, RunConfig
 
 QUICK_TRIALS, QUICK_DIVISOR = 12, 5
 
@@ -25,7 +25,7 @@ def member(investigation: str, side: str, *, world: str, quick: bool = False) ->
     Raises:
         BnsError: a preset, piece, setting or effect that does not exist (yet).
     """
-    from bns.batch import check_world
+    from bns.experiment.batch import check_world
 
     data = content(investigation)
     if world not in data["worlds"]:

@@ -37,9 +37,9 @@ from scipy import stats as scipy_stats
 from bns import stats
 from bns.claims import measures
 from bns.claims.claim import Cell
-from bns.power import power
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 from bns.stats import Interval
+from bns.stats.power import power
 
 LEVEL = 0.05
 MARGIN = 0.147

@@ -195,7 +195,7 @@ def _table(given: TableOf) -> int:
     from bns.campaign import results
     from bns.campaign.table import table
     from bns.cli.compare import span, text
-    from bns.compare import MEASURES
+    from bns.stats.compare import MEASURES
 
     found = table(results.read(given.directory), given.measure)
     head = ["member", "runs", "reached", "median", "95 % interval"]

@@ -232,8 +232,8 @@ def _table(given: Table) -> int:
 
 def _written(given: Table, worlds: dict) -> None:
     """The page, the findings, or both as files."""
-    from bns import files
     from bns.claims import page, published, report
+    from bns.storage import files
 
     if given.write:
         files.write_bytes(Path(given.write), page.page(worlds).encode())

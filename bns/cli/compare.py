@@ -25,8 +25,8 @@ class Arguments:
 def main(verb: str, argv: list[str]) -> int:
     """Run the verb; gives the exit code."""
     given = parse(Arguments, argv, prog="bns compare")
-    from bns.compare import MEASURES, compare
-    from bns.store import load
+    from bns.stats.compare import MEASURES, compare
+    from bns.storage.store import load
 
     found = compare([load(directory) for directory in given.directories])
     if given.json:

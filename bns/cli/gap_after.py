@@ -74,22 +74,27 @@ def main(verb: str, argv: list[str]) -> int:
 
 
 def _model(found: Any) -> Any:
-    from bns.gap import inputs, odometry_record
+    from bns.gap.models.odometry import record
+    from bns.gap.recordings import load_recordings
 
-    if found.model == odometry_record.MODEL:
+    if found.model == record.MODEL:
         raise BnsError(
             "A diagnosis of odometry has no simulated model to edit or apply; its "
             "magnitudes stand in diagnosis.json."
         )
-    return inputs.model(str(found.provenance.get("model", found.model)), threads=1)
+    return load_recordings.model(
+        str(found.provenance.get("model", found.model)), threads=1
+    )
 
 
 def _plan(given: Planned) -> int:
-    from bns.gap import command_file, odometry_record, plan, store
+    from bns.gap import store
+    from bns.gap.models.odometry import record
+    from bns.gap.planning import command_file, plan
 
     found = store.load(given.directory)
-    if found.model == odometry_record.MODEL:
-        made = odometry_record.planned(found)
+    if found.model == record.MODEL:
+        made = record.planned(found)
     else:
         model = _model(found)
         _plannable(found, model)
@@ -122,12 +127,13 @@ def _plannable(found: Any, model: Any) -> None:
 
 
 def _edit(given: Edit) -> int:
-    from bns.gap import edit, inputs, store
+    from bns.gap import edit, store
+    from bns.gap.recordings import load_recordings
 
     found = store.load(given.directory)
     model = _model(found)
-    trials = inputs.trials(given.predict, model, columns=given.columns)
-    inputs.tellable(trials, model)
+    trials = load_recordings.trials(given.predict, model, columns=given.columns)
+    load_recordings.tellable(trials, model)
     made = edit.edit(found, trials, model, remove=given.remove, effect=given.effect)
     print(made.sentence)
     for name, loss in made.losses.items():

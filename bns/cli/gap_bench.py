@@ -79,14 +79,15 @@ def main(verb: str, argv: list[str]) -> int:
 
 
 def _make(given: Make) -> int:
-    from bns.gap import casebook, inputs
+    from bns.gap.bench import benchmark_io
+    from bns.gap.recordings import load_recordings
 
-    model = inputs.model(given.model, threads=2)
+    model = load_recordings.model(given.model, threads=2)
     build, allowed = _builder(model)
     for kind in given.kinds:
         if kind not in allowed:
             raise UnknownNameError(f"kind of case of {model.name}", kind, allowed)
-    made = casebook.make(
+    made = benchmark_io.make(
         Path(given.cases), Path(given.answers), _cases(given, model, build)
     )
     print(f"{made} cases in {given.cases}, answers in {given.answers}")
@@ -95,11 +96,11 @@ def _make(given: Make) -> int:
 
 def _builder(model: Any) -> tuple[Callable[..., Any], tuple[str, ...]]:
     """What makes cases of a model, and the kinds that it can make."""
-    from bns.gap import cases, own_bench, walk_bench
+    from bns.gap.bench import cases, mjcf_bench, walk_bench
 
     wheeled = ("single", "pair", "none", "fault")
     if hasattr(model, "parse"):
-        return own_bench.build, (*wheeled, "off-library")
+        return mjcf_bench.build, (*wheeled, "off-library")
     if getattr(model, "winding", False):
         return walk_bench.build, walk_bench.KINDS
     return cases.build, wheeled
@@ -115,21 +116,22 @@ def _cases(
 
 
 def _run(given: Run) -> int:
-    from bns.gap import casebook, inputs
+    from bns.gap.bench import benchmark_io
+    from bns.gap.recordings import load_recordings
 
     if not Path(given.cases).is_dir():
         raise FormatError(f"There is no directory {given.cases} of cases.")
-    model = inputs.model(given.model, threads=given.threads)
-    count = casebook.run(Path(given.cases), model, Path(given.said))
+    model = load_recordings.model(given.model, threads=given.threads)
+    count = benchmark_io.run(Path(given.cases), model, Path(given.said))
     print(f"{count} cases diagnosed: {given.said}")
     return 0
 
 
 def _score(given: Score) -> int:
     from bns.cli.tables import show
-    from bns.gap import casebook, scoring
+    from bns.gap.bench import benchmark_io, scoring
 
-    rows = casebook.score(Path(given.said), Path(given.answers))
+    rows = benchmark_io.score(Path(given.said), Path(given.answers))
     if not rows:
         raise BnsError(f"{given.said} holds no diagnosis; run the cases first.")
     show(["kind", "cases", "figure", "value"], _figures(rows), json=False)
@@ -143,7 +145,7 @@ def _score(given: Score) -> int:
 
 
 def _figures(rows: list[dict]) -> list[list[str]]:
-    from bns.gap import scoring
+    from bns.gap.bench import scoring
 
     made = []
     kinds = ("single", 0.0), ("single", scoring.LARGE), ("pair", 0.0), ("lost", 0.0)

@@ -69,19 +69,19 @@ def main(verb: str, argv: list[str]) -> int:
 
 def nominal(given: Check, threads: int = 1) -> Any:
     """The model that was asked for."""
-    from bns.gap import inputs
+    from bns.gap.recordings import load_recordings
 
-    usual = inputs.MODELS.get(given.importer, "khepera3")
-    return inputs.model(given.model or usual, threads=threads)
+    usual = load_recordings.MODELS.get(given.importer, "khepera3")
+    return load_recordings.model(given.model or usual, threads=threads)
 
 
 def recorded(given: Check, model: Any) -> list[Any]:
     """The trials that were asked for; none if nothing was given."""
-    from bns.gap import inputs
+    from bns.gap.recordings import load_recordings
 
     if not given.data:
         return []
-    return inputs.trials(
+    return load_recordings.trials(
         given.data,
         model,
         columns=given.columns,
@@ -98,11 +98,11 @@ def _some(trials: list[Any]) -> list[Any]:
 
 
 def _check(given: Check) -> int:
-    from bns.gap import check, inputs
+    from bns.gap.recordings import check, load_recordings
 
     model = nominal(given)
     trials = _some(recorded(given, model))
-    inputs.tellable(trials, model)
+    load_recordings.tellable(trials, model)
     moving = _motion(trials, model)
     usable, notes = check.check(moving, model)
     for note in notes:
@@ -113,10 +113,11 @@ def _check(given: Check) -> int:
 
 def _motion(trials: list[Any], model: Any) -> list[Any]:
     """What of recordings is motion: without light, and where nobody held the robot."""
-    from bns.gap import light_diagnosis, light_model
+    from bns.gap.models.light import diagnosis
+    from bns.gap.models.light import model as light_model
 
     if light_model.told_by(model, trials):
-        return light_diagnosis.unhandled(trials, model)
+        return diagnosis.unhandled(trials, model)
     return trials
 
 
@@ -144,20 +145,21 @@ def _diagnose(given: Diagnose) -> int:
 
 
 def _general(given: Diagnose, model: Any, trials: list[Any], out: Path | None) -> Any:
-    from bns.gap import advice, check, inputs, partial
     from bns.gap.diagnose import diagnose
+    from bns.gap.recordings import check, load_recordings
+    from bns.gap.report import partial, warnings
 
-    inputs.tellable(trials, model)
+    load_recordings.tellable(trials, model)
     try:
         usable, _ = check.check(_motion(trials, model), model)
-        if given.reference and model.name == inputs.SERVO:
+        if given.reference and model.name == load_recordings.SERVO:
             return _servo(given, model, usable)
-        advice.reproducible(usable, model)
+        warnings.reproducible(usable, model)
         unchanged = recorded(replace(given, data=given.reference, trials=""), model)
         found = diagnose(
             trials, model, seed=given.seed, most=given.most, reference=unchanged
         )
-        more = advice.warnings(found, model)
+        more = warnings.warnings(found, model)
         return replace(found, warnings=(*found.warnings, *more))
     except BnsError as error:
         if out:
@@ -168,23 +170,23 @@ def _general(given: Diagnose, model: Any, trials: list[Any], out: Path | None) -
 
 def _servo(given: Diagnose, model: Any, trials: Any) -> Any:
     """Beside unchanged runs of the same servo, all of them."""
-    from bns.gap import servo_record
+    from bns.gap.models.servo import record
 
     all_of = replace(given, data=given.reference, only=(), trials="")
     unchanged = recorded(all_of, model)
-    return servo_record.record(trials, unchanged, seed=given.seed)
+    return record.record(trials, unchanged, seed=given.seed)
 
 
 def _odometry(given: Diagnose) -> Any:
-    from bns.gap import odometry_record
-    from bns.gap.importing import khepera3_odometry
+    from bns.gap.importers import khepera3_odometry
+    from bns.gap.models.odometry import record
 
     trials = [khepera3_odometry.read(path) for path in given.data]
-    return odometry_record.record(trials, axle=khepera3_odometry.AXLE)
+    return record.record(trials, axle=khepera3_odometry.AXLE)
 
 
 def _provenance(given: Diagnose, model: Any, trials: list[Any]) -> dict[str, Any]:
-    from bns import versions
+    from bns.experiment import versions
 
     named = given.model or (model.name if model else "odometry")
     return {
@@ -248,14 +250,12 @@ def _closed(found: Any) -> Sequence[str]:
 def _draw(given: Diagnose, found: Any, trials: Any, model: Any, out: Path) -> None:
     made = {"data": out / "diagnosis.json"}
     if given.report:
-        from bns.viz import gap_report
+        from bns.viz.gap import report as gap_report
 
         made["report"] = gap_report.write(found, trials, model, out / "report.html")
     if given.rerun and model is not None:
-        from bns.viz import gap_recording
+        from bns.viz.gap import recording
 
-        made["recording"] = gap_recording.write(
-            found, trials, model, out / "recording.rrd"
-        )
+        made["recording"] = recording.write(found, trials, model, out / "recording.rrd")
     for name, path in made.items():
         print(f"{name + ':':<11}{path}")

@@ -10,7 +10,7 @@ from bns.cli.parse import parse
 from bns.errors import BnsError, UnknownNameError
 
 if TYPE_CHECKING:
-    from bns.worlds.light_field import Lamp
+    from bns.worlds.light.field import Lamp
 
 VERBS = ("emulate", "check", "calibrate", "record")
 MANUAL = """usage: bns hardware {emulate,check,calibrate,record} [...]
@@ -217,7 +217,7 @@ def _lamps(given: Emulate) -> "tuple[Lamp, ...]":
             f"--lamp has {len(given.lamp)} numbers: give x, y, and if you like height "
             "[m] and power [W], such as --lamp 0 0."
         )
-    from bns.worlds.light_field import Lamp
+    from bns.worlds.light.field import Lamp
 
     names = ("x", "y", "height", "power")
     return (Lamp(**dict(zip(names, given.lamp, strict=False))),)

@@ -17,15 +17,15 @@ def execute(given: Any) -> int:
     Args:
         given: what `bns run` was told; one replicate is run, whatever the preset says.
     """
-    from bns.background import OPEN_LOOP
+    from bns.experiment.background import OPEN_LOOP
     from bns.hardware.line import check_port
     from bns.hardware.priority import urgent
 
     check_port(given.port)
     urgent()
     from bns.cli import outputs
+    from bns.experiment.run import train
     from bns.hardware.errors import LinkError, SafetyStop
-    from bns.run import train
 
     config = replace(given.config, replicates=1, record_replicates=1, threads=1)
     out = Path(given.out)

@@ -88,7 +88,7 @@ def _wheels(given: Any, out: Path) -> Iterator[str]:
 
 def record(given: Any) -> int:
     """`bns hardware record`."""
-    from bns.worlds import dataset
+    from bns.worlds.data import dataset
 
     if not given.move:
         raise BnsError(
@@ -131,7 +131,7 @@ def _recorded(given: Any) -> tuple[Any, Callable[[int], Any]]:
     A hexapod is sampled where it rests, between two commands: its servos are read one
     after the other, so that no sample between is of one moment.
     """
-    from bns.gap import command_file
+    from bns.gap.planning import command_file
     from bns.hardware import excitation
 
     shared: dict[str, Any] = {

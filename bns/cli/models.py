@@ -108,7 +108,7 @@ def check(given: Check) -> int:
     """
     from bns import models
     from bns.models import check as points
-    from bns.worlds import servo_joint
+    from bns.worlds.physics import servo_joint
 
     robot = models.robot(given.robot)
     servo_joint.law_of(robot)
@@ -144,7 +144,7 @@ def new_legged(given: NewLegged) -> int:
             robot that does not stand; servos that the world cannot have.
         FormatError: a file of servos that is not as it should be.
     """
-    from bns.worlds import servo_joint
+    from bns.worlds.physics import servo_joint
 
     place = given.directory
     servo_joint.own(legged_files.law(given.robot))

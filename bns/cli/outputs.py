@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from bns import stats
-from bns.config import RunConfig
 from bns.errors import BnsError
-from bns.record import RunRecord
+from bns.experiment.config import RunConfig
+from bns.experiment.record import RunRecord
 
 RECORDING = "recording.rrd"
 REPORT = "report.html"
@@ -53,7 +53,7 @@ def write_report(directories: list[Path], path: Path) -> Path:
 def write_recording(record: RunRecord, path: Path) -> Path:
     """The recording of the most typical replicate whose samples were kept."""
     from bns.viz import choices, recording
-    from bns.worlds import dataset
+    from bns.worlds.data import dataset
 
     os.environ.setdefault("RERUN_ANALYTICS", "0")
     kept = min(record.config.record_replicates, record.replicates)

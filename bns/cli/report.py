@@ -25,7 +25,7 @@ def main(verb: str, argv: list[str]) -> int:
     if not given.directories:
         raise BnsError("No run was given: give one or more run directories.")
     from bns.cli.outputs import REPORT, write_report
-    from bns.store import load
+    from bns.storage.store import load
 
     directories = [Path(directory) for directory in given.directories]
     for directory in directories:

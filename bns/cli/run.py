@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 import tyro
 
 from bns.cli.parse import parse
-from bns.config import RunConfig
 from bns.errors import BnsError, FormatError, UnknownNameError
+from bns.experiment.config import RunConfig
 
 _SHORT = {"world": "world.name", "damage": "world.damage"}
 """settings that have a short name on the command line"""
@@ -100,11 +100,12 @@ def source(text: str) -> tuple[RunConfig, str]:
     Raises:
         BnsError: there is none of that name.
     """
-    from bns import loading, presets
+    from bns import presets
+    from bns.experiment import loading
 
     path = Path(text)
     if path.is_dir() and text not in presets.names():
-        from bns.store import RunStore
+        from bns.storage.store import RunStore
 
         return RunStore.open(path).config, text
     if path.suffix == ".toml" or path.is_file():
@@ -123,7 +124,7 @@ def execute(given: Arguments) -> int:
 
         return hardware_run.execute(given)
     from bns.cli import outputs
-    from bns.run import train
+    from bns.experiment.run import train
 
     out = Path(given.out)
     with (

@@ -46,7 +46,7 @@ def find(path: Path) -> Path:
     """
     from bns.cli.outputs import RECORDING, write_recording
     from bns.gap.store import FILE
-    from bns.store import load
+    from bns.storage.store import load
 
     if path.suffix == ".rrd":
         if not path.is_file():

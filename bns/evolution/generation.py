@@ -11,9 +11,9 @@ import torch
 from torch import Tensor
 
 from bns.chromosome import Encoding, Population
-from bns.config import EvolutionConfig
 from bns.draws import Draws
 from bns.evolution import crossover, mutation, selection
+from bns.experiment.config import EvolutionConfig
 
 
 class Rates(NamedTuple):

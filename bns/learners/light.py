@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from bns.config import RunConfig
+from bns.experiment.config import RunConfig
 from bns.worlds.trial import Trial
 
 DOC = "networks from light readings to wheels that drive to a lamp and stay (B and C)"

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from bns.config import RunConfig
+from bns.experiment.config import RunConfig
 from bns.worlds.trial import Commands, Trial
 from bns.worlds.world import World
 

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
-from bns.config import RunConfig
 from bns.errors import BnsError
+from bns.experiment.config import RunConfig
 from bns.worlds.trial import Commands, Trial
 from bns.worlds.world import World
 

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from bns.config import RunConfig
 from bns.errors import BnsError
+from bns.experiment.config import RunConfig
 
 PER_RUN = ("mirror", "weights", "mutation_magnitude", "reset_every", "reset_elitists")
 """settings of `light` in which the runs of a batch may differ, as in the mutation rate

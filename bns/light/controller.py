@@ -14,9 +14,9 @@ import torch
 from torch import Tensor
 
 from bns.chromosome import Population
-from bns.config import RunConfig
 from bns.draws import Draws
 from bns.errors import BnsError
+from bns.experiment.config import RunConfig
 from bns.units import metres_per_second
 
 READINGS = 2

@@ -8,10 +8,10 @@ import torch
 from torch import Tensor
 
 from bns.chromosome import Population
-from bns.config import LightConfig
 from bns.draws import Draws, whole_below
 from bns.evolution import selection
 from bns.evolution.generation import take, whole_index
+from bns.experiment.config import LightConfig
 
 TOURNAMENT = 3  # of migrants chosen by tournament; silent
 

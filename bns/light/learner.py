@@ -14,10 +14,10 @@ from torch import Tensor
 from bns import choice, seeding
 from bns.adaptation import Adaptations
 from bns.chromosome import Population
-from bns.config import RunConfig
 from bns.detection import Detector
 from bns.draws import Draws
 from bns.evolution.generation import Breeder, Rates
+from bns.experiment.config import RunConfig
 from bns.learner import Proposal
 from bns.light import alike, islands, observing, patterns, resets, watching
 from bns.light.controller import Weights

@@ -10,10 +10,10 @@ import torch
 from torch import Tensor
 
 from bns.chromosome import Population
-from bns.config import RunConfig
 from bns.draws import Draws, whole_below
 from bns.evolution.generation import Breeder, Rates
 from bns.evolution.mutation import normal
+from bns.experiment.config import RunConfig
 from bns.inner import should_compile
 from bns.light.simulator import Noise, Simulator, State, Thetas
 from bns.light.task import LightTask

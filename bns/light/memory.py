@@ -4,8 +4,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from bns.config_watch import WatchConfig
 from bns.draws import Draws, whole_below
+from bns.experiment.config_watch import WatchConfig
 from bns.forgetting import contradicted, drop
 from bns.light.loops import LightLoops
 from bns.light.patterns import Patterns

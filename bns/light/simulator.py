@@ -11,7 +11,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from bns.config import RunConfig, SnnConfig
+from bns.experiment.config import RunConfig, SnnConfig
 from bns.light.controller import Controllers
 from bns.light.scaling import FAR, MOTION_INPUTS, MOTION_OUTPUTS, SENSORS, Scales
 from bns.snn.network import Shape, forward, predict

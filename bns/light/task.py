@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns import seeding
-from bns.config import LightConfig
 from bns.errors import BnsError
+from bns.experiment.config import LightConfig
 from bns.worlds.trial import Trial
 
 BOARD = (2.7, 1.8)  # [m] the arena (thesis 4.2.1)

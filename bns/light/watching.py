@@ -6,8 +6,8 @@ A wheel's miss is that of the way it rolled: half the turn's share less (left) o
 
 import numpy as np
 
-from bns.config_watch import WatchConfig
 from bns.detection import Ground, Misses, innovation
+from bns.experiment.config_watch import WatchConfig
 from bns.light.memory import Learned
 from bns.light.patterns import Patterns
 

@@ -8,8 +8,8 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from bns.config import RunConfig
 from bns.errors import UnknownNameError
+from bns.experiment.config import RunConfig
 
 
 @cache
@@ -34,13 +34,13 @@ def load(name: str) -> RunConfig:
     Raises:
         UnknownNameError: there is no such preset.
     """
-    from bns.loading import from_document
+    from bns.experiment.loading import from_document
 
     return replace(from_document(_content(name)), preset=name)
 
 
 def _content(name: str) -> dict[str, Any]:
-    from bns.loading import read_toml
+    from bns.experiment.loading import read_toml
 
     if name not in names():
         raise UnknownNameError("preset", name, names())

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from torch import Tensor
 
-from bns.config import SnnConfig
 from bns.draws import Draws
+from bns.experiment.config import SnnConfig
 from bns.snn import training
 from bns.snn.network import Shape, forward
 

@@ -12,8 +12,8 @@ from typing import Literal
 import torch
 from torch import Tensor
 
-from bns.config import SnnConfig
 from bns.draws import Draws
+from bns.experiment.config import SnnConfig
 from bns.snn.scaling import INPUTS, OUTPUTS
 
 Activation = Literal["sigmoid", "relu"]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from bns.config import TaskConfig
+from bns.experiment.config import TaskConfig
 from bns.tasks import registry
 
 CENTIMETRES = 100.0  # [cm/m]

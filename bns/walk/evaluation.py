@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from bns.chromosome import Population
-from bns.config import WalkConfig
+from bns.experiment.config import WalkConfig
 from bns.path import integrate
 from bns.snn.network import Shape, forward
 from bns.walk import fitness

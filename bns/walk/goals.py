@@ -7,13 +7,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from bns import robots
 from bns.chromosome import Population
-from bns.config import RunConfig
 from bns.draws import Draws
 from bns.errors import BnsError
 from bns.evolution.generation import Breeder, Coins, Rates
 from bns.evolution.selection import tournament_by_rank
+from bns.experiment import robots
+from bns.experiment.config import RunConfig
 from bns.walk import repetition
 from bns.worlds.trial import Channel, Commands
 

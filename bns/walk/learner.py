@@ -13,10 +13,10 @@ from torch import Tensor
 
 from bns import seeding
 from bns.adaptation import Adaptations
-from bns.config import RunConfig
 from bns.draws import Draws
 from bns.errors import BnsError
 from bns.evolution.generation import Rates
+from bns.experiment.config import RunConfig
 from bns.learner import Learner, check_alike
 from bns.patterns import PatternBuffer
 from bns.snn.network import Shape

@@ -10,9 +10,9 @@ from functools import partial
 
 from torch import Tensor
 
-from bns.config import RunConfig
 from bns.draws import Draws
 from bns.evolution.generation import Breeder
+from bns.experiment.config import RunConfig
 from bns.inner import InnerLoops
 from bns.snn.fitting import Patterns
 from bns.walk import training

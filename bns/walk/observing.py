@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bns.config import WalkConfig
+from bns.experiment.config import WalkConfig
 from bns.worlds.trial import Trial
 
 CENTIMETRES = 100.0  # [cm/m] scores are in the dissertation's unit

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from bns.config import RunConfig
 from bns.draws import Draws, whole_below
+from bns.experiment.config import RunConfig
 from bns.snn.fitting import Patterns, dropout, mean_error
 from bns.snn.network import Shape
 from bns.snn.training import gradient

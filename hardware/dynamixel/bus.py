@@ -25,7 +25,7 @@ from bns.hardware.line import INSTALL, check_port, claim
 from bns.hardware.openers import Openers
 from bns.hardware.stop_order import insist, phantomx
 from bns.hardware.watchdog import LARGEST, send
-from bns.worlds.legged_flags import OVERLOAD_TIME, SATURATED, STALLED
+from bns.worlds.physics.legged_flags import OVERLOAD_TIME, SATURATED, STALLED
 
 TRIES = 4
 HOT, EMPTY = 65, 9.9  # C, V: beyond it the robot rests

@@ -15,10 +15,10 @@ from bns.hardware.dynamixel import joints as tables
 from bns.hardware.dynamixel.joints import Joint
 from bns.hardware.emulators.live_body import LiveBody
 from bns.models.ax12a import NO_LOAD_SPEED
-from bns.worlds import legged_plan, servo_joint
 from bns.worlds.effects.base import Effect
-from bns.worlds.legged_goals import in_units
-from bns.worlds.physics import Compiled
+from bns.worlds.physics import legged_plan, servo_joint
+from bns.worlds.physics.legged_goals import in_units
+from bns.worlds.physics.rollout import Compiled
 
 LIFTED = 0.01  # m; how far the stand lifts it off the board
 

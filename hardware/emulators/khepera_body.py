@@ -7,9 +7,9 @@ import numpy as np
 
 from bns.hardware.emulators.live_body import LiveBody
 from bns.models.arena import SIZE
-from bns.worlds import light_sensors
 from bns.worlds.effects.base import Effect
-from bns.worlds.light_field import Lamp, LightField
+from bns.worlds.light import sensors
+from bns.worlds.light.field import Lamp, LightField
 
 HISTORY = 3.0  # s of set points that effects see again; longer memories fade out
 
@@ -117,9 +117,7 @@ class KheperaBody(LiveBody):
         if self._light is None:
             return (DARK,) * 11
         pose = np.array([self.pose()])
-        seen = light_sensors.of("khepera3").counts(
-            self._light, pose, self.now, rng=self._rng
-        )
+        seen = sensors.of("khepera3").counts(self._light, pose, self.now, rng=self._rng)
         return (*map(int, seen[0]), DARK, DARK)
 
     def outside(self) -> bool:

@@ -10,9 +10,10 @@ import numpy as np
 
 from bns import models
 from bns.errors import BnsError
-from bns.worlds import active, compile, observe
+from bns.worlds import active
 from bns.worlds.effects.base import BodyEffect, ControlSignal, Effect, ServoEffect
-from bns.worlds.physics import STATE, Compiled
+from bns.worlds.physics import compile, observe
+from bns.worlds.physics.rollout import STATE, Compiled
 
 KEPT = 30.0  # s of poses remembered
 FALL_BEHIND = 0.5  # s; a host that slept longer lets the time of a robot at rest skip

@@ -15,7 +15,7 @@ from bns.hardware.emulators.mishaps import Mishaps, Restarts
 from bns.hardware.emulators.pty_host import PtyHost
 from bns.hardware.khepera import protocol
 from bns.hardware.priority import urgent
-from bns.worlds.light_field import Lamp
+from bns.worlds.light.field import Lamp
 
 
 def khepera3(

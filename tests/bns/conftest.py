@@ -8,7 +8,7 @@ import pytest
 @pytest.fixture(autouse=True)
 def one_commit(monkeypatch):
     """Someone may commit between a run and the run it is compared with."""
-    monkeypatch.setattr("bns.versions.commit", lambda: "test")
+    monkeypatch.setattr("bns.experiment.versions.commit", lambda: "test")
 
 
 @pytest.fixture

@@ -16,8 +16,10 @@ from types import ModuleType, SimpleNamespace
 
 import numpy as np
 
-from bns import files, seeding, versions
-from bns.config import ControllerConfig, RunConfig, WorldConfig
+from bns import seeding
+from bns.experiment import versions
+from bns.experiment.config import ControllerConfig, RunConfig, WorldConfig
+from bns.storage import files
 from bns.worlds.trial import Commands, Trial
 
 CONFIG = RunConfig(
@@ -127,7 +129,7 @@ def dies_at(write, moment):
 
 def train(directory, **options):
     """Train the fakes in `directory`."""
-    from bns.run import train
+    from bns.experiment.run import train
 
     config = options.pop("config", CONFIG)
     return train(config, directory, world=FakeWorld(), **options)

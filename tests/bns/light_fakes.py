@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from bns import presets, seeding
-from bns.worlds.light_sensors import VIRTUAL
+from bns.worlds.light.sensors import VIRTUAL
 from bns.worlds.trial import POSE_CHANNELS, Commands, Trial
 
 AXLE = 0.0884

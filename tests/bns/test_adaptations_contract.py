@@ -6,8 +6,8 @@ import pytest
 
 from bns.adaptation import Adaptations
 from bns.adaptations import registry
-from bns.config import AdaptationConfig, RunConfig
 from bns.errors import BnsError, UnknownNameError
+from bns.experiment.config import AdaptationConfig, RunConfig
 
 
 @pytest.mark.parametrize("name", registry.names())

@@ -8,7 +8,6 @@ import time
 import numpy as np
 import pytest
 
-from bns import files
 from bns.campaign import drive, results
 from bns.campaign.engines.base import Outcome
 from bns.campaign.engines.inline import InlineEngine
@@ -18,6 +17,7 @@ from bns.campaign.plan import plan
 from bns.campaign.store import CampaignStore
 from bns.campaign.table import table
 from bns.errors import BnsError, FormatError
+from bns.storage import files
 from tests.bns.campaigns import campaign
 from tests.bns.contents import contents
 

@@ -4,9 +4,9 @@ import pytest
 
 from bns.campaign import file, identity, sample
 from bns.campaign.plan import Job, plan
-from bns.config import RunConfig
 from bns.errors import BnsError
-from bns.loading import from_mapping, to_mapping
+from bns.experiment.config import RunConfig
+from bns.experiment.loading import from_mapping, to_mapping
 from tests.bns.campaigns import CONTENT, campaign
 
 

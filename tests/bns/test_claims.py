@@ -14,9 +14,9 @@ from bns.campaign.identity import identity
 from bns.campaign.part import Block
 from bns.claims import measures, report, runner, sides, verdict
 from bns.claims.claim import Cell, claims, content, find
-from bns.config import RunConfig, WorldConfig
 from bns.errors import BnsError
-from bns.run import train
+from bns.experiment.config import RunConfig, WorldConfig
+from bns.experiment.run import train
 from bns.stats import Interval
 from tests.sources import ROOT
 

@@ -14,7 +14,7 @@ from bns.cli import VERBS
 from bns.cli.outputs import sentence
 from bns.cli.run import STOPPED, until_interrupted
 from bns.doctor import pins
-from bns.store import load
+from bns.storage.store import load
 
 TINY = [
     "--trials", "3", "--replicates", "2", "--record-replicates", "1",
@@ -231,7 +231,7 @@ def test_interrupted_run_says_how_to_go_on(capsys, fakes, tmp_path, monkeypatch)
         assert stop()
         return begun
 
-    monkeypatch.setattr("bns.run.train", interrupted)
+    monkeypatch.setattr("bns.experiment.run.train", interrupted)
     text = said(capsys, "run", "demo", "--out", out, code=STOPPED)
     assert f"bns run {out} --resume" in text
 
@@ -276,7 +276,7 @@ def test_known_bad_pins(installed, bad):
 
 
 def test_progress_without_a_terminal_is_a_line_now_and_then(capsys, fakes, monkeypatch):
-    monkeypatch.setattr("bns.progress.QUIET_SECONDS", 0.0)
+    monkeypatch.setattr("bns.experiment.progress.QUIET_SECONDS", 0.0)
     fakes.train(None, progress=True)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 4

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from bns.__main__ import main
-from bns.worlds import dataset, registry
+from bns.worlds import registry
+from bns.worlds.data import dataset
 from bns.worlds.trial import Commands
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from bns.__main__ import main
-from bns.worlds import dataset
+from bns.worlds.data import dataset
 
 ARM = str(Path(__file__).parents[2] / "examples" / "arm" / "arm.toml")
 

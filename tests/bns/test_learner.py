@@ -7,8 +7,10 @@ import pytest
 import torch
 
 from bns.adaptation import Adaptations
-from bns.batch import Batch
-from bns.config import (
+from bns.draws import Draws
+from bns.errors import BnsError
+from bns.experiment.batch import Batch
+from bns.experiment.config import (
     AdaptationConfig,
     EvolutionConfig,
     RunConfig,
@@ -16,8 +18,6 @@ from bns.config import (
     TaskConfig,
     WorldConfig,
 )
-from bns.draws import Draws
-from bns.errors import BnsError
 from bns.learner import Learner
 from bns.patterns import PatternBuffer, of_trial
 from bns.units import metres_per_second

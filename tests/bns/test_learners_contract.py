@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bns import presets, store
-from bns.config import AdaptationConfig
+from bns import presets
 from bns.errors import UnknownNameError
+from bns.experiment.config import AdaptationConfig
+from bns.experiment.run import train
 from bns.learners import registry
-from bns.run import train
+from bns.storage import store
 
 PRESETS = {presets.load(name).learner: name for name in presets.names()}
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import torch
 
-from bns.config_light import LightConfig
 from bns.draws import Draws
 from bns.errors import BnsError
+from bns.experiment.config_light import LightConfig
 from bns.light import patterns
 from bns.light.controller import Controllers
 from bns.light.policy import GenomePolicy

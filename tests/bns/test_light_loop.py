@@ -9,16 +9,16 @@ import torch
 from bns import presets
 from bns.adaptation import Adaptations
 from bns.chromosome import Population
-from bns.config import RunConfig
-from bns.config_light import LightConfig
 from bns.draws import Draws
 from bns.errors import BnsError
 from bns.evolution.generation import Breeder, Rates
+from bns.experiment.config import RunConfig
+from bns.experiment.config_light import LightConfig
+from bns.experiment.run import train
 from bns.light import islands
 from bns.light.controller import Controllers, Weights
 from bns.light.learner import LightLearner
 from bns.light.policy import Attempt, GenomePolicy
-from bns.run import train
 from tests.bns.contents import contents
 from tests.bns.light_fakes import FakeLightWorld, small
 

@@ -7,10 +7,11 @@ from itertools import pairwise
 
 import pytest
 
-from bns import config, loading, presets
-from bns.config import RunConfig, WorldConfig
+from bns import presets
 from bns.errors import BnsError, FormatError, OutOfBoundsError, UnknownNameError
-from bns.validate import BOUNDS, check, leaves
+from bns.experiment import config, loading
+from bns.experiment.config import RunConfig, WorldConfig
+from bns.experiment.validate import BOUNDS, check, leaves
 from bns.worlds.damage import Damage
 
 

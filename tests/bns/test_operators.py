@@ -4,11 +4,11 @@ import pytest
 import torch
 
 from bns.chromosome import Encoding, Population
-from bns.config import ControllerConfig, EvolutionConfig
 from bns.draws import Draws
 from bns.errors import UnknownNameError
 from bns.evolution import crossover, diversity, mutation, selection
 from bns.evolution.generation import Breeder, Rates
+from bns.experiment.config import ControllerConfig, EvolutionConfig
 
 COSTS = torch.tensor([[4.0, 1.0, 3.0, 2.0]])
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats as scipy_stats
 
-from bns import bootstrap
 from bns.errors import BnsError
-from bns.power import power, runs_needed
+from bns.stats import bootstrap
+from bns.stats.power import power, runs_needed
 
 
 @pytest.mark.parametrize(("a12", "runs"), [(0.65, 30), (0.65, 100), (0.3, 30)])

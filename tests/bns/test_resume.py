@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bns import files
-from bns.config import (
+from bns.errors import BnsError
+from bns.experiment.config import (
     AdaptationConfig,
     EvolutionConfig,
     RunConfig,
     SnnConfig,
     WorldConfig,
 )
-from bns.errors import BnsError
-from bns.run import train
-from bns.store import load
+from bns.experiment.run import train
+from bns.storage import files
+from bns.storage.store import load
 from tests.bns.contents import contents
 
 FAKES = Path(__file__).parent / "fakes.py"

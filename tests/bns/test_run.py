@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bns.config import AdaptationConfig, RunConfig, SnnConfig, WorldConfig
 from bns.errors import BnsError
-from bns.run import train, train_many
-from bns.surroundings import make_world
+from bns.experiment.config import AdaptationConfig, RunConfig, SnnConfig, WorldConfig
+from bns.experiment.run import train, train_many
+from bns.experiment.world_factory import make_world
 from bns.worlds.trial import WHEEL_CHANNELS
 
 LEFT = "wheel_gain:wheel=left,factor=0.5@1"

@@ -4,8 +4,8 @@ import pytest
 import torch
 
 from bns.chromosome import Encoding
-from bns.config import ControllerConfig, SnnConfig
 from bns.draws import Draws
+from bns.experiment.config import ControllerConfig, SnnConfig
 from bns.snn import training
 from bns.snn.network import Shape, forward, predict
 from bns.snn.scaling import Scaling

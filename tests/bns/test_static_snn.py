@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from bns import static_snn
-from bns.config import RunConfig
+from bns.experiment import static_snn
+from bns.experiment.config import RunConfig
 from bns.worlds import registry
 
 

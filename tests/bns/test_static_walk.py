@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from bns import models
-from bns import static_walk as static
 from bns.errors import BnsError
+from bns.experiment import static_walk as static
 from bns.worlds import registry
 from bns.worlds.effects.leg_raised import RAISED
-from bns.worlds.static_nets import StaticNets, kinematic_nets
+from bns.worlds.static_snn.nets import StaticNets, kinematic_nets
 from bns.worlds.trial import Commands
 from tests.bns.walkers import Slider, small
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from bns import stats
-from bns.compare import compare
-from bns.config import RunConfig
 from bns.errors import BnsError
-from bns.record import RunRecord
+from bns.experiment.config import RunConfig
+from bns.experiment.record import RunRecord
+from bns.stats.compare import compare
 
 # |U - 450| and p as the dissertation prints it, thirty runs against thirty: tables
 # 5.3, 5.5, 5.6, 5.7, 5.10, 5.18, 6.2, 6.3b, 6.6, 7.6b, 7.7b.

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bns import files
-from bns.config import RunConfig
 from bns.errors import BnsError, FormatError
-from bns.step import Step
-from bns.store import load
-from bns.worlds import dataset
+from bns.experiment.config import RunConfig
+from bns.experiment.step import Step
+from bns.storage import files
+from bns.storage.store import load
+from bns.worlds.data import dataset
 from bns.worlds.trial import Commands, Outcome, Trial
 from tests.bns.contents import contents
 

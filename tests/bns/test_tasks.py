@@ -6,8 +6,8 @@ import pytest
 import torch
 
 from bns import tasks
-from bns.config import TaskConfig
 from bns.errors import UnknownNameError
+from bns.experiment.config import TaskConfig
 from bns.path import integrate
 from bns.tasks import NavigationTask
 

@@ -11,7 +11,7 @@ from bns import presets
 from bns.chromosome import Population
 from bns.draws import Draws
 from bns.errors import BnsError
-from bns.run import train
+from bns.experiment.run import train
 from bns.snn.fitting import Patterns
 from bns.snn.network import Shape, forward
 from bns.walk import fitness, observing, scaling, training

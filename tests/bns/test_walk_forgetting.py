@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bns.config_watch import WatchConfig
+from bns.experiment.config_watch import WatchConfig
+from bns.experiment.run import train
 from bns.patterns import PatternBuffer
-from bns.run import train
 from bns.walk import forgetting
 from tests.bns.walkers import Slider, small
 

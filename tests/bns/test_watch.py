@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bns.config_watch import WatchConfig
 from bns.detection import Detector, Ground, Misses, innovation
+from bns.experiment.config_watch import WatchConfig
 from bns.forgetting import contradicted
 from bns.light.learner import LightLearner
 from bns.light.policy import GenomePolicy

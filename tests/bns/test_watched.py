@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bns.config import AdaptationConfig, SnnConfig, WorldConfig
-from bns.config_watch import WatchConfig
+from bns.experiment.config import AdaptationConfig, SnnConfig, WorldConfig
+from bns.experiment.config_watch import WatchConfig
 from bns.learner import Learner
 from bns.snn.scaling import AXLE
 from bns.watched import CHANNELS, ways

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bns.gap.cases import commands
-from bns.gap.wheeled import WheeledModel
+from bns.gap.bench.cases import commands
+from bns.gap.models.wheeled import WheeledModel
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.gap import casebook, cases, check, ladder, scoring, verdict
-from bns.gap.wheeled import WheeledModel
+from bns.gap.bench import benchmark_io, cases, scoring
+from bns.gap.core import model_order, verdict
+from bns.gap.models.wheeled import WheeledModel
+from bns.gap.recordings import check
 
 
 def row(named, names=("a",), aliases=(("a", "b"),), verdict="effect", sets=None):
@@ -66,15 +68,17 @@ def test_faults_are_noticed(model, seed):
 def test_a_casebook_keeps_its_answers_apart(model, tmp_path):
     case = cases.build(5, "none", model)
     with pytest.raises(BnsError, match="see the answers"):
-        casebook.make(tmp_path / "book", tmp_path / "book" / "a.json", [])
-    made = casebook.make(tmp_path / "book", tmp_path / "answers.json", [("c1", case)])
+        benchmark_io.make(tmp_path / "book", tmp_path / "book" / "a.json", [])
+    made = benchmark_io.make(
+        tmp_path / "book", tmp_path / "answers.json", [("c1", case)]
+    )
     assert made == 1
     assert "wheel_diameter" not in (tmp_path / "book/c1/dataset.json").read_text()
     said = tmp_path / "said.jsonl"
     few = FewCandidates(threads=1)
-    assert casebook.run(tmp_path / "book", few, said) == 1
-    assert casebook.run(tmp_path / "book", few, said) == 0
-    (row,) = casebook.score(said, tmp_path / "answers.json")
+    assert benchmark_io.run(tmp_path / "book", few, said) == 1
+    assert benchmark_io.run(tmp_path / "book", few, said) == 0
+    (row,) = benchmark_io.score(said, tmp_path / "answers.json")
     assert row["kind"] == "none"
     assert row["said"]["verdict"] == "no gap"
 
@@ -85,10 +89,10 @@ class FewCandidates(WheeledModel):
 
 
 def rungs():
-    nothing = ladder.Rung(0, 190.0, (95.0, 95.0), (((), 0.0),), 0.0, 80.0, 0.0)
+    nothing = model_order.Rung(0, 190.0, (95.0, 95.0), (((), 0.0),), 0.0, 80.0, 0.0)
     scores = ((("a",), 0.0), (("b",), 4.0))
-    one = ladder.Rung(1, 100.0, (50.0, 51.0), scores, 0.5, 0.0, 90.0)
-    two = ladder.Rung(2, 80.0, (41.0, 42.0), ((("a", "c"), 0.0),), 0.5, 0.0, 110.0)
+    one = model_order.Rung(1, 100.0, (50.0, 51.0), scores, 0.5, 0.0, 90.0)
+    two = model_order.Rung(2, 80.0, (41.0, 42.0), ((("a", "c"), 0.0),), 0.5, 0.0, 110.0)
     return [nothing, one, two]
 
 
@@ -108,9 +112,9 @@ def test_thresholds_are_applied_to_what_was_kept():
 
 def test_a_further_effect_has_to_explain_its_share():
     of = verdict.Calibration
-    assert ladder.climb(rungs(), 13.0, of(more=15.0, minor=0.1)).size == 2
-    assert ladder.climb(rungs(), 13.0, of(more=25.0, minor=0.1)).size == 1
-    assert ladder.climb(rungs(), 13.0, of(more=15.0, minor=0.2)).size == 1
-    assert ladder.climb(rungs(), 200.0, of(more=15.0, minor=0.1)).size == 0
+    assert model_order.climb(rungs(), 13.0, of(more=15.0, minor=0.1)).size == 2
+    assert model_order.climb(rungs(), 13.0, of(more=25.0, minor=0.1)).size == 1
+    assert model_order.climb(rungs(), 13.0, of(more=15.0, minor=0.2)).size == 1
+    assert model_order.climb(rungs(), 200.0, of(more=15.0, minor=0.1)).size == 0
     worse = replace(rungs()[2], held_out=(52.0, 53.0))
-    assert ladder.climb([*rungs()[:2], worse], 13.0, of(more=15.0)).size == 1
+    assert model_order.climb([*rungs()[:2], worse], 13.0, of(more=15.0)).size == 1

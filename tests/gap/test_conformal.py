@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bns.gap import conformal, magnitudes, verdict
+from bns.gap.core import conformal, uncertainty, verdict
 
 
 def test_times_are_apart_from_other_magnitudes():
@@ -23,9 +23,9 @@ def test_intervals_hold_as_often_as_they_say():
 
 def test_width_is_the_calibrated_multiple_of_the_standard_error():
     rules = verdict.Calibration(model_error=0.03, widen=2.0, coverage=0.9)
-    error = magnitudes.standard_error(0.4, 10.0, rules)
+    error = uncertainty.standard_error(0.4, 10.0, rules)
     assert error == pytest.approx(0.5)
-    half = magnitudes.half_width(error, "axle_length", "1", rules)
+    half = uncertainty.half_width(error, "axle_length", "1", rules)
     assert half == pytest.approx(conformal.reach("axle_length", "1", 0.9))
 
 

@@ -6,20 +6,14 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError, FormatError
-from bns.gap import (
-    check,
-    fit,
-    pieces,
-    select,
-    signatures,
-    verdict,
-)
+from bns.gap.core import fit, segments, select, signatures, verdict
+from bns.gap.core.problem import Problem
+from bns.gap.core.reference import Reference
 from bns.gap.diagnose import diagnose
-from bns.gap.problem import Problem
+from bns.gap.recordings import check
 from bns.gap.records import Candidate, Diagnosis
-from bns.gap.reference import Reference
 from bns.worlds.effects.base import CommandEffect, Parameter
-from bns.worlds.mujoco_world import MujocoWorld
+from bns.worlds.physics.wheeled_world import MujocoWorld
 from bns.worlds.trial import Channel, Commands
 
 NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.01"
@@ -204,8 +198,8 @@ def test_fits_end_on_the_simulation_itself(model, told):
 
 def test_stitched_pieces_keep_the_path():
     path = np.cumsum(np.random.default_rng(0).normal(size=(30, 3)), axis=0)
-    parts = [path[:11], pieces.moved(path[10:], np.array([5.0, -1.0, 2.0]))]
-    assert np.allclose(pieces.stitched(parts), path)
+    parts = [path[:11], segments.moved(path[10:], np.array([5.0, -1.0, 2.0]))]
+    assert np.allclose(segments.stitched(parts), path)
 
 
 def test_every_candidate_makes_its_effect(model):

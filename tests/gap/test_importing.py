@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from bns.errors import FormatError
-from bns.gap.importing import khepera3_odometry, kscale_sts3215, mrclam6, servo, xl330
-from bns.worlds import dataset
+from bns.gap.importers import khepera3_odometry, kscale_sts3215, mrclam6, servo, xl330
+from bns.worlds.data import dataset
 from bns.worlds.trial import body_displacements
 
 COLUMNS = [

@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.gap import advice, inputs, store
+from bns.gap import store
 from bns.gap.diagnose import diagnose
-from bns.gap.unicycle import UnicycleModel
-from bns.worlds import dataset, registry
-from bns.worlds.mujoco_world import MujocoWorld
+from bns.gap.models.unicycle import UnicycleModel
+from bns.gap.recordings import load_recordings
+from bns.gap.report import warnings
+from bns.worlds import registry
+from bns.worlds.data import dataset
+from bns.worlds.physics.wheeled_world import MujocoWorld
 from bns.worlds.trial import Channel, Commands, Trial
 
 
@@ -23,21 +26,21 @@ def test_recordings_are_pooled_chosen_and_of_one_robot(model, drive, tmp_path):
     for name, load in (("a", "light"), ("b", "heavy")):
         dataset.write(tmp_path / name, [drive.replace(conditions={"load": load})])
     both = [str(tmp_path / "a"), str(tmp_path / "b")]
-    assert len(inputs.trials(both, model)) == 2
-    (kept,) = inputs.trials(both, model, only=["load=heavy"])
+    assert len(load_recordings.trials(both, model)) == 2
+    (kept,) = load_recordings.trials(both, model, only=["load=heavy"])
     assert kept.conditions["load"] == "heavy"
     for only, said in (
         ("load=none", "Available: heavy, light"),
         ("mass=1", "'mass=1'"),
     ):
         with pytest.raises(BnsError, match=said):
-            inputs.trials(both, model, only=[only])
+            load_recordings.trials(both, model, only=[only])
     dataset.write(tmp_path / "c", [drive.replace(robot="rover")])
     with pytest.raises(BnsError, match="recording is of rover, the model is 'khep"):
-        inputs.trials([str(tmp_path / "c")], model)
+        load_recordings.trials([str(tmp_path / "c")], model)
     moved = f"/elsewhere/{model.name}"  # a directory of robots, on another machine
     dataset.write(tmp_path / "d", [drive.replace(robot=moved)])
-    assert len(inputs.trials([str(tmp_path / "d")], model)) == 1
+    assert len(load_recordings.trials([str(tmp_path / "d")], model)) == 1
 
 
 def test_trials_are_chosen_by_their_numbers_of_a_run_too(model, drive, tmp_path):
@@ -47,7 +50,7 @@ def test_trials_are_chosen_by_their_numbers_of_a_run_too(model, drive, tmp_path)
     dataset.write(run / "dataset", marked, replicates=[0, 0, 0, 1, 1, 1])
 
     def numbers(text):
-        found = inputs.trials([str(run)], model, numbers=text)
+        found = load_recordings.trials([str(run)], model, numbers=text)
         return [trial.conditions["n"] for trial in found]
 
     assert numbers("") == [0, 1, 2, 3, 4, 5]
@@ -61,22 +64,22 @@ def test_trials_are_chosen_by_their_numbers_of_a_run_too(model, drive, tmp_path)
 
 
 def test_commands_that_the_robot_can_not_be_told_are_refused(model, drive):
-    inputs.tellable([drive], model)
+    load_recordings.tellable([drive], model)
     fast = drive.commands.values * 20
     told = Commands(fast, drive.commands.durations)
     with pytest.raises(BnsError, match=r"trial 0: left_speed = -1\.0 m/s"):
-        inputs.tellable([drive.replace(commands=told)], model)
+        load_recordings.tellable([drive.replace(commands=told)], model)
     other = (Channel("forward_speed", "m/s"), Channel("turning_rate", "rad/s"))
     told = Commands(drive.commands.values, drive.commands.durations, other)
     with pytest.raises(BnsError, match="'forward_speed'; model 'khepera3' is told"):
-        inputs.tellable([drive.replace(commands=told)], model)
+        load_recordings.tellable([drive.replace(commands=told)], model)
 
 
 def test_a_model_that_does_not_move_is_noticed(model, drive):
-    advice.reproducible([drive], model)
+    warnings.reproducible([drive], model)
     still = Commands(0 * drive.commands.values, drive.commands.durations)
     with pytest.raises(BnsError, match="does not move on the recorded commands"):
-        advice.reproducible([drive.replace(commands=still)], model)
+        warnings.reproducible([drive.replace(commands=still)], model)
 
 
 def test_rounding_to_the_grid_does_not_add_up():
@@ -84,11 +87,11 @@ def test_rounding_to_the_grid_does_not_add_up():
     told = Commands(np.ones((count, 2)) * 0.1, np.full(count, 1 / 30))
     times = np.arange(count + 1) / 30
     trial = Trial(told, times, np.zeros((count + 1, 3)), np.arange(count + 1))
-    made = inputs.on_grid(trial, 0.005)
+    made = load_recordings.on_grid(trial, 0.005)
     ends = np.cumsum(made.commands.durations)
     assert np.abs(ends - np.cumsum(told.durations)).max() <= 0.0025 + 1e-9
     np.testing.assert_allclose(ends / 0.005, np.rint(ends / 0.005), atol=1e-6)
-    coarse = inputs.on_grid(trial, 0.1)
+    coarse = load_recordings.on_grid(trial, 0.1)
     assert len(coarse.commands) == 100
     assert coarse.commands.duration == pytest.approx(10.0)
     assert coarse.boundaries[-1] == count
@@ -99,8 +102,8 @@ def test_what_mujoco_recorded_keeps_its_commands():
     told = Commands(np.ones((9, 2)) * 0.1, np.full(9, 0.5024))
     (trial,) = registry.make("mujoco", threads=1).run([told])
     assert trial.times[-1] == pytest.approx(9 * 0.5)
-    assert inputs.on_grid(trial, 0.005) is trial
-    assert inputs.on_grid(trial.replace(conditions={}), 0.005) is not trial
+    assert load_recordings.on_grid(trial, 0.005) is trial
+    assert load_recordings.on_grid(trial.replace(conditions={}), 0.005) is not trial
 
 
 def test_many_samples_are_thinned():
@@ -108,8 +111,8 @@ def test_many_samples_are_thinned():
     times = np.arange(count) * 0.01
     told = Commands(np.ones((3, 2)) * 0.1, [10.0, 20.0, 19.99])
     at = np.array([0, 1000, 3000, count - 1])
-    made = inputs.thinned(Trial(told, times, np.zeros((count, 3)), at))
-    assert len(made.times) <= inputs.SAMPLES + 4
+    made = load_recordings.thinned(Trial(told, times, np.zeros((count, 3)), at))
+    assert len(made.times) <= load_recordings.SAMPLES + 4
     np.testing.assert_array_equal(made.times[made.boundaries], times[at])
 
 
@@ -145,9 +148,9 @@ def test_a_robot_told_speed_and_rate(text, names, value):
 
 def test_unknown_models_say_what_there_is():
     with pytest.raises(BnsError, match="Did you mean 'khepera3'"):
-        inputs.model("khepera4")
+        load_recordings.model("khepera4")
     with pytest.raises(BnsError, match="gap_your_robot"):
-        inputs.model("arm.xml")
+        load_recordings.model("arm.xml")
 
 
 def test_trials_keep_their_numbers_in_what_is_said(model, tmp_path):
@@ -169,13 +172,13 @@ def test_trials_keep_their_numbers_in_what_is_said(model, tmp_path):
         dataset.write(tmp_path / "runs", recorded, replicates=[0] * 8 + [1] * 8)
     )
     few = [c for c in model.candidates() if c.name.startswith("wheel_gain")]
-    found = diagnose(inputs.trials([place], model), model, candidates=few)
+    found = diagnose(load_recordings.trials([place], model), model, candidates=few)
     assert (found.change["trial"], found.change["direction"]) == (4, "sets in")
-    notes = advice.warnings(found, model)
+    notes = warnings.warnings(found, model)
     assert any("sets in at trial 4, but" in note for note in notes)
     same = "trial 2 of run 0: the same samples as trial 1 of run 0, left out"
     assert same in found.faults
-    after = inputs.trials([place], model, numbers="4-")
+    after = load_recordings.trials([place], model, numbers="4-")
     later = diagnose(after, model, candidates=few)
     assert later.change == {}
     assert later.verdict.named == (("wheel_gain[left]",),)

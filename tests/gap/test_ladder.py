@@ -2,8 +2,8 @@
 
 import pytest
 
-from bns.gap.ladder import Rung, climb
-from bns.gap.verdict import Calibration
+from bns.gap.core.model_order import Rung, climb
+from bns.gap.core.verdict import Calibration
 
 WORTH = 15.0
 

@@ -9,13 +9,16 @@ import pytest
 
 from bns.cli import gap_after
 from bns.errors import BnsError
-from bns.gap import diagnose, light_cases, light_diagnosis, light_library
-from bns.gap.confirmed import confirmed
-from bns.gap.light_model import SightModel, sees, unlikely
-from bns.gap.light_reader import _clipped
-from bns.gap.problem import Problem
+from bns.gap import diagnose
+from bns.gap.bench import light_cases
+from bns.gap.candidates import light
+from bns.gap.core.cross_trial_check import confirmed
+from bns.gap.core.problem import Problem
+from bns.gap.models.light import diagnosis
+from bns.gap.models.light.model import SightModel, sees, unlikely
+from bns.gap.models.light.reader import _clipped
+from bns.gap.models.wheeled import WheeledModel
 from bns.gap.records import Verdict
-from bns.gap.wheeled import WheeledModel
 from bns.worlds.effects import registry
 from bns.worlds.trial import Commands, Trial
 
@@ -47,7 +50,7 @@ def find():
 
 def test_a_reading_stuck_at_zero_in_part_is_a_gain():
     readings = np.linspace(0, 4095, 22).reshape(2, 11)
-    names = tuple(f"ir_{name}" for name in light_library.FORWARD) + tuple("abcde")
+    names = tuple(f"ir_{name}" for name in light.FORWARD) + tuple("abcde")
     on, rng = np.ones(2, dtype=bool), np.random.default_rng(0)
     gain = registry.parse("sensor_gain:sensor=left_45,factor=0.8")
     stuck = registry.parse("sensor_stuck_min:sensor=left_45,blend=0.2")
@@ -57,7 +60,7 @@ def test_a_reading_stuck_at_zero_in_part_is_a_gain():
     )
     assert one == pytest.approx(other, abs=0.51)
     assert not np.allclose(one, readings)
-    found = {item.name: item.aliases for item in light_library.candidates(singles=True)}
+    found = {item.name: item.aliases for item in light.candidates(singles=True)}
     assert found["sensor_gain[left_45]"] == ("sensor_stuck_min[left_45]",)
 
 
@@ -136,16 +139,14 @@ def test_scatter_does_not_grow_without_end():
 
 
 def test_a_lamp_is_displaced_as_far_as_the_candidate_says():
-    (item,) = [
-        c for c in light_library.candidates(singles=True) if c.name == "light_displaced"
-    ]
+    (item,) = [c for c in light.candidates(singles=True) if c.name == "light_displaced"]
     effect = item.make(0.2, extras={"heading": np.pi / 6})
     assert effect["x"] == pytest.approx(0.2 * np.cos(np.pi / 6))
     assert effect["y"] == pytest.approx(0.1)
 
 
 def test_the_virtual_sensors_have_no_candidates_behind():
-    names = [c.name for c in light_library.candidates(singles=False)]
+    names = [c.name for c in light.candidates(singles=False)]
     assert "sensor_gain[left_45]" in names
     assert not [name for name in names if "back" in name]
 
@@ -163,7 +164,7 @@ def test_stretches_in_which_the_robot_was_handled_are_cut_out():
         handled=handled,
         robot="khepera3",
     )
-    parts = light_diagnosis.unhandled([trial], WheeledModel(threads=1))
+    parts = diagnosis.unhandled([trial], WheeledModel(threads=1))
     assert [len(part.commands) for part in parts] == [8, 11]
     assert parts[1].times[0] == pytest.approx(3.6)
 
@@ -175,22 +176,22 @@ def verdict(kind, *names, p_gap=0.5):
 
 def test_verdicts_on_motion_and_light_join():
     nothing, gain = verdict("no gap"), verdict("effect", "a", p_gap=0.001)
-    assert light_diagnosis.merged(nothing, nothing).kind == "no gap"
-    alone = light_diagnosis.merged(nothing, gain)
+    assert diagnosis.merged(nothing, nothing).kind == "no gap"
+    alone = diagnosis.merged(nothing, gain)
     assert (alone.kind, alone.named) == ("effect", (("a",),))
     assert alone.p_gap == pytest.approx(0.002)
-    both = light_diagnosis.merged(verdict("effect", "w"), gain)
+    both = diagnosis.merged(verdict("effect", "w"), gain)
     assert (both.kind, both.named) == ("together", (("w", "a"),))
-    tied = light_diagnosis.merged(verdict("either", "w", "v"), gain)
+    tied = diagnosis.merged(verdict("either", "w", "v"), gain)
     assert (tied.kind, len(tied.named)) == ("either", 2)
     strange = replace(nothing, kind="none of the library")
-    assert light_diagnosis.merged(strange, gain).kind == "none of the library"
+    assert diagnosis.merged(strange, gain).kind == "none of the library"
 
 
 def test_of_many_supports_those_listed_are_joined():
     listed = SimpleNamespace(names=("a",))
     many = SimpleNamespace(fits=[listed], verdict=verdict("either", "a", "b"))
-    assert light_diagnosis._named(many) == [listed]
+    assert diagnosis._named(many) == [listed]
 
 
 def test_a_recording_with_light_is_diagnosed_whole():

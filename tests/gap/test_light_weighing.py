@@ -5,13 +5,14 @@ import pytest
 
 from bench.gap_light_effects import Coarse
 from bench.gap_sensors import _likened
-from bns.gap import diagnose, light_cases
-from bns.gap.fit import Term
-from bns.gap.light_diagnosis import light_rules
-from bns.gap.light_model import SightModel, squeezed, stretched
-from bns.gap.light_ranking import weighed
-from bns.gap.light_weighing import Readings, apart
-from bns.gap.problem import Problem
+from bns.gap import diagnose
+from bns.gap.bench import light_cases
+from bns.gap.core.fit import Term
+from bns.gap.core.problem import Problem
+from bns.gap.models.light.diagnosis import light_rules
+from bns.gap.models.light.model import SightModel, squeezed, stretched
+from bns.gap.models.light.ranking import weighed
+from bns.gap.models.light.weighing import Readings, apart
 from bns.worlds.effects import registry
 
 NOISE = registry.make("tracker_noise", position_sd=0.001, heading_sd=0.008)

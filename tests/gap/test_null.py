@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from bns.gap.null import Null, correlation, lasting, quiet
+from bns.gap.core.null import Null, correlation, lasting, quiet
 from bns.worlds.trial import POSE_CHANNELS, Channel
 
 TRIALS, WINDOWS = 5, 80

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.gap import odometry, odometry_diagnosis
-from bns.gap.importing.khepera3_odometry import chained
-from bns.gap.odometry import Motions, Noise, changed, fit
+from bns.gap.importers.khepera3_odometry import chained
+from bns.gap.models.odometry import diagnosis
+from bns.gap.models.odometry import fit as odometry
+from bns.gap.models.odometry.fit import Motions, Noise, changed, fit
 from bns.worlds.trial import Channel, Commands, Trial
 
 AXLE, INTERVAL = 0.0884, 0.8
@@ -82,7 +83,7 @@ def test_whitening_takes_a_common_bias_of_lengths_out():
 
 def test_slow_drives_tie_axle_and_diameters_and_ask_for_a_long_one():
     data = motions({"both_diameters": 0.0126, "mount_x": -0.0058}, count=2400)
-    found = odometry_diagnosis.diagnose(data)
+    found = diagnosis.diagnose(data)
     assert found.verdict.kind == "either"
     assert set(found.verdict.named) == {
         ("both_diameters", "mount_x"),
@@ -99,7 +100,7 @@ def test_slow_drives_tie_axle_and_diameters_and_ask_for_a_long_one():
 
 def test_fast_drives_settle_it():
     data = motions({"both_diameters": 0.02}, speed=0.3, count=2400)
-    found = odometry_diagnosis.diagnose(data)
+    found = diagnosis.diagnose(data)
     assert found.verdict.kind == "effect"
     assert found.verdict.named == (("both_diameters",),)
     assert "both_diameters +2.0" in found.verdict.sentence
@@ -108,10 +109,10 @@ def test_fast_drives_settle_it():
 
 def test_nothing_is_nothing():
     for seed in range(3):
-        found = odometry_diagnosis.diagnose(motions({}, seed=seed))
+        found = diagnosis.diagnose(motions({}, seed=seed))
         assert found.verdict.kind == "no gap" and found.verdict.named == ()
 
 
 def test_too_few_intervals_are_refused():
     with pytest.raises(BnsError, match="100 intervals are too few"):
-        odometry_diagnosis.diagnose(motions({}, count=100))
+        diagnosis.diagnose(motions({}, count=100))

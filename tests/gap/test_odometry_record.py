@@ -2,21 +2,22 @@
 
 import numpy as np
 
-from bns.gap import odometry_record, store
-from bns.gap.odometry_diagnosis import diagnose
+from bns.gap import store
+from bns.gap.models.odometry import record
+from bns.gap.models.odometry.diagnosis import diagnose
 from tests.gap.test_odometry import motions
 
 
 def test_it_is_stored_and_planned_like_every_other(tmp_path):
     data = motions({"axle": -0.012, "mount_x": -0.006}, count=3000)
-    found = odometry_record.of(diagnose(data), 1)
+    found = record.of(diagnose(data), 1)
     assert found.verdict.kind == "either"
     store.save(found, tmp_path)
     again = store.load(tmp_path)
-    assert again.model == odometry_record.MODEL
+    assert again.model == record.MODEL
     assert again.verdict.named == found.verdict.named
     assert set(again.best.names) == set(found.verdict.named[0])
-    made = odometry_record.planned(again)
+    made = record.planned(again)
     first = made.options[0].excitation
     assert first.name.startswith("long straight drive") and made.repeats >= 1
     way = (first.commands.values * first.commands.durations[:, None])[0]

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError, FormatError
-from bns.gap import own_cases
+from bns.gap.bench import mjcf_cases
 from bns.gap.diagnose import diagnose
-from bns.gap.own_config import OwnConfig
-from bns.gap.own_effects import CLASSES
-from bns.gap.own_model import OwnModel
-from bns.worlds import dataset
+from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.models.mjcf.effects import CLASSES
+from bns.gap.models.mjcf.model import OwnModel
+from bns.worlds.data import dataset
 
 ARM = Path(__file__).parents[2] / "examples" / "arm" / "arm.toml"
 KEPT = (
@@ -31,7 +31,7 @@ def arm():
 
 @pytest.fixture(scope="module")
 def told(arm):
-    return own_cases.commands(arm, np.random.default_rng(0), 4, seconds=2.0)
+    return mjcf_cases.commands(arm, np.random.default_rng(0), 4, seconds=2.0)
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def find(arm, told):
     few = [item for item in arm.candidates() if item.name in KEPT]
 
     def run(*texts):
-        trials = own_cases.record(arm, told, [arm.parse(t) for t in texts], seed=1)
+        trials = mjcf_cases.record(arm, told, [arm.parse(t) for t in texts], seed=1)
         return diagnose(trials, arm, candidates=few, full=False)
 
     return run
@@ -66,7 +66,7 @@ def test_nothing_planted_is_no_gap(find):
 
 
 def test_it_rests_at_home_and_follows(arm, told):
-    ((seen,),) = arm.simulate(own_cases.record(arm, told[:1], []), [()])
+    ((seen,),) = arm.simulate(mjcf_cases.record(arm, told[:1], []), [()])
     home = np.array([0.6, 0.9])
     assert np.abs(seen[0] - home).max() < 0.1  # gravity makes the servos give way
     assert np.ptp(seen, axis=0).min() > 0.2
@@ -112,7 +112,7 @@ def test_a_corrected_model_is_written(arm, tmp_path):
 
 
 def test_logs_and_datasets_give_the_same_trials(arm, told, tmp_path):
-    (trial,) = own_cases.record(arm, told[:1], [])
+    (trial,) = mjcf_cases.record(arm, told[:1], [])
     dataset.write(tmp_path / "data", [trial])
     (kept,) = dataset.read(tmp_path / "data").trials
     np.testing.assert_array_equal(kept.observed, trial.observed)

@@ -7,9 +7,10 @@ import pytest
 
 from bns.cli import gap_after
 from bns.errors import FormatError
-from bns.gap import command_file, excite, plan, plan_runs, servo_excite, store
+from bns.gap import store
+from bns.gap.models.servo.model import ServoModel
+from bns.gap.planning import command_file, excitation, plan, plan_runs, servo_excitation
 from bns.gap.records import Diagnosis, Fit, Verdict
-from bns.gap.servo_model import ServoModel
 
 FLOOR = {
     "sigma": [1e-3, 1e-3, 1e-2],
@@ -64,7 +65,7 @@ def test_nothing_is_tied(model):
 
 
 def test_magnitudes_that_are_not_known_part_less(model):
-    family = [item for item in excite.wheeled() if "in place" in item.name][:2]
+    family = [item for item in excitation.wheeled() if "in place" in item.name][:2]
     known, loose = (
         plan.plan(
             tied((*AXLE[:3], spread), ("tracker_scale", OTHER, 1.1, spread)),
@@ -84,7 +85,7 @@ def test_drives_stay_on_the_board(model):
     for option in small.options:
         path = plan.blank(option.excitation.commands, model).observed
         assert np.abs(path[:, :2]).max() < 0.25
-    assert len(small.options) < len(excite.wheeled())
+    assert len(small.options) < len(excitation.wheeled())
 
 
 def test_how_often_a_command_has_to_be_run():
@@ -126,28 +127,28 @@ def test_a_servo_gets_the_command_that_is_known_to_part(fits, wanted):
 
 
 def test_commands_for_servos_are_bounded_and_softer_ones_are_offered():
-    family = servo_excite.servo(told=TOLD)
+    family = servo_excitation.servo(told=TOLD)
     assert {item.conditions["gain"] for item in family} == {16.0, 4.0}
     for item in family:
         goals = item.commands.values[:, 0]
-        assert np.abs(goals).max() <= servo_excite.REACH + 1e-9
-        assert item.commands.duration == pytest.approx(servo_excite.LENGTH)
+        assert np.abs(goals).max() <= servo_excitation.REACH + 1e-9
+        assert item.commands.duration == pytest.approx(servo_excitation.LENGTH)
         if "steps" not in item.name and "stairs" not in item.name:
-            fastest = np.abs(np.diff(goals)).max() / servo_excite.HELD
-            assert fastest <= servo_excite.SWIFT
-    assert len(servo_excite.servo()) == len(family) / 2
+            fastest = np.abs(np.diff(goals)).max() / servo_excitation.HELD
+            assert fastest <= servo_excitation.SWIFT
+    assert len(servo_excitation.servo()) == len(family) / 2
 
 
 def test_general_commands_keep_to_the_limits():
     limits = {"a": (-1.0, 3.0, "N"), "b": (0.5, 2.0, "rad")}
-    for item in excite.general(limits):
+    for item in excitation.general(limits):
         low, high = item.commands.values.min(axis=0), item.commands.values.max(axis=0)
         assert (low >= [-1.0, 0.5]).all() and (high <= [3.0, 2.0]).all(), item.name
         assert item.commands.duration == pytest.approx(10.0, abs=0.6)
 
 
 def test_commands_survive_their_file(tmp_path):
-    told = excite.wheeled()[5].commands
+    told = excitation.wheeled()[5].commands
     read = command_file.read(command_file.write(told, tmp_path / "next.csv"))
     np.testing.assert_array_equal(read.values, told.values)
     np.testing.assert_allclose(read.durations, told.durations)
@@ -179,6 +180,6 @@ def test_each_command_of_a_plan_gets_a_file(tmp_path, monkeypatch, capsys):
     first, second = (
         command_file.read(tmp_path / f"next_command{more}.csv") for more in ("", "_2")
     )
-    wanted = excite.wheeled()
+    wanted = excitation.wheeled()
     assert np.allclose(first.values, wanted[0].commands.values)
     assert np.allclose(second.values, wanted[3].commands.values)

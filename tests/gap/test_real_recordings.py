@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from bench import real_data, servo_cases
-from bns.gap import servo
-from bns.gap.importing import khepera3_odometry, mrclam6, xl330
-from bns.gap.odometry import Motions
-from bns.gap.odometry_diagnosis import diagnose
-from bns.gap.servo_candidates import candidates
-from bns.gap.servo_nominal import Nominal
-from bns.gap.servo_runs import cells
+from bns.gap.importers import khepera3_odometry, mrclam6, xl330
+from bns.gap.models.odometry.diagnosis import diagnose
+from bns.gap.models.odometry.fit import Motions
+from bns.gap.models.servo import diagnosis
+from bns.gap.models.servo.candidates import candidates
+from bns.gap.models.servo.nominal import Nominal
+from bns.gap.models.servo.runs import cells
 from bns.models import servo_pendulum
 
 CANDIDATES = (
@@ -54,7 +54,7 @@ def test_servo_settings_that_are_mis_told():
         every.where(lambda k, n: k in (8, 16) and n in (1, 2), "gain", "repeat")
     )
     assert np.abs(law.predict(known) - known.angles).mean() < 0.03
-    reference = servo.learn(known, law, candidates=candidates(CANDIDATES))
+    reference = diagnosis.learn(known, law, candidates=candidates(CANDIDATES))
     for true in sorted(set(cells(known)))[5:7]:
         mine = servo_cases.of_cell(known, true, (1, 2))
         for at, kind in enumerate(("payload", "lever", "gain", "none")):
@@ -63,7 +63,7 @@ def test_servo_settings_that_are_mis_told():
                 levels = sorted({cell[at] for cell in cells(known)} - {true[at]})
                 told[at] = levels[-1]
             runs = servo_cases.retold(mine, tuple(told))
-            found, scores = servo.diagnose(runs, reference, without=[true])
+            found, scores = diagnosis.diagnose(runs, reference, without=[true])
             if kind == "none":
                 assert found.kind == "no gap"
             else:

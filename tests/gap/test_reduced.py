@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from bns.gap import travel
-from bns.gap.reduced import between, reduced
-from bns.gap.wheeled import WheeledModel
+from bns.gap.models import planar_rollout
+from bns.gap.models.surrogate import between, reduced
+from bns.gap.models.wheeled import WheeledModel
 from bns.worlds.effects import registry
-from bns.worlds.mujoco_world import MujocoWorld
+from bns.worlds.physics.wheeled_world import MujocoWorld
 from bns.worlds.trial import body_displacements
 
 NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.01"
@@ -45,7 +45,9 @@ def test_maps_between_levels_are_as_those_learnt_there(text):
     found = between("khepera3", effect, 1 / 0.0205)
     learnt = reduced("khepera3", (effect,), 1 / 0.0205)
     told = np.random.default_rng(0).uniform(-0.1, 0.1, (8, 2)).repeat(100, axis=0)
-    made = travel.poses([found.map, learnt.map], [travel.halved(told)] * 2, [None] * 2)
+    made = planar_rollout.poses(
+        [found.map, learnt.map], [planar_rollout.halved(told)] * 2, [None] * 2
+    )
     apart = body_displacements(made[0]) - body_displacements(made[1])
     assert np.abs(apart).max() < 4e-4
     assert found.good

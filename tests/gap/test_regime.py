@@ -3,11 +3,11 @@
 import numpy as np
 from scipy.stats import chi2
 
-from bns.gap import null, pieces
-from bns.gap.floor import Floor
-from bns.gap.problem import Problem
-from bns.gap.wheeled import WheeledModel
-from bns.worlds.mujoco_world import MujocoWorld
+from bns.gap.core import null, segments
+from bns.gap.core.floor import Floor
+from bns.gap.core.problem import Problem
+from bns.gap.models.wheeled import WheeledModel
+from bns.worlds.physics.wheeled_world import MujocoWorld
 from bns.worlds.trial import Commands
 
 NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.008"
@@ -15,10 +15,10 @@ NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.008"
 
 def test_a_robot_that_stays_has_no_places():
     noise = np.random.default_rng(0).normal(0, 1e-3, (50, 3))
-    coarse = pieces.coarse(noise + np.array([0.4, -0.2, 3.1]))
+    coarse = segments.coarse(noise + np.array([0.4, -0.2, 3.1]))
     assert np.ptp(coarse, axis=0).max() < 1e-12
     along = np.linspace(0, 1, 50)[:, None] * [0.5, 0.0, 0.0]
-    assert len(np.unique(pieces.coarse(along)[:, 0].round(9))) == 17  # 0.5 m / 3 cm
+    assert len(np.unique(segments.coarse(along)[:, 0].round(9))) == 17  # 0.5 m / 3 cm
 
 
 def test_noise_alone_has_no_structure():

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bns.gap import repeats
-from bns.gap.model import Windows
+from bns.gap.core import repeats
+from bns.gap.models.base import Windows
 
 COUNT, LENGTH, NOISE = 90, 0.1, 1e-3  # windows, their length [s], noise [m]
 

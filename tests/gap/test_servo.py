@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.gap import servo, servo_nominal
-from bns.gap.servo_candidates import candidates, columns
-from bns.gap.servo_nominal import Nominal
-from bns.gap.servo_runs import Runs, cells, merged, runs
-from bns.gap.servo_verdict import Null
+from bns.gap.models.servo import diagnosis, nominal
+from bns.gap.models.servo.candidates import candidates, columns
+from bns.gap.models.servo.nominal import Nominal
+from bns.gap.models.servo.runs import Runs, cells, merged, runs
+from bns.gap.models.servo.verdict import Null
 from bns.models import servo_pendulum
 from bns.worlds.effects import registry
-from bns.worlds.servo_law import law
-from bns.worlds.servo_physics import Drive, simulate
+from bns.worlds.physics.servo_law import law
+from bns.worlds.physics.servo_rollout import Drive, simulate
 from bns.worlds.trial import Channel, Commands, Trial
 
 NAMES = ("servo_payload", "servo_lever", "servo_gain", "servo_voltage", "servo_delay")
@@ -46,7 +46,7 @@ def recorded(settings, effect: str = "", seed: int = 0, rate=0.15) -> Runs:
 
 @pytest.fixture(scope="module")
 def reference():
-    return servo.learn(recorded(CELLS), NOMINAL, candidates=candidates(NAMES))
+    return diagnosis.learn(recorded(CELLS), NOMINAL, candidates=candidates(NAMES))
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def reference():
 )
 def test_a_planted_effect_is_named_and_measured(reference, effect, name, magnitude):
     runs = recorded([(0.55, 0.12, 10.0)], effect, seed=1)
-    found, scores = servo.diagnose(runs, reference)
+    found, scores = diagnosis.diagnose(runs, reference)
     named = {name for (name,) in found.named}
     tied = {"servo_payload", "servo_lever"}  # a little apart by their inertia alone
     assert name in named and (len(named) == 1 or named == tied)
@@ -70,7 +70,7 @@ def test_a_planted_effect_is_named_and_measured(reference, effect, name, magnitu
 
 def test_gain_and_voltage_come_out_as_a_set(reference):
     runs = recorded([(0.55, 0.12, 16.0)], "servo_gain:factor=0.8", seed=2)
-    found, scores = servo.diagnose(runs, reference)
+    found, scores = diagnosis.diagnose(runs, reference)
     assert found.kind == "either"
     assert {name for (name,) in found.named} == {"servo_gain", "servo_voltage"}
     assert found.angle < 5 and found.change
@@ -80,20 +80,22 @@ def test_gain_and_voltage_come_out_as_a_set(reference):
 
 def test_a_drive_that_saturates_tells_gain_from_voltage(reference):
     runs = recorded([(0.55, 0.12, 10.0)], "servo_gain:factor=0.6", seed=2, rate=0.35)
-    found, _ = servo.diagnose(runs, reference)
+    found, _ = diagnosis.diagnose(runs, reference)
     assert found.kind == "effect" and found.named == (("servo_gain",),)
 
 
 def test_nothing_is_nothing_though_the_nominal_is_wrong(reference):
     for seed in range(3):
-        found, _ = servo.diagnose(recorded([(0.55, 0.12, 10.0)], seed=seed), reference)
+        found, _ = diagnosis.diagnose(
+            recorded([(0.55, 0.12, 10.0)], seed=seed), reference
+        )
         assert found.kind == "no gap" and found.named == ()
         assert () in found.sets
 
 
 def test_an_effect_outside_the_library_is_none_of_it(reference):
     runs = recorded([(0.55, 0.12, 10.0)], "servo_offset:angle=0.3", seed=3)
-    found, _ = servo.diagnose(runs, reference)
+    found, _ = diagnosis.diagnose(runs, reference)
     assert found.kind == "none of the library"
 
 
@@ -110,7 +112,7 @@ def test_repeats_are_merged_and_settings_kept_apart():
 def test_a_fit_recovers_the_law():
     runs = recorded([(0.4, 0.1, 6.0), (0.7, 0.15, 16.0)])
     free = ("coulomb", "viscous", "load_friction")
-    found = servo_nominal.fit(runs, free=free, start=NOMINAL.values)
+    found = nominal.fit(runs, free=free, start=NOMINAL.values)
     for name in free:
         assert found.values[name] == pytest.approx(REALITY[name], abs=0.02)
     assert found.error < 2e-3 and not found.at_bound
@@ -145,15 +147,15 @@ def test_trials_are_resampled_on_the_grid():
 
 def test_too_little_is_refused(reference):
     with pytest.raises(BnsError, match="five settings"):
-        servo.learn(recorded(CELLS[:4]), NOMINAL)
+        diagnosis.learn(recorded(CELLS[:4]), NOMINAL)
     with pytest.raises(BnsError, match="told 2 settings"):
-        servo.diagnose(recorded(CELLS[:2]), reference)
+        diagnosis.diagnose(recorded(CELLS[:2]), reference)
     with pytest.raises(BnsError, match="do not fix"):
-        servo_nominal.fit(recorded(CELLS[:1]).take(np.zeros(0, int)))
+        nominal.fit(recorded(CELLS[:1]).take(np.zeros(0, int)))
     odd = recorded(CELLS[:1])
     odd = Runs(odd.drive, odd.angles, odd.told, {"trajectory": ("sweep", "jump")})
     with pytest.raises(BnsError, match="trajectory 'jump'"):
-        servo.diagnose(odd, reference)
+        diagnosis.diagnose(odd, reference)
 
 
 def test_alarms_are_weighed_by_gain():

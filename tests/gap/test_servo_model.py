@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.gap import diagnose, model
-from bns.gap.servo_candidates import candidates
-from bns.gap.servo_model import ServoModel, angles_only
+from bns.gap import diagnose
+from bns.gap.models import base
+from bns.gap.models.servo.candidates import candidates
+from bns.gap.models.servo.model import ServoModel, angles_only
 from bns.worlds.effects import registry
 from bns.worlds.trial import Channel, Commands, Trial
 
@@ -44,7 +45,7 @@ def recorded(effect: str, count: int = 4) -> list[Trial]:
 
 
 def test_it_is_such_a_model():
-    made: model.GapModel = ServoModel()
+    made: base.GapModel = ServoModel()
     names = [item.name for item in made.candidates()]
     assert len(names) == len(set(names)) >= 13
     assert all(item.excite and item.unit for item in made.candidates())

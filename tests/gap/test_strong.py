@@ -1,9 +1,9 @@
 """Strong effects are fitted although the learnt map of the robot misjudges them."""
 
-from bns.gap import excite
 from bns.gap.diagnose import diagnose
-from bns.gap.wheeled import WheeledModel
-from bns.worlds.mujoco_world import MujocoWorld
+from bns.gap.models.wheeled import WheeledModel
+from bns.gap.planning import excitation
+from bns.worlds.physics.wheeled_world import MujocoWorld
 
 NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.008"
 DRAG = "rolling_drag:wheel=both,torque=1e-4,viscous=0"
@@ -12,7 +12,7 @@ NAMES = "rolling_drag.torque[both]", "rolling_drag.viscous[both]"
 
 def test_dry_friction_is_told_from_viscous():
     model = WheeledModel("khepera3", threads=1)
-    family = {item.name: item.commands for item in excite.wheeled()}
+    family = {item.name: item.commands for item in excitation.wheeled()}
     slow = family["medium turn in place, both ways, each for 5 s"]
     fast = family["fast turn in place, both ways, each for 1.5 s"]
     world = MujocoWorld("khepera3", reality=[DRAG, NOISE], threads=1)

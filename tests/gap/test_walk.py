@@ -3,25 +3,21 @@
 import numpy as np
 import pytest
 
-from bns.gap import (
-    check,
-    diagnose,
-    magnitudes,
-    walk_bench,
-    walk_cases,
-    walk_library,
-    walk_lost,
-    walk_where,
-)
-from bns.gap.problem import Problem
-from bns.gap.walk_model import READING, WalkModel
-from bns.gap.walk_signs import Signs
-from bns.gap.walk_where import Suspects
+from bns.gap import diagnose
+from bns.gap.bench import walk_bench, walk_cases
+from bns.gap.candidates import legged
+from bns.gap.core import uncertainty
+from bns.gap.core.problem import Problem
+from bns.gap.models.legged import lost, where
+from bns.gap.models.legged.model import READING, WalkModel
+from bns.gap.models.legged.signs import Signs
+from bns.gap.models.legged.where import Suspects
+from bns.gap.recordings import check
 from bns.models.legs import LEGS
-from bns.worlds import legged_plan
 from bns.worlds.active import Stages
 from bns.worlds.damage import Damage
 from bns.worlds.effects import registry
+from bns.worlds.physics import legged_plan
 from bns.worlds.trial import Commands
 from tests.sources import ROOT
 
@@ -63,18 +59,18 @@ def test_the_leg_is_found_before_anything_is_fitted(model, told):
     rests = [
         t.observed[:, 3:] - p[:, 3:] for t, p in zip(trials, predicted, strict=True)
     ]
-    found = walk_where.suspects(rests, model.joints, READING)
+    found = where.suspects(rests, model.joints, READING)
     assert found.legs == ("right_front",)
-    share = walk_where.shares(rests, model.joints, READING)
+    share = where.shares(rests, model.joints, READING)
     assert sum(share.values()) == pytest.approx(1.0)
 
 
 def test_one_leg_alone_leaves_out_effects_on_all():
     names = ("left_front_coxa", "right_front_coxa")
     rests = [np.column_stack([np.full(50, 0.1), np.zeros(50)])]
-    found = walk_where.suspects(rests, names, READING)
+    found = where.suspects(rests, names, READING)
     assert found == Suspects(("left_front_coxa",), ("left_front",), False)
-    listed = [item.name for item in walk_library.candidates(found)]
+    listed = [item.name for item in legged.candidates(found)]
     assert "servo_delay[all]" not in listed
     assert "servo_gain[all]" in listed  # as what the model is uncertain of
     assert "servo_delay[left_front_coxa]" in listed
@@ -83,8 +79,8 @@ def test_one_leg_alone_leaves_out_effects_on_all():
 def test_candidates_are_on_legs_that_the_robot_has():
     model = WalkModel(str(ROOT / "examples" / "quad"))
     rests = [np.full((50, len(model.joints)), 0.1)]
-    found = walk_where.suspects(rests, model.joints, READING)
-    names = [item.name for item in walk_library.candidates(found, model.joints)]
+    found = where.suspects(rests, model.joints, READING)
+    names = [item.name for item in legged.candidates(found, model.joints)]
     assert "foot_slippery[right_rear]" in names and "link_length[tibia,all]" in names
     assert not any("middle" in name for name in (*names, *found.legs))
 
@@ -125,7 +121,7 @@ def test_what_walking_scatters_is_found_by_walking(model, told):
 def test_two_legs_that_depart_alike_are_both_suspected():
     names = ("left_front_coxa", "right_front_coxa", "left_rear_coxa")
     rests = [np.column_stack([np.full(50, v) for v in (0.1, 0.09, 0.01)])]
-    found = walk_where.suspects(rests, names, READING)
+    found = where.suspects(rests, names, READING)
     assert found.legs == ("left_front", "right_front")
 
 
@@ -178,7 +174,7 @@ def test_legs_and_joints_that_are_lost_are_named(model, told, damage):
     (term,) = made.choice.best.terms
     assert term.magnitude == pytest.approx(1.0, abs=0.02)
     assert not term.at_bound
-    assert magnitudes.spreads(made.problem, made.choice.best)[1] == pytest.approx(1.0)
+    assert uncertainty.spreads(made.problem, made.choice.best)[1] == pytest.approx(1.0)
 
 
 def test_play_in_a_horn_is_named_with_its_joint(model, told):
@@ -226,14 +222,14 @@ def test_robots_that_lack_a_leg_scatter_as_such_robots_do(model):
 
 def test_nothing_is_lost_where_no_loss_explains_much(model, told):
     trials = walk_cases.record(told, [], 1)
-    every = walk_library.lost(Signs({}, (), LEGS, LEGS))
-    assert walk_lost.likely(trials, every, model.simulate) == ()
-    assert walk_lost.likely(trials, (), model.simulate) == ()
+    every = legged.lost(Signs({}, (), LEGS, LEGS))
+    assert lost.likely(trials, every, model.simulate) == ()
+    assert lost.likely(trials, (), model.simulate) == ()
 
 
 def test_two_legs_are_lost_one_after_the_other(model, told):
     limp = registry.make("leg_limp", legs="1,5", loss=1.0)
     trials = walk_cases.record(told, [limp], 1)
-    every = walk_library.lost(Signs({}, (), LEGS, ()))
-    found = walk_lost.likely(trials, every, model.simulate)
+    every = legged.lost(Signs({}, (), LEGS, ()))
+    found = lost.likely(trials, every, model.simulate)
     assert {effect["legs"] for effect in found} == {"1", "5"}

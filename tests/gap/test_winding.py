@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.gap import fit, signatures, support, verdict, winding
-from bns.gap.walk_library import candidates
-from bns.gap.walk_where import Suspects
+from bns.gap.candidates.legged import candidates
+from bns.gap.core import adaptive_grid, fit, signatures, support, verdict
+from bns.gap.models.legged.where import Suspects
 
 (GRIP,) = (
     item
@@ -55,14 +55,14 @@ def test_what_does_far_more_than_the_recording_shows_is_left_out():
         name=GRIP.name,
         whole=False,
     )
-    winding.simulated(problem, [item])
+    adaptive_grid.simulated(problem, [item])
     assert 1.3 in problem.asked
     assert 1.7 not in problem.asked
-    assert len(problem.asked) <= len(strong) + 2 * winding.TRIES
+    assert len(problem.asked) <= len(strong) + 2 * adaptive_grid.TRIES
 
 
 def test_what_diverges_is_told_and_does_not_count():
-    found, diverged = winding.simulated(Turning(1.5), [GRIP])
+    found, diverged = adaptive_grid.simulated(Turning(1.5), [GRIP])
     assert [value for value, _ in found[0, 0] if value < 0.2] == []
     assert len(diverged) == 1
     assert "foot_slippery" in diverged[0]

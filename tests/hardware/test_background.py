@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from bns import presets
-from bns.background import LEAST, Worker, behind
 from bns.errors import BnsError
+from bns.experiment.background import LEAST, Worker, behind
 from bns.learners import registry as learners
 from bns.worlds import registry
 

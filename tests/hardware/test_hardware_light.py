@@ -14,8 +14,8 @@ from bns.hardware import route
 from bns.hardware.emulators import virtual
 from bns.hardware.errors import SafetyStop
 from bns.hardware.light_world import HardwareLight
-from bns.worlds import light_sensors
-from bns.worlds.light_field import Lamp
+from bns.worlds.light import sensors as light_sensors
+from bns.worlds.light.field import Lamp
 
 LAMP = Lamp()
 
@@ -132,7 +132,7 @@ def test_what_cannot_be_is_refused():
 
 def test_the_learner_drives_it(tmp_path):
     from bns import presets
-    from bns.run import train
+    from bns.experiment.run import train
 
     config = presets.load("khepera-light")
     config = replace(
@@ -152,6 +152,6 @@ def test_the_learner_drives_it(tmp_path):
 
 
 def _field():
-    from bns.worlds.light_field import LightField
+    from bns.worlds.light.field import LightField
 
     return LightField((LAMP,))

@@ -9,7 +9,8 @@ from bns.errors import BnsError
 from bns.models import ax12a, check, legged_files, legs, numbers
 from bns.models.new_legged import Legged
 from bns.models.phantomx import gait
-from bns.worlds import registry, servo_joint
+from bns.worlds import registry
+from bns.worlds.physics import servo_joint
 from bns.worlds.trial import Commands
 
 BODY = {"mass": 1.5, "body_length": 0.16, "body_width": 0.1}

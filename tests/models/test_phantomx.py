@@ -8,7 +8,7 @@ from bns import models
 from bns.errors import BnsError, OutOfBoundsError
 from bns.models import ax12a, legs, servo_pendulum
 from bns.models.phantomx import gait, kinematics, servos
-from bns.worlds import servo_joint, servo_law
+from bns.worlds.physics import servo_joint, servo_law
 
 # What one robot of the maker held as its neutral pose (NUKE, ik_neutral), by identity.
 NEUTRAL = (

@@ -9,8 +9,8 @@ import pytest
 
 from bns import models
 from bns.errors import BnsError
-from bns.gap import walk_cases
-from bns.gap.walk_model import WalkModel
+from bns.gap.bench import walk_cases
+from bns.gap.models.legged.model import WalkModel
 from bns.models import check, legs
 from bns.models.legs import PARTS
 from bns.worlds import registry

@@ -5,8 +5,8 @@ import os
 import numpy as np
 import pytest
 
-from bns.config import RunConfig, TaskConfig, WorldConfig
-from bns.record import RunRecord
+from bns.experiment.config import RunConfig, TaskConfig, WorldConfig
+from bns.experiment.record import RunRecord
 from bns.seeding import generator
 from bns.worlds.trial import Commands, Trial
 

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from bns.__main__ import main
-from bns.gap import store, wheeled_library
-from bns.gap.cases import commands
-from bns.worlds import corrected, dataset
-from bns.worlds.mujoco_world import MujocoWorld
+from bns.gap import store
+from bns.gap.bench.cases import commands
+from bns.gap.candidates import wheeled
+from bns.worlds import corrected
+from bns.worlds.data import dataset
+from bns.worlds.physics.wheeled_world import MujocoWorld
 
 NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.01"
 GAIN = "wheel_gain:wheel=left,factor=0.85"
@@ -29,9 +31,9 @@ def home(tmp_path_factory):
     here = tmp_path_factory.mktemp("gap")
     recorded(here / "data", GAIN)
     words = ["gap", "diagnose", str(here / "data"), "--out", str(here / "out")]
-    few = tuple(i for i in wheeled_library.candidates() if i.name in KEPT)
+    few = tuple(i for i in wheeled.candidates() if i.name in KEPT)
     with pytest.MonkeyPatch.context() as patch:  # few candidates take less time
-        patch.setattr(wheeled_library, "candidates", lambda: few)
+        patch.setattr(wheeled, "candidates", lambda: few)
         assert main([*words, "--threads", "1"]) == 0
     return here
 

@@ -5,10 +5,10 @@ import pytest
 
 from bns.viz import figures
 from bns.viz.figures.light_responses import moving_mean, roamed
-from bns.worlds import light_sensors
-from bns.worlds.light_field import LightField
+from bns.worlds.light import sensors
+from bns.worlds.light.field import LightField
 
-SENSORS, FIELD = light_sensors.of("khepera3"), LightField()
+SENSORS, FIELD = sensors.of("khepera3"), LightField()
 FORWARD = [at for at, name in enumerate(SENSORS.names) if "back" not in name]
 TEN = SENSORS.names.index("ir_front_left")
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bns.run import train
+from bns.experiment.run import train
 from bns.viz import figures, recording, report, scene
 from tests.bns.light_fakes import FakeLightWorld, small
 

@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from bns.step import ARRAYS, Step
+from bns.experiment.step import ARRAYS, Step
 from bns.viz import live, picture
 
 pytest.importorskip("rerun")

@@ -7,9 +7,9 @@ import mujoco
 import numpy as np
 
 from bns import models
-from bns.worlds import light_sensors
 from bns.worlds.effects.base import ControlSignal
-from bns.worlds.light_field import Lamp, LightField
+from bns.worlds.light import sensors
+from bns.worlds.light.field import Lamp, LightField
 
 ROVER = (Path(__file__).parent / "rover.xml").read_text()
 STEPS, DT = 600, 0.005
@@ -48,7 +48,7 @@ class Readings(NamedTuple):
 
 def read() -> Readings:
     """Forty random readings of each light sensor of a Khepera; read-only."""
-    names = light_sensors.of("khepera3").names
+    names = sensors.of("khepera3").names
     values = np.random.default_rng(4).integers(200, 4000, (40, len(names)))
     return Readings(
         times=frozen(np.arange(40) * 0.4), values=frozen(values * 1.0), channels=names
@@ -58,7 +58,7 @@ def read() -> Readings:
 def light() -> dict[str, np.ndarray]:
     """The law of light in an arena with two lamps, read-only."""
     field = LightField((Lamp(), Lamp(x=0.5, y=0.3, power=4.0)))
-    law = light_sensors.of("khepera3").law(field)
+    law = sensors.of("khepera3").law(field)
     return {name: frozen(values) for name, values in law.items()}
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from bns.errors import BnsError, OutOfBoundsError
 from bns.worlds import registry
-from bns.worlds.supervisor import Supervisor
+from bns.worlds.light.supervisor import Supervisor
 from bns.worlds.trial import Commands
 from tests.sources import ROOT
 

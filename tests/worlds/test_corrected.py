@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from bns.cli.run import expanded
-from bns.config import RunConfig, WorldConfig
 from bns.errors import BnsError, FormatError
+from bns.experiment.config import RunConfig, WorldConfig
 from bns.worlds import corrected, registry
 from bns.worlds.corrected import Corrected
 from bns.worlds.trial import Commands

@@ -9,7 +9,7 @@ import pytest
 from pyarrow import parquet
 
 from bns.errors import BnsError, FormatError
-from bns.worlds import dataset
+from bns.worlds.data import dataset
 from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Outcome, Trial
 
 

@@ -6,7 +6,6 @@ import pytest
 
 from bns.errors import BnsError, OutOfBoundsError, UnknownNameError
 from bns.models.legs import JOINTS
-from bns.worlds import servo_law
 from bns.worlds.effects import listing, registry
 from bns.worlds.effects.base import (
     STAGES,
@@ -16,6 +15,7 @@ from bns.worlds.effects.base import (
     SensorEffect,
     ServoEffect,
 )
+from bns.worlds.physics import servo_law
 from tests.worlds.subjects import (
     DT,
     LEGGED,

@@ -7,7 +7,8 @@ import pytest
 from bns import models
 from bns.errors import BnsError, UnknownNameError
 from bns.models.phantomx import gait, kinematics
-from bns.worlds import compile, registry
+from bns.worlds import registry
+from bns.worlds.physics import compile
 from bns.worlds.trial import Channel, Commands, body_displacements
 
 LEGS = tuple(Channel(*item) for item in models.robot("phantomx").channels)
@@ -170,7 +171,7 @@ def test_other_robots_and_effects_are_refused():
 
 
 def test_trials_go_through_a_dataset(walked, tmp_path):
-    from bns.worlds import dataset
+    from bns.worlds.data import dataset
 
     trial = walked[0].replace(truth={})
     (back,) = dataset.read(dataset.write(tmp_path / "walk", [trial])).trials

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError, FormatError, MissingDependencyError, UnknownNameError
-from bns.worlds import dataset
-from bns.worlds.importing import from_csv, from_mcap
+from bns.worlds.data import dataset
+from bns.worlds.data.importing import from_csv, from_mcap
 
 LOG = """\
 stamp,px,py,heading,vl,vr,run,light

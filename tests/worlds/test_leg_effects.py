@@ -8,9 +8,9 @@ from bns import models
 from bns.errors import BnsError
 from bns.models import ax12a
 from bns.worlds import registry as worlds
-from bns.worlds import servo_joint
 from bns.worlds.damage import Damage
 from bns.worlds.effects import legs, registry
+from bns.worlds.physics import servo_joint
 from bns.worlds.trial import Channel, Commands
 
 LEGS = tuple(Channel(*item) for item in models.robot("phantomx").channels)

@@ -8,11 +8,13 @@ import pytest
 
 from bns import models
 from bns.errors import BnsError, UnknownNameError
-from bns.worlds import light_law, light_sensors, registry, sight
-from bns.worlds.light_field import Lamp, LightField
+from bns.worlds import registry
+from bns.worlds.light import law as light_law
+from bns.worlds.light import sensors, sight
+from bns.worlds.light.field import Lamp, LightField
 from bns.worlds.objects import Post, RayScreen
 
-SENSORS = light_sensors.of("khepera3")
+SENSORS = sensors.of("khepera3")
 BACK = SENSORS.names.index("ir_back")
 SIDE = SENSORS.names.index("ir_left_45")
 
@@ -130,7 +132,7 @@ def test_the_kept_sight_is_of_this_model(rays):
     middle, half = known["ir_left_45"][0]
     azimuths = np.radians([middle - half - 2, middle - half + 2, middle, middle + 170])
     free = [rays.free("ir_left_45", azimuth, 0.0) for azimuth in azimuths]
-    assert free == [False, True, True, False], "run python -m bns.worlds.sight"
+    assert free == [False, True, True, False], "run python -m bns.worlds.light.sight"
 
 
 def test_a_bent_sensor_looks_into_the_robots_own_body():
@@ -213,7 +215,7 @@ def test_open_loop_trials_have_the_readings_as_well():
 
 BAD = {
     "no table": (
-        lambda: light_sensors.of("khepera3", "mine"),
+        lambda: sensors.of("khepera3", "mine"),
         UnknownNameError,
         "public, thesis",
     ),

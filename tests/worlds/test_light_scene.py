@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from bns.models import render
-from bns.worlds import light_scene, registry
+from bns.worlds import registry
+from bns.worlds.light import scene
 
 
 @pytest.fixture(scope="module")
@@ -12,7 +13,7 @@ def spec():
     """Two lamps and a post."""
     lights = [{}, {"x": 0.7, "y": -0.4, "height": 0.1}]
     posts = [{"x": -0.5, "y": 0.3}]
-    return light_scene.spec(registry.make("light", lights=lights, posts=posts))
+    return scene.spec(registry.make("light", lights=lights, posts=posts))
 
 
 def test_lamps_are_where_the_light_is(spec):
@@ -37,9 +38,9 @@ def test_bulbs_are_in_the_picture(spec, opengl):
 
 
 def test_no_boundary_where_nobody_watches():
-    from bns.worlds.supervisor import Supervisor
+    from bns.worlds.light.supervisor import Supervisor
 
     world = registry.make("light", supervisor=Supervisor(safety=0))
-    names = [geom.name for geom in light_scene.spec(world).geoms]
+    names = [geom.name for geom in scene.spec(world).geoms]
     assert "bulb_0" in names
     assert not any(name.startswith("boundary") for name in names)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError, FormatError
-from bns.worlds import dataset, dataset_checks, registry
+from bns.worlds import registry
 from bns.worlds.damage import Damage, Event
+from bns.worlds.data import dataset, dataset_checks
 from bns.worlds.effects.base import BodyEffect, Parameter
 from bns.worlds.trial import Commands, Trial
 

@@ -9,11 +9,12 @@ import pytest
 from bns import models
 from bns.errors import BnsError
 from bns.gap import diagnose
-from bns.gap.light_cases import Wanderer
-from bns.gap.wheeled import WheeledModel
+from bns.gap.bench.light_cases import Wanderer
+from bns.gap.models.wheeled import WheeledModel
 from bns.models import check, new
-from bns.worlds import light_sensors, registry
-from bns.worlds.light_field import LightField
+from bns.worlds import registry
+from bns.worlds.light import sensors as light_sensors
+from bns.worlds.light.field import LightField
 from tests.worlds.test_closed_loop import Seek
 
 
@@ -135,9 +136,9 @@ def test_a_weak_sensor_is_named(robot, request):
     trials = world.drive(roams, cycles=40, seeds=[1, 2, 3])
     names = ("wheel_gain[left]", "sensor_gain[left]", "sensor_gain[right]")
     model = WheeledModel(place)
-    from bns.gap import light_library
+    from bns.gap.candidates import light
 
-    library = (*model.candidates(), *light_library.candidates(singles=False))
+    library = (*model.candidates(), *light.candidates(singles=False))
     few = [item for item in library if item.name in names]
     found = diagnose.diagnose(trials, model, candidates=few, full=False).verdict
     assert found.named == (("sensor_gain[left]",),)

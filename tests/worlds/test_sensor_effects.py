@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.worlds import light_law, light_sensors
 from bns.worlds import registry as worlds
 from bns.worlds.effects import listing, registry
 from bns.worlds.effects.base import CommandEffect, OpticsEffect, SensorEffect
-from bns.worlds.light_field import LightField
+from bns.worlds.light import law as light_law
+from bns.worlds.light import sensors as light_sensors
+from bns.worlds.light.field import LightField
 from tests.worlds import subjects
 from tests.worlds.subjects import DT, light, read
 

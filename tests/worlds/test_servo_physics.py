@@ -7,9 +7,9 @@ import pytest
 from bns import models
 from bns.errors import BnsError, OutOfBoundsError, UnknownNameError
 from bns.models import servo_pendulum
-from bns.worlds import servo_law
 from bns.worlds.effects import registry
-from bns.worlds.servo_physics import Drive, simulate
+from bns.worlds.physics import servo_law
+from bns.worlds.physics.servo_rollout import Drive, simulate
 
 DT, SECONDS = 0.002, 2.0
 PLAIN = {

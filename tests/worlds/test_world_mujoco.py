@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.worlds import compile, physics, registry
+from bns.worlds import registry
 from bns.worlds.damage import Damage, Event
 from bns.worlds.effects.base import BodyEffect, Parameter
+from bns.worlds.physics import compile, rollout
 from bns.worlds.trial import Commands
 
 AXLE = 0.0874  # [m] between the wheels, models/khepera3
@@ -116,10 +117,10 @@ def test_a_cut_without_a_change_gives_the_same_bytes():
     scene = compile.compiled("khepera3")
     start = compile.start_state(scene, (0.0, 0.0, 0.0))
     control = np.repeat([[5.0, 2.0], [-3.0, 4.0]], 100, axis=0)
-    whole = physics.run(physics.Job(start, (physics.Segment(scene, control),)))
+    whole = rollout.run(rollout.Job(start, (rollout.Segment(scene, control),)))
     cuts = (0, 1, 37, 100, 163, 200)
-    pieces = [physics.Segment(scene, control[a:b]) for a, b in pairwise(cuts)]
-    cut = physics.run(physics.Job(start, tuple(pieces)))
+    pieces = [rollout.Segment(scene, control[a:b]) for a, b in pairwise(cuts)]
+    cut = rollout.run(rollout.Job(start, tuple(pieces)))
     assert cut.states.tobytes() == whole.states.tobytes()
     assert whole.diverged == cut.diverged == -1
     assert np.ptp(whole.states[:, 1]) > 0.01

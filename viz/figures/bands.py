@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 from bns.viz import style
 
 SPREAD = (25, 75)

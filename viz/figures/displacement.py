@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 from bns.viz import style
 from bns.worlds.trial import body_displacements
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 from bns.viz import style
 from bns.viz.figures import bands
 

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bns.viz import style
-from bns.worlds.light_field import LightField
-from bns.worlds.light_sensors import LightSensors
+from bns.worlds.light.field import LightField
+from bns.worlds.light.sensors import LightSensors
 
 READINGS = 18_000
 """taken from different angles and positions (thesis 5.2.1, figure 5.5)"""

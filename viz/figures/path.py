@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 from bns.viz import scene, style
 from bns.viz.choices import Choice, choose, typical
 from bns.viz.paths import arcs, listed

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 from bns.viz import style
 from bns.viz.choices import choose, typical
 

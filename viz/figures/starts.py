@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 from bns.viz import scene, style
 from bns.viz.choices import typical
 from bns.viz.paths import listed

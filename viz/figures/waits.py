@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from bns import stats
-from bns.record import RunRecord
+from bns.experiment.record import RunRecord
 from bns.viz import facts, style
 from bns.viz.figures import bands
 

@@ -188,7 +188,7 @@ class BodyEffect(Effect):
 
 
 class ServoEffect(Effect):
-    """Changes numbers of the servo law (`bns.worlds.servo_law`).
+    """Changes numbers of the servo law (`bns.worlds.physics.servo_law`).
 
     A servo closes a loop around its own encoder, so its gain, friction, delay or play
     can not be written as a transform of a signal that is known beforehand, nor as an
@@ -206,7 +206,7 @@ class ServoEffect(Effect):
 
     def edit(self, spec: Any) -> None:
         """Write the effect into the chosen servos of a walking robot's `MjSpec`."""
-        from bns.worlds import servo_joint
+        from bns.worlds.physics import servo_joint
 
         if self.is_nominal:
             return
@@ -216,7 +216,7 @@ class ServoEffect(Effect):
 
 
 class OpticsEffect(Effect):
-    """Changes numbers of the light law (`bns.worlds.light_law`): lamps or sensors.
+    """Changes numbers of the light law (`bns.worlds.light.law`): lamps or sensors.
 
     What light does before it is a reading can not be written as a transform of the
     readings: they have saturated. All such effects are numbers of one law.

@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from bns.worlds import servo_joint
 from bns.worlds.effects.base import BodyEffect, Parameter
 from bns.worlds.effects.legs import JOINT, chosen
+from bns.worlds.physics import servo_joint
 
 
 class JointWeak(BodyEffect):

@@ -3,9 +3,9 @@
 from typing import Any
 
 from bns.models.legs import LEGS
-from bns.worlds import servo_joint
 from bns.worlds.effects.base import BodyEffect, Parameter
 from bns.worlds.effects.legs import LEG_SET, chosen, read
+from bns.worlds.physics import servo_joint
 
 
 class LegLimp(BodyEffect):

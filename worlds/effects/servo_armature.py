@@ -1,7 +1,7 @@
 """Servo armature: inertia of rotor and gears."""
 
 from bns.worlds.effects.base import Parameter, ServoEffect
-from bns.worlds.servo_law import Law, clipped
+from bns.worlds.physics.servo_law import Law, clipped
 
 
 class ServoArmature(ServoEffect):

@@ -1,7 +1,7 @@
 """Servo backlash: play between gears and lever."""
 
 from bns.worlds.effects.base import Parameter, ServoEffect
-from bns.worlds.servo_law import Law, clipped
+from bns.worlds.physics.servo_law import Law, clipped
 
 
 class ServoBacklash(ServoEffect):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from bns.worlds.effects.base import Parameter, ServoEffect
-from bns.worlds.servo_law import NO_CURRENT_LIMIT, Law
+from bns.worlds.physics.servo_law import NO_CURRENT_LIMIT, Law
 
 
 class ServoCurrentLimit(ServoEffect):

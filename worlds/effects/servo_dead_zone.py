@@ -1,7 +1,7 @@
 """Servo dead zone: the motor rests while the error is small."""
 
 from bns.worlds.effects.base import Parameter, ServoEffect
-from bns.worlds.servo_law import Law, clipped
+from bns.worlds.physics.servo_law import Law, clipped
 
 
 class ServoDeadZone(ServoEffect):

@@ -1,7 +1,7 @@
 """Servo duty limit: the drive gives a share of the supply at most."""
 
 from bns.worlds.effects.base import Parameter, ServoEffect
-from bns.worlds.servo_law import Law, clipped
+from bns.worlds.physics.servo_law import Law, clipped
 
 
 class ServoDutyLimit(ServoEffect):

@@ -1,7 +1,7 @@
 """Servo lag: goals are followed through a first-order filter."""
 
 from bns.worlds.effects.base import Parameter, ServoEffect
-from bns.worlds.servo_law import Law, clipped
+from bns.worlds.physics.servo_law import Law, clipped
 
 
 class ServoLag(ServoEffect):

@@ -1,7 +1,7 @@
 """Servo lever: the mass sits nearer or further out."""
 
 from bns.worlds.effects.base import Parameter, ServoEffect
-from bns.worlds.servo_law import Law, clipped
+from bns.worlds.physics.servo_law import Law, clipped
 
 
 class ServoLever(ServoEffect):

@@ -1,7 +1,7 @@
 """Servo load friction: friction that grows with the torque that the gears carry."""
 
 from bns.worlds.effects.base import Parameter, ServoEffect
-from bns.worlds.servo_law import Law, clipped
+from bns.worlds.physics.servo_law import Law, clipped
 
 
 class ServoLoadFriction(ServoEffect):

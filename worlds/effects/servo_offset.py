@@ -1,7 +1,7 @@
 """Servo offset: the encoder's zero is not where the lever hangs."""
 
 from bns.worlds.effects.base import Parameter, ServoEffect
-from bns.worlds.servo_law import Law, clipped
+from bns.worlds.physics.servo_law import Law, clipped
 
 
 class ServoOffset(ServoEffect):

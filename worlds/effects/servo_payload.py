@@ -1,7 +1,7 @@
 """Servo payload: the mass at the end of the lever differs."""
 
 from bns.worlds.effects.base import Parameter, ServoEffect
-from bns.worlds.servo_law import Law, clipped
+from bns.worlds.physics.servo_law import Law, clipped
 
 
 class ServoPayload(ServoEffect):

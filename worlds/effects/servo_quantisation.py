@@ -1,7 +1,7 @@
 """Servo quantisation: the encoder reads in steps."""
 
 from bns.worlds.effects.base import Parameter, ServoEffect
-from bns.worlds.servo_law import Law, clipped
+from bns.worlds.physics.servo_law import Law, clipped
 
 
 class ServoQuantisation(ServoEffect):

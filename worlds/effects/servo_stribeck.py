@@ -1,7 +1,7 @@
 """Servo stribeck: dry friction that fades with speed."""
 
 from bns.worlds.effects.base import Parameter, ServoEffect
-from bns.worlds.servo_law import Law, clipped
+from bns.worlds.physics.servo_law import Law, clipped
 
 
 class ServoStribeck(ServoEffect):

@@ -1,7 +1,7 @@
 """Servo torque constant: the motor's torque per current differs."""
 
 from bns.worlds.effects.base import Parameter, ServoEffect
-from bns.worlds.servo_law import Law, clipped
+from bns.worlds.physics.servo_law import Law, clipped
 
 
 class ServoTorqueConstant(ServoEffect):

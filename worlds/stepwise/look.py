@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def scene(world: Any) -> Any:
     """The world's arena with its robot, as a `mujoco.MjSpec` to look at."""
     if hasattr(world, "field"):
-        from bns.worlds import light_scene
+        from bns.worlds.light import scene as light_scene
 
         return light_scene.spec(world)
     return models.scene_spec(world.robot)

@@ -1,0 +1,155 @@
+"""Configurations from TOML, from JSON and back; unknown keys are errors."""
+
+import json
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+from bns.errors import BnsError, FormatError, UnknownNameError
+from bns.experiment.config import RunConfig
+from bns.experiment.validate import check
+
+TABLES = ("damage", "reality")
+"""settings whose entries may be tables instead of text"""
+
+
+def from_mapping(
+    content: Mapping[str, Any], base: RunConfig | None = None
+) -> RunConfig:
+    """A configuration with the settings in `content` over those of `base`.
+
+    Raises:
+        UnknownNameError: a key that no setting has.
+        BnsError: a value of the wrong type, out of bounds, or contradictory.
+    """
+    return check(_merge(base or RunConfig(), content, ""))
+
+
+def from_file(path: Path | str) -> RunConfig:
+    """A configuration from a TOML file.
+
+    The key `preset` at the top names a preset that the file starts from;
+    `description` is free text.
+
+    Raises:
+        FormatError: not there, or not TOML.
+        BnsError: as `from_mapping`.
+    """
+    return from_document(read_toml(Path(path)))
+
+
+def from_document(content: Mapping[str, Any]) -> RunConfig:
+    """A configuration from the content of a TOML file, see `from_file`.
+
+    Raises:
+        BnsError: as `from_mapping`.
+    """
+    from bns import presets
+
+    content = dict(content)
+    content.pop("description", None)
+    name = content.pop("preset", "")
+    if not isinstance(name, str):
+        raise BnsError(f"preset = {name!r} is not allowed: give a preset's name.")
+    return from_mapping(content, presets.load(name) if name else None)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The content of a TOML file.
+
+    Raises:
+        FormatError: not there, or not TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise FormatError(f"{path} cannot be read as TOML: {error}.") from error
+
+
+def to_mapping(config: RunConfig) -> dict[str, Any]:
+    """The whole configuration as plain values, ready for JSON."""
+    return json.loads(json.dumps(asdict(config)))
+
+
+def to_toml(config: RunConfig) -> str:
+    """The whole configuration as TOML; `from_file` reads it back."""
+    content = to_mapping(config)
+    content.pop("preset")
+    top = [f"{key} = {_toml(v)}" for key, v in content.items() if type(v) is not dict]
+    for name, table in content.items():
+        if type(table) is dict:
+            top += ["", f"[{name}]"]
+            top += [f"{key} = {_toml(value)}" for key, value in table.items()]
+    return "\n".join(top) + "\n"
+
+
+def differences(one: RunConfig, other: RunConfig) -> dict[str, tuple[Any, Any]]:
+    """Settings in which two configurations differ, with both values."""
+    from bns.experiment.validate import leaves
+
+    values = dict(leaves(other))
+    return {
+        key: (value, values[key])
+        for key, value in leaves(one)
+        if value != values[key] and key != "preset"
+    }
+
+
+def _merge(config: Any, content: Mapping[str, Any], prefix: str) -> Any:
+    names = [field.name for field in fields(config)]
+    hints = get_type_hints(type(config))
+    changes = {}
+    for key, given in content.items():
+        if key not in names:
+            raise UnknownNameError("setting", prefix + key, [prefix + n for n in names])
+        current = getattr(config, key)
+        if is_dataclass(current):
+            if not isinstance(given, Mapping):
+                raise BnsError(
+                    f"{prefix}{key} = {given!r} is not allowed: it is a table."
+                )
+            changes[key] = _merge(current, given, f"{prefix}{key}.")
+        else:
+            changes[key] = _convert(prefix + key, hints[key], given)
+    return replace(config, **changes)
+
+
+def _convert(name: str, kind: Any, given: Any) -> Any:
+    if get_origin(kind) is Literal:
+        if given not in get_args(kind):
+            raise UnknownNameError(name, str(given), get_args(kind))
+        return given
+    if get_origin(kind) is tuple:
+        return _texts(name, given)
+    if kind is float and type(given) is int:
+        return float(given)
+    if type(given) is not kind:
+        wanted = {bool: "true or false", int: "a whole number", float: "a number"}
+        raise BnsError(
+            f"{name} = {given!r} is not allowed: give {wanted.get(kind, 'text')}."
+        )
+    return given
+
+
+def _texts(name: str, given: Any) -> tuple[str, ...]:
+    entries = [given] if isinstance(given, str) else given
+    if not isinstance(entries, list | tuple):
+        raise BnsError(f"{name} = {given!r} is not allowed: give a list of texts.")
+    texts = []
+    for entry in entries:
+        if isinstance(entry, Mapping) and name.rpartition(".")[2] in TABLES:
+            from bns.worlds.damage import Event
+
+            entry = str(Event.from_table(entry))
+        if not isinstance(entry, str):
+            raise BnsError(f"{name}: {entry!r} is not allowed: give text.")
+        texts.append(entry)
+    return tuple(texts)
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(_toml(item) for item in value)}]"
+    return json.dumps(value)

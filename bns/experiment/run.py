@@ -1,0 +1,247 @@
+"""Train: the loop of trials, stored after each one and resumable."""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bns.errors import BnsError
+from bns.experiment import versions
+from bns.experiment.batch import Batch, check_device, check_world, resolve
+from bns.experiment.config import RunConfig
+from bns.experiment.loading import differences
+from bns.experiment.progress import Progress
+from bns.experiment.record import RunRecord
+from bns.experiment.step import Step, assemble
+from bns.experiment.validate import check
+from bns.experiment.world_factory import make_world, surroundings
+from bns.storage import files
+from bns.storage.directory import check_free
+from bns.storage.store import RunStore
+from bns.worlds.damage import Damage
+from bns.worlds.trial import Trial
+from bns.worlds.world import World
+
+OnTrial = Callable[[int, Step, list[Trial]], None]
+
+
+def train(
+    config: RunConfig,
+    out: Path | str | None = None,
+    *,
+    world: World | None = None,
+    resume: bool = False,
+    progress: bool = False,
+    on_trial: OnTrial | None = None,
+    stop: Callable[[], bool] | None = None,
+    background: bool = False,
+) -> RunRecord:
+    """Train all replicates of a configuration.
+
+    Args:
+        config: the experiment.
+        out: directory to store the run in; None keeps it in memory.
+        world: where trials happen; None makes the one the configuration names. Its
+            damage has to be that of the configuration.
+        resume: go on with the run in `out`, if there is one.
+        progress: show it on the standard error stream.
+        on_trial: called after every trial with its number, what was learned, and
+            the trial of every replicate.
+        stop: asked before every trial; True ends the run there.
+        background: evolution goes on while a trial runs, for a world in real time;
+            generations are then what time allowed, and recorded.
+
+    Returns:
+        The record: all trials, or those done when `stop` said so.
+
+    Raises:
+        BnsError: a setting that is not allowed, a directory that is not free, holds
+            another configuration or cannot be written.
+    """
+    check(config)
+    check_device(config.device)
+    check_world(config, named=world is None)
+    store = _store(config, Path(out), resume=resume) if out is not None else None
+    try:
+        if store and store.finished:
+            store.clean()
+            return store.record()
+        settled, mode = resolve(config, store.mode if store else "")
+        batch = _batch(settled, store, world, background=background)
+        shown = Progress(config, enabled=progress)
+        steps = _loop(config, batch, store, shown, on_trial, stop or _never)
+        if store is None:
+            made = versions.collect()
+            return assemble(config, steps, versions=made, **facts(config, mode))
+        done, _ = store.read_state()
+        return store.finish() if done == config.trials else store.record()
+    finally:
+        if store:
+            store.close()
+
+
+def train_many(
+    configs: Sequence[RunConfig],
+    *,
+    worlds: Sequence[World] = (),
+    progress: bool = False,
+    on_trial: OnTrial | None = None,
+) -> list[RunRecord]:
+    """Train several configurations as one batch, in memory.
+
+    Args:
+        configs: they may differ in `adaptation` and `world` only.
+        worlds: one per configuration; none makes those the configurations name.
+        progress: show it on the standard error stream.
+        on_trial: as for `train`; the runs of all configurations, one after another.
+
+    Raises:
+        BnsError: a setting that is not allowed, or configurations too different.
+    """
+    for config in configs:
+        check_device(config.device)
+        check_world(check(config))
+    settled, mode = _settle(configs)
+    batch = Batch(settled, worlds or [make_world(config) for config in settled])
+    steps: list[Step] = []
+    bar = Progress(configs[0], enabled=progress)
+    with bar.start():
+        for trial in range(configs[0].trials):
+            step, tried = batch.advance(trial)
+            steps.append(step)
+            bar.update(trial, step)
+            if on_trial:
+                on_trial(trial, step, tried)
+    made = versions.collect()
+    return [
+        assemble(
+            config,
+            [step.part(batch.part(index)) for step in steps],
+            versions=made,
+            **facts(config, mode),
+        )
+        for index, config in enumerate(configs)
+    ]
+
+
+def facts(config: RunConfig, mode: str) -> dict[str, Any]:
+    """What a record says of the world beside the configuration."""
+    damage = Damage.parse(config.world.damage)
+    return {
+        "conditions": {
+            "damage": list(damage.texts()),
+            "reality": list(Damage.parse(config.world.reality).texts()),
+            "mode": mode,
+        },
+        "damage_onset": np.full(config.replicates, damage.first_trial, np.int64),
+    }
+
+
+def _settle(configs: Sequence[RunConfig]) -> tuple[list[RunConfig], str]:
+    settled = [resolve(config) for config in configs]
+    modes = {mode for _, mode in settled}
+    return [config for config, _ in settled], modes.pop()
+
+
+def _store(config: RunConfig, out: Path, *, resume: bool) -> RunStore:
+    """The store of a run: a new one, or the one to go on with."""
+    if resume and (out / "run.json").exists():
+        store = RunStore.open(out)
+        differing = differences(config, store.config)
+        if differing:
+            key, (here, there) = next(iter(differing.items()))
+            raise BnsError(
+                f"{out} was made with {key} = {there!r}, not {here!r}: resume with the "
+                f"configuration it has ({out}/config.toml), or give another --out."
+            )
+        store.lock()
+        files.remove_temporary(out)
+        files.remove_temporary(out / "steps")
+        return store
+    check_free(out)
+    _, mode = resolve(config)
+    known = facts(config, mode)
+    return RunStore(out, config, mode, versions.collect(), **known)
+
+
+def _loop(
+    config: RunConfig,
+    batch: Batch,
+    store: RunStore | None,
+    progress: Progress,
+    on_trial: OnTrial | None,
+    stop: Callable[[], bool],
+) -> list[Step]:
+    """All trials that are left; without a store their steps are kept and returned."""
+    memory: list[Step] = []
+    done = _restore(batch, store)
+    if store and done:
+        progress.recall(store.record())
+    with progress.start(done):
+        for trial in range(done, config.trials):
+            if stop():
+                break
+            started = time.perf_counter()
+            step, tried = batch.advance(trial, recorded=config.record_replicates)
+            if store:
+                _keep(store, trial, step, batch.learner.state(), started)
+            else:
+                memory.append(step)
+            progress.update(trial, step)
+            if on_trial:
+                on_trial(trial, step, tried)
+    return memory
+
+
+def _never() -> bool:
+    return False
+
+
+def _batch(
+    config: RunConfig, store: RunStore | None, world: World | None, *, background: bool
+) -> Batch:
+    """Learner and world; a new directory is made once both are known to be possible."""
+    from bns.experiment.background import behind
+
+    learner = behind(config) if background else None
+    if store is None:
+        return Batch([config], [world or make_world(config)], learner=learner)
+    keeps_nets = world is None and config.world.name == "static-snn"
+    if keeps_nets and not store.exists:
+        surroundings(config)  # stops before there is a directory
+        store.create()
+    made = world or make_world(config, store.directory)
+    batch = Batch([config], [made], learner=learner)
+    if not store.exists:
+        store.create()
+    return batch
+
+
+def _restore(batch: Batch, store: RunStore | None) -> int:
+    """Put the learner where the run stopped; gives the trials done."""
+    done, state = store.read_state() if store else (0, {})
+    if done:
+        batch.learner.restore(state)
+    if store:
+        store.note(event="resume" if done else "start", trials_done=done)
+    return done
+
+
+def _keep(
+    store: RunStore,
+    trial: int,
+    step: Step,
+    state: Mapping[str, np.ndarray],
+    started: float,
+) -> None:
+    computed = time.perf_counter()
+    store.write_step(trial, step)
+    store.write_state(trial + 1, state)
+    stored = time.perf_counter()
+    store.note(
+        trial=trial,
+        seconds=round(computed - started, 6),
+        storing=round(stored - computed, 6),
+    )

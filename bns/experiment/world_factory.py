@@ -1,0 +1,82 @@
+"""The world of a configuration, with what its learner tells it."""
+
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from bns.errors import BnsError
+from bns.experiment.config import AdaptationConfig, RunConfig, WorldConfig
+from bns.learners import registry as learners
+from bns.storage import files
+from bns.worlds import registry as worlds
+from bns.worlds.world import World
+
+
+def make_world(config: RunConfig, directory: Path | None = None) -> World:
+    """The world of a configuration.
+
+    Args:
+        config: says which, where the robot starts, and what is wrong with it.
+        directory: where a static SNN world keeps its nets; None trains them anew.
+    """
+    name = config.world.name
+    settings: dict[str, Any] = {
+        "robot": config.world.robot,
+        "damage": config.world.damage,
+        "reality": config.world.reality,
+        **surroundings(config),
+    }
+    if name == "static-snn":
+        return worlds.make(name, nets=_nets(config, directory), **settings)
+    return worlds.make(
+        name,
+        sample_dt=config.world.sample_dt,
+        threads=config.threads,
+        **settings,
+    )
+
+
+def surroundings(config: RunConfig) -> dict[str, Any]:
+    """What the learner of a configuration tells its world.
+
+    Raises:
+        UnknownNameError: no such learner or world.
+        BnsError: the world takes no such thing.
+    """
+    name = config.world.name
+    found = learners.get(config.learner).surroundings(config)
+    lacks = worlds.lacking(name, found)
+    if lacks:
+        fit = [item for item in worlds.names() if not worlds.lacking(item, found)]
+        raise BnsError(
+            f"The learner {config.learner!r} needs a world with {', '.join(lacks)}, "
+            f"which {name!r} has not: give --world.name {' or '.join(fit)}."
+        )
+    return found
+
+
+def _nets(config: RunConfig, directory: Path | None) -> Any:
+    """Nets of the static SNN world, from the run's directory if they are there."""
+    from bns.worlds.static_snn.nets import StaticNets
+
+    path = directory / "static_snn.npz" if directory else None
+    if path and path.exists():
+        return StaticNets.load(path)
+    nets = _fitted(replace(config, adaptation=AdaptationConfig(), world=_bare(config)))
+    if path:
+        files.replace(path, nets.save)
+    return nets
+
+
+@lru_cache(maxsize=4)
+def _fitted(config: RunConfig) -> Any:
+    """Nets are dear: configurations of one batch share them."""
+    from bns.experiment import static_snn
+
+    return static_snn.nets_for(config)
+
+
+def _bare(config: RunConfig) -> WorldConfig:
+    """The world without what differs within a batch."""
+    return WorldConfig(name=config.world.name, robot=config.world.robot)

@@ -1,0 +1,157 @@
+"""Runs against each other: medians, p values, effect sizes, milestones."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bns import stats
+from bns.errors import BnsError
+from bns.experiment.record import RunRecord
+from bns.stats import Interval
+
+MEASURES = {
+    "observation": "cost after the onset of damage (eq 3.1), lower is better",
+    "solve": "trials until solved, counted from 1",
+    "recover": "trials from the onset of damage until solved again, counted from 1",
+}
+"""what is compared, and what it means"""
+
+
+@dataclass(frozen=True)
+class Side:
+    """One run on one measure.
+
+    Attributes:
+        name: of the run.
+        measure: one of `MEASURES`.
+        runs: replicates that have a value.
+        reached: replicates that got there (all, for the observation).
+        median: with its interval; infinite = never.
+    """
+
+    name: str
+    measure: str
+    runs: int
+    reached: int
+    median: Interval
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two runs on one measure.
+
+    Attributes:
+        a, b: names of the runs.
+        measure: one of `MEASURES`.
+        p: two-sided Mann-Whitney, as the dissertation computes it.
+        p_holm: adjusted for all pairs of this measure.
+        a12: probability that a value of `a` is larger than one of `b`.
+    """
+
+    a: str
+    b: str
+    measure: str
+    p: float
+    p_holm: float
+    a12: Interval
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All runs and all pairs of them."""
+
+    sides: tuple[Side, ...]
+    pairs: tuple[Pair, ...]
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Plain values, ready for JSON (infinity as null, intervals as tables)."""
+        return {
+            "measures": MEASURES,
+            "runs": [
+                _plain(asdict(side), side.median, "median") for side in self.sides
+            ],
+            "pairs": [_plain(asdict(pair), pair.a12, "a12") for pair in self.pairs],
+        }
+
+
+def compare(records: Sequence[RunRecord], names: Sequence[str] = ()) -> Comparison:
+    """Compare two or more runs on every measure that all of them have.
+
+    Args:
+        records: finished runs.
+        names: of the runs; by default those of their directories.
+
+    Raises:
+        BnsError: fewer than two runs, or one that is not finished.
+    """
+    if len(records) < 2:
+        given = "1 run was" if records else "0 runs were"
+        raise BnsError(f"{given} given: give two or more to compare.")
+    names = list(names) or labels(records)
+    for name, record in zip(names, records, strict=True):
+        if record.trials < record.config.trials:
+            raise BnsError(
+                f"{name} has done {record.trials} of {record.config.trials} trials: "
+                f"finish it with `bns run {record.directory or name} --resume`."
+            )
+    sides: list[Side] = []
+    pairs: list[Pair] = []
+    for measure in MEASURES:
+        samples = [values(record, measure) for record in records]
+        if all(len(sample) for sample in samples):
+            sides += [side(n, measure, s) for n, s in zip(names, samples, strict=True)]
+            pairs += _pairs(names, samples, measure)
+    return Comparison(tuple(sides), tuple(pairs))
+
+
+def values(record: RunRecord, measure: str) -> np.ndarray:
+    """One number per replicate, without those that have none."""
+    found = {
+        "observation": stats.observation_after,
+        "solve": stats.trials_to_solve,
+        "recover": stats.trials_to_recover,
+    }[measure](record)
+    return found[~np.isnan(found)]
+
+
+def side(name: str, measure: str, sample: np.ndarray) -> Side:
+    """One run on one measure."""
+    reached = int(np.isfinite(sample).sum())
+    return Side(name, measure, len(sample), reached, stats.median_interval(sample))
+
+
+def labels(records: Sequence[RunRecord]) -> list[str]:
+    """Short names that tell the runs apart: the ends of their directories."""
+    paths = [Path(record.directory or f"run {i}") for i, record in enumerate(records)]
+    for length in range(1, max(len(path.parts) for path in paths) + 1):
+        short = ["/".join(path.parts[-length:]) for path in paths]
+        if len(set(short)) == len(short):
+            return short
+    return [f"{path} ({i + 1})" for i, path in enumerate(paths)]
+
+
+def _pairs(
+    names: Sequence[str], samples: Sequence[np.ndarray], measure: str
+) -> list[Pair]:
+    index = [(i, j) for i in range(len(names)) for j in range(i + 1, len(names))]
+    p = [stats.mann_whitney(samples[i], samples[j]) for i, j in index]
+    adjusted = stats.holm(p)
+    return [
+        Pair(
+            names[i],
+            names[j],
+            measure,
+            p[k],
+            float(adjusted[k]),
+            stats.a12(samples[i], samples[j]),
+        )
+        for k, (i, j) in enumerate(index)
+    ]
+
+
+def _plain(content: dict[str, Any], interval: Interval, key: str) -> dict[str, Any]:
+    finite = [float(x) if np.isfinite(x) else None for x in interval]
+    return content | {key: dict(zip(Interval._fields, finite, strict=True))}

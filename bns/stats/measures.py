@@ -1,0 +1,182 @@
+"""Statistics of runs: the dissertation's test, effect size, intervals, milestones.
+
+Definitions, all counting trials from 1:
+
+*Solved* at the first trial in which all objectives are reached. *Recovered* at the
+first trial, counted from the onset of damage (the onset trial is 1), in which all
+objectives are reached in the damaged world. Infinite where it never happens.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy import special, stats
+
+from bns.errors import BnsError
+from bns.experiment.record import RunRecord
+
+CONFIDENCE = 0.95
+
+
+class Interval(NamedTuple):
+    """An estimate with its confidence interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+def mann_whitney(a: Sequence[float], b: Sequence[float]) -> float:
+    """Two-sided Mann-Whitney p by the normal approximation, continuity corrected.
+
+    Reproduces the dissertation's tables. Infinite values rank as ties at the end.
+
+    Raises:
+        BnsError: a sample is empty or holds NaN.
+    """
+    a, b = _sample(a), _sample(b)
+    if (np.concatenate([a, b]) == a[0]).all():
+        return 1.0  # nothing to rank
+    return float(
+        stats.mannwhitneyu(
+            a, b, method="asymptotic", use_continuity=True, alternative="two-sided"
+        ).pvalue
+    )
+
+
+def p_of_u(u: float, n_a: int, n_b: int) -> float:
+    """The p of `mann_whitney` for a known U without ties.
+
+    Args:
+        u: statistic of either sample, 0 to ``n_a * n_b``.
+        n_a: size of one sample.
+        n_b: size of the other.
+    """
+    spread = np.sqrt(n_a * n_b * (n_a + n_b + 1) / 12)
+    z = (abs(u - n_a * n_b / 2) - 0.5) / spread
+    return float(min(1.0, 2 * special.ndtr(-z)))
+
+
+def holm(p: Sequence[float]) -> np.ndarray:
+    """p values adjusted for their number by Holm's step-down method, in order."""
+    p = np.asarray(p, dtype=np.float64)
+    order = np.argsort(p, kind="stable")
+    factors = len(p) - np.arange(len(p))
+    adjusted = np.empty_like(p)
+    adjusted[order] = np.minimum(1.0, np.maximum.accumulate(p[order] * factors))
+    return adjusted
+
+
+def a12(
+    a: Sequence[float], b: Sequence[float], *, confidence: float = CONFIDENCE
+) -> Interval:
+    """Vargha and Delaney's A12 with Newcombe's interval.
+
+    A12 is the probability that a value of `a` is larger than one of `b`, ties counted
+    half. The interval is method 5 of Newcombe (2006, Statistics in Medicine 25,
+    559-573): the score-like form of Hanley and McNeil's variance, which stays inside
+    0 to 1 and keeps its coverage near the ends, where DeLong's collapses.
+
+    Raises:
+        BnsError: a sample is empty or holds NaN.
+    """
+    a, b = _sample(a), _sample(b)
+    ranks = stats.rankdata(np.concatenate([a, b]))[: len(a)]
+    u = ranks.sum() - len(a) * (len(a) + 1) / 2
+    value = float(u / (len(a) * len(b)))
+    z = special.ndtri(0.5 + confidence / 2)
+    low = _newcombe(value, len(a), len(b), z, upper=False)
+    high = _newcombe(value, len(a), len(b), z, upper=True)
+    return Interval(value, low, high)
+
+
+def median_interval(
+    values: Sequence[float], *, confidence: float = CONFIDENCE
+) -> Interval:
+    """The median and its exact interval from order statistics.
+
+    The interval reaches from the k-th smallest to the k-th largest value, k the
+    largest for which the binomial guarantees the confidence whatever the
+    distribution; too few values give an infinite one. Infinite values are allowed.
+
+    Raises:
+        BnsError: no values, or NaN among them.
+    """
+    ordered = np.sort(_sample(values))
+    n = len(ordered)
+    k = int(stats.binom.ppf((1 - confidence) / 2, n, 0.5))
+    bounds = (ordered[k - 1], ordered[n - k]) if k >= 1 else (-np.inf, np.inf)
+    return Interval(median(ordered), float(bounds[0]), float(bounds[1]))
+
+
+def median(values: Sequence[float]) -> float:
+    """The median; infinite values are allowed (never = inf, half never = inf)."""
+    ordered = np.sort(_sample(values))
+    low, high = ordered[(len(ordered) - 1) // 2], ordered[len(ordered) // 2]
+    return float(low if low == high else (low + high) / 2)
+
+
+def trials_to_solve(record: RunRecord) -> np.ndarray:
+    """Trials until all objectives were first reached, ``(R,)``; inf = never."""
+    return _first(record["solved"] > 0)
+
+
+def trials_to_recover(record: RunRecord) -> np.ndarray:
+    """Trials from the onset of damage until all objectives were reached again.
+
+    Shape ``(R,)``; 1 = in the onset trial itself, inf = never, NaN = no damage in the
+    trials done.
+    """
+    onset = record.damage_onset[:, None]
+    trial = np.arange(record.trials)[None]
+    first = _first((record["solved"] > 0) & (trial >= onset))
+    hit = (record.damage_onset >= 0) & (record.damage_onset < record.trials)
+    return np.where(hit, first - record.damage_onset, np.nan)
+
+
+def observation_after(record: RunRecord) -> np.ndarray:
+    """The sum of the best individual's cost over the trials from the onset on.
+
+    Equation 3.1 of the dissertation, shape ``(R,)``; lower is better. Without damage
+    it runs over all trials; NaN where damage comes after the trials done.
+    """
+    onset = np.maximum(record.damage_onset, 0)[:, None]
+    trial = np.arange(record.trials)[None]
+    total = np.where(trial >= onset, record["fitness_best"], 0.0).sum(axis=1)
+    return np.where(onset[:, 0] < record.trials, total, np.nan)
+
+
+def _first(hit: np.ndarray) -> np.ndarray:
+    """1-based index of the first True along axis 1; inf = none."""
+    if hit.shape[1] == 0:
+        return np.full(len(hit), np.inf)
+    return np.where(hit.any(axis=1), hit.argmax(axis=1) + 1.0, np.inf)
+
+
+def _sample(values: Sequence[float]) -> np.ndarray:
+    values = np.asarray(values, dtype=np.float64)
+    if values.ndim != 1 or len(values) == 0 or np.isnan(values).any():
+        raise BnsError(
+            f"A sample of shape {values.shape} with {np.isnan(values).sum()} NaN "
+            "cannot be compared: give a list of numbers, at least one."
+        )
+    return values
+
+
+def _newcombe(value: float, n_a: int, n_b: int, z: float, *, upper: bool) -> float:
+    """The limit: where `value` is z standard errors away, found by bisection."""
+    mean = (n_a + n_b) / 2 - 1
+
+    def error(theta: float) -> float:
+        shape = (1 - theta) / (2 - theta) + theta / (1 + theta)
+        return float(np.sqrt(theta * (1 - theta) * (1 + mean * shape) / (n_a * n_b)))
+
+    inside, outside = value, 1.0 if upper else 0.0
+    for _ in range(60):
+        middle = (inside + outside) / 2
+        if abs(middle - value) <= z * error(middle):
+            inside = middle
+        else:
+            outside = middle
+    return outside if outside in (0.0, 1.0) else inside

@@ -1,0 +1,134 @@
+"""Cases on disk: written, run without their answers, scored with them.
+
+A casebook is a directory with one dataset per case (`worlds/data/dataset.py`), named
+after the case. Its answers lie elsewhere, in one JSON file: per case the attributes of
+`cases.Answer`. Others can write cases by hand: a dataset each, and an answer with at
+least `kind`, `names` (of candidates) and `aliases` (per name, the candidates that are
+accepted in its place, itself included). Said is one JSON line per case: `name` and the
+diagnosis.
+"""
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from bns.errors import BnsError, FormatError
+from bns.gap.bench.cases import Answer, Case
+from bns.gap.diagnose import diagnose
+from bns.gap.models.base import GapModel
+from bns.gap.records import plain
+from bns.worlds.data import dataset
+
+SCHEMA, VERSION = "bns-gap-answers", 1
+
+
+def make(directory: Path, answers: Path, cases: Iterable[tuple[str, Case]]) -> int:
+    """Write cases and, in another place, their answers.
+
+    Args:
+        directory: of the casebook, created.
+        answers: file of the answers; may not lie in the casebook.
+        cases: names and cases.
+
+    Returns:
+        How many were written.
+
+    Raises:
+        BnsError: the answers would lie beside the cases, or a case exists.
+    """
+    directory, answers = Path(directory), Path(answers)
+    if directory.resolve() in answers.resolve().parents:
+        raise BnsError(
+            f"{answers} lies in the casebook {directory}: who runs the cases would "
+            "see the answers; put it elsewhere."
+        )
+    directory.mkdir(parents=True, exist_ok=True)
+    known: dict[str, Any] = {}
+    for name, case in cases:
+        trials = [trial.replace(conditions={}, truth={}) for trial in case.trials]
+        dataset.write(directory / name, trials, provenance={"case": name})
+        known[name] = case.answer.as_dict()
+    content = {"schema": SCHEMA, "version": VERSION, "cases": known}
+    answers.write_text(json.dumps(plain(content), indent=1) + "\n", encoding="utf-8")
+    return len(known)
+
+
+def run(directory: Path, model: GapModel, said: Path, *, seed: int = 0) -> int:
+    """Diagnose the cases that are missing in `said`, appending as they come.
+
+    Returns:
+        How many were run.
+    """
+    said = Path(said)
+    done = {row["name"] for row in _lines(said)}
+    count = 0
+    for place in sorted(p for p in Path(directory).iterdir() if p.is_dir()):
+        if place.name in done:
+            continue
+        trials = dataset.read(place).trials
+        try:
+            found = json.loads(diagnose(trials, model, seed=seed).to_json())
+        except BnsError as error:
+            found = {"error": str(error)}
+        with said.open("a", encoding="utf-8") as out:
+            out.write(json.dumps({"name": place.name, "diagnosis": found}) + "\n")
+        count += 1
+    return count
+
+
+def score(said: Path, answers: Path) -> list[dict[str, Any]]:
+    """Rows that `scoring` takes, from what was said and what is true.
+
+    Raises:
+        FormatError: the answers are not such a file, or lack a case.
+    """
+    known = read_answers(answers)
+    rows = []
+    for line in _lines(Path(said)):
+        if line["name"] not in known:
+            raise FormatError(f"{answers} has no answer for {line['name']!r}.")
+        answer, found = known[line["name"]], line["diagnosis"]
+        row = {"kind": answer["kind"], "seed": line["name"], "answer": answer}
+        row["said"] = found if "error" in found else _said(found)
+        row["seconds"] = sum(found.get("seconds", {}).values())
+        rows.append(row)
+    return rows
+
+
+def _said(found: Mapping[str, Any]) -> dict[str, Any]:
+    verdict = found["verdict"]
+    keys = ("named", "sets", "p_gap", "p_misfit")
+    made = {key: verdict[key] for key in keys}
+    made["verdict"] = verdict["kind"]
+    made["ranked"] = found["signatures"].get("ranked", [])
+    for key in ("closed", "before", "after"):
+        made[key] = found["closed"].get(key)
+    return made
+
+
+def read_answers(answers: Path) -> dict[str, Any]:
+    """Answers by name of the case; what is left out is as in `Answer`.
+
+    Raises:
+        FormatError: it is no such file.
+    """
+    try:
+        content = json.loads(Path(answers).read_text(encoding="utf-8"))
+        if (content["schema"], content["version"]) != (SCHEMA, VERSION):
+            raise FormatError(f"{answers} is not {SCHEMA} version {VERSION}.")
+        return {
+            name: plain({**Answer(kind=item["kind"]).as_dict(), **item})
+            for name, item in content["cases"].items()
+        }
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        if isinstance(error, FormatError):
+            raise
+        raise FormatError(f"{answers} holds no answers ({error}).") from error
+
+
+def _lines(file: Path) -> list[dict[str, Any]]:
+    if not file.is_file():
+        return []
+    text = file.read_text(encoding="utf-8")
+    return [json.loads(line) for line in text.splitlines() if line]

@@ -1,0 +1,239 @@
+"""What may explain a gap of a user's own model: which effects, parts and ranges.
+
+Ranges that the user does not give follow from the model: from the number itself where
+it is not zero, else from the inertia that the joint moves, so that the largest value
+matters within a second.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from bns.errors import BnsError, UnknownNameError
+from bns.gap.models.mjcf import effects
+from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.models.mjcf.effect_target import ALL
+from bns.gap.records import Candidate
+from bns.worlds.effects.base import Effect
+
+RATIOS = (0.4, 0.6, 0.8, 0.9, 1.1, 1.25, 1.6, 2.5)
+SHARES = (0.02, 0.05, 0.12, 0.3, 1.0)  # of the largest value, beyond the nominal
+LOWER = (0.9, 0.5, 0.2)  # of the nominal value, taken off
+LATE = (0.01, 0.03, 0.08, 0.2, 0.5)  # [s]
+EXCITE = {
+    "joint_damping": "fast motion of that joint",
+    "joint_friction": "slow motion and reversals of that joint",
+    "joint_armature": "sudden changes of speed of that joint",
+    "joint_stiffness": "large excursions of that joint",
+    "body_mass": "motion against gravity, or sudden changes of speed",
+    "actuator_gain": "large commands",
+    "geom_friction": "sliding",
+    "command_delay": "steps",
+    "command_lag": "steps",
+    "command_gain": "large commands",
+    "command_offset": "any command",
+    "command_dead_zone": "small commands",
+    "sensor_gain": "large excursions",
+    "sensor_offset": "any command",
+    "sensor_delay": "fast motion",
+}
+USUAL = (
+    "joint_damping",
+    "joint_friction",
+    "joint_armature",
+    "body_mass",
+    "actuator_gain",
+    "command_delay",
+    "command_lag",
+    "sensor_gain",
+)
+"""considered where the user does not say which"""
+
+
+@dataclass(frozen=True)
+class OwnCandidate(Candidate):
+    """A candidate whose effect acts on a named part."""
+
+    @property
+    def whole(self) -> bool:
+        """Whether only whole magnitudes make sense: never."""
+        return False
+
+    def make(
+        self,
+        magnitude: float,
+        branch: int = 0,
+        extras: Mapping[str, float] | None = None,
+    ) -> Effect:
+        """The effect at a magnitude, clipped to the bounds."""
+        del extras
+        value = min(max(float(magnitude), self.low), self.high)
+        values = {**self.fixed, **self.branches[branch], self.parameter: value}
+        return effects.make(self.effect, values)
+
+
+def candidates(config: OwnConfig, model: mujoco.MjModel) -> tuple[OwnCandidate, ...]:
+    """All candidates, in a fixed order.
+
+    Args:
+        config: the description.
+        model: the nominal model.
+
+    Raises:
+        BnsError: an effect on a part that the model lacks, or bounds for none.
+    """
+    wanted = config.effects if config.effects is not None else _usual(config, model)
+    made = []
+    for name, parts in wanted.items():
+        if name not in effects.CLASSES:
+            raise UnknownNameError("effect in [effects]", name, effects.CLASSES)
+        for part in parts or (ALL,):
+            made.append(_candidate(name, part, config, model))
+    known = [item.name for item in made]
+    for name in config.bounds:
+        if name not in known:
+            raise UnknownNameError("effect in [bounds]", name, known)
+    if not made:
+        raise BnsError("[effects] names no effect; leave it out to consider the usual.")
+    return tuple(made)
+
+
+def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]]:
+    joints = tuple(model.joint(j).name for j in range(model.njnt) if _hinged(model, j))
+    owned = {int(model.jnt_bodyid[j]) for j in range(model.njnt)}
+    parts = {
+        "joint": tuple(name for name in joints if name),
+        "body": tuple(model.body(b).name for b in sorted(owned) if model.body(b).name),
+        "actuator": tuple(item.actuator for item in config.told),
+    }
+    made: dict[str, tuple[str, ...]] = {}
+    for name in USUAL:
+        kind = effects.OWNERS.get(name)
+        seen = tuple(item.channel.name for item in config.seen)
+        made[name] = (
+            parts[kind] if kind else (seen if name == "sensor_gain" else (ALL,))
+        )
+    return {name: parts for name, parts in made.items() if parts}
+
+
+def _hinged(model: mujoco.MjModel, joint: int) -> bool:
+    kinds = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+    return int(model.jnt_type[joint]) in map(int, kinds)
+
+
+def _candidate(
+    name: str, part: str, config: OwnConfig, model: mujoco.MjModel
+) -> OwnCandidate:
+    about = effects.CLASSES[name].parameters[0]
+    low, high, unit = _range(name, part, config, model)
+    given = config.bounds.get(f"{name}[{part}]", {})
+    low, high = given.get("low", low), given.get("high", high)
+    return OwnCandidate(
+        name=f"{name}[{part}]",
+        effect=name,
+        parameter=about.name,
+        unit=unit,
+        nominal=about.nominal,
+        low=min(low, about.nominal),
+        high=max(high, about.nominal),
+        grid=_grid(about.nominal, low, high),
+        fixed={"part": part},
+        slack=given.get("slack", 0.0),
+        excite=EXCITE[name],
+    )
+
+
+def _grid(nominal: float, low: float, high: float) -> tuple[float, ...]:
+    if nominal == 1.0:
+        inside = [ratio for ratio in RATIOS if low <= ratio <= high]
+        return tuple(sorted({*inside, low, high} - {nominal}))
+    up = [share * high for share in SHARES if high > 0]
+    down = [share * low for share in LOWER if low < 0]
+    if low < 0 and abs(low) >= high:  # both ways alike: a signed quantity
+        down = [share * low for share in SHARES]
+    return tuple(sorted({*down, *up}))
+
+
+def _range(
+    name: str, part: str, config: OwnConfig, model: mujoco.MjModel
+) -> tuple[float, float, str]:
+    """Lowest and highest value, and the unit."""
+    kind = effects.OWNERS.get(name)
+    if kind:
+        return _of_model(name, kind, part, model)
+    if name in ("command_delay", "sensor_delay", "command_lag"):
+        _channel(part, config)
+        return 0.0, LATE[-1], "s"
+    if name in ("command_gain", "sensor_gain"):
+        _channel(part, config)
+        return RATIOS[0], RATIOS[-1], "1"
+    return _of_channel(name, part, config)
+
+
+def _channel(part: str, config: OwnConfig) -> Any:
+    known = [item.channel.name for item in (*config.told, *config.seen)]
+    if part != ALL and part not in known:
+        raise UnknownNameError("channel in [effects]", part, known)
+
+
+def _of_channel(name: str, part: str, config: OwnConfig) -> tuple[float, float, str]:
+    _channel(part, config)
+    told = {item.channel.name: item for item in config.told}
+    seen = {item.channel.name: item for item in config.seen}
+    if part in told:
+        item = told[part]
+        size = max(abs(item.low), abs(item.high))
+        low = 0.0 if name == "command_dead_zone" else -0.3 * size
+        return low, 0.3 * size if low else 0.6 * size, item.channel.unit
+    if part in seen:
+        size = 100 * seen[part].noise
+        return -size, size, seen[part].channel.unit
+    raise BnsError(f"[effects] {name} needs the name of one channel, not {part!r}.")
+
+
+def _of_model(
+    name: str, kind: str, part: str, model: mujoco.MjModel
+) -> tuple[float, float, str]:
+    known = _names(model, kind)
+    if part not in known:
+        raise UnknownNameError(f"{kind} in [effects] {name}", part, known)
+    at = known.index(part)
+    if name in ("actuator_gain", "geom_friction"):
+        return 0.2, 3.0, "1"
+    if name == "body_mass":
+        mass = float(model.body_mass[at])
+        return -0.9 * mass, 2.0 * mass, "kg"
+    return _of_joint(name, at, model)
+
+
+def _of_joint(name: str, joint: int, model: mujoco.MjModel) -> tuple[float, float, str]:
+    dof = int(model.jnt_dofadr[joint])
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    full = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, full)
+    inertia = float(full[dof, dof])
+    slide = int(model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
+    now, high, unit = {
+        "joint_damping": (model.dof_damping[dof], 10.0 * inertia, "N m s/rad"),
+        "joint_friction": (model.dof_frictionloss[dof], 5.0 * inertia, "N m"),
+        "joint_armature": (model.dof_armature[dof], inertia, "kg m2"),
+        "joint_stiffness": (model.jnt_stiffness[joint], 20.0 * inertia, "N m/rad"),
+    }[name]
+    if slide:
+        unit = {"N m s/rad": "N s/m", "N m": "N", "kg m2": "kg"}.get(unit, "N/m")
+    now = float(np.ravel(now)[0])
+    return -now, float(max(high, 5.0 * now)), unit
+
+
+def _names(model: mujoco.MjModel, kind: str) -> list[str]:
+    count = {
+        "joint": model.njnt,
+        "body": model.nbody,
+        "actuator": model.nu,
+        "geom": model.ngeom,
+    }[kind]
+    return [getattr(model, kind)(number).name for number in range(count)]

@@ -1,0 +1,145 @@
+"""Trials in pieces: windows between samples, and short runs from observed headings."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from bns.gap.models.base import Windows
+from bns.gap.models.planar_rollout import EVERY
+from bns.worlds.trial import Trial
+
+LENGTH = 2.5  # [s] of a piece; a heading drifts little in it
+# Place and heading in a regime are told this coarsely [m, m, rad]: finer, they would
+# hold the tracker's noise, which is in the residuals of the same samples as well.
+COARSE = 0.03, 0.03, 0.1
+LEAD = 1.0  # [s] simulated before each, eight time constants of the drive
+
+
+class Piece(NamedTuple):
+    """A stretch of a trial that is simulated by itself.
+
+    Attributes:
+        first, last: physics steps of its controls; None = to the end.
+        lead: of them, how many only bring the robot up to speed.
+        yaw: heading at the first [rad].
+    """
+
+    first: int
+    last: int | None
+    lead: int
+    yaw: float
+
+
+WHOLE = Piece(0, None, 0, 0.0)
+
+
+def pieces_of(trial: Trial, steps: int, dt: float) -> list[Piece]:
+    """Pieces that tile a trial, each started at the heading that was observed.
+
+    Args:
+        trial: recorded trial.
+        steps: physics steps of it.
+        dt: of a step [s].
+    """
+    yaw = trial.channel("yaw")
+    seen = np.isfinite(yaw)
+    times = trial.times - trial.times[trial.boundaries[0]]
+    made = []
+    for begin in range(0, steps, round(LENGTH / dt)):
+        first = max(begin - round(LEAD / dt), 0)
+        at = float(np.interp(first * dt, times[seen], yaw[seen]))
+        last = min(begin + round(LENGTH / dt), steps)
+        made.append(Piece(first, last, begin - first, at))
+    return made
+
+
+class Told(NamedTuple):
+    """What a robot was told in each of W windows.
+
+    Attributes:
+        index: number of the command, ``(W,)``.
+        since: time since it began [s].
+        at: time in the trial [s].
+    """
+
+    index: np.ndarray
+    since: np.ndarray
+    at: np.ndarray
+
+
+def told(trial: Trial, windows: Windows) -> Told:
+    """The command that was in force in the middle of each window."""
+    lasting = trial.commands.durations
+    ends = np.cumsum(lasting)
+    at = windows.times - trial.times[trial.boundaries[0]]
+    index = np.minimum(np.searchsorted(ends, at), len(ends) - 1)
+    return Told(index, at - (ends - lasting)[index], at)
+
+
+def stitched(poses: Sequence[np.ndarray]) -> np.ndarray:
+    """Pieces of a path put end to end; motion in the robot's frame is kept.
+
+    Args:
+        poses: per piece ``(S_i + 1, 3)``; each begins where the one before ended.
+
+    Returns:
+        ``(S + 1, 3)``.
+    """
+    path = [poses[0]]
+    for piece in poses[1:]:
+        path.append(moved(piece, path[-1][-1])[1:])
+    return np.concatenate(path)
+
+
+def moved(
+    poses: np.ndarray, start: np.ndarray, origin: np.ndarray | None = None
+) -> np.ndarray:
+    """Poses as if they had begun at `start`, not at `origin` (None = the first)."""
+    origin = poses[0] if origin is None else origin
+    turn = start[2] - origin[2]
+    cos, sin = np.cos(turn), np.sin(turn)
+    x, y = (poses[:, :2] - origin[:2]).T
+    return np.column_stack(
+        [start[0] + cos * x - sin * y, start[1] + sin * x + cos * y, poses[:, 2] + turn]
+    )
+
+
+def windows(trial: Trial, length: float) -> Windows:
+    """Windows of at least a length [s] that tile a trial, between seen samples.
+
+    Args:
+        trial: recorded trial.
+        length: infinity = one window, from the first sample to the last.
+    """
+    seen = np.flatnonzero(np.isfinite(trial.observed).all(axis=1))
+    seen = seen[seen >= trial.boundaries[0]]
+    if np.isinf(length):
+        marks = seen[[0, -1]] if len(seen) > 1 else seen[:0]
+    else:
+        kept = list(seen[:1])
+        for sample in seen[1:]:
+            if trial.times[sample] - trial.times[kept[-1]] >= 0.95 * length:
+                kept.append(sample)
+        marks = np.array(kept, dtype=int)
+    first, last = marks[:-1], marks[1:]
+    begin, end = trial.times[first], trial.times[last]
+    return Windows(first, last, (begin + end) / 2, end - begin)
+
+
+def thinned(poses: np.ndarray) -> np.ndarray:
+    """Every `EVERY`-th pose; the last interval is made whole by going on straight."""
+    missing = -(len(poses) - 1) % EVERY
+    if missing:
+        beyond = poses[-1] + np.arange(1, missing + 1)[:, None] * (
+            poses[-1] - poses[-2]
+        )
+        poses = np.concatenate([poses, beyond])
+    return poses[::EVERY].copy()
+
+
+def coarse(poses: np.ndarray) -> np.ndarray:
+    """Poses in steps of `COARSE` around their mean, headings going on beyond pi."""
+    poses = np.column_stack([poses[:, :2], np.unwrap(poses[:, 2])])
+    mean, step = poses.mean(axis=0), np.array(COARSE)
+    return mean + step * np.round((poses - mean) / step)

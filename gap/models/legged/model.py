@@ -1,0 +1,197 @@
+"""A walking robot as a nominal model for the diagnosis: `WalkModel`.
+
+The recorded goals are executed again, each as long as it took in the recording. What is
+compared is each servo's position, which its own loop holds so that errors do not add
+up, and the body's motion over short windows, in its own frame.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from bns.gap.candidates import legged
+from bns.gap.core import segments
+from bns.gap.core.floor import Floor
+from bns.gap.core.problem import Problem
+from bns.gap.core.whitening import Whitener
+from bns.gap.models.base import Windows
+from bns.gap.models.legged import floor, where
+from bns.gap.models.legged import lost as walk_lost
+from bns.gap.models.legged import signs as walk_signs
+from bns.gap.models.legged.signs import Signs
+from bns.gap.models.legged.where import Suspects
+from bns.gap.records import Candidate
+from bns.models.legs import names as legs_of
+from bns.worlds.active import Stages, as_damage
+from bns.worlds.damage import Damage
+from bns.worlds.effects.base import Effect
+from bns.worlds.physics import legged_plan, observe
+from bns.worlds.physics.legged_rollout import walk
+from bns.worlds.physics.legged_world import SPEED, HexapodWorld
+from bns.worlds.trial import Channel, Trial, body_displacement
+
+WINDOW = 0.12  # [s] over which the body's motion is compared
+TRACKER = (1e-3, 1e-3, 1e-2)  # [m, m, rad] noise of the tracker; assumed
+READING = 2e-3  # [rad] of a servo's reading, which comes in steps of 5.1 mrad
+SCATTER = (2e-3, 2e-3, 0.01)  # [m, m, rad per root second] of a walking body; assumed
+WOBBLE = 3e-3  # [rad per root second] of a joint; assumed
+
+
+class WalkModel:
+    """A hexapod in MuJoCo whose servos report their positions, see `GapModel`.
+
+    Args:
+        robot: name of the robot model, of kind "legged".
+        pose_sd: noise of the tracker [m, m, rad].
+
+    Raises:
+        BnsError: the robot does not walk.
+    """
+
+    timed = False
+    """commands last until the robot rests, not as long as they are told"""
+    winding = True
+    """signatures turn as effects grow, see `winding`"""
+
+    def __init__(self, robot: str = "phantomx", *, pose_sd: Sequence[float] = TRACKER):
+        world = HexapodWorld(robot, threads=1)
+        self.name, self.dt = robot, world.dt
+        self.channels = tuple(world.channels)
+        joints = self.channels[3:]
+        self.joints = tuple(c.name.removesuffix("_position") for c in joints)
+        self.limits = {
+            channel.name: (float(low), float(high), channel.unit)
+            for channel, (low, high) in zip(
+                world.model.commands, _ranges(world), strict=True
+            )
+        }
+        self.features = (
+            Channel("forward", "m"),
+            Channel("left", "m"),
+            Channel("turn", "rad"),
+            *joints,
+        )
+        self.process = np.array([*SCATTER, *[WOBBLE] * len(joints)])
+        self.resolution = np.array([*pose_sd, *[READING] * len(joints)])
+        self.floor = Floor(self.resolution, self.process, "model", 0)
+        self._walks: tuple[bytes, list[list[np.ndarray]]] = b"", []
+
+    def candidates(self) -> tuple[Candidate, ...]:
+        """Effects on all legs together; `suspected` has those of single ones."""
+        return legged.candidates(Suspects((), (), True), self.joints)
+
+    def suspected(
+        self, trials: Sequence[Trial], *, everywhere: bool = False
+    ) -> tuple[Candidate, ...]:
+        """Candidates on the joints and legs in which recordings depart, and on all.
+
+        Args:
+            trials: recordings.
+            everywhere: on every joint and leg; a push that the body passes on shows
+                where it does not act.
+        """
+        (predicted,) = self.simulate(trials, [()])
+        signs = self.signs(trials, predicted)
+        if everywhere:
+            every = Suspects(self.joints, legs_of(self.joints), True)
+            return legged.candidates(every, self.joints, signs)
+        walks = self._robots(trials)
+        rests = []
+        for number, (trial, path) in enumerate(zip(trials, predicted, strict=True)):
+            scatter = np.mean([(w[number] - path)[:, 3:] ** 2 for w in walks], axis=0)
+            rest = trial.observed[:, 3:] - path[:, 3:]
+            rests.append(rest / np.sqrt(1 + np.nan_to_num(scatter) / READING**2))
+        found = where.suspects(rests, self.joints, READING)
+        return legged.candidates(found, self.joints, signs)
+
+    def signs(self, trials: Sequence[Trial], predicted: Sequence[np.ndarray]) -> Signs:
+        """What the servos say of joints and legs that hold, hang or are gone."""
+        return walk_signs.signs(trials, predicted, self.joints)
+
+    def unsure(self, problem: Problem, uncertain: Sequence[Candidate]) -> Whitener:
+        """The whitener that knows what walking scatters, see `walk_floor`."""
+        trials = problem.trials
+        (nominal,) = self.simulate(trials, [()])
+        losses = legged.lost(self.signs(trials, nominal))
+        lost = walk_lost.likely(trials, losses, self.simulate)
+        (centre,) = self.simulate(trials, [lost]) if lost else (nominal,)
+        return floor.whitener(problem, self._robots(trials, lost), centre)
+
+    def _robots(
+        self, trials: Sequence[Trial], lost: Sequence[Effect] = ()
+    ) -> list[list[np.ndarray]]:
+        """What would have been observed of each of the robots this one may be."""
+        key = "".join(map(str, lost)).encode() + b"".join(
+            t.commands.values.tobytes() + t.times.tobytes() + t.boundaries.tobytes()
+            for t in trials
+        )
+        if key != self._walks[0]:
+            uncertain = [item for item in self.candidates() if item.slack > 0]
+            drawn = floor.robots(uncertain)
+            made = self.simulate(trials, [(*robot, *lost) for robot in drawn])
+            self._walks = key, made
+        return self._walks[1]
+
+    def simulate(
+        self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
+    ) -> list[list[np.ndarray]]:
+        """Predicted poses and servo positions, see `GapModel.simulate`."""
+        return [[self._walked(trial, items) for trial in trials] for items in effects]
+
+    def _walked(self, trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
+        times = trial.times - trial.times[trial.boundaries[0]]
+        counts = np.diff(np.rint(times[trial.boundaries] / self.dt)).astype(np.int64)
+        start = (0.0, 0.0, _heading(trial) if _sloping(effects) else 0.0)
+        stages = Stages.of(as_damage(effects), Damage.none(), 0, times[-1])
+        job, servos = legged_plan.job(
+            self.name,
+            trial.commands,
+            stages,
+            start=start,
+            speed=float(trial.conditions.get("speed", SPEED)),  # type: ignore[arg-type]
+            seed=0,
+            trial=0,
+            counts=np.maximum(counts, 1),
+        )
+        states = walk(job).states
+        poses = observe.planar(states[:, 1:8], start[2])
+        angles = states[:, servos.angles] + servos.laws["offset"]
+        grid = np.arange(len(states)) * self.dt
+        both = np.column_stack([poses, angles])
+        return np.stack([np.interp(times, grid, column) for column in both.T], axis=1)
+
+    def windows(self, trial: Trial) -> Windows:
+        """Windows between samples that were seen, `WINDOW` long or more."""
+        return segments.windows(trial, WINDOW)
+
+    def compare(
+        self, trial: Trial, observed: np.ndarray, windows: Windows
+    ) -> np.ndarray:
+        """The body's displacement in its frame, and servo positions at the end."""
+        begin, end = observed[..., windows.first, :], observed[..., windows.last, :]
+        moved = body_displacement(begin[..., :3], end[..., :3])
+        return np.concatenate([moved, end[..., 3:]], axis=-1)
+
+    def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
+        """Time in the trial and since the command changed, in each window."""
+        times = trial.times[trial.boundaries]
+        at = np.searchsorted(times, windows.times, side="right") - 1
+        return {
+            "time since the command changed": windows.times - times[at],
+            "time in the trial": windows.times - times[0],
+        }
+
+
+def _sloping(effects: Sequence[Effect]) -> bool:
+    """Whether headings in the world differ: only then does the start's count."""
+    return any(effect.name == "floor_slope" for effect in effects)
+
+
+def _heading(trial: Trial) -> float:
+    yaw = trial.channel("yaw")
+    seen = yaw[np.isfinite(yaw)]
+    return float(np.round(seen[0], 2)) if len(seen) else 0.0
+
+
+def _ranges(world: HexapodWorld) -> list[tuple[float, float]]:
+    return [(item.low, item.high) for item in world.model.commands]

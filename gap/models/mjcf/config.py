@@ -1,0 +1,210 @@
+"""The TOML file that describes a model of one's own; see docs/gap_your_robot.md."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from bns.errors import BnsError, FormatError, UnknownNameError
+from bns.worlds.data.column_map import FACTORS, Source
+from bns.worlds.trial import Channel
+
+KEYS = (
+    "name",
+    "model",
+    "window",
+    "commands",
+    "observed",
+    "start",
+    "effects",
+    "bounds",
+    "log",
+)
+START = ("keyframe", "recorded", "settle")
+QUANTITIES = ("joint", "speed", "site", "body")
+"""what an observed channel can be: position or speed of a joint, place of a site or
+body"""
+AXES = ("x", "y", "z")
+WINDOW = 0.1  # [s] between two samples that are compared
+
+
+@dataclass(frozen=True)
+class Told:
+    """A command channel: the actuator it goes to and its limits."""
+
+    channel: Channel
+    actuator: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Seen:
+    """An observed channel.
+
+    Attributes:
+        channel: name and unit.
+        quantity: one of `QUANTITIES`.
+        part: name of the joint, site or body.
+        axis: of a site or body, in the world frame.
+        noise: standard deviation of its measurement, in its unit.
+        scatter: of what the robot itself scatters, per square root of a second.
+    """
+
+    channel: Channel
+    quantity: str
+    part: str
+    axis: int
+    noise: float
+    scatter: float
+
+
+@dataclass(frozen=True)
+class OwnConfig:
+    """A described model.
+
+    Attributes:
+        name: of the robot; recordings carry it.
+        model: its MJCF file.
+        told, seen: channels.
+        keyframe: pose at the start of each trial; "" = the model's own.
+        recorded: whether observed joints start where they were recorded.
+        settle: how long the robot stands at rest before a trial [s].
+        window: see `WINDOW`.
+        effects: parts by effect; None = all that make sense.
+        bounds: by candidate: low, high, slack.
+        log: columns of CSV logs by channel; empty = their own names.
+    """
+
+    name: str
+    model: Path
+    told: tuple[Told, ...]
+    seen: tuple[Seen, ...]
+    keyframe: str = ""
+    recorded: bool = False
+    settle: float = 0.0
+    window: float = WINDOW
+    effects: Mapping[str, tuple[str, ...]] | None = None
+    bounds: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    log: Mapping[str, Source] = field(default_factory=dict)
+
+    @classmethod
+    def read(cls, path: str | Path) -> "OwnConfig":
+        """The description in a TOML file.
+
+        Raises:
+            FormatError: no such file, not TOML, or something of it missing.
+            BnsError: an unknown key, unit or quantity.
+        """
+        path = Path(path)
+        try:
+            given = tomllib.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise FormatError(f"Model file {path} cannot be read ({error}).") from None
+        _known(given, KEYS, f"key of {path}")
+        for key in ("name", "model", "commands", "observed"):
+            if not given.get(key):
+                raise FormatError(
+                    f"{path} lacks {key!r}; see docs/gap_your_robot.md for an example."
+                )
+        start = _table(given, "start", path)
+        _known(start, START, f"key of [start] in {path}")
+        bounds = _table(given, "bounds", path)
+        effects = given.get("effects")
+        return cls(
+            name=str(given["name"]),
+            model=path.parent / str(given["model"]),
+            told=tuple(_told(n, t, path) for n, t in given["commands"].items()),
+            seen=tuple(_seen(n, t, path) for n, t in given["observed"].items()),
+            keyframe=str(start.get("keyframe", "")),
+            recorded=bool(start.get("recorded", False)),
+            settle=float(start.get("settle", 0.0)),
+            window=float(given.get("window", WINDOW)),
+            effects=None
+            if effects is None
+            else {name: _names(parts) for name, parts in effects.items()},
+            bounds={name: _bounds(name, row, path) for name, row in bounds.items()},
+            log={n: _source(n, s, path) for n, s in _table(given, "log", path).items()},
+        )
+
+
+def _known(given: Mapping[str, Any], allowed: tuple[str, ...], kind: str) -> None:
+    for key in given:
+        if key not in allowed:
+            raise UnknownNameError(kind, key, allowed)
+
+
+def _table(given: Mapping[str, Any], key: str, path: Path) -> Mapping[str, Any]:
+    table = given.get(key, {})
+    if not isinstance(table, dict):
+        raise FormatError(f"{path}: {key!r} has to be a table, [{key}].")
+    return table
+
+
+def _names(parts: Any) -> tuple[str, ...]:
+    return (parts,) if isinstance(parts, str) else tuple(map(str, parts))
+
+
+def _told(name: str, table: Any, path: Path) -> Told:
+    kind = f"key of [commands.{name}] in {path}"
+    table = _mapping(table, f"[commands.{name}]", path)
+    _known(table, ("actuator", "unit", "low", "high"), kind)
+    for key in ("actuator", "unit", "low", "high"):
+        if key not in table:
+            raise FormatError(f"{path}: [commands.{name}] lacks {key!r}.")
+    low, high = float(table["low"]), float(table["high"])
+    if not low < high:
+        raise BnsError(f"{path}: [commands.{name}] needs low < high.")
+    channel = Channel(name, str(table["unit"]))
+    return Told(channel, str(table["actuator"]), low, high)
+
+
+def _seen(name: str, table: Any, path: Path) -> Seen:
+    table = _mapping(table, f"[observed.{name}]", path)
+    allowed = (*QUANTITIES, "axis", "unit", "noise", "scatter")
+    _known(table, allowed, f"key of [observed.{name}] in {path}")
+    what = [key for key in QUANTITIES if key in table]
+    if len(what) != 1 or "unit" not in table or not table.get("noise", 0) > 0:
+        raise FormatError(
+            f"{path}: [observed.{name}] needs one of {', '.join(QUANTITIES)}, a unit "
+            "and a positive noise (standard deviation of its measurement)."
+        )
+    axis = str(table.get("axis", "x"))
+    if axis not in AXES:
+        raise UnknownNameError(f"axis of [observed.{name}]", axis, AXES)
+    noise = float(table["noise"])
+    return Seen(
+        Channel(name, str(table["unit"])),
+        what[0],
+        str(table[what[0]]),
+        AXES.index(axis),
+        noise,
+        float(table.get("scatter", noise)),
+    )
+
+
+def _mapping(table: Any, where: str, path: Path) -> Mapping[str, Any]:
+    if not isinstance(table, dict):
+        raise FormatError(f"{path}: {where} has to be a table.")
+    return table
+
+
+def _bounds(name: str, row: Any, path: Path) -> Mapping[str, float]:
+    row = _mapping(row, f"bounds of {name}", path)
+    _known(row, ("low", "high", "slack"), f"bound of {name} in {path}")
+    return {key: float(value) for key, value in row.items()}
+
+
+def _source(name: str, item: Any, path: Path) -> Source:
+    if isinstance(item, str):
+        return Source(item, "")
+    table = _mapping(item, f"log column of {name}", path)
+    unit = str(table.get("unit", ""))
+    known = {unit for row in FACTORS.values() for unit in row}
+    if "column" not in table or (unit and unit not in known):
+        raise FormatError(
+            f"{path}: [log] {name} needs a column and a unit among "
+            f"{', '.join(sorted(known))}."
+        )
+    return Source(str(table["column"]), unit)

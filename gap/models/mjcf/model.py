@@ -1,0 +1,271 @@
+"""Any MJCF model, with a TOML file that maps its channels, as a nominal model."""
+
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from bns.errors import BnsError, FormatError, UnknownNameError
+from bns.gap.candidates import mjcf
+from bns.gap.core import segments
+from bns.gap.models.base import Windows
+from bns.gap.models.mjcf import effects as own_effects
+from bns.gap.models.mjcf import log, view
+from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.records import Candidate
+from bns.worlds.effects.base import ControlSignal, Effect
+from bns.worlds.physics import control
+from bns.worlds.physics.rollout import STATE, Compiled, Job, Pool, Segment
+from bns.worlds.trial import Trial
+
+LEAD = 1.0  # [s] of rest before a trial, so that what is late has something before it
+KEPT, MODELS = 20_000, 2000  # simulated trials and compiled models kept in memory
+FINE = 0.005  # [s] between kept states; the step if that is longer
+RESOLUTION = 1e-9
+
+
+class OwnModel:
+    """A model of the user's own; see `gap/models/base.py` for the attributes.
+
+    Args:
+        config: the description.
+        threads: of the physics.
+
+    Raises:
+        FormatError: the MJCF file is missing or MuJoCo refuses it.
+        BnsError: a part that the model lacks.
+    """
+
+    def __init__(self, config: OwnConfig, *, threads: int = 2):
+        self.config, self.name = config, config.name
+        self.channels = tuple(item.channel for item in config.seen)
+        self.features = self.channels
+        self.process = np.array([item.scatter for item in config.seen])
+        self.resolution = np.array([item.noise for item in config.seen])
+        self.limits = {
+            item.channel.name: (item.low, item.high, item.channel.unit)
+            for item in config.told
+        }
+        self._pool = Pool(threads)
+        self._compiled: OrderedDict[tuple, Compiled] = OrderedDict()
+        self._cache: OrderedDict[tuple, np.ndarray] = OrderedDict()
+        model = self.compiled(()).model
+        self.actuators = [_index(model, "actuator", t.actuator) for t in config.told]
+        if config.keyframe:
+            _index(model, "key", config.keyframe)  # there, before anything runs
+        self.view = view.View.of(config, model)
+        self._candidates = mjcf.candidates(config, model)
+
+    @classmethod
+    def read(cls, path: str | Path, *, threads: int = 2) -> "OwnModel":
+        """The model that a TOML file describes."""
+        return cls(OwnConfig.read(path), threads=threads)
+
+    @staticmethod
+    def parse(text: str) -> Effect:
+        """An effect on this model, as a diagnosis writes it."""
+        return own_effects.parse(text)
+
+    def read_log(self, path: str) -> list[Trial]:
+        """Trials of a CSV log."""
+        return log.read(path, self.config)
+
+    def candidates(self) -> tuple[Candidate, ...]:
+        """All candidates, in a fixed order."""
+        return self._candidates
+
+    def spec(self, effects: Sequence[Effect]) -> mujoco.MjSpec:
+        """The model with the effects on its parts written into it.
+
+        Raises:
+            FormatError: the MJCF file is missing or MuJoCo refuses it.
+        """
+        if not self.config.model.is_file():
+            raise FormatError(f"There is no model file {self.config.model}.")
+        try:
+            made = mujoco.MjSpec.from_file(str(self.config.model))
+            made.copy().compile()
+        except ValueError as error:
+            first = str(error).strip().splitlines()[0]
+            raise FormatError(f"{self.config.model}: {first}") from None
+        for effect in effects:
+            if effect.stage == "body" and not effect.is_nominal:
+                effect.edit(made)
+        return made
+
+    def compiled(self, effects: Sequence[Effect]) -> Compiled:
+        """The compiled model with the effects on its parts."""
+        body = tuple(str(e) for e in effects if e.stage == "body" and not e.is_nominal)
+        if body not in self._compiled:
+            self._compiled[body] = Compiled(self.spec(effects).compile())
+            while len(self._compiled) > MODELS:
+                self._compiled.popitem(last=False)
+        return self._compiled[body]
+
+    def simulate(
+        self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
+    ) -> list[list[np.ndarray]]:
+        """Predicted samples, see `GapModel.simulate`."""
+        keys = [[_key(trial, items) for trial in trials] for items in effects]
+        wanted = {}
+        for items, row in zip(effects, keys, strict=True):
+            for trial, key in zip(trials, row, strict=True):
+                if key not in self._cache:
+                    wanted.setdefault(key, (trial, items))
+        jobs = [self._job(trial, items) for trial, items in wanted.values()]
+        motions = self._pool.map(jobs) if jobs else []
+        fresh = {}
+        for (key, (trial, items)), motion in zip(wanted.items(), motions, strict=True):
+            states = motion.states[self._lead() :]
+            fresh[key] = self._samples(trial, items, states)
+        made = [[fresh.get(key, self._cache.get(key)) for key in row] for row in keys]
+        self._cache.update(fresh)
+        while len(self._cache) > KEPT:
+            self._cache.popitem(last=False)
+        return made
+
+    @property
+    def dt(self) -> float:
+        """Physics step [s]."""
+        return float(self.compiled(()).model.opt.timestep)
+
+    def _lead(self) -> int:
+        return round(self.config.settle / self.dt)
+
+    def _job(self, trial: Trial, effects: Sequence[Effect]) -> Job:
+        scene = self.compiled(effects)
+        told = self._told(trial, effects)
+        begin = self._start(trial, scene.model)
+        ctrl = np.tile(self._rest(scene.model), (len(told), 1))
+        ctrl[:, self.actuators] = told
+        return Job(begin, (Segment(scene, ctrl),))
+
+    def _rest(self, model: mujoco.MjModel) -> np.ndarray:
+        if self.config.keyframe:
+            key = _index(model, "key", self.config.keyframe)
+            return np.array(model.key_ctrl[key])
+        return np.zeros(model.nu)
+
+    def _told(self, trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
+        """Commands at each physics step after the effects, settling included."""
+        dt = self.dt
+        counts = control.steps(trial.commands.durations, dt)
+        lead, extra = self._lead(), round(LEAD / dt)
+        rest = self._rest(self.compiled(()).model)[self.actuators]
+        values = np.repeat(trial.commands.values, counts, axis=0)
+        before = np.tile(rest, (lead + extra, 1))
+        values = np.concatenate([before, values])
+        signal = ControlSignal(
+            times=np.arange(len(values)) * dt,
+            values=values,
+            command=np.repeat(np.arange(-1, len(counts)), [len(before), *counts]),
+            channels=tuple(item.channel.name for item in self.config.told),
+            dt=dt,
+        )
+        on, rng = np.ones(len(values), bool), np.random.default_rng(0)
+        for effect in effects:
+            if effect.stage == "command":
+                made = effect.apply(signal, on, rng)
+                signal = ControlSignal(
+                    signal.times, made, signal.command, signal.channels, dt
+                )
+        return signal.values[extra:]
+
+    def _start(self, trial: Trial, model: mujoco.MjModel) -> np.ndarray:
+        data = mujoco.MjData(model)
+        if self.config.keyframe:
+            key = _index(model, "key", self.config.keyframe)
+            mujoco.mj_resetDataKeyframe(model, data, key)
+        if self.config.recorded:
+            seen = trial.observed[np.isfinite(trial.observed).all(axis=1)]
+            self.view.place(data, seen[0])
+        state = np.empty(mujoco.mj_stateSize(model, STATE))
+        data.time = 0.0
+        mujoco.mj_getState(model, data, state, STATE)
+        return state
+
+    def _samples(
+        self, trial: Trial, effects: Sequence[Effect], states: np.ndarray
+    ) -> np.ndarray:
+        every = max(1, int(FINE / self.dt + 1e-9))
+        grid = np.arange(0, len(states), every)
+        times = grid * self.dt
+        scene = self.compiled(effects)
+        read = self.view.read(scene.model, states[grid])
+        names = tuple(channel.name for channel in self.channels)
+        on, rng = np.ones(len(times), bool), np.random.default_rng(0)
+        for effect in effects:
+            if effect.stage == "sensor":
+                read = effect.apply(times, read, names, on, rng)
+        at = trial.times - trial.times[trial.boundaries[0]]
+        return np.stack([np.interp(at, times, column) for column in read.T], axis=1)
+
+    def windows(self, trial: Trial) -> Windows:
+        """Windows between samples that were seen."""
+        return segments.windows(trial, self.config.window)
+
+    def compare(
+        self, trial: Trial, observed: np.ndarray, windows: Windows
+    ) -> np.ndarray:
+        """What is observed at the end of each window, ``(..., W, C)``."""
+        return observed[..., windows.last, :]
+
+    def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
+        """Commands, their changes, time, and the predicted readings and their speed.
+
+        Predicted and not recorded ones: the noise of these is part of what is tested.
+        """
+        ((expected,),) = self.simulate([trial], [()])
+        index, since, at = segments.told(trial, windows)
+        told = trial.commands.values
+        before = np.vstack([told[:1], told[:-1]])[index]
+        made = {}
+        for column, item in enumerate(self.config.told):
+            name = item.channel.name
+            made[f"command {name}"] = told[index, column]
+            made[f"change of command {name}"] = told[index, column] - before[:, column]
+        for column, channel in enumerate(self.channels):
+            seen = np.nan_to_num(expected[:, column])
+            made[channel.name] = seen[windows.first]
+            step = seen[windows.last] - seen[windows.first]
+            made[f"speed of {channel.name}"] = step / windows.durations
+        made["time since the command changed"] = since
+        made["time in the trial"] = at
+        return made
+
+    def write_corrected(self, effects: Sequence[str], path: str | Path) -> list[str]:
+        """Write the MJCF with the effects on its parts; gives those it can not hold.
+
+        Raises:
+            BnsError: the file can not be written.
+        """
+        made = [self.parse(text) for text in effects]
+        spec = self.spec(made)
+        spec.compile()
+        try:
+            Path(path).write_text(spec.to_xml(), encoding="utf-8")
+        except OSError as error:
+            raise BnsError(f"{path} cannot be written: {error.strerror}.") from error
+        return [str(effect) for effect in made if effect.stage != "body"]
+
+
+def _key(trial: Trial, effects: Sequence[Effect]) -> tuple:
+    told = trial.commands
+    return (
+        told.values.tobytes(),
+        told.durations.tobytes(),
+        trial.times.tobytes(),
+        trial.observed[:1].tobytes(),
+        tuple(str(effect) for effect in effects),
+    )
+
+
+def _index(model: mujoco.MjModel, kind: str, name: str) -> int:
+    try:
+        return int(getattr(model, kind)(name).id)
+    except KeyError:
+        count = {"actuator": model.nu, "key": model.nkey}[kind]
+        known = [getattr(model, kind)(number).name for number in range(count)]
+        raise UnknownNameError(f"{kind} of the model", name, known) from None

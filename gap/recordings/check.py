@@ -1,0 +1,263 @@
+"""Is a recording sound? Faults are repaired and listed, or stop the diagnosis."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bns.errors import BnsError, FormatError
+from bns.gap.models.base import GapModel
+from bns.gap.recordings import stuck_channels, trial_labels
+from bns.worlds.data.importing import MOMENTS
+from bns.worlds.trial import Trial
+
+TURNS = 1.5  # steps beside it that a spike is larger than; a turn is one; assumed
+SPIKE = 8.0  # robust standard deviations from both neighbours
+WRAP = 0.6  # of a full turn, between two samples, that counts as a wrap
+LOST = 0.5  # share of samples that may be missing
+STUCK = 0.9  # share of equal neighbours, while commands move, that counts as stuck
+LONG_GAP = 10.0  # times the usual step
+COARSE = 12  # fewer distinct steps than this while moving: quantised
+CLOCK = 0.05  # relative disagreement of recorded and commanded time
+BEYOND = 30.0  # times as far as the model moves: degrees for radians, mm for m
+SHOWS = 30.0  # times the resolution that a channel has to move to be compared
+FAR = 1e3  # [m] beyond it a position is a slip of a unit
+
+
+def check(
+    trials: Sequence[Trial], model: GapModel
+) -> tuple[tuple[Trial, ...], tuple[str, ...]]:
+    """Repair what can be repaired; by the model's own `check` if it has one.
+
+    Args:
+        trials: recorded trials.
+        model: nominal model.
+
+    Returns:
+        usable trials; what was repaired or noticed, one line each.
+
+    Raises:
+        FormatError: channels that the model lacks or needs, or no usable trial.
+    """
+    own = getattr(model, "check", None)
+    if own is not None:
+        return own(trials)
+    wanted = tuple(channel.name for channel in model.channels)
+    notes: list[str] = []
+    kept: list[Trial] = []
+    seen: dict[bytes, str] = {}
+    timed = getattr(model, "timed", True)  # else commands end by themselves
+    odd = _odd_clocks(trials) if timed else {}
+    for number, trial in enumerate(trials):
+        label = trial_labels.of(trial, number)
+        _channels(trial, model, label)
+        if not trial.outcome.usable:
+            notes.append(f"{label}: flagged as diverged, left out")
+            continue
+        same = trial.observed.tobytes()
+        if same in seen:
+            notes.append(f"{label}: the same samples as {seen[same]}, left out")
+            continue
+        seen[same] = label
+        trial, found = _repaired(trial, label, timed)
+        notes += found
+        trial, found = stuck_channels.dropped(trial, model)
+        notes += [f"{label}: {note}" for note in found]
+        fault = odd.get(number) or _unusable(trial, wanted)
+        if fault:
+            notes.append(f"{label}: {fault}, left out")
+            continue
+        kept.append(trial)
+    if not kept:
+        raise FormatError(
+            "No trial of the recording is usable: "
+            + "; ".join(notes or ["it is empty"])
+        )
+    _units(kept, model)
+    return tuple(kept), (*_moments(kept), *notes)
+
+
+def _moments(trials: Sequence[Trial]) -> list[str]:
+    """Whether it is known when commands began."""
+    sampled = [t for t in trials if t.conditions.get(MOMENTS) == "sampled"]
+    if not sampled:
+        return []
+    step = np.median(np.concatenate([np.diff(trial.times) for trial in sampled]))
+    return [
+        f"{len(sampled)} trials: when a command began is known to a sample only "
+        f"({step:.3g} s), which can pass for a gap; give command_time"
+    ]
+
+
+def _units(trials: Sequence[Trial], model: GapModel) -> None:
+    """Stop at channels that move much farther than their commands can make them."""
+    (predicted,) = model.simulate(trials, [()])
+    for column, channel in enumerate(model.channels):
+        shares = []
+        for trial, path in zip(trials, predicted, strict=True):
+            seen = trial.observed[np.isfinite(trial.observed).all(axis=1), column]
+            told = np.ptp(path[:, column])
+            if told > SHOWS * model.resolution[column]:  # not where it diverged
+                shares.append(np.ptp(seen) / told)
+        if shares and np.median(shares) > BEYOND:
+            raise FormatError(
+                f"{channel.name} moves {np.median(shares):.3g} times as far as its "
+                f"commands make the model move: its unit, {channel.unit}, or that of "
+                "the commands seems wrong."
+            )
+
+
+def _channels(trial: Trial, model: GapModel, label: str) -> None:
+    given = {channel.name: channel.unit for channel in trial.channels}
+    for channel in model.channels:
+        if channel.name not in given:
+            raise FormatError(
+                f"The {label} has no channel {channel.name!r}; model {model.name!r} "
+                f"needs {', '.join(c.name for c in model.channels)}."
+            )
+        if given[channel.name] != channel.unit:
+            raise FormatError(
+                f"The {label}: {channel.name} is in {given[channel.name]!r}, the "
+                f"model's in {channel.unit!r}; convert it to SI."
+            )
+    if [c.name for c in trial.channels][: len(model.channels)] != [
+        c.name for c in model.channels
+    ]:
+        raise BnsError("Observed channels have to begin with those of the model.")
+
+
+def _repaired(trial: Trial, label: str, timed: bool) -> tuple[Trial, list[str]]:
+    notes: list[str] = []
+    observed = trial.observed.copy()
+    for column, channel in enumerate(trial.channels):
+        values = observed[:, column]
+        if channel.unit == "rad":
+            values, wraps = _unwrapped(values)
+            if wraps:
+                notes.append(f"{label}: {channel.name} wrapped {wraps} times, undone")
+        infinite = np.isinf(values)
+        if infinite.any():
+            values = np.where(infinite, np.nan, values)
+            notes.append(f"{label}: {infinite.sum()} infinite {channel.name}, dropped")
+        observed[:, column] = values
+        notes += _noticed(trial, values, channel.name, label)
+    spikes = _spikes(observed, trial.times)
+    if spikes.any():
+        observed[spikes] = np.nan
+        notes.append(f"{label}: {spikes.sum()} spikes, dropped")
+    lost = ~np.isfinite(observed).all(axis=1)
+    if lost.any():
+        observed[lost] = np.nan
+        notes.append(f"{label}: {lost.sum()} of {len(lost)} samples lost, bridged")
+    repeated = np.diff(trial.times, prepend=trial.times[0] - 1) <= 0
+    if repeated.any():
+        observed[repeated] = np.nan
+        notes.append(f"{label}: {repeated.sum()} samples with a repeated time, dropped")
+    notes += _timing(trial, label, timed)
+    changed = not np.array_equal(observed, trial.observed, equal_nan=True)
+    return (trial.replace(observed=observed) if changed else trial), notes
+
+
+def _unwrapped(values: np.ndarray) -> tuple[np.ndarray, int]:
+    """An angle made continuous over lost samples too; number of wraps undone."""
+    seen = np.isfinite(values)
+    jumps = np.abs(np.diff(values[seen])) > WRAP * 2 * np.pi
+    if not jumps.any():
+        return values, 0
+    made = values.copy()
+    made[seen] = np.unwrap(values[seen])
+    return made, int(jumps.sum())
+
+
+def _spikes(observed: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Single samples far from both neighbours, which agree with each other."""
+    found = np.zeros(len(observed), dtype=bool)
+    for values in observed.T:
+        seen = np.flatnonzero(np.isfinite(values))
+        if len(seen) < 8:
+            continue
+        kept = values[seen]
+        off = kept[1:-1] - (kept[:-2] + kept[2:]) / 2
+        apart = np.abs(kept[2:] - kept[:-2]) / 2
+        scale = np.median(np.abs(off)) / 0.6745 + 1e-9
+        hit = (np.abs(off) > SPIKE * scale) & (np.abs(off) > 4 * apart)
+        # where a motion turns back, going on from either side leads to the sample
+        before = 2 * kept[1:-3] - kept[:-4] - kept[2:-2]
+        after = 2 * kept[3:-1] - kept[4:] - kept[2:-2]
+        hit[1:-1] &= np.minimum(np.abs(before), np.abs(after)) > SPIKE * scale
+        # and it stands out by no more than the speeds on either side make of a step
+        lasted = np.maximum(np.diff(times[seen]), 1e-9)
+        speed = np.abs(np.diff(kept)) / lasted
+        step = np.maximum(lasted[1:-2], lasted[2:-1])
+        beside = np.minimum(speed[:-3], speed[3:]) * step
+        hit[1:-1] &= np.abs(off[1:-1]) > TURNS * beside
+        found[seen[1:-1][hit]] = True
+    return found
+
+
+def _noticed(trial: Trial, values: np.ndarray, name: str, label: str) -> list[str]:
+    seen = values[np.isfinite(values)]
+    if len(seen) < 20 or not np.abs(trial.commands.values).any():
+        return []
+    steps = np.diff(seen)
+    if (steps == 0).mean() > STUCK:
+        return [f"{label}: {name} is stuck at {np.median(seen):.4g}"]
+    notes = []
+    moving = np.abs(steps[steps != 0])
+    if len(moving) > 20 and len(np.unique(moving.round(12))) < COARSE:
+        notes.append(f"{label}: {name} comes in steps of {moving.min():.3g}")
+    ends = [(seen == seen.min()).sum(), (seen == seen.max()).sum()]
+    if max(ends) > max(5, 0.1 * len(seen)) and (steps == 0).mean() < STUCK:
+        notes.append(f"{label}: {name} rests at its extreme value; clipped?")
+    return notes
+
+
+def _timing(trial: Trial, label: str, timed: bool) -> list[str]:
+    notes = []
+    steps = np.diff(trial.times)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    if usual > 0 and (steps > LONG_GAP * usual).any():
+        notes.append(f"{label}: a gap of {steps.max():.3g} s in the samples")
+    told = trial.commands.duration
+    recorded = _span(trial)
+    if timed and abs(recorded - told) > CLOCK * told + usual:
+        notes.append(
+            f"{label}: commands last {told:.3g} s, the samples between their start and "
+            f"end {recorded:.3g} s; clocks disagree or samples were lost"
+        )
+    if len(steps) and trial.times[0] > 1e6:
+        notes.append(f"{label}: time stamps are absolute ({trial.times[0]:.6g} s)")
+    return notes
+
+
+def _odd_clocks(trials: Sequence[Trial]) -> dict[int, str]:
+    """Trials whose clock runs otherwise than that of most, and by how much."""
+    ratios = np.array([_span(t) / max(t.commands.duration, 1e-9) for t in trials])
+    usual = float(np.median(ratios)) if len(ratios) else 1.0
+    if usual <= 0:
+        return {}
+    apart = np.abs(ratios / usual - 1)
+    if (apart <= CLOCK).sum() <= len(ratios) / 2:
+        return {}
+    return {
+        int(number): f"its clock runs {ratios[number] / usual:.3g} times as fast as "
+        "that of the other trials"
+        for number in np.flatnonzero(apart > CLOCK)
+    }
+
+
+def _span(trial: Trial) -> float:
+    """Recorded time from the first command to the end of the last [s]."""
+    first, last = trial.boundaries[0], trial.boundaries[-1]
+    return float(trial.times[last] - trial.times[first])
+
+
+def _unusable(trial: Trial, wanted: Sequence[str]) -> str:
+    seen = np.isfinite(trial.observed).all(axis=1)
+    if seen.mean() < LOST or seen.sum() < 8:
+        return f"only {seen.sum()} of {len(seen)} samples were seen"
+    values = trial.observed[seen][:, : len(wanted)]
+    if (np.ptp(values, axis=0) == 0).all() and np.abs(trial.commands.values).any():
+        return "nothing moves although it is told to"
+    if (np.abs(values) > FAR).any():
+        return f"values beyond {FAR:g}; a unit seems wrong"
+    return ""

@@ -1,0 +1,71 @@
+"""What is said beside a verdict: candidates at bounds, effects that nothing excited."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bns.errors import BnsError
+from bns.gap.models.base import GapModel
+from bns.gap.recordings import trial_labels
+from bns.gap.records import Diagnosis
+from bns.worlds.trial import Trial
+
+LISTED = 5  # effects that are listed at most
+STILL = 1e-3  # share of the recorded motion that the model has to make, at least
+
+
+def reproducible(trials: Sequence[Trial], model: GapModel) -> None:
+    """Stop if the nominal model can not execute the recorded commands.
+
+    Raises:
+        BnsError: its simulation diverges, or it does not move at all.
+    """
+    (predicted,) = model.simulate(trials, [()])
+    for number, (trial, made) in enumerate(zip(trials, predicted, strict=True)):
+        bad = ~np.isfinite(made).all(axis=1)
+        if bad.any():
+            raise BnsError(
+                f"The simulation of {trial_labels.of(trial, number)} by the nominal "
+                f"model {model.name!r} diverges at {trial.times[bad.argmax()]:.2f} s; "
+                "check its time step, its start and the commands."
+            )
+    recorded = max(_travel(trial.observed) for trial in trials)
+    simulated = max(_travel(made) for made in predicted)
+    if recorded > 0 and simulated < STILL * recorded:
+        raise BnsError(
+            f"Model {model.name!r} does not move on the recorded commands, although "
+            "the robot did; check which actuator each command goes to."
+        )
+
+
+def _travel(observed: np.ndarray) -> float:
+    seen = observed[np.isfinite(observed).all(axis=1)]
+    return float(np.ptp(seen, axis=0).max()) if len(seen) else 0.0
+
+
+def warnings(found: Diagnosis, model: GapModel) -> tuple[str, ...]:
+    """Further warnings on a diagnosis, one line each."""
+    made = []
+    if change := found.change:
+        made.append(
+            f"The gap {change['direction']} at trial {change['trial']}, but effects "
+            "are fitted as if they held throughout: diagnose what comes before and "
+            "after apart (--trials)."
+        )
+    singles = [fit for fit in found.fits if len(fit.names) == 1]
+    if singles and all(fit.at_bound for fit in singles):
+        made.append(
+            "Every fitted effect ends at a bound: the ranges are too narrow, or the "
+            "model is of another robot."
+        )
+    items = {item.name: item for item in model.candidates()}
+    least = found.signatures.get("detectability", {})
+    quiet = [name for name, size in least.items() if size is None and name in items]
+    shown = [f"{name} ({items[name].excite})" for name in quiet[:LISTED]]
+    if quiet:
+        more = f" and {len(quiet) - LISTED} more" if len(quiet) > LISTED else ""
+        made.append(
+            f"Not excited, so neither found nor excluded: {', '.join(shown)}{more}; in "
+            "brackets what would excite it."
+        )
+    return tuple(made)

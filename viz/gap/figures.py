@@ -1,0 +1,210 @@
+"""Figures of a diagnosis: how far the gap closes, where it is, and the motion."""
+
+import numpy as np
+
+from bns.gap.records import Diagnosis
+from bns.viz import style
+from bns.viz.gap.view import View
+
+RECORDED, NOMINAL, CORRECTED = style.BLACK, style.VERMILION, style.BLUE
+LISTED = 7  # single effects in the figure of what closes the gap
+ROUND = {"m": ("mm", 1e3), "rad": ("mrad", 1e3)}
+"""units in which small residuals are read"""
+
+SIDE = 4  # features that fit side by side
+
+
+def closing(found: Diagnosis):
+    """How far the gap shrinks: nominal, each effect alone, the chosen set, floor."""
+    closed = found.closed
+    singles = sorted(closed["singles"].items(), key=lambda row: row[1])[:LISTED]
+    rows = [("nominal model", closed["before"], NOMINAL)]
+    named = " + ".join(found.best.names) if found.verdict.named else ""
+    rows += [(f"with {n}", value, style.GREY) for n, value in reversed(singles)]
+    rows.append(("flexible model (ceiling)", closed["ceiling"], style.ORANGE))
+    if found.verdict.named:
+        rows = [row for row in rows if row[0] != f"with {named}"]
+        rows.append((f"with {named}", closed["after"], CORRECTED))
+    rows = [(name, max(value, 1e-3), colour) for name, value, colour in rows]
+    with style.plotting() as figure_class:
+        figure = figure_class(figsize=(7.0, 0.9 + 0.28 * len(rows)), layout="tight")
+        axes = figure.subplots()
+        names, values, colours = zip(*rows, strict=True)
+        axes.barh(range(len(rows)), values, color=colours, height=0.62, left=0)
+        axes.set_yticks(range(len(rows)), names)
+        axes.axvline(closed["floor"], color=style.GREEN, ls="--", lw=1.4)
+        axes.set_ylim(len(rows) - 0.4, -0.6)
+        _log(axes.xaxis, axes.set_xscale)
+        axes.set_xlim(left=0.7 * min(closed["floor"], *values))
+        axes.text(
+            closed["floor"],
+            1.01,
+            "floor",
+            color=style.GREEN,
+            ha="center",
+            va="bottom",
+            transform=axes.get_xaxis_transform(),
+        )
+        axes.grid(axis="y", visible=False)
+        axes.set_xlabel("held-out loss per residual (1 = noise alone), log scale")
+    return figure
+
+
+def horizons(found: Diagnosis, view: View):
+    """Root mean square of the residuals against how far ahead was predicted."""
+    rms = [np.array(found.where[key], dtype=float) for key in ("rms", "rms_floor")]
+    low, high = (np.array(found.where[k], dtype=float) for k in ("rms_low", "rms_high"))
+    labels = [_horizon(value) for value in found.where["horizons"]]
+    place = np.arange(len(labels))
+    features, columns = view.problem.model.features, view.largest(SIDE)
+    with style.plotting() as figure_class:
+        figure = figure_class(figsize=(7.0, 2.7), layout="constrained")
+        panels = figure.subplots(1, len(columns), squeeze=False)[0]
+        for axes, column in zip(panels, columns, strict=True):
+            feature = features[column]
+            unit, factor = ROUND.get(feature.unit, (feature.unit, 1.0))
+            before = factor * rms[0][:, column]
+            spread = factor * np.array([low[:, column], high[:, column]])
+            axes.errorbar(
+                place,
+                before,
+                yerr=np.abs(spread - before),
+                color=NOMINAL,
+                marker="o",
+                capsize=3,
+                label="nominal",
+            )
+            if view.effects:
+                axes.plot(
+                    place,
+                    factor * view.after.rms[:, column],
+                    color=CORRECTED,
+                    marker="s",
+                    label="corrected",
+                )
+            axes.plot(
+                place,
+                factor * rms[1][:, column],
+                color=style.GREEN,
+                ls="--",
+                label="floor",
+            )
+            axes.set_xticks(place, labels)
+            _log(axes.yaxis, axes.set_yscale)
+            axes.set_title(f"{feature.name} [{unit}]")
+            axes.set_xlabel("predicted over")
+        handles, names = panels[0].get_legend_handles_labels()
+        figure.legend(handles, names, loc="outside lower center", ncols=3)
+    return figure
+
+
+def _log(axis, set_scale) -> None:
+    """A logarithmic axis with plain numbers."""
+    from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
+
+    set_scale("log")
+    low, high = sorted(axis.get_view_interval())
+    subs = (1.0, 2.0, 5.0) if high / max(low, 1e-300) < 300 else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs))
+    axis.set_minor_locator(NullLocator())
+    axis.set_minor_formatter(NullFormatter())
+    axis.set_major_formatter("{x:g}")
+
+
+def _horizon(value: float | None) -> str:
+    whole = value is None or not np.isfinite(value)
+    return "trial" if whole else f"{value:g} s"
+
+
+def over_time(view: View):
+    """Residuals of one trial over time, nominal and corrected, with the floor."""
+    trial = view.shown
+    times = view.problem.windows[trial].times
+    gap, left, scatter = view.gap(trial), view.left[trial], view.scatter(trial)
+    features = view.problem.model.features
+    columns = view.largest()
+    size = (7.0, 0.8 + 1.35 * len(columns))
+    with style.plotting() as figure_class:
+        figure = figure_class(figsize=size, layout="constrained")
+        panels = figure.subplots(len(columns), 1, squeeze=False, sharex=True)[:, 0]
+        for axes, column in zip(panels, columns, strict=True):
+            feature = features[column]
+            unit, factor = ROUND.get(feature.unit, (feature.unit, 1.0))
+            band = 2 * factor * scatter[:, column]
+            axes.fill_between(
+                times, -band, band, color=style.GREEN, alpha=0.18, lw=0, label="floor"
+            )
+            axes.plot(times, factor * gap[:, column], color=NOMINAL, lw=1.2)
+            if view.effects:
+                axes.plot(times, factor * left[:, column], color=CORRECTED, lw=1.2)
+            axes.set_ylabel(f"{feature.name} [{unit}]")
+        panels[-1].set_xlabel("time in the trial [s]")
+        _legend(figure, view, "floor, two deviations")
+    return figure
+
+
+def _legend(figure, view: View, third: str) -> None:
+    from matplotlib.lines import Line2D
+
+    known = [("recorded minus nominal", NOMINAL), (third, style.GREEN)]
+    if view.effects:
+        known.insert(1, ("recorded minus corrected", CORRECTED))
+    lines = [Line2D([], [], color=colour, label=name) for name, colour in known]
+    figure.legend(handles=lines, loc="outside lower center", ncols=3)
+
+
+def motion(view: View):
+    """The trial with the largest gap: the path, or each channel over time."""
+    trial = view.trials[view.shown]
+    series = [
+        ("recorded", trial.observed, RECORDED, 2.2, "-"),
+        ("nominal", view.nominal[view.shown], NOMINAL, 1.4, "-"),
+    ]
+    if view.effects:
+        series.append(
+            ("corrected", view.corrected[view.shown], CORRECTED, 1.4, (0, (4, 2)))
+        )
+    planar = [channel.name for channel in trial.channels][:2] == ["x", "y"]
+    return _path(series) if planar else _channels(trial, series)
+
+
+def _path(series):
+    with style.plotting() as figure_class:
+        figure = figure_class(figsize=(7.0, 4.6), layout="constrained")
+        axes = figure.subplots()
+        for name, values, colour, width, line in series:
+            axes.plot(
+                values[:, 0], values[:, 1], color=colour, lw=width, ls=line, label=name
+            )
+        start = series[0][1][0]
+        axes.plot(start[0], start[1], "o", color=RECORDED, ms=6)
+        axes.annotate(" start", (start[0], start[1]), va="bottom")
+        axes.set_aspect("equal", "datalim")
+        axes.set_xlabel("x [m]")
+        axes.set_ylabel("y [m]")
+        axes.legend(loc="best")
+    return figure
+
+
+def _channels(trial, series):
+    size = (7.0, 0.8 + 1.35 * len(trial.channels))
+    with style.plotting() as figure_class:
+        figure = figure_class(figsize=size, layout="constrained")
+        panels = figure.subplots(len(trial.channels), 1, squeeze=False, sharex=True)
+        for column, axes in enumerate(panels[:, 0]):
+            for name, values, colour, width, line in series:
+                axes.plot(
+                    trial.times,
+                    values[:, column],
+                    color=colour,
+                    lw=width,
+                    ls=line,
+                    label=name,
+                )
+            axes.set_ylabel(
+                f"{trial.channels[column].name} [{trial.channels[column].unit}]"
+            )
+        panels[-1, 0].set_xlabel("time in the trial [s]")
+        handles, names = panels[0, 0].get_legend_handles_labels()
+        figure.legend(handles, names, loc="outside lower center", ncols=3)
+    return figure

@@ -1,0 +1,200 @@
+"""Rerun recording of a diagnosis: recorded, nominal and corrected robot together."""
+
+from collections.abc import Sequence
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+
+from bns.gap.models.base import GapModel
+from bns.gap.records import Diagnosis
+from bns.viz import series, style
+from bns.viz.blueprint import BACKGROUND, LIVE_TIMELINE
+from bns.viz.gap import scene
+from bns.viz.gap.figures import CORRECTED, NOMINAL
+from bns.viz.gap.view import MOST, View, view
+from bns.worlds.trial import POSE, Channel, Trial
+
+GAP = 1.0
+"""s of pause between two trials"""
+
+TRIALS = 6
+"""trials that are shown at most, those with the largest gap"""
+
+
+def write(
+    found: Diagnosis, trials: Sequence[Trial], model: GapModel, path: str | Path
+) -> Path:
+    """Write the recording.
+
+    Args:
+        found: the diagnosis.
+        trials: the recording it was made of.
+        model: its nominal model.
+        path: file to write, `.rrd`.
+    """
+    import rerun as rr
+
+    seen = view(found, trials, model)
+    losses = [seen.energy(number).mean() for number in range(len(seen.trials))]
+    chosen = sorted(np.argsort(losses)[::-1][:TRIALS].tolist())
+    starts = _starts(seen, chosen)
+    identity = sha256(found.to_json().encode()).hexdigest()[:12]
+    stream = rr.RecordingStream("bns", recording_id=identity, send_properties=False)
+    stream.set_log_time_enabled(False)
+    stream.set_log_tick_enabled(False)
+    planar = scene.planar(seen)
+    length = starts[-1] + _length(seen.trials[chosen[-1]])
+    stream.save(str(path), default_blueprint=_layout(seen, planar, length))
+    stream.send_recording_name(f"gap of {found.model}: {found.verdict.kind}")
+    _styles(stream, seen)
+    if planar:
+        scene.log_static(stream, seen)
+    for number, start in zip(chosen, starts, strict=True):
+        _residuals(stream, seen, number, start)
+        _observed(stream, seen, number, start)
+        if planar:
+            scene.send(stream, seen, number, start)
+    stream.log("about", _about(found, chosen), static=True)
+    stream.flush()
+    stream.disconnect()
+    return Path(path)
+
+
+def _length(trial: Trial) -> float:
+    return float(trial.times[-1] - trial.times[0])
+
+
+def _starts(seen: View, chosen: Sequence[int]) -> list[float]:
+    lengths = [_length(seen.trials[number]) + GAP for number in chosen]
+    return np.concatenate([[0.0], np.cumsum(lengths)[:-1]]).tolist()
+
+
+def _styles(stream, seen: View) -> None:
+    import rerun as rr
+
+    colours = {"nominal": NOMINAL, "corrected": CORRECTED, "floor": style.GREEN}
+    for feature in seen.problem.model.features:
+        for name, colour in colours.items():
+            stream.log(
+                f"residuals/{feature.name}/{name}",
+                rr.SeriesLines(names=name, colors=style.rgb(colour), widths=1.5),
+                static=True,
+            )
+    bright = {"recorded": "#ffffff", "nominal": NOMINAL, "corrected": style.SKY}
+    for channel in seen.trials[0].channels:
+        for name, colour in bright.items():
+            stream.log(
+                f"observed/{channel.name}/{name}",
+                rr.SeriesLines(names=name, colors=style.rgb(colour), widths=1.5),
+                static=True,
+            )
+
+
+def _residuals(stream, seen: View, number: int, start: float) -> None:
+    """Recorded minus predicted motion, window by window, in the features' units."""
+    windows = seen.problem.windows[number]
+    at = start + windows.times - seen.trials[number].times[0]
+    shown = {"nominal": seen.gap(number), "floor": 2 * seen.scatter(number)}
+    if seen.effects:
+        shown["corrected"] = seen.left[number]
+    for column, feature in enumerate(seen.problem.model.features):
+        for name, values in shown.items():
+            path = f"residuals/{feature.name}/{name}"
+            series.send(stream, path, at, values[:, column])
+
+
+def _observed(stream, seen: View, number: int, start: float) -> None:
+    trial = seen.trials[number]
+    at = start + trial.times - trial.times[0]
+    shown = {"recorded": trial.observed, "nominal": seen.nominal[number]}
+    if seen.effects:
+        shown["corrected"] = seen.corrected[number]
+    for name, values in shown.items():
+        for column, channel in enumerate(trial.channels):
+            fine = np.isfinite(values[:, column])
+            path = f"observed/{channel.name}/{name}"
+            series.send(stream, path, at[fine], values[fine, column])
+
+
+def _features(seen: View) -> list[Channel]:
+    """The features that are shown."""
+    return [seen.problem.model.features[column] for column in seen.largest()]
+
+
+def _channels(seen: View) -> list[Channel]:
+    """The channels that are shown: the pose, and those whose feature is."""
+    channels = list(seen.trials[0].channels)
+    named = {feature.name for feature in _features(seen)}
+    few = [c for c in channels if c.name in named or c.name in POSE]
+    return channels if len(channels) <= MOST else few
+
+
+def _layout(seen: View, planar: bool, length: float):
+    import rerun.blueprint as rrb
+
+    span = rrb.TimeRange(
+        rrb.TimeRangeBoundary.absolute(seconds=0.0),
+        rrb.TimeRangeBoundary.absolute(seconds=length),
+    )
+
+    def plots(root: str, words: str, channels):
+        """One below the other, a plot of each channel."""
+        return rrb.Vertical(
+            *(
+                rrb.TimeSeriesView(
+                    origin=f"{root}/{channel.name}",
+                    name=f"{channel.name} [{channel.unit}]{words}",
+                    axis_x=rrb.TimeAxis(view_range=span),
+                    plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+                )
+                for channel in channels
+            ),
+            name="Residuals" if root == "residuals" else "Observed",
+        )
+
+    residuals = plots("residuals", ": recorded minus predicted", _features(seen))
+    observed = plots("observed", "", _channels(seen))
+    about = rrb.TextDocumentView(origin="/about", name="How to read this")
+    if planar:
+        parts = rrb.Horizontal(
+            scene.view_3d(seen, BACKGROUND),
+            rrb.Tabs(residuals, observed, about, active_tab=0),
+            column_shares=[3, 2],
+        )
+    else:
+        parts = rrb.Horizontal(
+            residuals, rrb.Tabs(observed, about, active_tab=0), column_shares=[1, 1]
+        )
+    return rrb.Blueprint(
+        parts,
+        rrb.TimePanel(state="collapsed", timeline=LIVE_TIMELINE, play_state="paused"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _about(found: Diagnosis, chosen: Sequence[int]):
+    import rerun as rr
+
+    lines = [
+        f"# {found.verdict.kind}",
+        "",
+        found.verdict.sentence,
+        "",
+        "**World.** Side by side, on the same commands from the same start: the "
+        "nominal model (orange), the recorded robot in its own colours, the corrected "
+        "model (blue). Beside the models' paths the recorded one is drawn thin. The "
+        "recorded path is grey where the nominal model is right and red where it "
+        "fails; arrows show by how much its motion is wrong there, five times "
+        "enlarged.",
+        "",
+        "**Residuals.** Recorded minus predicted motion, window by window; the green "
+        "line is two deviations of what the recording scatters by itself.",
+        "",
+        f"Trials shown, one after another: {', '.join(map(str, chosen))} (those with "
+        "the largest gap).",
+    ]
+    return rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN)

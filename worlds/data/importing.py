@@ -1,0 +1,267 @@
+"""Logs from elsewhere as trials: CSV and MCAP, columns mapped to channels.
+
+See `bns.worlds.data.column_map` for the map. Where the commanded wheel speeds are given
+each stretch of equal ones becomes a command. Times count from the start of each trial,
+headings are made continuous, empty or NaN poses are lost samples. What comes out can be
+written with `bns.worlds.data.dataset.write`.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from bns.errors import FormatError
+from bns.worlds.data import dataset_checks as checks
+from bns.worlds.data.column_map import SPEEDS, ColumnMap, Source, factor
+from bns.worlds.data.mcap_log import STAMPS
+from bns.worlds.trial import POSE, Commands, Trial
+
+MOMENTS = "command_moments"
+"""condition of a trial: "sampled" where commands are only known to begin by a sample"""
+
+CLOCK = 1e-6  # s; nearer to a sample a command begins with it
+
+
+def from_csv(
+    path: str | Path,
+    columns: Mapping[str, str] | ColumnMap | str | Path,
+    *,
+    units: Mapping[str, str] | None = None,
+    robot: str = "khepera3",
+    delimiter: str = ",",
+) -> list[Trial]:
+    """Trials from a table of samples, one row each, with a line of column names.
+
+    Args:
+        path: of the CSV file.
+        columns: which column holds which channel; a mapping, a `ColumnMap` or a TOML
+            file of one.
+        units: of the channels that are not in SI (with a mapping only).
+        robot: name of the robot model (with a mapping only).
+        delimiter: between columns.
+
+    Raises:
+        FormatError: no such file, no table, a column missing or not of numbers, time
+            going backwards.
+        BnsError: an unknown channel or unit.
+    """
+    found = _map(columns, units, robot)
+    table = _csv_columns(
+        Path(path), [s.column for s in found.columns.values()], delimiter
+    )
+    named = {name: table[source.column] for name, source in found.columns.items()}
+    return trials(named, found, where=str(path))
+
+
+def from_mcap(
+    path: str | Path,
+    columns: Mapping[str, str] | ColumnMap | str | Path,
+    *,
+    units: Mapping[str, str] | None = None,
+    robot: str = "khepera3",
+) -> list[Trial]:
+    """Trials from an MCAP log of JSON messages, or ROS 2 ones.
+
+    A column is written ``/topic:field``, with dots for fields in fields. The topic of
+    `x` gives the samples; of other topics the last message before each holds. The
+    column of `time` may be ``log_time`` or ``publish_time`` (unit ns); the stamps of
+    the speeds' messages then say when they were sent.
+
+    Args:
+        path: of the MCAP file.
+        columns, units, robot: as in `from_csv`.
+
+    Raises:
+        MissingDependencyError: the package `mcap` is not installed, or
+            `mcap-ros2-support` for a log of ROS 2 messages.
+        FormatError: no such file, no MCAP, a topic or field missing.
+        BnsError: an unknown channel or unit.
+    """
+    from bns.worlds.data import mcap_log
+
+    found = _map(columns, units, robot)
+    sources = {name: source.column for name, source in found.columns.items()}
+    stamped = SPEEDS[0] if _told_apart(found) else ""
+    named = mcap_log.samples(Path(path), sources, clock="x", stamped=stamped)
+    if stamped:
+        clock = Source(sources["time"], found.columns["time"].unit)
+        found = replace(found, columns={**found.columns, "command_time": clock})
+    return trials(named, found, where=str(path))
+
+
+def _told_apart(columns: ColumnMap) -> bool:
+    """Whether a log's own stamps say when the speeds were sent."""
+    own = columns.columns["time"].column in STAMPS
+    return (
+        own and SPEEDS[0] in columns.columns and "command_time" not in columns.columns
+    )
+
+
+def _map(
+    columns: Mapping[str, str] | ColumnMap | str | Path,
+    units: Mapping[str, str] | None,
+    robot: str,
+) -> ColumnMap:
+    if isinstance(columns, ColumnMap):
+        return columns
+    if isinstance(columns, str | Path):
+        return ColumnMap.read(columns)
+    return ColumnMap.of(columns, units, robot)
+
+
+def _csv_columns(
+    path: Path, wanted: Sequence[str], delimiter: str
+) -> dict[str, np.ndarray]:
+    import pyarrow
+    from pyarrow import csv
+
+    try:
+        table = csv.read_csv(
+            path,
+            parse_options=csv.ParseOptions(delimiter=delimiter),
+            convert_options=csv.ConvertOptions(
+                include_columns=sorted(set(wanted)), include_missing_columns=False
+            ),
+        )
+    except KeyError as error:
+        raise FormatError(f"{path} lacks a column of the map: {error}.") from None
+    except (pyarrow.ArrowException, OSError) as error:
+        raise FormatError(f"{path} cannot be read as CSV ({error}).") from None
+    arrays = {}
+    for name in table.column_names:
+        column = table.column(name)
+        if not (
+            pyarrow.types.is_integer(column.type)
+            or pyarrow.types.is_floating(column.type)
+        ):
+            raise FormatError(
+                f"{path}: column {name!r} is {column.type}, it needs numbers."
+            )
+        arrays[name] = column.cast("float64").fill_null(np.nan).to_numpy()
+    return arrays
+
+
+def trials(
+    named: Mapping[str, np.ndarray], columns: ColumnMap, *, where: str
+) -> list[Trial]:
+    """Trials from arrays by channel, in the units of the map.
+
+    Args:
+        named: samples by channel, each ``(T,)``, in order of time.
+        columns: the map.
+        where: what to name in errors.
+
+    Raises:
+        FormatError: no sample, or a trial that is not valid.
+    """
+    si = {
+        name: np.asarray(values, float) * factor(name, columns.columns[name].unit)
+        for name, values in named.items()
+    }
+    if not len(si["time"]):
+        raise FormatError(f"{where}: there is no sample in it.")
+    label = si.get("trial", np.zeros(len(si["time"])))
+    edges = np.flatnonzero(np.diff(label) != 0) + 1
+    return [
+        _trial({key: si[key][rows] for key in si}, columns, f"{where}: trial {index}")
+        for index, rows in enumerate(np.split(np.arange(len(label)), edges))
+    ]
+
+
+def _trial(si: Mapping[str, np.ndarray], columns: ColumnMap, where: str) -> Trial:
+    times = si["time"] - si["time"][0]
+    if not np.isfinite(times).all() or (np.diff(times) < 0).any():
+        row = int(np.flatnonzero(~(np.diff(times, prepend=-np.inf) >= 0))[0])
+        raise FormatError(
+            f"{where}: time is missing or goes backwards at sample {row}; sort the "
+            "samples by time."
+        )
+    pose = np.stack([si[name] for name in POSE], axis=1)
+    pose[~np.isfinite(pose).all(axis=1)] = np.nan
+    seen = np.isfinite(pose[:, 2])
+    pose[seen, 2] = np.unwrap(pose[seen, 2])
+    other = [si[channel.name] for channel in columns.observed[len(POSE) :]]
+    commands, boundaries = _commands(si, times)
+    observed = np.column_stack([pose, *other])
+    exact = "command_time" in si or not len(commands)
+    if "command_time" in si and len(commands):
+        sent = si["command_time"] - si["time"][0]
+        times, observed, boundaries = _sent(times, observed, boundaries, sent, where)
+        commands = replace(commands, durations=np.diff(times[boundaries]))
+    trial = Trial(
+        commands=commands,
+        times=times,
+        observed=observed,
+        boundaries=boundaries,
+        channels=columns.observed,
+        robot=columns.robot,
+        world="imported",
+        conditions={} if exact else {MOMENTS: "sampled"},
+    )
+    checks.valid(trial, where)
+    return trial
+
+
+def _commands(
+    si: Mapping[str, np.ndarray], times: np.ndarray
+) -> tuple[Commands, np.ndarray]:
+    """Stretches of equal speeds, and the samples between which they hold."""
+    none = Commands(np.zeros((0, 2)), np.zeros(0)), np.zeros(1, int)
+    if SPEEDS[0] not in si or len(times) < 2:
+        return none
+    speeds = np.stack([si[name] for name in SPEEDS], axis=1)
+    speeds = _held(speeds)
+    change = (np.diff(speeds[:-1], axis=0) != 0).any(axis=1)
+    begins = np.concatenate([[0], np.flatnonzero(change) + 1])
+    begins = begins[np.diff(times[np.append(begins, len(times) - 1)]) > 0]
+    if not len(begins):
+        return none
+    bounds = np.append(begins, len(times) - 1)
+    return Commands(speeds[begins], np.diff(times[bounds])), bounds
+
+
+def _sent(
+    times: np.ndarray,
+    observed: np.ndarray,
+    boundaries: np.ndarray,
+    sent: np.ndarray,
+    where: str,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Samples with those added, without a pose, at which commands began.
+
+    Raises:
+        FormatError: a command sent after the sample that has it, or before the one
+            before.
+    """
+    rows = boundaries[1:-1]
+    begins, first = sent[rows], times[rows - 1]
+    wrong = np.flatnonzero(
+        ~((begins > first - CLOCK) & (begins <= times[rows] + CLOCK))
+    )
+    if len(wrong):
+        row = rows[wrong[0]]
+        raise FormatError(
+            f"{where}: command_time is {sent[row]:.4g} s where the sample of "
+            f"{times[row]:.4g} s is the first with the command and the one before is "
+            f"of {times[row - 1]:.4g} s; it has to lie between them."
+        )
+    late = times[rows] - begins > CLOCK
+    begins = np.maximum(begins, first + CLOCK)
+    at = rows[late]
+    new = observed[at - 1]  # a copy
+    new[:, : len(POSE)] = np.nan
+    grown = np.insert(times, at, begins[late])
+    held = np.insert(observed, at, new, axis=0)
+    before = np.concatenate([[0], np.cumsum(late)])
+    inner = rows + before[:-1]
+    ends = [[0], inner, [len(grown) - 1]]
+    return grown, held, np.concatenate(ends)
+
+
+def _held(speeds: np.ndarray) -> np.ndarray:
+    """Missing speeds are the last ones given; before the first the robot stands."""
+    given = np.isfinite(speeds).all(axis=1)
+    last = np.maximum.accumulate(np.where(given, np.arange(len(speeds)), -1))
+    return np.where(last[:, None] >= 0, speeds[last], 0.0)

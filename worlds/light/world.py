@@ -1,0 +1,178 @@
+"""The physics world with lamps: robots that see light and steer themselves."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from functools import cached_property
+from math import inf
+
+import numpy as np
+
+from bns import seeding
+from bns.errors import BnsError
+from bns.worlds import given, objects
+from bns.worlds.active import Placed, Stages
+from bns.worlds.damage import Damage
+from bns.worlds.light import sensors as light_sensors
+from bns.worlds.light import starts as light_starts
+from bns.worlds.light.field import Lamp, LightField
+from bns.worlds.light.sensing import LEAD, Sensing
+from bns.worlds.light.supervisor import Supervisor
+from bns.worlds.objects import Objects, Post, RayScreen
+from bns.worlds.physics import observe
+from bns.worlds.physics.rollout import Motion
+from bns.worlds.physics.wheeled_world import MujocoWorld, Plan
+from bns.worlds.trial import Trial
+
+
+class LightWorld(MujocoWorld):
+    """Robots that see light in MuJoCo and steer themselves, N at a time.
+
+    What `MujocoWorld` is, and lamps: `drive` lets controllers drive by what the light
+    sensors read. Lamps have no body to bump into; the safety boundary is around them.
+
+    Args:
+        lights: lamps, as `Lamp` or as tables with its fields.
+        ambient: irradiance that is everywhere [W/m2].
+        posts: things in the way, as `Post` or as tables with its fields.
+        sensors: which way the sensors look, where the robot offers several: of a
+            Khepera III "thesis" (the usual) or "public".
+        singles: whether trials have each single sensor beside the virtual two.
+        supervisor: what happens at the lamp and at the edge, as `Supervisor` or as a
+            table with its fields.
+        damage, reality, sample_dt, threads, start, arena, name, truth: those of
+            `MujocoWorld`; `start` is that of `run`.
+
+    Raises:
+        BnsError: no lamp, a robot without light sensors.
+    """
+
+    stages = (*MujocoWorld.stages, "sensor")
+
+    def __init__(
+        self,
+        robot: str = "khepera3",
+        *,
+        lights: Sequence[Lamp | Mapping] = (Lamp(),),
+        ambient: float = 0.02,
+        posts: Sequence[Post | Mapping] = (),
+        sensors: str = "",
+        singles: bool = False,
+        supervisor: Supervisor | Mapping | None = None,
+        damage: Damage | Sequence = (),
+        reality: Damage | Sequence = (),
+        sample_dt: float = 0.1,
+        threads: int = 2,
+        start: Sequence[float] = (0.0, 0.0, 0.0),
+        arena: Sequence[float] = (2.7, 1.8),
+        name: str = "light",
+        truth: bool = False,
+    ):
+        super().__init__(
+            robot,
+            damage=damage,
+            reality=reality,
+            sample_dt=sample_dt,
+            threads=threads,
+            start=start,
+            arena=arena,
+            name=name,
+            truth=truth,
+        )
+        self.field = LightField(given.several(Lamp, "lamp", lights), ambient)
+        self.posts = given.several(Post, "object", posts)
+        self.sensors = light_sensors.of(robot, sensors)
+        self.radius = self.sensors.radius
+        objects.checked(self.posts, self._places, np.zeros((0, 2)), self.radius)
+        self._screen = RayScreen(self.posts) if self.posts else None
+        self.singles = singles
+        told = {} if supervisor is None else supervisor
+        self.supervisor = given.one(Supervisor, "supervisor", told)
+
+    def _refuse(self, damage: Damage) -> None:
+        light_sensors.refuse_absent(damage, self.robot)
+
+    def _supervisor(self) -> Supervisor:
+        return self.supervisor
+
+    @cached_property
+    def _places(self) -> np.ndarray:
+        return self.field.positions[:, :2]
+
+    def _lamps(self) -> np.ndarray:
+        return self._places
+
+    def _sensing(
+        self, stages: Sequence[Stages], seeds: Sequence[int], trial: int, reads: int
+    ) -> Sensing:
+        return Sensing(
+            self.field,
+            self.sensors,
+            stages,
+            seeds=seeds,
+            trial=trial,
+            reads=reads,
+            screen=self._screen,
+            singles=self.singles,
+        )
+
+    def _stages(self, damage: Damage, trial: int, duration: float) -> Stages:
+        stages = super()._stages(damage, trial, duration)
+        if not self.posts:
+            return stages
+        placed = Placed(Objects(self.posts), 0.0, inf, ("objects",))
+        return replace(stages, body=(placed, *stages.body))
+
+    def _about(self) -> dict[str, object]:
+        about = {"lights": [asdict(lamp) for lamp in self.field.lamps]}
+        if self.posts:
+            about["objects"] = [asdict(post) for post in self.posts]
+        return super()._about() | about | {"ambient": self.field.ambient}
+
+    def _observe(self, plan: Plan, motion: Motion, trial: int) -> Trial:
+        """The trial of a list of commands, with what was read after each."""
+        made = super()._observe(plan, motion, trial)
+        ends = np.concatenate([[0], np.cumsum(plan.counts)])
+        sensing = self._sensing([plan.stages], [plan.seed], trial, len(ends))
+        for before, end in zip([0, *ends], ends, strict=False):
+            at = max(end - round(LEAD / self.dt), before)
+            free = motion.states[at, 1:8][None]
+            moment = np.array([at * self.dt])
+            sensing.read(end * self.dt, observe.flat(free), moment)
+        held = np.searchsorted(made.boundaries, np.arange(len(made.times)), "right") - 1
+        return made.replace(
+            observed=np.hstack([made.observed, sensing.readings[0][held]]),
+            channels=made.channels + sensing.channels,
+        )
+
+    def _starts(self, n: int, seeds: Sequence[int], trial: int) -> np.ndarray:
+        return np.array([self._start(seed, trial) for seed in seeds]).reshape(n, 3)
+
+    def _start(self, seed: int, trial: int) -> tuple[float, float, float]:
+        """Anywhere on the board, but not near a lamp, an object or the edge."""
+        rng = seeding.generator(seed, "world", trial, "start")
+        taken = [(p.x, p.y, p.radius + self.radius) for p in self.posts]
+        return light_starts.anywhere(
+            rng, self.arena, self._places, edge=self.supervisor.edge, taken=taken
+        )
+
+    def _checked_starts(self, starts: object, n: int) -> np.ndarray:
+        poses = super()._checked_starts(starts, n)
+        objects.checked(self.posts, self._places, poses, self.radius)
+        for pose in poses:
+            way = np.hypot(*(self._places - pose[:2]).T)
+            lamp = int(way.argmin())
+            where = (
+                f"lamp {lamp} at ({', '.join(f'{v:g}' for v in self._places[lamp])})"
+            )
+            if way[lamp] < self.radius:
+                raise BnsError(
+                    f"Start ({pose[0]:g}, {pose[1]:g}) puts {where} inside the robot; "
+                    "start further away."
+                )
+            if way[lamp] < self.supervisor.safety:
+                raise BnsError(
+                    f"Start ({pose[0]:g}, {pose[1]:g}) is {way[lamp]:.3f} m from "
+                    f"{where}, inside its safety boundary of "
+                    f"{self.supervisor.safety:g} m; start further away."
+                )
+        return poses

@@ -1,0 +1,118 @@
+"""Compiled models by robot and body effects, and robots placed at their start."""
+
+from functools import lru_cache
+from itertools import pairwise
+
+import mujoco
+import numpy as np
+
+from bns import models
+from bns.worlds.active import Placed
+from bns.worlds.effects.base import BodyEffect
+from bns.worlds.physics import control, servo_joint
+from bns.worlds.physics.rollout import STATE, Compiled, Job, Segment, run
+
+ARENA = 2**22
+"""bytes of work space of a robot; a hexapod that falls over uses 0.13 MB. MuJoCo's own
+choice is 14 MB, and a diagnosis keeps hundreds of them"""
+
+SETTLE = 0.5  # [s] at rest before a trial, so that it starts without a bounce; assumed
+
+
+@lru_cache(maxsize=256)
+def compiled(robot: str, effects: tuple[BodyEffect, ...] = ()) -> Compiled:
+    """The robot's scene with the effects written into it.
+
+    Args:
+        robot: name of the robot model.
+        effects: edits, in order.
+    """
+    spec = models.spec(robot, visuals=False)
+    servo_joint.fit(spec, models.robot(robot))
+    for effect in effects:
+        effect.edit(spec)
+    if spec.memory < 0:  # not said in the model
+        spec.memory = ARENA
+    return Compiled(spec.compile())
+
+
+@lru_cache(maxsize=256)
+def start_state(scene: Compiled, start: tuple[float, float, float]) -> np.ndarray:
+    """Full physics state of the robot at rest at its start pose, time 0.
+
+    The robot is put down in its `home` pose and left alone for `SETTLE` seconds, so
+    that it stands as its body and the floor let it stand; what it drifts is undone.
+
+    Args:
+        scene: the compiled model.
+        start: pose (x, y, yaw) in the world frame [m, m, rad].
+    """
+    model = scene.model
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    place = free_joint(model)
+    data.qpos[place] = posed(data.qpos[place], start)
+    state = np.empty(mujoco.mj_stateSize(model, STATE))
+    mujoco.mj_getState(model, data, state, STATE)
+    rest = np.zeros((round(SETTLE / model.opt.timestep), model.nu))
+    rest[:] = data.ctrl
+    motion = run(Job(state, (Segment(scene, rest),)))
+    if motion.diverged < 0:
+        mujoco.mj_setState(model, data, motion.states[-1], STATE)
+        data.time = 0.0
+        data.qvel[:] = 0.0
+        data.qpos[place] = posed(data.qpos[place], start)
+        mujoco.mj_getState(model, data, state, STATE)
+    state.setflags(write=False)
+    return state
+
+
+def posed(free: np.ndarray, start: tuple[float, float, float]) -> np.ndarray:
+    """A free joint's (7,) values moved to a planar pose, its height and tilt kept."""
+    x, y, yaw = start
+    w, i, j, k = free[3:]
+    angle = yaw - np.arctan2(2 * (w * k + i * j), 1 - 2 * (j * j + k * k))
+    turn = np.array([np.cos(angle / 2), 0, 0, np.sin(angle / 2)])
+    turned = np.empty(4)
+    mujoco.mju_mulQuat(turned, turn, free[3:])
+    return np.array([x, y, free[2], *turned])
+
+
+def free_joint(model: mujoco.MjModel) -> slice:
+    """Where the base's position and orientation lie in qpos."""
+    joint = int(np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)[0])
+    at = int(model.jnt_qposadr[joint])
+    return slice(at, at + 7)
+
+
+def segments(
+    robot: str, effects: tuple[Placed, ...], values: np.ndarray, dt: float
+) -> tuple[Segment, ...]:
+    """The trial cut where a body effect starts or stops.
+
+    Args:
+        robot: name of the robot model.
+        effects: body effects with their spans.
+        values: actuator controls on the physics grid, shape ``(S, nu)``.
+        dt: physics step [s].
+    """
+    total = len(values)
+    if not effects:
+        return (Segment(compiled(robot), values),)
+    moments = [moment for item in effects for moment in (item.start, item.stop)]
+    inside = {control.step_at(moment, dt) for moment in moments if np.isfinite(moment)}
+    cuts = [0, *sorted(step for step in inside if 0 < step < total), total]
+    return tuple(
+        Segment(compiled(robot, _held(effects, begin, dt)), values[begin:end])
+        for begin, end in pairwise(cuts)
+    )
+
+
+def _held(effects: tuple[Placed, ...], step: int, dt: float) -> tuple[BodyEffect, ...]:
+    """The effects that hold from a physics step on."""
+    return tuple(
+        item.effect
+        for item in effects
+        if control.step_at(item.start, dt) <= step
+        and not (np.isfinite(item.stop) and control.step_at(item.stop, dt) <= step)
+    )

@@ -1,0 +1,169 @@
+"""The physics world of walking robots: servo goals, each until the robot rests."""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+import numpy as np
+
+from bns import models
+from bns.models.ax12a import SPEED_UNIT
+from bns.worlds.active import Stages
+from bns.worlds.checks import bounded, of_kind
+from bns.worlds.damage import Damage
+from bns.worlds.physics import control, legged_flags, legged_plan, observe
+from bns.worlds.physics.legged_goals import in_units
+from bns.worlds.physics.legged_plan import Servos
+from bns.worlds.physics.legged_rollout import Walk, WalkJob, walk
+from bns.worlds.physics.world import PhysicsWorld
+from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Trial
+
+STAGES = ("command", "actuator", "body", "sensor", "tracking")
+SPEED = round(300 * SPEED_UNIT, 4)  # [rad/s] moving speed register 300; assumed
+LOADS_EVERY = 5  # steps at which the servos' loads are looked at
+
+
+class Plan(NamedTuple):
+    """One robot's trial before it is run."""
+
+    commands: Commands
+    stages: Stages
+    seed: int
+    servos: Servos
+    job: WalkJob
+
+
+class HexapodWorld(PhysicsWorld[Plan]):
+    """Walking robots in MuJoCo: a command is a goal for every servo, until they rest.
+
+    Each command lasts until servos and body are at rest, at most as long as it is told
+    (`Commands.durations`); the actual times are the trial's. Observed are the pose and,
+    after it, the position that each servo reports. A trial depends on its commands,
+    damage, trial number and seed alone.
+
+    Goals are those of the servos from half-way [rad], signs alike for all legs: coxa
+    forward, femur up, tibia outward. One beyond a servo's end stops is refused; what an
+    effect moves beyond them ends there, as on the robot.
+
+    Args:
+        robot: name of the robot model, see `bns robots`.
+        speed: moving speed of the servos [rad/s].
+        threads: of the physics.
+        damage, reality, sample_dt, start, arena, name, truth: see `PhysicsWorld`.
+
+    Raises:
+        UnknownNameError: no such robot or effect.
+        OutOfBoundsError: a number outside its bounds, a start outside the arena.
+        BnsError: an effect that this robot or world cannot have, effects that take all
+            legs away or let the robot start fallen.
+    """
+
+    stages = STAGES
+
+    def __init__(
+        self,
+        robot: str = "phantomx",
+        *,
+        damage: Damage | Sequence = (),
+        reality: Damage | Sequence = (),
+        speed: float = SPEED,
+        sample_dt: float = 0.1,
+        threads: int = 2,
+        start: Sequence[float] = (0.0, 0.0, 0.0),
+        arena: Sequence[float] = (2.7, 1.8),
+        name: str = "hexapod",
+        truth: bool = False,
+    ):
+        super().__init__(
+            robot,
+            of_kind("legged", models.robot(robot)),
+            damage=damage,
+            reality=reality,
+            sample_dt=sample_dt,
+            start=start,
+            arena=arena,
+            name=name,
+            truth=truth,
+        )
+        self._ranges = self.model.ranges
+        readings = (Channel(f"{c.name}_position", c.unit) for c in self.model.commands)
+        self.channels = (*POSE_CHANNELS, *readings)
+        self.speed = bounded("speed", speed, 0.01, 100.0, "rad/s")
+        threads = int(bounded("threads", threads, 1, 1024, "1"))
+        self._threads = ThreadPoolExecutor(threads) if threads > 1 else None
+        legged_plan.refuse_fallen(robot, self.reality, self.start, self._channels)
+
+    @property
+    def dt(self) -> float:
+        """Physics step [s]."""
+        return legged_plan.timestep(self.robot)
+
+    def motions(self, plans: Sequence[Plan]) -> list[Walk]:
+        """What the physics makes of plans, see `PhysicsWorld.motions`."""
+        jobs = [plan.job for plan in plans]
+        if self._threads is None or len(jobs) == 1:
+            return [walk(job) for job in jobs]
+        return list(self._threads.map(walk, jobs))
+
+    def _refuse(self, damage: Damage) -> None:
+        legged_plan.refuse_legless(self.reality + damage, self.model)
+
+    def _about(self) -> dict[str, object]:
+        return {"speed": self.speed} | super()._about()
+
+    def _plan(self, commands: Commands, damage: Damage, trial: int, seed: int) -> Plan:
+        control.check(commands, self._channels, self._ranges, self.robot)
+        stages = Stages.of(self.reality, damage, trial, commands.duration)
+        job, servos = legged_plan.job(
+            self.robot,
+            commands,
+            stages,
+            start=self.start,
+            speed=self.speed,
+            seed=seed,
+            trial=trial,
+        )
+        return Plan(commands, stages, seed, servos, job)
+
+    def _observe(self, plan: Plan, done: Walk, trial: int) -> Trial:
+        servos, states = plan.servos, done.states
+        free = states[:, 1:8]
+        every = max(self.sample_dt / self.dt, 1.0)
+        sampled, boundaries = observe.sample_steps(done.counts, every)
+        poses = observe.planar(free, self.start[2])
+        times, seen = observe.watched(
+            poses,
+            sampled,
+            dt=self.dt,
+            effects=plan.stages.tracking,
+            seed=plan.seed,
+            trial=trial,
+        )
+        readings = states[np.ix_(sampled, servos.angles)] + servos.laws["offset"]
+        readings = in_units(readings, servos.laws["quantisation"])
+        some = slice(None, -1, LOADS_EVERY)
+        outcome = legged_flags.outcome(
+            free,
+            states[some, servos.angles],
+            states[some, servos.speeds],
+            done.control[::LOADS_EVERY],
+            servos.laws,
+            servos.carried,
+            dt=self.dt * LOADS_EVERY,
+            arena=self.arena,
+            touched=bool(done.touched.any()),
+            rested=bool(done.rested.all()),
+            diverged=done.diverged >= 0,
+        )
+        return Trial(
+            commands=plan.commands,
+            times=times,
+            observed=np.column_stack([seen, readings]),
+            boundaries=boundaries,
+            channels=self.channels,
+            outcome=outcome,
+            robot=self.robot,
+            world=self.name,
+            conditions=plan.stages.conditions(trial, plan.seed) | self._about(),
+            truth=servos.hidden(states[sampled]) if self.truth else {},
+        )
