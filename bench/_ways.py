@@ -84,7 +84,8 @@ def _cable(scene: Scene) -> float:
 
 def _hears(scene: Scene, begin: float) -> float:
     """When a robot that starts anew hears again [s]."""
-    while not (row := scene.log.newest("hears", begin, time.monotonic())):
+    # a row has the time at which the robot's round began, a moment earlier
+    while not (row := scene.log.newest("hears", begin - 0.5, time.monotonic())):
         if time.monotonic() > begin + 10:
             raise BnsError("The emulated robot does not start anew.")
         time.sleep(0.01)
