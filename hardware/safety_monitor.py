@@ -74,8 +74,8 @@ class SafetyMonitor(ABC):
     def _seen(self, *, moving: bool) -> list[Sighting]:
         """New sightings; a robot that moves must have been seen of late.
 
-        Pictures that cannot be of now are left out: repeated ones of a robot that
-        moves, and those with a time stamp ahead of the clock.
+        Pictures that cannot be of now are left out: repeated ones, and those with a
+        time stamp ahead of the clock.
 
         Raises:
             SafetyStop: the operator says so, the camera is gone, a lamp is near.
@@ -87,7 +87,7 @@ class SafetyMonitor(ABC):
         except BnsError as error:
             raise SafetyStop(f"the camera is lost ({error})", "check it") from error
         latest = self.clock.now() + AHEAD
-        seen = [s for s in seen if s.time <= latest and not (moving and s.repeated)]
+        seen = [s for s in seen if s.time <= latest and not s.repeated]
         if seen:
             self.last = seen[-1]
         if moving and (self.last is None or self._since(self.last) > self.limits.blind):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from bns.errors import BnsError
 from bns.hardware.motion_check import AXLE, SLOWEST, MotionCheck
 from bns.hardware.tracking.tracker import Frame, Sighting, Tracker
 from bns.worlds.trial import Commands
@@ -121,6 +122,11 @@ def test_a_camera_that_hangs_stops_the_robot_in_time(way, monkeypatch):
     stops = [at for at in rig.device.stops if at > broken["at"] > 0]
     assert stops[0] - broken["at"] < 0.2
     assert max(map(abs, rig.body.wheel_speeds())) < 0.02
+    if way in ("frozen", "stale", "ahead"):  # nor does it begin to move again
+        told = len(rig.device.log)
+        with pytest.raises(BnsError, match="not in view"):
+            world.run([ROUND])
+        assert all(row[1:] == (0, 0) for row in list(rig.device.log)[told:])
 
 
 def test_a_robot_that_is_held_is_no_hanging_camera():
