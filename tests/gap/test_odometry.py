@@ -100,15 +100,14 @@ def test_numbers_come_back_within_their_deviations():
 
 
 def test_a_bias_of_lengths_makes_diameters_uncertain():
-    data = motions({}, bias=2e-4)
+    data, names = motions({}, bias=2e-4), ("axle", "both_diameters")
     sure, unsure = (
-        problem(data, length_bias=bias).fit(("both_diameters",)) for bias in (0.0, 2e-4)
+        problem(data, length_bias=bias).fit(names, slack=0.0) for bias in (0.0, 2e-4)
     )
-    assert unsure.deviations["both_diameters"] > 1.5 * sure.deviations["both_diameters"]
-    assert (
-        abs(unsure.magnitudes["both_diameters"])
-        < 3 * (unsure.deviations["both_diameters"])
-    )
+    name = "both_diameters"
+    assert unsure.deviations[name] > 2 * sure.deviations[name]
+    assert abs(sure.magnitudes[name]) > 5 * sure.deviations[name]
+    assert abs(unsure.magnitudes[name]) < 3 * unsure.deviations[name]
 
 
 def test_five_departures_come_out_together():

@@ -88,7 +88,8 @@ class Motions:
         """
         axle, left, right, scale, x, y, angle, bias = values
         way, turn = self.driven(left, right, axle)
-        sign = np.sign(way) * (np.abs(way) > STILL)
+        told = self.driven()[0]
+        sign = np.sign(told) * (np.abs(told) > STILL)
         chord = (1 + scale) * way * np.sinc(turn / (2 * np.pi)) + bias * sign
         cos, sin = np.cos(turn) - 1, np.sin(turn)
         dx = chord * np.cos(turn / 2) + (1 + scale) * (cos * x - sin * y)
