@@ -6,7 +6,7 @@ import pytest
 from bns.errors import BnsError
 from bns.gap.importers.khepera3_odometry import chained
 from bns.gap.models.odometry import diagnosis
-from bns.gap.models.odometry.fit import problem
+from bns.gap.models.odometry.fit import TERMS, problem
 from bns.gap.models.odometry.motions import (
     NUMBERS,
     TURN,
@@ -27,7 +27,9 @@ def motions(magnitudes, *, speed=0.01, count=1200, bias=0.0, seed=0) -> Motions:
     kinds = np.array([(1, 1), (-1, -1), (-1, 1), (1, -1)])[rng.integers(0, 4, count)]
     ways = kinds * speed * INTERVAL * rng.uniform(0.95, 1.0, (count, 2))
     clean = Motions(ways[:, 0], ways[:, 1], np.zeros((count, 3)), AXLE)
-    truth = changed({"length_bias": bias, **magnitudes})
+    truth = changed({"length_bias": bias})
+    for name, value in magnitudes.items():
+        truth += changed(dict.fromkeys(TERMS[name].numbers, value))
     seen = clean.predict(truth) + rng.normal(0, SCATTER, (count, 3))
     seen[rng.integers(0, count, 5)] += 0.1
     return Motions(ways[:, 0], ways[:, 1], seen, AXLE)
@@ -165,7 +167,9 @@ def test_fast_drives_settle_it():
     found = diagnosis.diagnose(data)
     assert found.verdict.kind == "effect"
     assert found.verdict.named == (("both_diameters",),)
-    assert "both_diameters +2.0" in found.verdict.sentence
+    magnitude = found.fits["both_diameters",].magnitudes["both_diameters"]
+    assert magnitude == pytest.approx(0.02, abs=5e-4)
+    assert f"both_diameters {100 * magnitude:+.2f} %" in found.verdict.sentence
     assert found.plan == ()
 
 

@@ -76,17 +76,21 @@ def diagnose(
         )
     problem = fit.problem(motions, length_bias=length_bias)
     full = problem.fit(FULL)
-    unseen = tuple(n for n in MOUNT if full.deviations[n] > UNSEEN * TERMS[n].size)
-    search = Search(replace(problem, unseen=unseen))
+    place = problem.fit(MOUNT[:2])  # on its own: an open heading leaves it on a circle
+    known = {**full.deviations, **place.deviations}
+    unseen = tuple(n for n in MOUNT if known[n] > UNSEEN * TERMS[n].size)
+    search = Search(problem)
     best = search.best()
     tied = search.tied(best)
-    fits = {names: search.fit(names) for names in {(), *tied}}
-    gain = held_out(search.problem, best)
+    honest = replace(problem, unseen=unseen)
+    fits = {names: honest.fit(names) for names in {(), *tied}}
+    gain = held_out(problem, best)
     plan = _plan(motions, fits[tied[0]], fits[tied[1]]) if len(tied) > 1 else ()
     verdict = _verdict(tied, fits, gain, plan, unseen)
-    shares = _shares(search.problem, best)
-    noise = search.problem.noise
-    return OdometryDiagnosis(verdict, fits, full, shares, unseen, gain, noise, plan)
+    shares = _shares(problem, best)
+    return OdometryDiagnosis(
+        verdict, fits, full, shares, unseen, gain, problem.noise, plan
+    )
 
 
 def _supports() -> Iterator[tuple[str, ...]]:
