@@ -9,13 +9,14 @@ import numpy as np
 from bns.errors import BnsError
 from bns.gap.models.odometry import fit
 from bns.gap.models.odometry.fit import BLOCK, FULL, TERMS, Noise, OdometryFit, Problem
-from bns.gap.models.odometry.motions import Motions
+from bns.gap.models.odometry.motions import TURN, Motions
 from bns.gap.records import Verdict
 
 TIE = 3.0  # difference of evidence up to which two supports are tied; assumed
 UNSEEN = 0.5  # of a plausible size: known no better, a mount's number is not seen
 REACH, MOST = 6.0, 12  # evidence behind the best, and how many, are fitted in full
 MOUNT = ("mount_x", "mount_y", "mount_angle")
+TURNED = 0.2  # [rad] no sensor is turned as far by accident; assumed
 SENSOR = np.array([0.005, 0.005, 0.01])
 """deviation of a pose measured before and after a whole drive [m, m, rad]; assumed"""
 
@@ -79,7 +80,8 @@ def diagnose(
     place = problem.fit(MOUNT[:2])  # on its own: an open heading leaves it on a circle
     known = {**full.deviations, **place.deviations}
     unseen = tuple(n for n in MOUNT if known[n] > UNSEEN * TERMS[n].size)
-    search = Search(problem)
+    turned = abs(full.values[TURN]) > TURNED
+    search = Search(problem, tuple(_allowed(unseen, turned)))
     best = search.best()
     tied = search.tied(best)
     honest = replace(problem, unseen=unseen)
@@ -93,16 +95,21 @@ def diagnose(
     )
 
 
-def _supports() -> Iterator[tuple[str, ...]]:
-    """All sets of terms in which no two change the same number."""
-    for count in range(len(FULL) + 1):
-        for names in combinations(TERMS, count):
+def _allowed(unseen: Sequence[str], turned: bool) -> Iterator[tuple[str, ...]]:
+    """All sets of terms that are seen, in which no two change the same number.
+
+    Args:
+        unseen: terms that no drive shows.
+        turned: whether the sensor was turned on purpose. Its place is then two numbers
+            or none: a heading known a little only could turn either of them to zero.
+    """
+    seen = [name for name in TERMS if name not in unseen]
+    for count in range(len(seen) + 1):
+        for names in combinations(seen, count):
             numbers = [number for name in names for number in TERMS[name].numbers]
-            if len(set(numbers)) == len(numbers):
+            alone = ("mount_x" in names) != ("mount_y" in names)
+            if len(set(numbers)) == len(numbers) and not (turned and alone):
                 yield names
-
-
-SUPPORTS = tuple(_supports())
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,10 +121,12 @@ class Search:
 
     Attributes:
         problem: the motions.
+        supports: that are considered.
         known: fits so far, by support.
     """
 
     problem: Problem
+    supports: tuple[tuple[str, ...], ...]
     known: dict[tuple[str, ...], OdometryFit] = field(default_factory=dict)
 
     def fit(self, names: tuple[str, ...]) -> OdometryFit:
@@ -128,18 +137,19 @@ class Search:
 
     def best(self) -> tuple[str, ...]:
         """The support of the highest evidence, ranked about everything at first."""
-        best, ranked = FULL, None
-        while best != ranked:
-            ranked = best
-            self._fit_near(SUPPORTS, self.fit(ranked).values)
-            best = min(self.known, key=self._cost)
-        return best
+        best, about = None, self.problem.fit(FULL).values
+        while True:
+            self._fit_near(self.supports, about)
+            better = min(self.known, key=self._cost)
+            if better == best:
+                return best
+            best, about = better, self.fit(better).values
 
     def tied(self, best: tuple[str, ...]) -> list[tuple[str, ...]]:
         """The support and those with one term exchanged that explain as well."""
         swaps = [
             names
-            for names in SUPPORTS
+            for names in self.supports
             if len(names) == len(best) and len(set(names) - set(best)) == 1
         ]
         self._fit_near([best, *swaps], self.fit(best).values)
