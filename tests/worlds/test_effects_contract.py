@@ -1,5 +1,7 @@
 """What every effect must keep to; a new effect is tested by being there."""
 
+import re
+
 import mujoco
 import numpy as np
 import pytest
@@ -15,16 +17,17 @@ from bns.worlds.effects.base import (
     SensorEffect,
     ServoEffect,
 )
+from bns.worlds.effects.parts import Part
 from bns.worlds.physics import servo_law
 from tests.worlds.subjects import (
     DT,
-    LEGGED,
     STEPS,
     as_bytes,
     bare,
     compiled,
     frozen,
     light,
+    on_part,
     read,
     signal_of,
     told,
@@ -179,8 +182,20 @@ class TestEveryEffect:
         with pytest.raises(UnknownNameError, match=f"parameter of {name} 'strenght'"):
             registry.make(name, strenght=1)
         for choice in registry.get(name).choices:
+            if isinstance(choice, Part):
+                continue  # known when there is a model
             with pytest.raises(UnknownNameError, match=choice.options[0]):
                 registry.make(name, **{choice.name: "nowhere"})
+
+    @pytest.mark.parametrize("part", ["nowhere", "no*"])
+    def test_unknown_parts_are_refused_where_they_are_looked_for(
+        self, name, part, signals
+    ):
+        if not on_part(registry.get(name)):
+            return
+        values = listing.example(registry.get(name)).values | {"part": part}
+        with pytest.raises(UnknownNameError, match=re.escape(part)):
+            unchanged(registry.make(name, **values), signals)
 
     def test_text_and_table_read_back(self, name):
         rng = np.random.default_rng(3)
@@ -266,9 +281,9 @@ def test_body_effects_keep_the_sizes_and_the_physics_sound(name):
     if not kind.resizes:
         assert len(as_bytes(model)) == len(as_bytes(bare(kind)))
     data = mujoco.MjData(model)
-    if kind.robots == LEGGED:
+    if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
-    data.ctrl[:] = 0.2 if kind.robots == LEGGED else 3.0  # [rad], [rad/s]
+    data.ctrl[:] = 0.2 if model.nkey else 3.0  # [rad], [rad/s]
     mujoco.mj_step(model, data, nstep=200)
     assert np.isfinite(data.qpos).all()
     assert not any(warning.number for warning in data.warning)

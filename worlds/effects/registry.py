@@ -17,6 +17,12 @@ from bns.worlds import effects as package
 from bns.worlds.effects.base import Effect
 
 EXAMPLE = "wheel_gain:wheel=left,factor=0.8"
+FORMER = {
+    "sensor_gain": "reading_gain",
+    "sensor_offset": "reading_offset",
+    "sensor_delay": "reading_delay",
+}
+"""Names that effects on a `part` had before; their texts are still read."""
 
 
 @cache
@@ -68,7 +74,12 @@ def make(name: str, **values: Any) -> Effect:
         UnknownNameError: unknown effect, parameter or option.
         OutOfBoundsError: a value outside its bounds.
     """
-    return get(name)(values)
+    return get(current(name) if "part" in values else name)(values)
+
+
+def current(name: str) -> str:
+    """The name of an effect on a part today, if it had another one before."""
+    return FORMER.get(name, name)
 
 
 def parse(text: str) -> Effect:
@@ -110,4 +121,4 @@ def from_table(table: Mapping[str, Any]) -> Effect:
             f"Effect table {dict(table)!r} has no name: give "
             '{effect = "wheel_gain", wheel = "left", factor = 0.8}.'
         )
-    return get(name)(values)
+    return make(name, **values)

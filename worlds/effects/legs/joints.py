@@ -2,10 +2,9 @@
 
 from typing import Any
 
-import numpy as np
-
 from bns.worlds.effects.base import BodyEffect, Parameter
 from bns.worlds.effects.leg_sets import JOINT, chosen
+from bns.worlds.effects.parts import loosen
 from bns.worlds.physics import servo_joint
 
 
@@ -117,26 +116,5 @@ class LooseHorn(BodyEffect):
     def edit(self, spec: Any) -> None:
         if self.is_nominal:
             return
-        joint, half = spec.joint(self["joint"]), self["angle"] / 2
-        name = f"{self['joint']}_play"
-        if spec.joint(name) is not None:  # a second one widens it
-            wide = spec.joint(name)
-            wide.range = [wide.range[0] - half, wide.range[1] + half]
-            return
-        before = _place(spec, joint.name)
-        joint.parent.add_joint(
-            name=name,
-            axis=joint.axis,
-            range=[-half, half],
-            limited=True,
-            armature=ARMATURE,
-            damping=[DAMPING, 0.0, 0.0],
-        )
-        for key in spec.keys:
-            key.qpos = np.insert(np.array(key.qpos), before + 1, 0.0)
-
-
-def _place(spec: Any, name: str) -> int:
-    """Where in qpos a joint's angle lies."""
-    model = spec.copy().compile()
-    return int(model.jnt_qposadr[model.joint(name).id])
+        joint = spec.joint(self["joint"])
+        loosen(spec, joint, self["angle"], armature=ARMATURE, damping=DAMPING)
