@@ -128,6 +128,11 @@ class Effect(ABC):
             values[p.name] = round(value) if p.integer else value
         return type(self)(values)
 
+    def in_trial(self, since: int) -> "Effect":
+        """The effect so many trials after it set in, where it depends on them."""
+        del since
+        return self
+
     def lost(self) -> frozenset[int]:
         """Numbers of the legs that no longer carry a walking robot."""
         return frozenset()

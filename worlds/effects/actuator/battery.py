@@ -48,3 +48,54 @@ class BatterySag(ActuatorEffect):
         left = np.exp(-(np.cumsum(loss) - loss))  # at the start of each step
         values[active] *= left[active, None]
         return values
+
+
+class BatteryFade(ActuatorEffect):
+    """The speed decays exponentially with the number of trials that were driven.
+
+    In an experiment the trials since the onset are counted; with a recurrence the
+    battery is charged at the start of every period.
+    """
+
+    name = "battery_fade"
+    doc = "the speed reached falls from trial to trial"
+    source = "assumed: speed in proportion to supply, exponential discharge"
+    parameters = (
+        Parameter(
+            "per_trial",
+            unit="1",
+            nominal=0.0,
+            low=0.0,
+            high=0.5,
+            doc="share of the speed lost with each trial; bounds assumed",
+            example=0.02,
+        ),
+        Parameter(
+            "trials",
+            unit="1",
+            nominal=0,
+            low=0,
+            high=1_000_000,
+            doc="driven since the battery was full, before the first one",
+            example=10,
+            integer=True,
+            scales=False,
+        ),
+    )
+
+    @property
+    def is_nominal(self) -> bool:
+        """Whether nothing is lost, at all or yet."""
+        return super().is_nominal or not self["trials"]
+
+    def in_trial(self, since: int) -> "BatteryFade":
+        """The effect after so many trials more."""
+        return type(self)({**self.values, "trials": self["trials"] + since})
+
+    def apply(
+        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        values = signal.values.copy()
+        if not self.is_nominal:
+            values[active] *= np.exp(-self["per_trial"] * self["trials"])
+        return values

@@ -46,3 +46,50 @@ class MotorLag(ActuatorEffect):
                     [1 - keep], [1, -keep], told[span], zi=[keep * before]
                 )
         return values
+
+
+class WheelBacklash(ActuatorEffect):
+    """Play between a wheel and its motor: at each reversal some travel is lost.
+
+    The motor turns as it is told; the wheel stands still while the play is open. A
+    trial, or the effect, begins with the play half open either way.
+    """
+
+    name = "wheel_backlash"
+    doc = "play between motor and wheel: travel is lost at each reversal"
+    source = "play operator (Nordin and Gutman, Automatica 38, 2002); bounds assumed"
+    choices = (WHEEL,)
+    parameters = (
+        Parameter(
+            "play",
+            unit="m",
+            nominal=0.0,
+            low=0.0,
+            high=0.05,
+            doc="full play at the wheel's rim, angle times radius; bounds assumed",
+            example=0.005,
+        ),
+    )
+
+    def apply(
+        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        values = signal.values.copy()
+        if self.is_nominal:
+            return values
+        half = self["play"] / 2
+        for column in columns(self, signal):
+            for span in spans(active):
+                motor = np.cumsum(signal.values[span, column]) * signal.dt  # [m]
+                wheel = _played(motor, half)
+                values[span, column] = np.diff(wheel, prepend=0.0) / signal.dt
+        return values
+
+
+def _played(motor: np.ndarray, half: float) -> np.ndarray:
+    """Travel of what follows with play, ``(S,)``, from the middle of the play."""
+    followed, at = np.empty_like(motor), 0.0
+    for step, moved in enumerate(motor):
+        at = min(max(at, moved - half), moved + half)
+        followed[step] = at
+    return followed

@@ -144,3 +144,79 @@ class TorqueLimit(BodyEffect):
                 )
             share = max(self["factor"], LEAST)
             motor.forcerange = np.asarray(motor.forcerange) * share
+
+
+class WheelEccentricity(BodyEffect):
+    """A wheel turns about an axle beside its centre: it drives by fits and starts.
+
+    At a steady rate w of turning the robot's speed there is w (r + offset sin(a)), a
+    being the wheel's angle plus the phase; over whole turns nothing is lost. The
+    wheel's mass stays on the axle.
+    """
+
+    name = "wheel_eccentricity"
+    doc = "a wheel turns about an axle beside its centre"
+    source = "rolling without slip; bounds assumed"
+    choices = (WHEEL,)
+    parameters = (
+        Parameter(
+            "offset",
+            unit="m",
+            nominal=0.0,
+            low=0.0,
+            high=0.005,
+            doc="from the axle to the wheel's centre; bounds assumed",
+            example=0.001,
+        ),
+        Parameter(
+            "phase",
+            unit="rad",
+            nominal=0.0,
+            low=-np.pi,
+            high=np.pi,
+            doc="where that is at a trial's start; 0 = ahead, in the sense of rolling",
+            example=0.5,
+            scales=False,
+        ),
+    )
+
+    def edit(self, spec: Any) -> None:
+        if self.is_nominal:
+            return
+        for side in self.wheels():
+            axis = np.array(bodies.joint(spec, side).axis)
+            ahead = np.array([1.0, 0.0, 0.0])
+            down = np.cross(axis / np.linalg.norm(axis), ahead)
+            way = np.cos(self["phase"]) * ahead + np.sin(self["phase"]) * down
+            for geom in bodies.wheel(spec, side).geoms:
+                geom.pos += self["offset"] * way
+
+
+class CasterDrag(BodyEffect):
+    """What the body rests on beside its wheels rubs on the floor."""
+
+    name = "caster_drag"
+    doc = "the casters drag on the floor instead of rolling"
+    source = "dry friction; the nominal casters have none; bounds assumed"
+    parameters = (
+        Parameter(
+            "friction",
+            unit="1",
+            nominal=0.0,
+            low=0.0,
+            high=1.0,
+            doc="friction coefficient added; bounds assumed",
+            example=0.2,
+        ),
+    )
+
+    def edit(self, spec: Any) -> None:
+        if self.is_nominal:
+            return
+        base = bodies.base(spec)
+        casters = list(bodies.contact_geoms(base))
+        if not casters:
+            raise BnsError(f"Body {base.name!r} rests on its wheels alone: no caster.")
+        for geom in casters:
+            geom.condim = max(geom.condim, 3)  # 1 has no friction
+            geom.friction[0] += self["friction"]

@@ -72,6 +72,39 @@ class DeadBand(CommandEffect):
         return values
 
 
+class DeadZone(CommandEffect):
+    """Speeds are reduced by a constant magnitude; slower ones give a stop."""
+
+    name = "dead_zone"
+    doc = "a wheel turns slower than it is told by a constant"
+    source = "the dead zone of control engineering; bounds assumed"
+    memoryless = True
+    choices = (WHEEL,)
+    parameters = (
+        Parameter(
+            "speed",
+            unit="m/s",
+            nominal=0.0,
+            low=0.0,
+            high=0.2,
+            doc="taken off every speed; bounds assumed",
+            example=0.02,
+        ),
+    )
+
+    def apply(
+        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        values = signal.values.copy()
+        if self.is_nominal:
+            return values
+        for column in columns(self, signal):
+            told = values[active, column]
+            left = np.maximum(np.abs(told) - self["speed"], 0.0)
+            values[active, column] = np.sign(told) * left
+        return values
+
+
 class SpeedSaturation(CommandEffect):
     """Speeds beyond a limit, forward or backward, are cut to it."""
 
