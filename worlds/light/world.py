@@ -10,7 +10,7 @@ import numpy as np
 
 from bns import seeding
 from bns.errors import BnsError
-from bns.worlds import given, objects
+from bns.worlds import checks, objects
 from bns.worlds.active import Placed, Stages
 from bns.worlds.damage import Damage
 from bns.worlds.light import sensors as light_sensors
@@ -64,15 +64,15 @@ class LightWorld(MujocoWorld):
         **settings: Unpack[Settings],
     ):
         super().__init__(robot, name=name, **settings)
-        self.field = LightField(given.several(Lamp, "lamp", lights), ambient)
-        self.posts = given.several(Post, "object", posts)
+        self.field = LightField(checks.several(Lamp, "lamp", lights), ambient)
+        self.posts = checks.several(Post, "object", posts)
         self.sensors = light_sensors.of(robot, sensors)
         self.radius = self.sensors.radius
         objects.checked(self.posts, self._places, np.zeros((0, 2)), self.radius)
         self._screen = RayScreen(self.posts) if self.posts else None
         self.singles = singles
         told = {} if supervisor is None else supervisor
-        self.supervisor = given.one(Supervisor, "supervisor", told)
+        self.supervisor = checks.one(Supervisor, "supervisor", told)
 
     def _refuse(self, damage: Damage) -> None:
         light_sensors.refuse_absent(damage, self.robot)

@@ -1,7 +1,7 @@
 """The physics world: robots in MuJoCo, each with its own damage, in batches."""
 
 from collections.abc import Sequence
-from typing import NamedTuple, Unpack
+from typing import ClassVar, NamedTuple, Unpack
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from bns.worlds.physics import compile, control, observe
 from bns.worlds.physics.rollout import Job, Motion, Pool
 from bns.worlds.physics.session import Session, Setting
 from bns.worlds.physics.world import PhysicsWorld, Settings
-from bns.worlds.trial import POSE_CHANNELS, Commands, Trial
+from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Trial
 
 STAGES = ("command", "actuator", "body", "tracking")
 
@@ -47,7 +47,7 @@ class MujocoWorld(PhysicsWorld[Plan]):
         BnsError: an effect that this robot or world cannot have.
     """
 
-    stages = STAGES
+    stages: ClassVar[tuple[str, ...]] = STAGES
 
     def __init__(
         self,
@@ -268,7 +268,7 @@ class MujocoWorld(PhysicsWorld[Plan]):
             seed=seed,
             trial=setting.trial,
         )
-        channels = POSE_CHANNELS
+        channels: tuple[Channel, ...] = POSE_CHANNELS
         if session.sensing is not None:
             channels += session.sensing.channels
             seen = np.hstack([seen, session.sensing.readings[robot][held]])

@@ -10,7 +10,7 @@ from bns.models.robot_model import RobotModel
 from bns.worlds import active
 from bns.worlds.checks import bounded, checked_start, shared
 from bns.worlds.damage import Damage
-from bns.worlds.trial import Commands, Trial
+from bns.worlds.trial import Channel, Commands, Trial
 
 PlanT = TypeVar("PlanT")
 
@@ -74,7 +74,8 @@ class PhysicsWorld(ABC, Generic[PlanT]):
         arena: Sequence[float] = (2.7, 1.8),
         truth: bool = False,
     ):
-        self.robot, self.model, self._channels = robot, model, model.channels
+        self.robot, self.model = robot, model
+        self._channels = tuple(Channel(*item) for item in model.channels)
         self.name, self.truth = name, truth
         self.damage = active.per_robot(damage)
         self.reality = active.as_damage(reality)

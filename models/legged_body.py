@@ -1,6 +1,10 @@
-"""What of a walking robot made of a few numbers touches, and what only shows."""
+"""Masses and shapes of a robot that is made of a few numbers.
+
+A shin is its servo, at the knee, and a rod; a part before it a box; so is the body.
+"""
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -8,6 +12,64 @@ from bns.models.directory import short
 from bns.models.new_legged import Legged
 
 ROWS = ("front", "middle", "rear")
+SHARES = {2: (0.3, 0.7), 3: (0.19, 0.38, 0.43)}  # of a leg's mass, by part; PhantomX's
+SERVO = 0.6  # share of a shin's mass that its servo is; PhantomX's
+KNEE, ROD = 0.165, 0.5  # where on the shin servo and rod have their centres; PhantomX's
+CENTRE = SERVO * KNEE + (1 - SERVO) * ROD
+
+
+def box(mass: float, sides: Sequence[float]) -> list[float]:
+    """About the axes through a box's middle [kg m2].
+
+    Args:
+        mass: [kg].
+        sides: its length, width and height [m].
+    """
+    squares = [side * side for side in sides]
+    return [mass / 12 * (sum(squares) - square) for square in squares]
+
+
+def masses(known: Legged) -> dict[str, Any]:
+    """What numbers.toml lists of them.
+
+    Returns:
+        masses: by part, each with mass [kg], centre [m] and inertia [kg m2], share of
+            the leg [%], and in words where the centre is and whose inertia that is.
+        body_mass: [kg].
+        body_inertia: [kg m2].
+    """
+    shares = SHARES[len(known.lengths)]
+    made = {
+        part: {"share": round(100 * share), **_part(known, part, share)}
+        for part, share in zip(known.lengths, shares, strict=True)
+    }
+    body = known.mass - known.legs * sum(item["mass"] for item in made.values())
+    size = known.body_length, known.body_width, known.height
+    around = short(box(body, size))
+    return {"masses": made, "body_mass": short(body), "body_inertia": around}
+
+
+def _part(known: Legged, part: str, share: float) -> dict[str, Any]:
+    mass, length, thick = share * known.each_leg, known.lengths[part], known.thick
+    if part != known.outer:
+        return {
+            "mass": short(mass),
+            "centre": short(length / 2),
+            "inertia": short(box(mass, (length, thick, thick))),
+            "where": "half-way",
+            "like": "of a box of that mass, as long and thick as the part",
+        }
+    cube = box(SERVO * mass, (thick, thick, thick))[0]
+    apart = SERVO * (KNEE - CENTRE) ** 2 + (1 - SERVO) * (ROD - CENTRE) ** 2
+    across = cube + mass * length**2 * (apart + (1 - SERVO) / 12)
+    return {
+        "mass": short(mass),
+        "centre": short(CENTRE * length),
+        "inertia": short([cube, across, across]),
+        "where": f"{CENTRE:.1%} of the length, PhantomX",
+        "like": f"of a servo, {SERVO:.0%} of that mass at {KNEE:.1%} of the length, "
+        "and a rod",
+    }
 
 
 def shapes(known: Legged) -> dict[str, Any]:
@@ -61,7 +123,7 @@ def looks(known: Legged) -> dict[str, Any]:
     out = max(y for _, y in known.hips.values())
     reach = max(math.hypot(*place) for place in known.hips.values())
     reach += 0.85 * sum(known.lengths.values())
-    made = {
+    made: dict[str, float | list[float]] = {
         "hip": [1.2 * thigh, known.height / 2 + 0.1 * thigh],
         "coxa": [0.38 * known.coxa_length, 0.67 * thigh, thigh],
         "rib": [1.2 * thigh, out, 0.4 * known.height],
