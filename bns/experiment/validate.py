@@ -97,6 +97,7 @@ BOUNDS = {
     "watch.forget_floor": Bound(1e-6, 1),
     "watch.forget_reach": Bound(0, 100),
     "watch.forget_least": Bound(1, 100_000, "patterns"),
+    "prior.evaluations": Bound(1, 1_000_000_000, "executions"),
     "world.sample_dt": Bound(0.005, 10, "s"),
     "choose_tournament": Bound(0, 1),
     "evolve_from": Bound(0, 1_000_000, "trials"),
@@ -142,10 +143,12 @@ def check(config: RunConfig) -> RunConfig:
         BnsError: two settings that contradict each other.
     """
     values = dict(leaves(config))
+    own = {f"settings.{n}": Bound(*b) for n, b in config.settings.bounds.items()}
+    bounds = BOUNDS | own
     for name, value in values.items():
         if isinstance(value, bool) or not isinstance(value, int | float):
             continue
-        bound = BOUNDS.get(name, Bound(-math.inf, math.inf))
+        bound = bounds.get(name, Bound(-math.inf, math.inf))
         if not (math.isfinite(value) and bound.low <= value <= bound.high):
             raise OutOfBoundsError(name, value, *bound)
     for lower, upper in _ORDERED:

@@ -9,13 +9,13 @@ from bns import tasks
 from bns.errors import UnknownNameError
 from bns.experiment.config import TaskConfig
 from bns.path import integrate
-from bns.tasks import NavigationTask
+from bns.tasks.navigation import Route
 
 GOALS = [(0.3, -0.3), (-0.3, -0.3), (-0.3, 0.3), (0.3, 0.3), (0.3, -0.3)]
 
 
 def score(points, length=None, **settings):
-    task = NavigationTask.of(TaskConfig(**settings))
+    task = Route.of(TaskConfig(**settings))
     x, y = torch.tensor(points, dtype=torch.float64).T
     length = torch.tensor(len(points) if length is None else length)
     cost, reached = task.score(x, y, length)
@@ -60,14 +60,14 @@ def test_reached_only_inside_the_radius():
 
 
 def test_infinity_passes_the_centre_twice():
-    task = NavigationTask.of(TaskConfig(name="infinity"))
+    task = Route.of(TaskConfig(name="infinity"))
     assert task.goals.tolist().count([0.0, 0.0]) == 2
     assert len(task.goals) == 7
 
 
 def test_unknown_task():
     with pytest.raises(UnknownNameError, match="Unknown task 'simpel'"):
-        NavigationTask.of(TaskConfig(name="simpel"))
+        Route.of(TaskConfig(name="simpel"))
 
 
 def test_integration_of_a_square():
