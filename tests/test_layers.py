@@ -34,8 +34,8 @@ PROTOCOL = {
 EXPERIMENT = {
     f"bns.experiment.{name}"
     for name in (
+        "background",
         "batch",
-        "loading",
         "robots",
         "run",
         "static_snn",

@@ -15,9 +15,8 @@ from hashlib import sha256
 from typing import Any
 
 from bns import seeding
-from bns.experiment.config import AdaptationConfig, RunConfig, WorldConfig
+from bns.experiment.config import BNS_SECTIONS, AdaptationConfig, RunConfig, WorldConfig
 from bns.experiment.validate import leaves
-from bns.learners import registry as learners
 from bns.tasks import registry as tasks
 
 TASK_SECTIONS = ("light", "walk")
@@ -40,7 +39,7 @@ def foreign(config: RunConfig) -> list[str]:
     """Sections of the configuration that belong to other tasks and learners."""
     others = [name for name in TASK_SECTIONS if name != tasks.kind(config.task.name)]
     if config.learner != "bns":
-        others += learners.get("bns").sections
+        others += BNS_SECTIONS
     return others
 
 

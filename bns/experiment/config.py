@@ -176,6 +176,19 @@ class PriorConfig:
     """executions in the model that a run may spend"""
 
 
+BNS_SECTIONS = (
+    "evolution",
+    "snn",
+    "adaptation",
+    "watch",
+    "choose",
+    "choose_tournament",
+    "evolve_from",
+    "compiled",
+)
+"""sections and settings of the learner `bns`; other learners have `settings`"""
+
+
 @dataclass(frozen=True, kw_only=True)
 class LearnerSettings:
     """The section `settings`: a learner's own; bns has its own sections instead."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from bns.errors import BnsError, FormatError, UnknownNameError
-from bns.experiment.config import LearnerSettings, PriorConfig, RunConfig
+from bns.experiment.config import BNS_SECTIONS, LearnerSettings, PriorConfig, RunConfig
 from bns.experiment.validate import check
 
 TABLES = ("damage", "reality")
@@ -44,7 +44,8 @@ def with_learner(config: RunConfig, learner: str) -> RunConfig:
     kind, usual = _settings(learner), RunConfig()
     fresh: dict[str, Any] = {}
     if learner != config.learner and config.learner in registry.names():
-        names = registry.get(config.learner).sections
+        bns = config.learner == "bns"
+        names = BNS_SECTIONS if bns else registry.get(config.learner).sections
         fresh = {name: getattr(usual, name) for name in names}
     return replace(config, learner=learner, settings=kind(), **fresh)
 
@@ -136,6 +137,8 @@ def read_toml(path: Path) -> dict[str, Any]:
 def to_mapping(config: RunConfig) -> dict[str, Any]:
     """The whole configuration as plain values, ready for JSON."""
     content: dict[str, Any] = json.loads(json.dumps(asdict(config)))
+    if config.learner != "bns":
+        content = {k: v for k, v in content.items() if k not in BNS_SECTIONS}
     if config.prior == PriorConfig():
         content.pop("prior")
     if not content["settings"]:

@@ -6,7 +6,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any, NamedTuple
 
 from bns.errors import BnsError, OutOfBoundsError
-from bns.experiment.config import RunConfig
+from bns.experiment.config import BNS_SECTIONS, RunConfig
 
 
 class Bound(NamedTuple):
@@ -158,7 +158,34 @@ def check(config: RunConfig) -> RunConfig:
                 f"raise {upper} or lower {lower}."
             )
     check_choice(config)
+    check_learner(config)
     return config
+
+
+def check_learner(config: RunConfig) -> None:
+    """Refuse settings of a learner that is not the configuration's.
+
+    Raises:
+        UnknownNameError: no such learner.
+        BnsError: settings of another learner.
+    """
+    if config.learner == "bns":
+        return
+    from bns.learners import registry
+
+    kind = registry.get(config.learner)
+    if type(config.settings) is not kind.Settings:
+        raise BnsError(
+            f"These settings are not of learner = {config.learner!r}: make the "
+            "configuration by bns.experiment.loading.with_learner."
+        )
+    usual = RunConfig()
+    for name in BNS_SECTIONS:
+        if name not in kind.sections and getattr(config, name) != getattr(usual, name):
+            raise BnsError(
+                f"`{name}` belongs to the learner 'bns', not to {config.learner!r}, "
+                "which would not heed it: leave it out."
+            )
 
 
 def check_choice(config: RunConfig) -> None:

@@ -109,6 +109,10 @@ class Learner(ABC):
         self.config, self.configs, self.runs = configs[0], list(configs), len(configs)
         self.replicates, self.models = list(replicates), list(models)
         self.task: Task = tasks.of(configs[0])
+        self.begin()
+
+    def begin(self) -> None:  # noqa: B027 (nothing to do is the default)
+        """Make what the first trial needs, once configurations and task are known."""
 
     def check_alike(self, configs: Sequence[RunConfig]) -> None:
         """Refuse configurations that cannot share a batch.

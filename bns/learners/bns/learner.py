@@ -16,7 +16,7 @@ from bns import seeding
 from bns.draws import Draws
 from bns.errors import BnsError
 from bns.evolution.chromosome import Population
-from bns.experiment.config import RunConfig
+from bns.experiment.config import BNS_SECTIONS, RunConfig
 from bns.learners.base import Curves, Learner, Panel, Proposal
 from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.change_detection import Detector
@@ -76,16 +76,7 @@ class Bns(Learner):
     dropped.
     """
 
-    sections = (
-        "evolution",
-        "snn",
-        "adaptation",
-        "watch",
-        "choose",
-        "choose_tournament",
-        "evolve_from",
-        "compiled",
-    )
+    sections = BNS_SECTIONS
     columns: ClassVar[Mapping[str, str]] = {
         "fitness_predicted": "of the controller tried, inside the SNN before the trial",
         "snn_forward": "RMS error of the SNN on this trial before training on it [m]",

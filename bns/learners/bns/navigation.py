@@ -12,8 +12,7 @@ from torch import Tensor
 from bns.draws import Draws
 from bns.evolution import diversity
 from bns.evolution.chromosome import Encoding, Population
-from bns.evolution.generation import Breeder, Coins, Rates
-from bns.evolution.goals import Goals
+from bns.evolution.generation import Breeder, Coins, Genes, Rates
 from bns.experiment.config import RunConfig
 from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.change_detection import Ground, Misses, innovation
@@ -28,6 +27,13 @@ from bns.tasks.navigation import Route
 from bns.worlds.trial import Trial, body_displacements
 
 SHARP = 2.5  # [rad] commands that turn further do not tell how far each wheel rolled
+
+
+class CommandGenes(Genes, Protocol):
+    """Genes that mean lists of commands."""
+
+    def commands(self, individual: Population) -> list[Any]:
+        """The first individual of each run as commands for a world."""
 
 
 class PathEvaluator(Protocol):
@@ -54,7 +60,7 @@ class PathEvaluator(Protocol):
 class OpenLoopProblem(Problem):
     """BNS for lists of commands: one stack of networks foresees each one's motion."""
 
-    encoding: Encoding | Goals
+    encoding: CommandGenes
     shape: Shape
     evaluator: PathEvaluator
     output: Tensor
