@@ -10,7 +10,7 @@ from bns.errors import MissingDependencyError
 from bns.experiment.config import RunConfig
 
 if TYPE_CHECKING:
-    import pandas
+    import pandas  # type: ignore[import-untyped]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +58,12 @@ class RunRecord:
     @property
     def replicates(self) -> int:
         """Number of runs R."""
-        return self.sent.shape[0]
+        return len(self.sent)
 
     @property
     def trials(self) -> int:
         """Number of trials T done by every run."""
-        return self.sent.shape[1]
+        return int(self.sent.shape[1])
 
     def __getitem__(self, column: str) -> np.ndarray:
         return self.columns[column]

@@ -48,7 +48,7 @@ class Search:
         self, settings: CmaSettings, start: np.ndarray, rng: np.random.Generator
     ):
         try:
-            import cma
+            import cma  # type: ignore[import-untyped]
         except ImportError:
             raise MissingDependencyError(
                 "learner = 'cma'", "cma", "pip install 'bns-testbed[cma]'"
@@ -118,8 +118,8 @@ class CmaEs(Learner):
             for run in self.replicates
         ]
 
-    def _controllers(self, units: Sequence[np.ndarray]) -> list[Any]:
-        vectors = self._space.low + np.stack(units) * self._range
+    def _controllers(self, units: Sequence[np.ndarray] | np.ndarray) -> list[Any]:
+        vectors = self._space.low + np.asarray(units) * self._range
         return self._space.controllers(vectors)
 
     def _evolve_in_models(self) -> None:

@@ -161,7 +161,8 @@ class Task(ABC):
             trial: its number.
             seeds: of what is random in the world, N.
         """
-        return world.run(tried, trial=trial, seeds=seeds)
+        found: list[Trial] = world.run(tried, trial=trial, seeds=seeds)
+        return found
 
     @property
     @abstractmethod
@@ -204,7 +205,8 @@ class Task(ABC):
         Returns:
             ``(..., K)``, NaN beyond a list's end.
         """
-        return record.sent[at][..., 2]
+        found: np.ndarray = record.sent[at][..., 2]
+        return found
 
     def problem(self) -> "type[Problem]":
         """What the BNS learner needs beside: genes, networks, and controllers' worth
@@ -232,4 +234,5 @@ def seen_places(poses_world: np.ndarray) -> np.ndarray:
     known = np.isfinite(places).all(1)
     first = int(known.argmax())
     last = np.maximum.accumulate(np.where(known, np.arange(len(places)), first))
-    return np.nan_to_num(places[last])
+    found: np.ndarray = np.nan_to_num(places[last])
+    return found

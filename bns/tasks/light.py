@@ -10,7 +10,7 @@ import torch
 
 from bns import seeding
 from bns.errors import BnsError
-from bns.experiment.config import LightConfig
+from bns.experiment.config_light import LightConfig
 from bns.tasks.base import Arrays, Picture, Space, Task, seen_places
 from bns.tasks.light_controller import Controllers, GenomePolicy, LightController
 from bns.worlds.trial import Trial
@@ -79,15 +79,20 @@ class LampGoal:
         if self.config.charge_stopped != "stand":
             beyond = self.config.goal if self.config.charge_stopped == "far" else 0.0
             after = np.where(stopped, begun + beyond, after)
-        return np.abs(after - self.config.goal).sum(-1) / begun[..., 0]
+        found: np.ndarray = np.abs(after - self.config.goal).sum(-1) / begun[..., 0]
+        return found
 
     def distances(self, places: np.ndarray) -> np.ndarray:
         """Distance from the lamp [m], ``(..., K + 1)``."""
-        return np.hypot(*np.moveaxis(places - np.asarray(self.lamp), -1, 0))
+        found: np.ndarray = np.hypot(
+            *np.moveaxis(places - np.asarray(self.lamp), -1, 0)
+        )
+        return found
 
     def reached(self, places: np.ndarray) -> np.ndarray:
         """Whether robots came to the goal radius, ``(...)`` bool; places as `cost`."""
-        return self.distances(places).min(-1) <= self.config.goal
+        found: np.ndarray = self.distances(places).min(-1) <= self.config.goal
+        return found
 
     def solved(self, places: np.ndarray, handled: np.ndarray) -> bool:
         """Whether a robot circles the lamp.
@@ -325,7 +330,8 @@ class LightTask(Task):
 def readings(trial: Trial) -> np.ndarray:
     """What the sensors read at the start and after each cycle, ``(K + 1, 2)``."""
     seen = np.stack([trial.channel(name) for name in READINGS], axis=1)
-    return seen[trial.boundaries]
+    found: np.ndarray = seen[trial.boundaries]
+    return found
 
 
 def _moving(trial: Trial) -> int:

@@ -184,7 +184,7 @@ class GenomePolicy:
         genomes = torch.stack([one.genome for one in controllers])
         return cls(controllers[0].controllers, genomes)
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         bad = ~torch.isfinite(self.genomes).all(1)
         if bad.any():
             raise BnsError(

@@ -149,7 +149,8 @@ def score_trials(
         places[:, :count, index] = seen[1:].T
         places[:, count:, index] = seen[-1:].T
     lengths = torch.tensor([len(trial.commands) for trial in trials])
-    return route.score(*torch.from_numpy(places), lengths)
+    x, y = torch.from_numpy(places)
+    return route.score(x, y, lengths)
 
 
 class WheeledTask(Task):

@@ -34,7 +34,8 @@ def distance(poses_world: np.ndarray) -> np.ndarray:
     seen = np.isfinite(places).all(-1)
     last = places.shape[-2] - 1 - seen[..., ::-1].argmax(-1)
     end = np.take_along_axis(places, last[..., None, None], axis=-2)[..., 0, :]
-    return np.hypot(*np.moveaxis(end - places[..., 0, :], -1, 0))
+    found: np.ndarray = np.hypot(*np.moveaxis(end - places[..., 0, :], -1, 0))
+    return found
 
 
 def cost(ways: np.ndarray) -> np.ndarray:
@@ -87,10 +88,12 @@ class WalkTask(Task):
     def space(self) -> Space:
         """See `Task.space`."""
         goals, count = self.goals, self.goals.max_commands
-        low, high = goals.low.cpu(), goals.high.cpu()
-        first = low.clamp(min=-goals.initial), high.clamp(max=goals.initial)
-        edges = [np.tile(edge.double().numpy(), count) for edge in (low, high, *first)]
-        return Space(*edges, decode=self._decode)
+        lowest, highest = goals.low.cpu(), goals.high.cpu()
+        first = lowest.clamp(min=-goals.initial), highest.clamp(max=goals.initial)
+        low, high, first_low, first_high = (
+            np.tile(edge.double().numpy(), count) for edge in (lowest, highest, *first)
+        )
+        return Space(low, high, first_low, first_high, self._decode)
 
     def _decode(self, vectors: np.ndarray) -> list[Commands]:
         shape = (len(vectors), 1, *self.goals.gene_shape)

@@ -181,5 +181,6 @@ def innovation(
         + np.maximum(misses.usual**2, here)
         + blind[:, None] * unit**2
     )
-    found = np.sort(misses.new[known] ** 2 / expected, axis=0)
-    return found[-config.largest :].mean(axis=0)
+    ratios = np.sort(misses.new[known] ** 2 / expected, axis=0)
+    largest: np.ndarray = ratios[-config.largest :].mean(axis=0)
+    return largest

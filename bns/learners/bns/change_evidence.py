@@ -65,7 +65,8 @@ def covariance(inputs: np.ndarray) -> np.ndarray:
     apart = squares[:, None] + squares - 2 * inputs @ inputs.T
     reach = REACH**2 * inputs.shape[1]
     alike = np.exp(-np.maximum(apart, 0.0) / (2 * reach))
-    return 1.0 + alike + NOISE * np.eye(len(inputs))
+    found: np.ndarray = 1.0 + alike + NOISE * np.eye(len(inputs))
+    return found
 
 
 def foretold(like: np.ndarray, told: np.ndarray, scale: np.ndarray) -> np.ndarray:
@@ -79,4 +80,5 @@ def foretold(like: np.ndarray, told: np.ndarray, scale: np.ndarray) -> np.ndarra
     root = np.linalg.cholesky(like)
     fresh = np.linalg.solve(root, told)
     spread = np.log(np.diag(root)) * told.shape[1] + np.log(scale).sum() / 2
-    return -(fresh**2 / scale).sum(1) / 2 - spread
+    found: np.ndarray = -(fresh**2 / scale).sum(1) / 2 - spread
+    return found

@@ -34,7 +34,8 @@ class Law(NamedTuple):
 
     def expected(self, far: np.ndarray) -> np.ndarray:
         """At squared distances ``(n,)``, of each output: ``(n, O)``."""
-        return self.noise + self.slope * far[:, None]
+        found: np.ndarray = self.noise + self.slope * far[:, None]
+        return found
 
 
 def newer(trials: np.ndarray, gone: np.ndarray) -> int:
@@ -72,10 +73,11 @@ def contradicted(
         return np.empty(0, dtype=np.int64)
     newest = trials == trials.max()
     new, told = inputs[newest], targets[newest]
+    known: Law | None = None
     if usual is None:
-        own, known = _within(new, told, config.forget_reach), None
+        own = [_within(new, told, config.forget_reach)]
     else:
-        own, known = None, Law(usual**2, np.zeros_like(usual))
+        own, known = [], Law(usual**2, np.zeros_like(usual))
     old = np.unique(trials[~newest])
     for index in range(len(old))[::-1]:
         seen, was = inputs[trials == old[index]], targets[trials == old[index]]
@@ -84,7 +86,7 @@ def contradicted(
             continue
         law = known
         if law is None:
-            law = _law([own, _within(seen, was, config.forget_reach)], config)
+            law = _law([*own, _within(seen, was, config.forget_reach)], config)
         if law is not None and _differs(across, law, config):
             return old[: index + 1]
     return old[:0]
@@ -139,7 +141,8 @@ def _across(
 
 def _squares(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     square = (one**2).sum(1)[:, None] + (other**2).sum(1) - 2 * one @ other.T
-    return np.maximum(square, 0.0)
+    found: np.ndarray = np.maximum(square, 0.0)
+    return found
 
 
 def _smallest(values: np.ndarray) -> np.ndarray:

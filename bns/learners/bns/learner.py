@@ -201,7 +201,7 @@ class Bns(Learner):
         self.population = self.problem.restart(trial, self.memories, self.population)
         for run in np.flatnonzero(resets.data):
             for memory in self.memories:
-                memory.keep(run, 0)
+                memory.keep(int(run), 0)
         if resets.simulator.any():
             which = torch.from_numpy(resets.simulator).to(self.config.device)
             for memory in self.memories:

@@ -165,7 +165,8 @@ class Memory:
     def predict(self, run: int, inputs: np.ndarray) -> np.ndarray:
         """What a run's networks say of scaled inputs ``(N, I)``, scaled, ``(N, O)``."""
         said = predict(self.shape, self.theta[run : run + 1], self._tensor(inputs))[0]
-        return said.cpu().numpy().T
+        outputs: np.ndarray = said.cpu().numpy().T
+        return outputs
 
     def _tensor(self, inputs: np.ndarray) -> Tensor:
         rows = torch.from_numpy(inputs.T.astype(np.float32))
@@ -173,14 +174,16 @@ class Memory:
 
     def error(self, run: int, patterns: Patterns) -> np.ndarray:
         """How far the networks are off on patterns, scaled, ``(N, O)``."""
-        return self.predict(run, patterns.inputs) - patterns.targets
+        found: np.ndarray = self.predict(run, patterns.inputs) - patterns.targets
+        return found
 
     def variance(self, run: int, patterns: Patterns) -> np.ndarray:
         """Variance of the ensemble's members on patterns, ``(N, O)``; 0 without one."""
         if self.shape.outputs == 1:
             return np.zeros_like(patterns.targets)
         said = self.members(run, patterns.inputs)
-        return said.var(0, unbiased=False).cpu().numpy().T
+        spread: np.ndarray = said.var(0, unbiased=False).cpu().numpy().T
+        return spread
 
     def patterns(self, run: int) -> Patterns:
         """Those a run has learned."""

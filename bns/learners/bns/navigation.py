@@ -156,7 +156,8 @@ class OpenLoopProblem(Problem):
         if len(inputs) == 0:
             return np.full(OUTPUTS, np.nan)
         said = memories[0].predict(run, inputs) * self.output.cpu().numpy()
-        return np.sqrt(np.mean((said - moved) ** 2, axis=0))
+        found: np.ndarray = np.sqrt(np.mean((said - moved) ** 2, axis=0))
+        return found
 
     def diversity(self, population: Population) -> dict[str, np.ndarray]:
         """See `Problem.diversity`."""
@@ -202,11 +203,11 @@ class Evaluator:
         moved = outputs.view(runs, 3, -1, count)
         places = torch.arange(moved.shape[2], device=lengths.device)[:, None]
         used = places < lengths.unsqueeze(1)
-        steps = [
+        ahead, left, turn = (
             torch.where(used, moved[:, axis] * self.scaling.output[axis], 0.0)
             for axis in range(3)
-        ]
-        return integrate(*steps, self.task.start, dim=1)
+        )
+        return integrate(ahead, left, turn, self.task.start, dim=1)
 
     def judge(
         self, theta: Tensor, inputs: Tensor, lengths: Tensor, *, fused: bool = False
@@ -317,7 +318,8 @@ class NavigationProblem(OpenLoopProblem):
     def _off(self, run: int, memory: Memory) -> np.ndarray:
         """How far the networks are off on what a run learned, scaled, ``(N, 3)``."""
         inputs, targets = memory.patterns(run)
-        return self._said(run, memory, inputs).mean(0) - targets
+        found: np.ndarray = self._said(run, memory, inputs).mean(0) - targets
+        return found
 
     def _said(self, run: int, memory: Memory, inputs: np.ndarray) -> np.ndarray:
         """Scaled outputs of each network with all of them, ``(G, N, 3)``."""

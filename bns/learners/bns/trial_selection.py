@@ -37,7 +37,7 @@ def choose(
         BnsError: disagreement without an ensemble.
         UnknownNameError: no such rule.
     """
-    kind = config.choose
+    kind: str = config.choose
     if kind == "best-worst-random":
         kind = ("best", "worst", "random")[trial % 3]
     if kind == "best":

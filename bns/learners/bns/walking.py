@@ -25,7 +25,8 @@ from bns.errors import BnsError
 from bns.evolution.chromosome import Population
 from bns.evolution.generation import Rates
 from bns.evolution.goals import TICK, GoalBreeder, Goals
-from bns.experiment.config import RunConfig, WalkConfig
+from bns.experiment.config import RunConfig
+from bns.experiment.config_walk import WalkConfig
 from bns.learners.bns import change_evidence
 from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.memory import Memory
@@ -124,8 +125,8 @@ def path(outputs: Tensor, count: int) -> tuple[Tensor, Tensor, Tensor]:
     """
     runs, members = outputs.shape[:2]
     moved = outputs.view(runs, members, 3, -1, count)
-    steps = [moved[:, :, axis] * MOVED[axis] for axis in range(3)]
-    return integrate(*steps, START, dim=2)
+    ahead, left, turn = (moved[:, :, axis] * MOVED[axis] for axis in range(3))
+    return integrate(ahead, left, turn, START, dim=2)
 
 
 def variance(outputs: Tensor, count: int) -> Tensor:
@@ -195,6 +196,7 @@ class WalkProblem(OpenLoopProblem):
     the networks foresee is a matter of large matrix products, as fast without.
     """
 
+    encoding: Goals
     stream = "walk-learner"
     relative_cost = 0.0
     bucket = 256
