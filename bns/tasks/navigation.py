@@ -5,10 +5,11 @@ section 4.2.4): lower is better.
 """
 
 import math
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import torch
@@ -59,6 +60,23 @@ def objectives(config: TaskConfig) -> dict[str, tuple[float, float]]:
     return {"A": (x, -y), "B": (-x, -y), "C": (-x, y), "D": (x, y), "E": (0.0, 0.0)}
 
 
+class PathGoal(Protocol):
+    """What a path is worth, for lists of wheel commands."""
+
+    @property
+    def start(self) -> tuple[float, float, float]:
+        """Start pose in the world frame [m, m, rad]."""
+
+    def judge(self, x: Tensor, y: Tensor, yaw: Tensor, lengths: Tensor) -> Tensor:
+        """Cost of paths, ``(...)``; lower is better.
+
+        Args:
+            x, y, yaw: pose after each command in the world frame, ``(K, ...)`` [m, m,
+                rad]; beyond a list's end they repeat the last one.
+            lengths: commands in each list, ``(...)``.
+        """
+
+
 @dataclass(frozen=True)
 class Route:
     """A fixed order of objectives.
@@ -99,6 +117,11 @@ class Route:
             cost ``(...)`` and objectives reached ``(...)`` (int64).
         """
         return score(x, y, lengths, self.goals.tolist(), self.config)
+
+    def judge(self, x: Tensor, y: Tensor, yaw: Tensor, lengths: Tensor) -> Tensor:
+        """See `PathGoal.judge`; the heading does not matter."""
+        del yaw
+        return self.score(x, y, lengths)[0]
 
 
 def score(
@@ -192,6 +215,20 @@ class WheeledTask(Task):
         lengths = torch.from_numpy(np.rint(vectors[:, -1:]).astype(np.int64))
         return encoding.commands(Population(genes, lengths))
 
+    @abstractmethod
+    def path_goal(self, device: str = "cpu") -> PathGoal:
+        """What paths are worth, in the world and inside an SNN."""
+
+    def surroundings(self) -> dict[str, Any]:
+        """Where the robot starts."""
+        return {"start": self.path_goal().start}
+
+    def problem(self) -> "type[Problem]":
+        """See `Task.problem`."""
+        from bns.learners.bns.navigation import WheeledProblem
+
+        return WheeledProblem
+
     def told_and_seen(self, tried: Sequence[Trial]) -> Arrays:
         """Commands sent and poses seen, padded with NaN, and how many commands."""
         longest = self.config.controller.max_commands
@@ -214,9 +251,9 @@ class NavigationTask(WheeledTask):
         """The objectives, on the CPU."""
         return Route.of(self.config.task)
 
-    def surroundings(self) -> dict[str, Any]:
-        """Where the robot starts."""
-        return {"start": self.route.start}
+    def path_goal(self, device: str = "cpu") -> Route:
+        """See `WheeledTask.path_goal`."""
+        return Route.of(self.config.task, device)
 
     def fitness(self, trials: Sequence[Trial]) -> np.ndarray:
         """Algorithm 5, see `score`."""
@@ -269,12 +306,6 @@ class NavigationTask(WheeledTask):
                 return len(poses_world) - 1
             row += 1 + int(near[0])
         return row
-
-    def problem(self) -> "type[Problem]":
-        """See `Task.problem`."""
-        from bns.learners.bns.navigation import NavigationProblem
-
-        return NavigationProblem
 
 
 TASK = NavigationTask

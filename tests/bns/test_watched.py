@@ -7,7 +7,7 @@ import pytest
 
 from bns.experiment.config import AdaptationConfig, SnnConfig, WorldConfig
 from bns.experiment.config_watch import WatchConfig
-from bns.learners.bns.navigation import NavigationProblem, ways
+from bns.learners.bns.navigation import WheeledProblem, ways
 from bns.snn.scaling import AXLE
 from tests.bns.test_learner import SMALL, batch, play
 
@@ -40,7 +40,7 @@ def test_a_slow_wheel_is_found_named_forgotten_and_reacted_to(wheel):
     last = rows[10]
     assert last["detected"].mean() > 0.5
     named = last["suspect"][last["detected"] > 0].astype(int)
-    assert {NavigationProblem.channels[name] for name in named} == {f"{wheel} wheel"}
+    assert {WheeledProblem.channels[name] for name in named} == {f"{wheel} wheel"}
     resets = made.learner.adaptations.resets(11).population
     assert np.array_equal(resets, last["detected"] > 0)
     assert last["forgotten"].sum() > np.mean([row["forgotten"].sum() for row in rows])

@@ -1,4 +1,4 @@
-"""BNS for lists of commands, and navigation: commands -> predicted path -> cost."""
+"""BNS for lists of commands, and on wheels: commands -> predicted path -> cost."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from bns.path import integrate
 from bns.snn.network import Shape, forward, predict
 from bns.snn.scaling import AXLE, OUTPUTS, Scaling
 from bns.tasks.base import Task
-from bns.tasks.navigation import Route
+from bns.tasks.navigation import PathGoal, WheeledTask
 from bns.worlds.trial import Trial, body_displacements
 
 SHARP = 2.5  # [rad] commands that turn further do not tell how far each wheel rolled
@@ -177,7 +177,7 @@ class Evaluator:
     encoding: Encoding
     scaling: Scaling
     shape: Shape
-    task: Route
+    goal: PathGoal
 
     def inputs(self, population: Population) -> Tensor:
         """Scaled network inputs, ``(R, 5, K * P)``, the individual varying fastest."""
@@ -207,14 +207,17 @@ class Evaluator:
             torch.where(used, moved[:, axis] * self.scaling.output[axis], 0.0)
             for axis in range(3)
         )
-        return integrate(ahead, left, turn, self.task.start, dim=1)
+        return integrate(ahead, left, turn, self.goal.start, dim=1)
 
     def judge(
         self, theta: Tensor, inputs: Tensor, lengths: Tensor, *, fused: bool = False
     ) -> Tensor:
         """Predicted cost ``(R, P)`` from inputs; arguments as in `path`."""
-        x, y, _ = self.path(theta, inputs, lengths, fused=fused)
-        return self.task.score(x.movedim(1, 0), y.movedim(1, 0), lengths)[0]
+        x, y, yaw = (
+            part.movedim(1, 0)
+            for part in self.path(theta, inputs, lengths, fused=fused)
+        )
+        return self.goal.judge(x, y, yaw, lengths)
 
     def cost(self, theta: Tensor, population: Population) -> Tensor:
         """Predicted cost of a population, ``(R, P)``."""
@@ -224,7 +227,7 @@ class Evaluator:
         """Predicted pose at the start and after each command, ``(R, P, K + 1, 3)``."""
         path = self.path(theta, self.inputs(population), population.lengths)
         after = torch.stack(path, dim=-1).transpose(1, 2)
-        start = torch.tensor(self.task.start, dtype=after.dtype, device=after.device)
+        start = torch.tensor(self.goal.start, dtype=after.dtype, device=after.device)
         return torch.cat([start.expand_as(after[:, :, :1]), after], dim=2)
 
     def disagreement(self, theta: Tensor, population: Population) -> Tensor:
@@ -239,8 +242,10 @@ class Evaluator:
         return torch.where(population.valid.transpose(1, 2), spread, 0.0).sum(1)
 
 
-class NavigationProblem(OpenLoopProblem):
-    """BNS for objectives that are to be reached in order (investigation A)."""
+class WheeledProblem(OpenLoopProblem):
+    """BNS for lists of wheel commands (investigation A)."""
+
+    task: WheeledTask
 
     stream = "learner"
     channels = ("left wheel", "right wheel")
@@ -258,8 +263,8 @@ class NavigationProblem(OpenLoopProblem):
         self.scaling = Scaling.of(self.encoding)
         self.output = self.scaling.output
         self.shape = Shape.of(config.snn)
-        route = Route.of(config.task, config.device)
-        self.evaluator = Evaluator(self.encoding, self.scaling, self.shape, route)
+        goal = self.task.path_goal(config.device)
+        self.evaluator = Evaluator(self.encoding, self.scaling, self.shape, goal)
         fixed = config.controller.fixed_length
         self.breeder = Breeder(config.evolution, self.encoding, fixed)
         self.usual = np.zeros((self.runs, OUTPUTS))  # RMS errors on the patterns
