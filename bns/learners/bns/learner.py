@@ -306,7 +306,8 @@ class Bns(Learner):
         lengths = arrays.get("lengths", self.population.lengths.cpu().numpy())
         self.population = Population(genes, torch.from_numpy(lengths).to(device))
         self.draws.restore(arrays["draws"])
-        self.adaptations.onsets = arrays.get("onsets", self.adaptations.onsets).copy()
+        if self.config.watch.detect:  # else they are told, and may be another branch's
+            self.adaptations.onsets = arrays["onsets"].copy()
         self.detector.past = arrays.get("innovations", self.detector.past).copy()
         self.problem.restore(arrays)
         for memory in self.memories:
