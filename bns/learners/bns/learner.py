@@ -123,12 +123,13 @@ class Bns(Learner):
 
     def check_alike(self, configs: Sequence[RunConfig]) -> None:
         """See `Learner.check_alike`; more is free in light following."""
-        kind: type[Problem] = tasks.of(configs[0]).problem()
+        task = tasks.of(configs[0])
+        kind: type[Problem] = task.problem()
         first = kind.shared(configs[0], configs[0])
         if any(kind.shared(config, configs[0]) != first for config in configs):
             raise BnsError(
-                f"Runs of one batch may differ in {kind.free} only; train the others "
-                "as a batch of their own."
+                f"Runs of one batch of {task.picture.name} may differ in {kind.free} "
+                "only; train the others as a batch of their own."
             )
 
     @classmethod
