@@ -6,6 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from bns.errors import FormatError
 from bns.worlds.trial import Trial, body_displacements
 
 BUCKET = 64  # patterns; training tensors grow in these steps, so shapes recur
@@ -84,8 +85,19 @@ class PatternBuffer:
         }
 
     def restore(self, arrays: dict[str, np.ndarray]) -> None:
-        """Go on from `state`."""
-        edges = np.cumsum(arrays["pattern_counts"])[:-1]
+        """Go on from `state`.
+
+        Raises:
+            FormatError: the counts are not those of the patterns.
+        """
+        counts, held = arrays["pattern_counts"], len(arrays["pattern_inputs"])
+        if (counts < 0).any() or {counts.sum(), len(arrays["pattern_targets"])} != {
+            held
+        }:
+            raise FormatError(
+                f"A stored state counts {counts.sum()} of {held} patterns."
+            )
+        edges = np.cumsum(counts)[:-1]
         self.inputs = np.split(arrays["pattern_inputs"], edges)
         self.targets = np.split(arrays["pattern_targets"], edges)
 
