@@ -8,7 +8,17 @@ from tests.sources import modules
 
 BASE = {"bns", "bns.errors", "bns.seeding", "bns.storage"} | {
     f"bns.storage.{name}"
-    for name in ("arrays", "csv_table", "files", "lock", "parquet", "reading", "seal")
+    for name in (
+        "arrays",
+        "csv_table",
+        "files",
+        "journal",
+        "lock",
+        "numbers",
+        "parquet",
+        "reading",
+        "seal",
+    )
 }
 """what knows no robot and no world; of the storage all that knows no run"""
 

@@ -44,7 +44,7 @@ class Entry(msgspec.Struct, forbid_unknown_fields=True):
 class Kept(msgspec.Struct, forbid_unknown_fields=True):
     """The file."""
 
-    worlds: dict[str, Entry] = {}
+    worlds: dict[str, Any] = {}
 
 
 @dataclass(frozen=True)
@@ -148,11 +148,12 @@ def _read(path: Path) -> dict[str, Corrected]:
     if not path.exists():
         return {}
     found = reading.typed(reading.read_toml(path), Kept, path, todo=TABLES)
+    items = reading.tables(found.worlds, Entry, path, todo=TABLES)
     return {
         name: Corrected(
             name, item.base, item.robot, tuple(item.reality), item.note, str(path)
         )
-        for name, item in found.worlds.items()
+        for name, item in items.items()
     }
 
 

@@ -8,7 +8,7 @@ content or a `FormatError` of one line.
 import os
 import stat
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
@@ -222,6 +222,20 @@ def typed(content: Any, kind: type[Kind], name: object, *, todo: str = "") -> Ki
         raise FormatError(f"{name} is not as it should be{where}: {why}.{more}") from (
             error
         )
+
+
+def tables(
+    content: Mapping[str, Any], kind: type[Kind], name: object, *, todo: str = ""
+) -> dict[str, Kind]:
+    """Each table of some content as `typed` makes it; errors say which it is.
+
+    Raises:
+        FormatError: as `typed`.
+    """
+    return {
+        key: typed(table, kind, f"[{key}] in {name}", todo=todo)
+        for key, table in content.items()
+    }
 
 
 def _why(error: Exception) -> str:

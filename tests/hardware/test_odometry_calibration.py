@@ -42,6 +42,6 @@ def test_a_robot_that_is_none_is_refused(tmp_path):
     Wheels(left=2 * WHEEL_DIAMETER, right=WHEEL_DIAMETER, axle=0.088).write(
         tmp_path / "odd.json"
     )
-    for name, words in (("odd.json", "nominal size"), ("none.json", "calibration of")):
+    for name, words in (("odd.json", "nominal size"), ("none.json", "cannot be read")):
         with pytest.raises(FormatError, match=words):
             Wheels.read(tmp_path / name)

@@ -76,5 +76,5 @@ def test_a_distorted_camera_projects_and_comes_back(tmp_path):
     held = Camera.read(tmp_path / "c.json")
     assert (held.distortion == bent.distortion).all()
     (tmp_path / "d.json").write_text("{}")
-    with pytest.raises(FormatError, match="no camera calibration"):
+    with pytest.raises(FormatError, match="bns hardware calibrate"):
         Camera.read(tmp_path / "d.json")

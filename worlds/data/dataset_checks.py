@@ -93,10 +93,10 @@ def valid(trial: Trial, where: str) -> None:
             f"{where}: commands begin or end outside the {len(trial.times)} samples, "
             "or overlap."
         )
-    _plausible(trial, where)
+    plausible(trial, where)
 
 
-def _plausible(trial: Trial, where: str) -> None:
+def plausible(trial: Trial, where: str) -> None:
     """Stop at numbers that no robot can have made.
 
     Raises:
