@@ -27,6 +27,7 @@ def merge(out: Path, others: Sequence[Path], *, mix: bool = False) -> int:
         BnsError: a campaign of another seed or version, one that is being written.
         FormatError: a directory that holds no campaign, or a damaged file.
     """
+    CampaignStore.open(out)  # there is one
     with Lock(out, make=False):
         store = CampaignStore.open(out)
         sources = [CampaignStore.open(other) for other in others]

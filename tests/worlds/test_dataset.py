@@ -194,7 +194,7 @@ DAMAGED_FILES = {
     "no header": (lambda d: (d / "dataset.json").unlink(), "half-written"),
     "no table": (lambda d: (d / "commands.parquet").unlink(), "is missing"),
     "no directory": (shutil.rmtree, "no dataset"),
-    "half a header": (cut("dataset.json", 40), "not JSON"),
+    "half a header": (cut("dataset.json", 40), "read as JSON"),
     "half a table": (cut("trials.parquet", 300), "cannot be read as Parquet"),
     "foreign": (header(schema="lerobot"), "schema 'lerobot'"),
     "newer": (header(version=2), "version 2; this release reads 1"),
