@@ -46,6 +46,24 @@ def load(path: Path) -> Any:
         raise FormatError(f"MuJoCo cannot read {path}: {error}") from error
 
 
+def compiled(spec: Any, name: object) -> Any:
+    """A spec as a `mujoco.MjModel`.
+
+    Args:
+        spec: as `load` gives it.
+        name: of its file, for messages.
+
+    Raises:
+        FormatError: MuJoCo refuses it.
+    """
+    import mujoco
+
+    try:
+        return spec.compile()
+    except (ValueError, mujoco.FatalError, *reading.UNREADABLE) as error:
+        raise FormatError(f"MuJoCo refuses {name}: {error}") from error
+
+
 def check(path: Path, *, depth: int = 0) -> None:
     """Stop at a file, or one that it includes, that asks for too much.
 

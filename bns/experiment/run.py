@@ -241,16 +241,34 @@ def _restore(batch: Batch, store: RunStore | None) -> int:
     done, state = store.read_state() if store else (0, {})
     if store and done:
         path = store.directory / "state.npz"
-        alike(state, batch.learner.state(), path)
-        try:
-            batch.learner.restore(state)
-        except reading.UNREADABLE as error:
-            raise FormatError(
-                f"{path} is no state of this learner: {error}."
-            ) from error
+        restored(batch.learner, batch.learner.state(), state, path)
     if store:
         store.note(event="resume" if done else "start", trials_done=done)
     return done
+
+
+def restored(
+    learner: Any,
+    fresh: Mapping[str, np.ndarray],
+    state: Mapping[str, np.ndarray],
+    path: Path,
+) -> None:
+    """Put a stored state into a learner.
+
+    Args:
+        learner: made for the same configuration.
+        fresh: its own state before it did anything.
+        state: as read.
+        path: of the file, for messages.
+
+    Raises:
+        FormatError: it is no state of such a learner.
+    """
+    alike(state, fresh, path)
+    try:
+        learner.restore(state)
+    except reading.UNREADABLE as error:
+        raise FormatError(f"{path} is no state of this learner: {error}.") from error
 
 
 def _keep(

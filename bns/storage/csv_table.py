@@ -8,6 +8,8 @@ import numpy as np
 from bns.errors import FormatError
 from bns.storage import reading
 
+THREADS = 1 << 20  # [bytes] above which several threads are worth it
+
 
 def read(
     path: Path | str, wanted: Sequence[str] | None = None, *, delimiter: str = ","
@@ -29,12 +31,13 @@ def read(
     try:
         table = csv.read_csv(
             pyarrow.BufferReader(data),
+            read_options=csv.ReadOptions(use_threads=len(data) > THREADS),
             parse_options=csv.ParseOptions(delimiter=delimiter),
         )
+        names = table.column_names
     except (*reading.UNREADABLE, pyarrow.ArrowException) as error:
-        first = str(error).splitlines()[0]
+        first = str(error).partition("\n")[0]
         raise FormatError(f"{path} cannot be read as CSV: {first}.") from error
-    names = table.column_names
     chosen = names if wanted is None else list(dict.fromkeys(wanted))
     for name in chosen:
         if names.count(name) != 1:

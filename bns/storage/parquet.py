@@ -8,6 +8,7 @@ from typing import Any
 from bns.errors import FormatError
 from bns.storage import files, reading, seal
 
+THREADS = 1 << 20  # [bytes] above which several threads are worth it
 KEY = b"sha256"
 """key of the schema's metadata that holds the digest of columns and other metadata"""
 
@@ -69,7 +70,7 @@ def decode(data: bytes, name: object, *, most: int = reading.DATA) -> Any:
 
     try:
         file = opened(pyarrow.BufferReader(data), name, most=most)
-        table = file.read()
+        table = file.read(use_threads=len(data) > THREADS)
         table.validate()
     except (*reading.UNREADABLE, pyarrow.ArrowException) as error:
         raise unreadable(error, name) from error

@@ -102,9 +102,12 @@ def published(directory: str | Path) -> Published:
         covariance = np.array(content["covariance"], dtype=float).reshape(6, 6)
     except (ArithmeticError, KeyError, TypeError, ValueError) as error:
         raise FormatError(f"{file} is no published estimate ({error!r}).") from None
-    known = np.isfinite([*values.values(), *covariance.ravel()]).all()
+    known = (np.abs([*values.values(), *covariance.ravel()]) <= checks.STRONGEST).all()
     if not known or (np.diag(covariance) < 0).any():
-        raise FormatError(f"{file}: NaN, or a covariance that is negative.")
+        raise FormatError(
+            f"{file}: NaN, a number beyond {checks.STRONGEST:g}, or a covariance that "
+            "is negative."
+        )
     spread = np.sqrt(np.diag(covariance)).tolist()
     return Published(values, dict(zip(PARAMETERS, spread, strict=True)), covariance)
 

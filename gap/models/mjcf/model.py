@@ -87,11 +87,7 @@ class OwnModel:
         if not self.config.model.exists():
             raise FormatError(f"There is no model file {self.config.model}.")
         made = mjcf_file.load(self.config.model)
-        try:
-            made.copy().compile()
-        except (ValueError, mujoco.FatalError) as error:
-            first = str(error).strip().splitlines()[0]
-            raise FormatError(f"{self.config.model}: {first}") from None
+        mjcf_file.compiled(made.copy(), self.config.model)
         for effect in effects:
             if effect.stage == "body" and not effect.is_nominal:
                 effect.edit(made)
