@@ -17,7 +17,7 @@ the same bytes in everything but `log.jsonl`.
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
@@ -38,6 +38,14 @@ class Head(msgspec.Struct):
     name: str
     seed: int
     versions: dict[str, str]
+
+
+class Failure(msgspec.Struct):
+    """What failed/KEY.json says."""
+
+    key: str
+    reason: str
+    attempts: Annotated[int, msgspec.Meta(ge=0, le=1_000_000)]
 
 
 @dataclass(eq=False)
@@ -168,7 +176,11 @@ class CampaignStore:
     def failures(self) -> dict[str, dict[str, Any]]:
         """Batches that failed, by key."""
         paths = sorted(self.failed.glob("[0-9a-f]*.json"))
-        return {path.stem: seal.opened(reading.read_json(path), path) for path in paths}
+        said = {path: seal.opened(reading.read_json(path), path) for path in paths}
+        return {
+            path.stem: msgspec.structs.asdict(reading.typed(entry, Failure, path))
+            for path, entry in said.items()
+        }
 
     def forgive(self) -> None:
         """Forget all failures, so that they are tried again."""
