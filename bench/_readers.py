@@ -314,6 +314,10 @@ def _given() -> Iterator[Reader]:
         arm = OwnConfig.read(ROOT / "examples" / "arm" / "arm.toml")
         return log.read(str(home / "own.csv"), arm)
 
+    def law(home: Path) -> Any:
+        servo_numbers._tables.cache_clear()
+        return servo_numbers.law(home / "law")
+
     listed = [
         ("config.toml", "run/config.toml",
          lambda h: loading.from_file(h / "run" / "config.toml"), finite),
@@ -321,7 +325,8 @@ def _given() -> Iterator[Reader]:
          lambda h: journal.entries(h / "run" / "timing.jsonl"), _fine),
         ("campaign file", "campaign.toml",
          lambda h: campaign_file.read(h / "campaign.toml"), _fine),
-        ("worlds.toml", "worlds.toml", lambda h: corrected._read(h / "worlds.toml"), _fine),
+        ("worlds.toml", "worlds.toml",
+         lambda h: corrected._read(h / "worlds.toml"), _fine),
         ("column map", "map.toml", lambda h: ColumnMap.read(h / "map.toml"), _fine),
         ("CSV log", "log.csv",
          lambda h: importing.from_csv(h / "log.csv", ROOT_MAP), trials),
@@ -336,8 +341,7 @@ def _given() -> Iterator[Reader]:
          finite),
         ("numbers.toml", "burger/numbers.toml", lambda h: numbers.read(h / "burger"),
          finite),
-        ("law.toml", "law/law.toml", lambda h: (
-            servo_numbers._tables.cache_clear(), servo_numbers.law(h / "law"))[1], finite),
+        ("law.toml", "law/law.toml", law, finite),
         ("commands.csv", "commands.csv",
          lambda h: command_file.read(h / "commands.csv"), finite),
         ("lstraight.tuple", "khepera/lstraight.tuple",

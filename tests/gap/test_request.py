@@ -1,4 +1,4 @@
-"""A diagnosis that is killed: the same command again is possible, and another is not."""
+"""A killed diagnosis: the same command again is possible, another is not."""
 
 import pytest
 
