@@ -101,6 +101,7 @@ def _block(home: Path, block: int, size: int, there) -> None:
         mine = Path(name) / "files"
         shutil.copytree(home, mine)
         for reader in readers():
+            reader.read(mine)  # all that it imports is there
             for seed in range(block * size, (block + 1) * size):
                 attempt(reader, mine, seed, found)
     seconds = round(time.monotonic() - began, 1)

@@ -1,4 +1,4 @@
-"""Pairs of processes told to write into one directory: one does, the other is refused."""
+"""Two processes told to write into one directory: one does, the other may not."""
 
 import io
 import json
@@ -116,7 +116,7 @@ def _start(words: list[str], said: Path):
 
 
 def _pair(home: Path, out: Path, kind: str, offset: float) -> dict:
-    """What came of two processes; `fault` is "" where one did all and the other none."""
+    """What came of two processes; `fault` is "" where one did all of it alone."""
     files = [home / f"said-{seed}.txt" for seed in (1, 2)]
     first = _start(_words(home, out, kind, 1), files[0])
     time.sleep(offset)
@@ -125,7 +125,9 @@ def _pair(home: Path, out: Path, kind: str, offset: float) -> dict:
         process.join()
     codes = [first.exitcode, second.exitcode]
     lines = [_lines(file) for file in files]
-    refused = [code == 2 and len(line) == 1 for code, line in zip(codes, lines)]
+    refused = [
+        code == 2 and len(line) == 1 for code, line in zip(codes, lines, strict=True)
+    ]
     fault = ""
     if sorted(codes) != [0, 2] or sum(refused) != 1:
         fault = f"exit codes {codes}: {[line[-1:] for line in lines]}"

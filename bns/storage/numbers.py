@@ -9,6 +9,6 @@ BEYOND = 1e9
 Finite = Annotated[float, msgspec.Meta(ge=-BEYOND, le=BEYOND)]
 """any number; NaN and infinity are none"""
 
-Positive = Annotated[float, msgspec.Meta(gt=0, le=BEYOND)]
+Positive = Annotated[float, msgspec.Meta(ge=1 / BEYOND, le=BEYOND)]
 Least = Annotated[float, msgspec.Meta(ge=0, le=BEYOND)]
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]

@@ -140,8 +140,9 @@ def trials(
 
 def _trial(si: Mapping[str, np.ndarray], columns: ColumnMap, where: str) -> Trial:
     times = si["time"] - si["time"][0]
-    if not np.isfinite(times).all() or (np.diff(times) < 0).any():
-        row = int(np.flatnonzero(~(np.diff(times, prepend=-np.inf) >= 0))[0])
+    wrong = ~np.isfinite(times) | (np.diff(times, prepend=times[0]) < 0)
+    if wrong.any():
+        row = int(np.argmax(wrong))
         raise FormatError(
             f"{where}: time is missing or goes backwards at sample {row}; sort the "
             "samples by time."

@@ -13,6 +13,7 @@ from bns import seeding
 from bns.errors import BnsError, FormatError
 from bns.storage import arrays as npz
 from bns.storage import reading
+from bns.storage.numbers import BEYOND
 
 SCHEMA, VERSION = "bns-static-nets", 1
 INPUTS, OUTPUTS = 5, 3
@@ -143,6 +144,8 @@ class StaticNets:
         for name, array in arrays.items():
             if array.dtype != np.float64:
                 raise FormatError(f"{path}: {name} is {array.dtype}, not float64.")
+            if not (np.abs(array) <= BEYOND).all():
+                raise FormatError(f"{path}: {name} holds NaN or more than {BEYOND:g}.")
         try:
             return cls(**arrays, provenance=said.provenance, activation=said.activation)
         except BnsError as error:
