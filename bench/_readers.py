@@ -201,22 +201,14 @@ def _recordings(home: Path) -> None:
 
 def readers() -> list[Reader]:
     """All of them."""
-    return [*_stored(), *_given()]
+    return [*_stored(), *_made(), *_given(), *_recorded()]
 
 
 def _stored() -> Iterator[Reader]:
     from bns.campaign import results
-    from bns.campaign.part import decode
     from bns.campaign.store import CampaignStore
-    from bns.gap import store as gap_store
-    from bns.gap.bench.benchmark_io import read_answers
-    from bns.hardware.dynamixel import joints
-    from bns.hardware.odometry import Wheels
-    from bns.hardware.tracking.camera import Camera
-    from bns.storage import reading
     from bns.storage.store import RunStore, load
     from bns.worlds.data import dataset
-    from bns.worlds.static_snn.nets import StaticNets
 
     yield Reader(
         "run.json", "run/run.json", lambda h: RunStore.open(h / "run"), stored=True
@@ -240,6 +232,19 @@ def _stored() -> Iterator[Reader]:
     }
     for name, read in stores.items():
         yield Reader(name, f"store/{name}", read, stored=True)
+
+
+def _made() -> Iterator[Reader]:
+    from bns.campaign.part import decode
+    from bns.campaign.store import CampaignStore
+    from bns.gap import store as gap_store
+    from bns.gap.bench.benchmark_io import read_answers
+    from bns.hardware.dynamixel import joints
+    from bns.hardware.odometry import Wheels
+    from bns.hardware.tracking.camera import Camera
+    from bns.storage import reading
+    from bns.worlds.static_snn.nets import StaticNets
+
     yield Reader(
         "part.parquet", "part.parquet",
         lambda h: decode(
@@ -300,7 +305,6 @@ _LEARNERS: dict[Path, Any] = {}
 def _given() -> Iterator[Reader]:
     from bns.campaign import file as campaign_file
     from bns.experiment import loading
-    from bns.gap.importers import khepera3_odometry, kscale_sts3215, mrclam6, xl330
     from bns.gap.models.mjcf import log
     from bns.gap.models.mjcf.config import OwnConfig
     from bns.gap.planning import command_file
@@ -344,6 +348,15 @@ def _given() -> Iterator[Reader]:
         ("law.toml", "law/law.toml", law, finite),
         ("commands.csv", "commands.csv",
          lambda h: command_file.read(h / "commands.csv"), finite),
+    ]  # fmt: skip
+    for name, file, read, sane in listed:
+        yield Reader(name, file, read, sane)
+
+
+def _recorded() -> Iterator[Reader]:
+    from bns.gap.importers import khepera3_odometry, kscale_sts3215, mrclam6, xl330
+
+    listed = [
         ("lstraight.tuple", "khepera/lstraight.tuple",
          lambda h: khepera3_odometry.read(h / "khepera"), trials),
         ("lstraight_results.json", "khepera/lstraight_results.json",

@@ -23,7 +23,7 @@ KEPT = RESULTS / "fuzz.part.jsonl"
 """a line a block that is done: a bench that is stopped goes on from there"""
 
 
-def run(quick: bool, inputs: int = INPUTS) -> Result:
+def run(quick: bool) -> Result:
     """Every input follows from its reader and seed, so that each can be had again.
 
     Resumes after the blocks that are in `bench/results/fuzz.part.jsonl`; remove that to
@@ -35,7 +35,7 @@ def run(quick: bool, inputs: int = INPUTS) -> Result:
         make(home)
         count = len(readers())
         size = QUICK // count if quick else BLOCK
-        wanted = 1 if quick else -(-inputs // (size * count))
+        wanted = 1 if quick else -(-INPUTS // (size * count))
         rows = [] if quick else _kept()
         todo = [b for b in range(wanted) if b not in {row["block"] for row in rows}]
         for row in _worked(home, todo, size):
@@ -43,7 +43,7 @@ def run(quick: bool, inputs: int = INPUTS) -> Result:
             if not quick:
                 with KEPT.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(row) + "\n")
-    return _result(rows, quick, inputs)
+    return _result(rows, quick)
 
 
 def _memory() -> str | None:
@@ -109,13 +109,13 @@ def _block(home: Path, block: int, size: int, there) -> None:
     there.send(row | {"seconds": seconds})
 
 
-def _result(rows: list[dict], quick: bool, inputs: int) -> Result:
+def _result(rows: list[dict], quick: bool) -> Result:
     total: dict[str, int] = {}
     for row in rows:
         for name, count in row["counts"].items():
             total[name] = total.get(name, 0) + count
     bad = sum(total.get(name, 0) for name in BAD)
-    enough = quick or total.get("inputs", 0) >= inputs
+    enough = quick or total.get("inputs", 0) >= INPUTS
     return Result(
         figure=bad,
         unit="tracebacks, hangs, wrong acceptances, bad messages, crashes",
