@@ -10,6 +10,7 @@ from bns.campaign.engines.base import Engine
 from bns.campaign.file import Campaign, Member
 from bns.claims import sides, verdict
 from bns.claims.claim import Claim
+from bns.storage.lock import Lock
 
 ROOT = Path("runs/claims")
 QUICK_RUNS = 6
@@ -142,15 +143,13 @@ def take(
     need = needed(claims, world=world)
     campaign = _campaign(need.members, 1, world)
     out = directory(world, quick=False, root=root)
-    store = drive.opened(campaign, out, resume=True)
-    store.check_versions()
-    store.lock()
-    try:
+    with Lock(out) as lock:
+        store = drive.opened(campaign, out, resume=True, lock=lock)
+        store.check_versions()
+        store.tidy()
         taken = []
         for folder in folders:
             held = drive.replicates_done(store, campaign)
             taken += adopt(store, folder, need.runs, held)
         store.compact()
-        return taken
-    finally:
-        store.close()
+    return taken

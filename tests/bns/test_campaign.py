@@ -17,7 +17,7 @@ from bns.campaign.plan import plan
 from bns.campaign.store import CampaignStore
 from bns.campaign.table import table
 from bns.errors import BnsError, FormatError
-from bns.storage import files
+from bns.storage import files, reading
 from tests.bns.campaigns import campaign
 from tests.bns.contents import contents
 
@@ -244,7 +244,7 @@ def test_what_does_not_belong_together_is_not_put_together(clean, tmp_path):
         merge(other, [clean])
     with pytest.raises(BnsError, match="given twice"):
         merge(clean, [clean])
-    head = files.read_json(other / "campaign.json")
+    head = reading.read_json(other / "campaign.json")
     head["seed"], head["versions"]["mujoco"] = 0, "1.0"
     files.write_json(other / "campaign.json", head)
     with pytest.raises(BnsError, match="another mujoco"):
