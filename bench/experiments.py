@@ -31,6 +31,7 @@ DAMAGES = {
 }
 LATER = ("learner", "light", "walk", "watch")  # newer than the first stored runs
 NEWER = (
+    ("adaptation", "simulator_reset_untrained"),
     ("light", "readings"),
     ("light", "renewed"),
     ("walk", "repeat"),

@@ -142,7 +142,8 @@ class Learner:
             which = torch.from_numpy(resets.simulator).to(self.config.device)
             fresh_theta = self.shape.random(self.runs, self.draws)
             self.theta = torch.where(which[:, None], fresh_theta, self.theta)
-            self._train(which & torch.from_numpy(self.buffer.counts > 0).to(which))
+            due = resets.trained & (self.buffer.counts > 0)
+            self._train(torch.from_numpy(due).to(which))
 
     def observe(
         self, trial: int, tried: Sequence[Trial], best: Sequence[Trial] | None

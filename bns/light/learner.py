@@ -170,7 +170,7 @@ class LightLearner:
             for learned in (self.motion, self.sensors):
                 fresh = learned.fresh()
                 learned.theta = torch.where(which[:, None], fresh, learned.theta)
-                learned.train(self.loops, due.simulator)
+                learned.train(self.loops, due.trained)
 
     def _restart(self, which: np.ndarray, *, elitists: bool) -> None:
         """Fresh random populations in some runs, but for their elitists if asked."""

@@ -3,8 +3,9 @@
 Figures, each ``(R,)``: fitness (equation 5.2 with its sign turned: 0 is best; the
 dissertation maximises), fitness_best, fitness_predicted (inside the SNNs, from the
 trial's own start), reached (1 where it came to the goal radius), solved
-(`LightTask.solved`), edge_turns, lamp_stops, commands
-(cycles until the robot was stopped), the errors of `ERRORS`, snn_loss, sensor_loss,
+(`LightTask.solved`), edge_turns, lamp_stops, turned (by how much the robot turned on
+the whole, counter-clockwise positive [rad]), commands (cycles until the robot was
+stopped), the errors of `ERRORS`, snn_loss, sensor_loss,
 patterns, sensor_patterns, diversity_41, diversity_51, diversity_73.
 
 Arrays: sent ``(R, K, 3)`` (left, right [m/s], duration [s]), poses and predicted
@@ -58,6 +59,7 @@ def measured(
         "reached": task.reached(went).astype(np.float64),
         "solved": np.array(solved, np.float64),
         "commands": np.array([_moving(trial) for trial in tried], np.float64),
+        "turned": np.array([_turned(trial) for trial in tried]),
         **counted,
     }
 
@@ -65,6 +67,13 @@ def measured(
 def _readings(trial: Trial) -> np.ndarray:
     seen = np.stack([trial.channel(name) for name in READINGS], axis=1)
     return seen[trial.boundaries]
+
+
+def _turned(trial: Trial) -> float:
+    """Net turn over all command ends; less than half a turn a command [rad]."""
+    yaw = trial.command_poses_world[:, 2]
+    yaw = np.unwrap(yaw[np.isfinite(yaw)])
+    return float(yaw[-1] - yaw[0]) if len(yaw) else 0.0
 
 
 def _moving(trial: Trial) -> int:
