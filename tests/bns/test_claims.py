@@ -12,7 +12,7 @@ from bns import presets, stats
 from bns.campaign.engines.inline import InlineEngine
 from bns.campaign.identity import identity
 from bns.campaign.part import Block
-from bns.claims import measures, report, runner, sides, verdict
+from bns.claims import measures, price, report, runner, sides, verdict
 from bns.claims.claim import Cell, claims, content, find
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig, WorldConfig
@@ -246,6 +246,46 @@ def test_the_onset_of_improvement_is_where_a_fifth_is_made_up():
     assert measures.of(runs, "onset-of-improvement").tolist() == [30.0, np.inf]
 
 
+def test_the_peak_is_placed_by_the_other_runs():
+    cost = np.full((3, 20), 1.0)
+    cost[:, 8:13] = 9.0  # damage at 5, worst from 8 to 12
+    cost[0, 15:20] = 99.0  # one run's own accident
+    runs = record(cost, onset=5)
+    assert measures.of(runs, "peak")[0] == 9.0
+
+
+def test_nothing_but_noise_is_no_improvement():
+    rng = np.random.default_rng(3)
+    noise = record(rng.normal(size=(100, 100)), onset=30)
+    cell = Cell(a="x", b="x", measure="end", measure_b="peak")
+    found = verdict.judge(cell, noise, noise)
+    assert found.share.low < 0.5 < found.share.high
+    own = np.array([c[30:].max() for c in noise["fitness_best"]])
+    assert stats.a12_value(own, measures.of(noise, "end")) > 0.99  # a run's own worst
+
+
+def with_columns(onset, **columns):
+    """Runs with the given columns, each ``(R, T)``."""
+    arrays = {name: np.array(values, float) for name, values in columns.items()}
+    runs, trials = next(iter(arrays.values())).shape
+    config = RunConfig(replicates=runs, trials=trials)
+    return Block("x", config, 0, onset, arrays).record()
+
+
+def test_handedness_by_hand():
+    one, half = [3.0] * 10, [3.0, -0.1] * 5
+    nine = [-2.0] * 9 + [2.0]
+    runs = with_columns(-1, turned=[[-1.0, *one], [1.0, *half], [1.0, *nine]])
+    assert measures.of(runs, "one-handed").tolist() == pytest.approx([1, 0, 0.8])
+
+
+def test_walking_as_far_as_before_by_hand():
+    ways = [[1, 2, 2, 0, 1.7, 1.9, 2.1], [1, 2, 2, 2, 0, 0, 0], [1, 2, 2, 0, 0, 0, 0]]
+    runs = with_columns(3, distance=ways)
+    assert measures.of(runs, "regain").tolist() == [3, 1, np.inf]
+    assert measures.of(runs, "surpass").tolist() == [4, 1, np.inf]
+
+
 @pytest.fixture
 def tiny(monkeypatch):
     """Quick runs that take no time."""
@@ -323,6 +363,39 @@ def test_finished_runs_are_taken(tmp_path, monkeypatch):
 def test_a_side_that_needs_what_does_not_exist_says_so():
     cell = Cell(a="left-20 no-such-piece")
     assert "Unknown piece of A" in sides.missing("A", cell, world="mujoco")
+
+
+@pytest.mark.parametrize(
+    ("letter", "side", "trials"),
+    [
+        ("A", "undamaged", 24),  # solved within 24, nothing else
+        ("C", "sensor-min adapted", 28),  # recovers within 8 from trial 20 on
+        ("C", "left-slow feedforward", 36),
+        ("A", "left-20", 100),  # its cost counts as well
+        ("D", "type-0 restart", 200),
+    ],
+)
+def test_a_side_runs_no_longer_than_what_is_asked_of_it(letter, side, trials):
+    assert sides.member(letter, side, world="mujoco").config.trials == trials
+
+
+def test_a_comparison_costs_what_its_share_implies():
+    clear, close = Cell(a="x", b="y", p="0.00000"), Cell(a="x", b="y", p="0.04207")
+    assert price.implied(close) == pytest.approx(0.5 + 0.153, abs=0.002)
+    assert price.expected(clear, price.implied(clear)) == 20
+    assert price.expected(close, price.implied(close)) == 50
+    assert price.expected(Cell(a="x", b="y", says="<"), 0.02) == 10
+    assert price.expected(Cell(a="x", b="y", says="="), 0.5) == 100
+    assert price.expected(Cell(a="x", at_most=5), 1.0) == 10
+    assert price.expected(Cell(a="x", b="y", variant="v"), 0.6) == 30
+
+
+def test_shared_trials_are_paid_once():
+    two = price.planned([find("D20")], world="mujoco")
+    assert two.sides == 4 and two.hours < two.apart  # 14, 14 data-reset, each printed
+    alone = price.planned([find("D31")], world="mujoco")
+    assert alone.hours == alone.apart > 0
+    assert price.planned([find("B2")], world="static-snn").sides == 0
 
 
 def test_quick_sides_are_short():
