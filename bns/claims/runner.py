@@ -87,7 +87,7 @@ def run(
         retry: try batches again that failed before.
         stop: asked after every batch; True ends the session there.
         progress: show it on the standard error stream.
-        found: called after every round, when there are new findings.
+        found: called after every batch, when there may be new findings, and at the end.
 
     Raises:
         BnsError: a store of another version, or one that is being written.
@@ -112,8 +112,7 @@ def run(
                 break
             if progress and not quick:
                 print(price.left(rows, world=world))
-            _work(todo, store, engine, session, stop, progress, world)
-            found()
+            _work(todo, store, engine, session, stop, progress, world, found)
         store.compact()
     finally:
         store.close()
@@ -147,6 +146,7 @@ def _work(
     stop: Stop,
     progress: bool,
     world: str,
+    found: Found,
 ) -> None:
     """Run batches, trunks before the sides that begin with them."""
     for part in _phases(jobs):
@@ -160,6 +160,7 @@ def _work(
                     )
                 elif outcome.data:
                     store.add(outcome.key, outcome.data)
+                    found()
                 session.done += outcome.data is not None
                 store.note(
                     batch=outcome.key,

@@ -1,6 +1,7 @@
 """`bns claims`: the dissertation's claims, run and judged."""
 
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -25,6 +26,7 @@ The rule is in docs/claims.md. `bns claims VERB --help` is the manual of a verb.
 
 WORLDS = ("mujoco", "static-snn")
 PUBLISHED = "published"
+KEEP_EVERY = 300.0  # s
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +71,7 @@ class Run:
     own: bool = False
     """run what is published as well"""
     findings: str = ""
-    """file that all findings are written to after every round; by default
+    """file that all findings are written to as they come; by default
     ROOT/findings.json"""
     engine: Literal["local", "inline", "ray"] = "local"
     """local: processes of one thread each; inline: this process; ray: a Ray cluster"""
@@ -202,6 +204,7 @@ def _run(given: Run) -> int:
     engine = registry.make(
         given.engine, workers=given.workers, ray_address=given.ray_address
     )
+    keeper = Keeper(given)
     with until_interrupted() as stop:
         session = runner.run(
             wanted,
@@ -214,8 +217,9 @@ def _run(given: Run) -> int:
             mix=given.mix,
             retry=given.retry,
             stop=stop,
-            found=lambda: _keep(given),
+            found=keeper,
         )
+    keeper.keep()
     for key, reason in session.failed.items():
         print(f"failed: {key}: {reason}")
     _table(
@@ -232,17 +236,29 @@ def _run(given: Run) -> int:
     return int(bool(session.failed or session.waiting))
 
 
-def _keep(given: Run) -> None:
-    """Write the findings of both worlds, ready to be published."""
-    if given.quick:
-        return
-    from bns.claims import published, report
-    from bns.storage import files
+@dataclass
+class Keeper:
+    """Writes the findings of both worlds to a file, every few minutes at most."""
 
-    path = Path(given.findings or f"{given.root}/findings.json")
-    files.make_directory(path.parent)
-    worlds = _both(given.root)
-    published.write(path, report.publishable(worlds), report.settings(worlds))
+    given: Run
+    wrote: float = field(default_factory=time.monotonic)
+
+    def __call__(self) -> None:
+        if time.monotonic() - self.wrote > KEEP_EVERY:
+            self.keep()
+
+    def keep(self) -> None:
+        """Write them now; of quick runs none."""
+        if self.given.quick:
+            return
+        from bns.claims import published, report
+        from bns.storage import files
+
+        path = Path(self.given.findings or f"{self.given.root}/findings.json")
+        files.make_directory(path.parent)
+        worlds = _both(self.given.root)
+        published.write(path, report.publishable(worlds), report.settings(worlds))
+        self.wrote = time.monotonic()
 
 
 def _both(root: str, *, own: bool = False) -> dict:
