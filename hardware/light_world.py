@@ -9,7 +9,6 @@ import numpy as np
 from bns import seeding
 from bns.errors import BnsError
 from bns.hardware import homing, records
-from bns.hardware.errors import LinkError
 from bns.hardware.limits import Limits
 from bns.hardware.rig import Rig, battery
 from bns.hardware.schedule import GRID
@@ -102,11 +101,7 @@ class HardwareLight(HardwareWorld):
             stand = homing.go(mover, start, lamps=self._places, keep=keep)
             steering = self._steering(mover, stages, seed, trial, cycles, cycle)
             begin = rig.clock.now()
-            try:
-                done = steering.perform(policy)
-            except LinkError:
-                self._rig = None if rig.leash is not None else rig
-                raise
+            done = steering.perform(policy)
             about = self._about(rig, volts, float(begin), stand, done)
             conditions = stages.conditions(trial, seed) | about | self._light()
             return self._made(done, cycle, float(start[2]), conditions)

@@ -4,7 +4,7 @@ from bns.errors import BnsError
 from bns.hardware.khepera import protocol
 
 
-def stranger(heard: bytes) -> BnsError:
+def port_error(heard: bytes) -> BnsError:
     """What it means that `B` got no answer."""
     if b"\xff\xff" in heard:
         return BnsError(

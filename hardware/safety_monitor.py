@@ -4,16 +4,17 @@ from abc import ABC, abstractmethod
 
 from bns.errors import BnsError
 from bns.hardware.clock import Clock
-from bns.hardware.errors import SafetyStop
+from bns.hardware.errors import SafetyStop, Void
 from bns.hardware.faults import FaultLog
 from bns.hardware.limits import Limits, Operator
 from bns.hardware.tracking.eyes import Eyes
 from bns.hardware.tracking.tracker import Sighting
 
 SIGHT = 3.0  # s to wait for the standing robot to be seen
+AHEAD = 0.05  # s by which a time stamp may be ahead of the clock
 
 
-class Lookout(ABC):
+class SafetyMonitor(ABC):
     """Who moves a robot under the limits, as far as seeing it goes.
 
     Args:
@@ -45,7 +46,8 @@ class Lookout(ABC):
         """New sightings; with the safety checks of a tick.
 
         Raises:
-            SafetyStop: the operator, the camera or the tracker.
+            SafetyStop: the operator or the camera.
+            Void: it was not seen for too long, or not seen to move.
         """
 
     @abstractmethod
@@ -70,16 +72,27 @@ class Lookout(ABC):
         )
 
     def _seen(self, *, moving: bool) -> list[Sighting]:
-        """New sightings; a robot that moves must have been seen of late."""
+        """New sightings; a robot that moves must have been seen of late.
+
+        Pictures that cannot be of now are left out: repeated ones, and those with a
+        time stamp ahead of the clock.
+
+        Raises:
+            SafetyStop: the operator says so, the camera is gone, a lamp is near.
+            Void: it was not seen for too long; the caller stops it.
+        """
         self.operator.check()
         try:
             seen = self.eyes.poll()
         except BnsError as error:
             raise SafetyStop(f"the camera is lost ({error})", "check it") from error
+        latest = self.clock.now() + AHEAD
+        seen = [s for s in seen if s.time <= latest and not s.repeated]
         if seen:
             self.last = seen[-1]
-        if moving and (self.last is None or self._since(self.last) > self._blind):
-            raise SafetyStop("the tracker has lost it", "free the view of its tag")
+        if moving and (self.last is None or self._since(self.last) > self.limits.blind):
+            self.faults.note("not seen", "tag", f"{self.limits.blind:g} s")
+            raise Void(f"it was not seen for {self.limits.blind:g} s while it moved")
         if moving and any(map(self.limits.at_lamp, seen)):
             raise SafetyStop(
                 f"it came within {self.limits.lamp:g} m of a lamp",
@@ -89,8 +102,3 @@ class Lookout(ABC):
 
     def _since(self, sighting: Sighting) -> float:
         return self.clock.now() - sighting.time
-
-    @property
-    def _blind(self) -> float:
-        """How long a moving robot may be out of sight [s]."""
-        return self.limits.blind + self.eyes.tracker.camera.latency
