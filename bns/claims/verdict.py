@@ -13,7 +13,7 @@ Of a claimed difference
     null            it is on the other side or on none, Holm's p >= 0.05
     reversed        it is on the other side, and Holm's p < 0.05
 Of a claimed "no difference"
-    holds           equivalent: two one-sided tests refuse, at 0.05, that the share is
+    holds           equivalent: two one-sided tests refuse, at 0.04, that the share is
                     0.36 or less and that it is 0.64 or more
     null            neither that nor a difference is shown
     reversed        not equivalent, and Holm's p < 0.05: there is a difference
@@ -53,6 +53,9 @@ from bns.stats.power import power
 from bns.stats.sequential import Design, up_to
 
 LEVEL = 0.05
+ALIKE = 0.04
+"""level of equivalence: at 0.05 it was shown at the margin in 5.4 % of 20,000 simulated
+comparisons in which 100 % of one side and 72 % of the other recover, now in 4.4 %"""
 REVERSAL = 0.0003
 """p at which the other side than the claimed stops: 0.05 over more comparisons than any
 investigation has"""
@@ -185,7 +188,7 @@ def stops(says: str, share: float, p: float, alike: float) -> bool:
     """
     if says == "=":
         return p < REVERSAL
-    if alike < LEVEL or p < REVERSAL:
+    if alike < ALIKE or p < REVERSAL:
         return True
     value = 1 - share if says == "<" else share
     return p < LEVEL and (says == "?" or value > 0.5)
@@ -196,7 +199,7 @@ def verdict(
 ) -> str:
     """The verdict of one comparison by the rule above."""
     if says == "=":
-        if equivalent < LEVEL:
+        if equivalent < ALIKE:
             return "holds"
         return "reversed" if p_holm < LEVEL else "null"
     if says == "?":
