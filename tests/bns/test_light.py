@@ -259,3 +259,14 @@ class TestPatterns:
         read = np.array([0.0, 1000.0, 4095.0])
         np.testing.assert_allclose(counts(brightness(read)), read, atol=1e-9)
         assert brightness(np.array(0.0)) == 1.0
+
+
+def test_the_net_turn_of_a_trial_goes_on_beyond_half_a_turn():
+    from bns.light.observing import _turned
+    from bns.worlds.trial import Commands, Trial
+
+    yaw = np.array([3.0, 4.0, 5.0, 6.0, 7.0])
+    poses = np.column_stack([yaw * 0, yaw * 0, (yaw + np.pi) % (2 * np.pi) - np.pi])
+    commands = Commands([[0.1, 0.1]] * 4, [1.0] * 4)
+    trial = Trial(commands, np.arange(5.0), poses, np.arange(5))
+    assert _turned(trial) == pytest.approx(4.0)
