@@ -4,15 +4,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-import tyro
-
+from bns.cli.fields import Positional
 from bns.cli.parse import dispatch
 from bns.cli.tables import show
 from bns.errors import BnsError
 
 MANUAL = """usage: bns claims {list,run,take,table} [...]
 
-  list           all 157 claims: where, what is compared, what the dissertation says
+  list           all 157 claims: where, what is compared, what was said
   run ID ...     run what a claim needs and is missing, then say what it says
   run C ...      the same for all claims of an investigation
   run --all      the same for every claim whose preset exists
@@ -30,7 +29,7 @@ PUBLISHED = "published"
 class List:
     """List the claims: id, place, kind, what the dissertation says, comparisons."""
 
-    ids: tyro.conf.Positional[tuple[str, ...]] = ()
+    ids: Positional[tuple[str, ...]] = ()
     """claims to show with all their comparisons; none lists all"""
     json: bool = False
     """print JSON instead of a table"""
@@ -42,7 +41,7 @@ class Run:
     runs/claims/WORLD and never done twice; more can be added at any time.
     """
 
-    ids: tyro.conf.Positional[tuple[str, ...]] = ()
+    ids: Positional[tuple[str, ...]] = ()
     """claims, as in `bns claims run A15 C22`, or investigations: A, B, C, D"""
     all: bool = False
     """every claim"""
@@ -72,7 +71,7 @@ class Take:
     side's, and of which there are none yet.
     """
 
-    folders: tyro.conf.Positional[tuple[str, ...]]
+    folders: Positional[tuple[str, ...]]
     """folders of run directories"""
     world: Literal["mujoco", "static-snn"] = "mujoco"
     """whose runs"""
@@ -86,7 +85,7 @@ class Table:
     the package where those rest on more runs of the same settings.
     """
 
-    ids: tyro.conf.Positional[tuple[str, ...]] = ()
+    ids: Positional[tuple[str, ...]] = ()
     """claims or investigations, as in `A15 C`; none means all"""
     world: Literal["mujoco", "static-snn"] = "mujoco"
     """which runs"""

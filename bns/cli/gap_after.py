@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import tyro
-
+from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.errors import BnsError, UnknownNameError
 
@@ -16,7 +15,7 @@ class Planned:
     tied, and write it to a file. Record it, then diagnose both recordings together.
     """
 
-    directory: tyro.conf.Positional[str]
+    directory: Positional[str]
     """a directory that `bns gap diagnose` wrote"""
     to: str = ""
     """file for the commands, CSV (default: DIRECTORY/next_command.csv)"""
@@ -32,7 +31,7 @@ class Edit:
     was not there: a model with the right physics stays right.
     """
 
-    directory: tyro.conf.Positional[str]
+    directory: Positional[str]
     """a directory that `bns gap diagnose` wrote"""
     remove: str
     """name of the effect, wheel_gain[left] or wheel_gain; * = all"""
@@ -50,7 +49,7 @@ class Apply:
     it, `bns worlds` lists it. For a model of your own: write the corrected MJCF.
     """
 
-    directory: tyro.conf.Positional[str]
+    directory: Positional[str]
     """a directory that `bns gap diagnose` wrote"""
     world: str = ""
     """name for the world"""

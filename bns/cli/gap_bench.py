@@ -5,12 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import tyro
-
-from bns.cli.parse import parse
+from bns.cli.fields import Positional
+from bns.cli.parse import dispatch
 from bns.errors import BnsError, FormatError, UnknownNameError
 
-VERBS = ("make", "run", "score")
 MANUAL = """usage: bns gap bench {make,run,score} [...]
 
   make   write recordings with hidden effects, their answers in another place
@@ -25,7 +23,7 @@ dataset directory each, and an answers file as `make` writes it."""
 class Make:
     """Write blind cases: a dataset directory each, the answers in a file elsewhere."""
 
-    cases: tyro.conf.Positional[str]
+    cases: Positional[str]
     """directory for the cases"""
     answers: str
     """file for the answers, JSON; may not lie in the directory of the cases"""
@@ -44,7 +42,7 @@ class Make:
 class Run:
     """Diagnose the cases of a directory; those already in the file are left out."""
 
-    cases: tyro.conf.Positional[str]
+    cases: Positional[str]
     """directory of the cases"""
     said: str
     """file for what is said, a JSON line per case; appended to"""
@@ -58,24 +56,17 @@ class Run:
 class Score:
     """Compare what was said with the answers."""
 
-    said: tyro.conf.Positional[str]
+    said: Positional[str]
     """file that `run` wrote"""
-    answers: tyro.conf.Positional[str]
+    answers: Positional[str]
     """file that `make` wrote"""
 
 
 def main(verb: str, argv: list[str]) -> int:
     """Run the verb; gives the exit code."""
     del verb
-    if not argv or argv[0] in ("-h", "--help"):
-        print(MANUAL)
-        raise SystemExit(0)
-    kinds: dict[str, Any] = {"make": (Make, _make), "run": (Run, _run)}
-    kinds["score"] = (Score, _score)
-    if argv[0] not in kinds:
-        raise UnknownNameError("verb of `bns gap bench`", argv[0], VERBS)
-    kind, do = kinds[argv[0]]
-    return do(parse(kind, argv[1:], prog=f"bns gap bench {argv[0]}"))
+    does = {"make": (Make, _make), "run": (Run, _run), "score": (Score, _score)}
+    return dispatch("gap bench", argv, does, MANUAL)
 
 
 def _make(given: Make) -> int:

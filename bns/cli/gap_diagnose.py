@@ -5,8 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import tyro
-
+from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.errors import BnsError
 
@@ -20,7 +19,7 @@ class Check:
     repaired stops it.
     """
 
-    data: tyro.conf.Positional[tuple[str, ...]]
+    data: Positional[tuple[str, ...]]
     """dataset directories, or those of runs; or CSV or MCAP logs, with --columns"""
     model: str = ""
     """nominal robot (see `bns robots`), or the TOML file of a model of your own

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import tyro
-
+from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.errors import BnsError
 
@@ -13,7 +12,7 @@ from bns.errors import BnsError
 class Arguments:
     """Write a report on runs: one HTML file that opens offline."""
 
-    directories: tyro.conf.Positional[tuple[str, ...]]
+    directories: Positional[tuple[str, ...]]
     """run directories, finished or not"""
     out: str = ""
     """file to write; without it report.html in the first directory"""

@@ -5,8 +5,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-import tyro
-
+from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.errors import BnsError, MissingDependencyError
 
@@ -16,7 +15,7 @@ class Arguments:
     """Open the recording of a run or a gap diagnosis in the Rerun viewer, or draw it to
     a file."""
 
-    directory: tyro.conf.Positional[str]
+    directory: Positional[str]
     """directory of a run or of a gap diagnosis, or a recording (.rrd)"""
     png: str = ""
     """write a picture to this file instead; needs no display"""
