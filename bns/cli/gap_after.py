@@ -7,6 +7,7 @@ from typing import Any
 from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.errors import BnsError, UnknownNameError
+from bns.progress import working
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,7 +98,8 @@ def _plan(given: Planned) -> int:
     else:
         model = _model(found)
         _plannable(found, model)
-        made = plan.plan(found, model, arena=given.arena, seed=given.seed)
+        with working("planning"):
+            made = plan.plan(found, model, arena=given.arena, seed=given.seed)
     print(made.sentence)
     if not made.options or not made.repeats:
         return 0
@@ -133,7 +135,8 @@ def _edit(given: Edit) -> int:
     model = _model(found)
     trials = load_recordings.trials(given.predict, model, columns=given.columns)
     load_recordings.tellable(trials, model)
-    made = edit.edit(found, trials, model, remove=given.remove, effect=given.effect)
+    with working("predicting"):
+        made = edit.edit(found, trials, model, remove=given.remove, effect=given.effect)
     print(made.sentence)
     for name, loss in made.losses.items():
         errors = ", ".join(

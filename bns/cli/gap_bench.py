@@ -8,6 +8,7 @@ from typing import Any
 from bns.cli.fields import Positional
 from bns.cli.parse import dispatch
 from bns.errors import BnsError, FormatError, UnknownNameError
+from bns.progress import working
 
 MANUAL = """usage: bns gap bench {make,run,score} [...]
 
@@ -113,7 +114,8 @@ def _run(given: Run) -> int:
     if not Path(given.cases).is_dir():
         raise FormatError(f"There is no directory {given.cases} of cases.")
     model = load_recordings.model(given.model, threads=given.threads)
-    count = benchmark_io.run(Path(given.cases), model, Path(given.said))
+    with working("diagnosing the cases"):
+        count = benchmark_io.run(Path(given.cases), model, Path(given.said))
     print(f"{count} cases diagnosed: {given.said}")
     return 0
 

@@ -8,6 +8,7 @@ from typing import Any
 from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.errors import BnsError
+from bns.progress import working
 
 LISTED = 8  # faults that are printed at most
 
@@ -131,7 +132,8 @@ def _diagnose(given: Diagnose) -> int:
     else:
         model = nominal(given, given.threads)
         trials = _some(recorded(given, model))
-        found = _general(given, model, trials, out)
+        with working(f"diagnosing {len(trials)} trials"):
+            found = _general(given, model, trials, out)
     found = replace(
         found, provenance={**found.provenance, **_provenance(given, model, trials)}
     )
@@ -247,6 +249,15 @@ def _closed(found: Any) -> Sequence[str]:
 
 
 def _draw(given: Diagnose, found: Any, trials: Any, model: Any, out: Path) -> None:
+    with working("drawing"):
+        made = _drawn(given, found, trials, model, out)
+    for name, path in made.items():
+        print(f"{name + ':':<11}{path}")
+
+
+def _drawn(
+    given: Diagnose, found: Any, trials: Any, model: Any, out: Path
+) -> dict[str, Path]:
     made = {"data": out / "diagnosis.json"}
     if given.report:
         from bns.viz.gap import report as gap_report
@@ -256,5 +267,4 @@ def _draw(given: Diagnose, found: Any, trials: Any, model: Any, out: Path) -> No
         from bns.viz.gap import recording
 
         made["recording"] = recording.write(found, trials, model, out / "recording.rrd")
-    for name, path in made.items():
-        print(f"{name + ':':<11}{path}")
+    return made

@@ -11,6 +11,7 @@ from bns import stats
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
+from bns.progress import working
 
 RECORDING = "recording.rrd"
 REPORT = "report.html"
@@ -34,9 +35,11 @@ def write(
     """Write recording and report, then say where everything is."""
     made = {"data": out}
     if report:
-        made |= _try("report", lambda: write_report([out], out / REPORT))
+        with working("drawing the report"):
+            made |= _try("report", lambda: write_report([out], out / REPORT))
     if recording:
-        made |= _try("recording", lambda: write_recording(record, out / RECORDING))
+        with working("writing the recording"):
+            made |= _try("recording", lambda: write_recording(record, out / RECORDING))
     print(summary(record))
     for name, path in made.items():
         print(f"{name + ':':<11}{path}")

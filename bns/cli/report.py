@@ -6,6 +6,7 @@ from pathlib import Path
 from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.errors import BnsError
+from bns.progress import working
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,5 +32,7 @@ def main(verb: str, argv: list[str]) -> int:
         if load(directory).trials == 0:
             raise BnsError(f"{directory} has no trial yet: let it run for a while.")
     path = Path(given.out) if given.out else directories[0] / REPORT
-    print(write_report(directories, path))
+    with working("drawing the report"):
+        write_report(directories, path)
+    print(path)
     return 0

@@ -347,7 +347,7 @@ def test_known_bad_pins(installed, bad):
 
 
 def test_progress_without_a_terminal_is_a_line_now_and_then(capsys, fakes, monkeypatch):
-    monkeypatch.setattr("bns.experiment.progress.QUIET_SECONDS", 0.0)
+    monkeypatch.setattr("bns.progress.QUIET_SECONDS", 0.0)
     fakes.train(None, progress=True)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 4
