@@ -8,4 +8,4 @@ from bns.errors import BnsError
 
 __all__ = ["BnsError", "__version__"]
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from bns.cli.extras import attempt
 from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.errors import BnsError
@@ -258,13 +259,19 @@ def _draw(given: Diagnose, found: Any, trials: Any, model: Any, out: Path) -> No
 def _drawn(
     given: Diagnose, found: Any, trials: Any, model: Any, out: Path
 ) -> dict[str, Path]:
-    made = {"data": out / "diagnosis.json"}
-    if given.report:
+    def report() -> Path:
         from bns.viz.gap import report as gap_report
 
-        made["report"] = gap_report.write(found, trials, model, out / "report.html")
-    if given.rerun and model is not None:
-        from bns.viz.gap import recording
+        return gap_report.write(found, trials, model, out / "report.html")
 
-        made["recording"] = recording.write(found, trials, model, out / "recording.rrd")
+    def recording() -> Path:
+        from bns.viz.gap import recording as gap_recording
+
+        return gap_recording.write(found, trials, model, out / "recording.rrd")
+
+    made = {"data": out / "diagnosis.json"}
+    if given.report:
+        made |= attempt("report", report)
+    if given.rerun and model is not None:
+        made |= attempt("recording", recording)
     return made

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bns import stats
-from bns.errors import BnsError
+from bns.cli.extras import attempt
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
 from bns.progress import working
@@ -36,10 +36,12 @@ def write(
     made = {"data": out}
     if report:
         with working("drawing the report"):
-            made |= _try("report", lambda: write_report([out], out / REPORT))
+            made |= attempt("report", lambda: write_report([out], out / REPORT))
     if recording:
         with working("writing the recording"):
-            made |= _try("recording", lambda: write_recording(record, out / RECORDING))
+            made |= attempt(
+                "recording", lambda: write_recording(record, out / RECORDING)
+            )
     print(summary(record))
     for name, path in made.items():
         print(f"{name + ':':<11}{path}")
@@ -119,14 +121,3 @@ def _first(record: RunRecord, runs: int) -> RunRecord:
         predicted=record.predicted[:runs],
         damage_onset=record.damage_onset[:runs],
     )
-
-
-def _try(name: str, make: Callable[[], Path]) -> dict[str, Path]:
-    """A picture that fails must not take the data with it."""
-    import sys
-
-    try:
-        return {name: make()}
-    except (BnsError, OSError) as error:
-        print(f"bns: no {name}: {error}", file=sys.stderr)
-        return {}

@@ -5,6 +5,7 @@ import os
 import re
 import signal
 import sys
+import tomllib
 from functools import reduce
 
 import numpy as np
@@ -13,9 +14,10 @@ import pytest
 from bns import presets
 from bns.__main__ import INTERRUPTED, SPINS, WRONG_INPUT, main
 from bns.cli import VERBS
+from bns.cli.extras import EXTRAS
 from bns.cli.outputs import sentence
 from bns.cli.run import STOPPED, until_interrupted
-from bns.doctor import pins
+from bns.doctor import OPTIONAL, pins
 from bns.storage.store import load
 
 TINY = [
@@ -54,7 +56,33 @@ def test_help_lists_every_verb(capsys, argv):
 
 
 def test_version(capsys):
-    assert said(capsys, "--version") == "bns 0.1.0\n"
+    assert said(capsys, "--version") == "bns 0.2.0\n"
+
+
+@pytest.mark.parametrize("name", EXTRAS)
+def test_a_package_that_is_missing_is_named_with_its_extra(capsys, monkeypatch, name):
+    def missing(argv):
+        raise ModuleNotFoundError(f"No module named {name!r}", name=f"{name}.part")
+
+    monkeypatch.setattr("bns.__main__.dispatch", missing)
+    text = said(capsys, "doctor", code=WRONG_INPUT)
+    assert text.count("\n") == 1
+    assert f"pip install 'bns-testbed[{EXTRAS[name]}]'" in text
+
+
+def test_the_extras_exist(root):
+    known = tomllib.loads((root / "pyproject.toml").read_text())["project"]
+    assert set(EXTRAS.values()) <= set(known["optional-dependencies"])
+    assert {entry.extra for entry in OPTIONAL} <= set(known["optional-dependencies"])
+
+
+def test_a_module_of_ours_that_is_missing_is_a_fault_of_ours(monkeypatch):
+    def missing(argv):
+        raise ModuleNotFoundError("No module named 'bns.nothing'", name="bns.nothing")
+
+    monkeypatch.setattr("bns.__main__.dispatch", missing)
+    with pytest.raises(ModuleNotFoundError):
+        main(["doctor"])
 
 
 def test_threads_that_wait_leave_the_cores_to_others(capsys, monkeypatch):
