@@ -18,6 +18,8 @@ VERBS = {
     "robots": ("lists", "list the robot models"),
     "models": ("models", "make, check, open or draw a robot model"),
     "effects": ("lists", "list the effects with parameters, units and ranges"),
+    "examples": ("examples", "list, print or copy the examples"),
+    "schema": ("schema", "JSON Schema of the TOML files, for editors"),
     "gap": ("gap", "diagnose the gap between recordings and a model (experimental)"),
     "hardware": ("hardware", "real robots: rehearse, check, calibrate, record"),
     "doctor": ("doctor", "check this machine and say what to install"),
@@ -28,9 +30,9 @@ VERBS = {
 GROUPS = {
     "Learn": ("run", "report", "compare", "view"),
     "Many runs": ("campaign", "claims"),
-    "What there is": ("presets", "worlds", "robots", "effects", "models"),
+    "What there is": ("presets", "worlds", "robots", "effects", "models", "examples"),
     "Real robots": ("gap", "hardware"),
-    "This machine": ("doctor", "completion"),
+    "This machine": ("doctor", "completion", "schema"),
 }
 """title in the manual -> verbs"""
 
