@@ -83,7 +83,7 @@ def campaign() -> dict[str, Any]:
 
 
 def _table(known: list[Setting], shape: Callable[[Setting], Any]) -> dict[str, Any]:
-    """An object with the settings; those of an inner dataclass are in one of its own."""
+    """An object with the settings; those of an inner dataclass are in its own."""
     top: dict[str, Any] = _object(known[0].title if known else "")
     for setting in known:
         at = top
