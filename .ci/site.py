@@ -24,7 +24,9 @@ BORROWED = {
 }
 """page of the site -> file of the repository"""
 LINK = re.compile(r"(\]\()(?![a-z]+:|#)([^)\s#]+)")
-INDEX = "# Python reference\n\nEvery public name, by package. Importing `bns` is light.\n\n"
+INDEX = (
+    "# Python reference\n\nEvery public name, by package. Importing `bns` is light.\n\n"
+)
 
 
 def on_files(files: Files, config: Any) -> Files:
