@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -57,19 +58,28 @@ def write_report(directories: list[Path], path: Path) -> Path:
 
 def write_recording(record: RunRecord, path: Path) -> Path:
     """The recording of the most typical replicate whose samples were kept."""
-    from bns.viz import choices, recording
-    from bns.worlds.data import dataset
+    from bns.viz import recording
 
     os.environ.setdefault("RERUN_ANALYTICS", "0")
-    kept = min(record.config.record_replicates, record.replicates)
-    replicate = choices.typical(record if not kept else _first(record, kept))
-    dense = {}
-    if kept:
-        found = dataset.read(Path(record.directory) / "dataset")
-        known = zip(found.replicates, found.numbers, found.trials, strict=True)
-        dense = {number: trial for run, number, trial in known if run == replicate}
+    replicate, dense = shown(record)
     recording.write(record, dense, path, replicate=replicate)
     return path
+
+
+def shown(record: RunRecord) -> tuple[int, dict[int, Any]]:
+    """The most typical replicate whose samples were kept, and its trials by number."""
+    from bns.viz import choices
+    from bns.worlds.data import dataset
+
+    kept = min(record.config.record_replicates, record.replicates)
+    replicate = choices.typical(record if not kept else _first(record, kept))
+    if not kept:
+        return replicate, {}
+    found = dataset.read(Path(record.directory) / "dataset")
+    known = zip(found.replicates, found.numbers, found.trials, strict=True)
+    return replicate, {
+        number: trial for run, number, trial in known if run == replicate
+    }
 
 
 def summary(record: RunRecord) -> str:
