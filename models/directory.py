@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from bns.errors import BnsError
 
@@ -61,6 +61,18 @@ def make(directory: Path, files: Mapping[str, str]) -> None:
             (directory / name).write_text(content, encoding="utf-8")
     except OSError as error:
         raise BnsError(f"{directory} cannot be written: {error.strerror}.") from error
+
+
+@overload
+def short(value: float) -> float: ...
+
+
+@overload
+def short(value: list[float]) -> list[float]: ...
+
+
+@overload
+def short(value: float | list[float]) -> float | list[float]: ...
 
 
 def short(value: float | list[float]) -> float | list[float]:

@@ -13,8 +13,7 @@ from bns.errors import BnsError
 from bns.models import ax12a, servo_numbers, stance
 from bns.models.directory import make, named, short, text, texts
 from bns.models.joint_numbers import joint_numbers
-from bns.models.legged_masses import masses
-from bns.models.legged_shapes import looks, pairs, shapes
+from bns.models.legged_body import looks, masses, pairs, shapes
 from bns.models.new_legged import AX12A, CLEAR, Legged
 
 FILES = {

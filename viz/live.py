@@ -69,7 +69,7 @@ class Stream:
     def _open(self, url: str | None) -> None:
         os.environ.setdefault("RERUN_ANALYTICS", "0")
         made = open_stream(self._config, self._replicate)
-        layout = blueprint(*scene.extent(self._config), follow=True)
+        layout = blueprint(scene.picture(self._config), follow=True)
         made.connect_grpc(url or _spawn(), default_blueprint=layout)
         self._model = scene.compiled(self._config.world.robot)
         scene.log_static(made, self._config, self._model)

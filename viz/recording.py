@@ -54,15 +54,16 @@ def write(
     model = scene.compiled(record.config.world.robot) if model is None else model
     stream = open_stream(record.config, replicate)
     seconds = moments.duration(record, replicate, chosen)
+    shown = scene.picture(record.config)
     layout = blueprint(
-        *scene.extent(record.config),
+        shown,
         seconds=seconds,
         readings="readings" in record.extra,
-        walks=scene.walks(record.config),
+        charts=charts.chart_titles(record.columns, shown),
     )
     stream.save(str(path), default_blueprint=layout)
     stream.send_recording_name(
-        f"{record.config.preset or scene.task(record.config)} / replicate {replicate}"
+        f"{record.config.preset or shown.name} / replicate {replicate}"
     )
     stream.send_property("run", rr.AnyValues(**_properties(record, replicate)))
     scene.log_static(stream, record.config, model)
@@ -104,7 +105,7 @@ def _by_number(trials) -> Mapping[int, Trial]:
 def _properties(record: RunRecord, replicate: int) -> dict:
     config = record.config
     return {
-        "task": scene.task(config),
+        "task": scene.picture(config).name,
         "robot": config.world.robot,
         "world": config.world.name,
         "damage": " + ".join(config.world.damage) or "none",
@@ -118,11 +119,12 @@ def _properties(record: RunRecord, replicate: int) -> dict:
 def _about(record: RunRecord, replicate: int, chosen: Sequence[Choice]):
     import rerun as rr
 
+    shown = scene.picture(record.config)
     lines = [
-        f"# {record.config.preset or scene.task(record.config)}, replicate {replicate}",
+        f"# {record.config.preset or shown.name}, replicate {replicate}",
         "",
         "**World.** Solid trails are where the robot went, dashed trails where its "
-        "simulator network (SNN) said it would go. " + _discs(record.config) + " Press "
+        "simulator network (SNN) said it would go. " + shown.discs + " Press "
         "play: the robot goes through the trials below, one after another.",
         "",
         *(f"- trial {choice.trial}: {choice.label}" for choice in chosen),
@@ -135,23 +137,6 @@ def _about(record: RunRecord, replicate: int, chosen: Sequence[Choice]):
         "`trial` at the bottom left: the paths then are those of each trial.",
     ]
     return rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN)
-
-
-def _discs(config: RunConfig) -> str:
-    if scene.walks(config):
-        return (
-            "An adequate gait gets out of the disc. The body is drawn level, its legs "
-            "as the servos reported them."
-        )
-    if scene.follows_light(config):
-        return (
-            "The disc has the radius at which the robot is to circle the lamp; at the "
-            "orange ring it is stopped."
-        )
-    return (
-        "Discs are the objectives; their size is the distance within which one counts "
-        "as reached; a solid trail gets thin once all are."
-    )
 
 
 def _onset(record: RunRecord, replicate: int) -> str:

@@ -115,7 +115,7 @@ class Part:
 
 
 def _mapping(config: RunConfig) -> dict[str, Any]:
-    """A configuration without what belongs to other learners."""
+    """A configuration without what belongs to other tasks and learners."""
     others = foreign(config)
     return {
         key: value for key, value in to_mapping(config).items() if key not in others

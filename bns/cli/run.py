@@ -67,9 +67,25 @@ def main(verb: str, argv: list[str]) -> int:
             f"`bns run demo {argv[0]} ...`. See bns run --help."
         )
     config, out = source(argv[0])
+    config = _for_learner(config, argv[1:])
     start = Arguments(source=argv[0], config=config, out=out)
     given = parse(Arguments, list(map(_long, argv)), prog="bns run", default=start)
     return execute(replace(given, config=expanded(given.config)))
+
+
+def _for_learner(config: RunConfig, words: list[str]) -> RunConfig:
+    """The experiment for the learner that the words name, with its own settings."""
+    from bns.experiment.loading import OLD_LEARNERS, with_learner
+
+    named = [
+        value or after
+        for word, after in zip(words, [*words[1:], ""], strict=True)
+        for flag, _, value in [word.partition("=")]
+        if flag == "--learner"
+    ]
+    if not named or named[-1] in (config.learner, *OLD_LEARNERS):
+        return config
+    return with_learner(config, named[-1])
 
 
 def _long(word: str) -> str:

@@ -16,7 +16,7 @@ from bns.experiment.progress import Progress
 from bns.experiment.record import RunRecord
 from bns.experiment.step import Step, assemble
 from bns.experiment.validate import check
-from bns.experiment.world_factory import make_world, surroundings
+from bns.experiment.world_factory import make_models, make_world, surroundings
 from bns.storage import files
 from bns.storage.directory import check_free
 from bns.storage.store import RunStore
@@ -50,8 +50,8 @@ def train(
         on_trial: called after every trial with its number, what was learned, and
             the trial of every replicate.
         stop: asked before every trial; True ends the run there.
-        background: evolution goes on while a trial runs, for a world in real time;
-            generations are then what time allowed, and recorded.
+        background: the learner thinks while a trial runs, for a world in real time;
+            how much is then what time allowed, and recorded.
 
     Returns:
         The record: all trials, or those done when `stop` said so.
@@ -104,7 +104,11 @@ def train_many(
         check_device(config.device)
         check_world(check(config))
     settled, mode = _settle(configs)
-    batch = Batch(settled, worlds or [make_world(config) for config in settled])
+    batch = Batch(
+        settled,
+        worlds or [make_world(config) for config in settled],
+        models=[model for config in settled for model in make_models(config)],
+    )
     steps: list[Step] = []
     bar = Progress(configs[0], enabled=progress)
     with bar.start():
@@ -206,14 +210,16 @@ def _batch(
     from bns.experiment.background import behind
 
     learner = behind(config) if background else None
+    models = [] if background else make_models(config)
     if store is None:
-        return Batch([config], [world or make_world(config)], learner=learner)
+        made = world or make_world(config)
+        return Batch([config], [made], learner=learner, models=models)
     keeps_nets = world is None and config.world.name == "static-snn"
     if keeps_nets and not store.exists:
         surroundings(config)  # stops before there is a directory
         store.create()
     made = world or make_world(config, store.directory)
-    batch = Batch([config], [made], learner=learner)
+    batch = Batch([config], [made], learner=learner, models=models)
     if not store.exists:
         store.create()
     return batch

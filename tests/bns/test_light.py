@@ -9,15 +9,13 @@ import torch
 from bns.draws import Draws
 from bns.errors import BnsError
 from bns.experiment.config_light import LightConfig
-from bns.light import patterns
-from bns.light.controller import Controllers
-from bns.light.policy import GenomePolicy
-from bns.light.scaling import brightness, counts
-from bns.light.simulator import Simulator, Thetas
-from bns.light.task import LightTask, lost
+from bns.learners.bns.light import patterns
+from bns.learners.bns.light.simulator import Simulator, Thetas
+from bns.tasks.light import LampGoal, LightTask, lost
+from bns.tasks.light_controller import Controllers, GenomePolicy, brightness, counts
 from tests.bns.light_fakes import FakeLightWorld, small
 
-TASK = LightTask.of(LightConfig(goal=0.3, circle_cycles=40))
+TASK = LampGoal.of(LightConfig(goal=0.3, circle_cycles=40))
 
 
 class TestController:
@@ -89,8 +87,8 @@ class TestController:
 class TestTask:
     def test_a_lamp_that_no_robot_can_reach_is_refused(self):
         with pytest.raises(BnsError, match="off the board"):
-            LightTask.of(LightConfig(lamps=("x=1.4,y=0",)))
-        assert LightTask.of(LightConfig(lamps=("x=1.3,y=0", "x=9"))).lamp == (1.3, 0)
+            LampGoal.of(LightConfig(lamps=("x=1.4,y=0",)))
+        assert LampGoal.of(LightConfig(lamps=("x=1.3,y=0", "x=9"))).lamp == (1.3, 0)
 
     def test_cost_of_standing_still_is_the_start_distance_share(self):
         path = np.tile([0.9, 0.0], (11, 1))
@@ -141,11 +139,11 @@ class TestTask:
     @pytest.mark.parametrize("text", ["x", "x=left", "x=1,y"])
     def test_lamps_that_cannot_be_read(self, text):
         with pytest.raises(BnsError, match="Lamp"):
-            LightTask.of(LightConfig(lamps=(text,)))
+            LampGoal.of(LightConfig(lamps=(text,)))
 
     def test_no_lamp(self):
         with pytest.raises(BnsError, match="lamps is empty"):
-            LightTask.of(LightConfig(lamps=()))
+            LampGoal.of(LightConfig(lamps=()))
 
 
 class TestSimulator:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -157,7 +158,7 @@ def listed_trials(header: dict, where: Path) -> list[dict]:
     Raises:
         FormatError: they are missing or malformed.
     """
-    items = header.get("trials")
+    items: Any = header.get("trials")
     fine = isinstance(items, list) and all(
         isinstance(item, dict)
         and isinstance(item.get("replicate"), int)
@@ -172,7 +173,7 @@ def listed_trials(header: dict, where: Path) -> list[dict]:
     return items
 
 
-def flags(about: dict, where: Path) -> dict[str, bool | int]:
+def flags(about: dict, where: Path) -> dict[str, Any]:
     """Outcome flags and counters of a trial.
 
     Raises:

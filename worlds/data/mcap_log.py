@@ -97,8 +97,8 @@ def _messages(path: Path, topics: set[str]) -> dict[str, list]:
                 found[channel.topic].append((stamps, value))
     except (*_BROKEN, McapError) as error:
         raise FormatError(f"{path} cannot be read as MCAP ({error}).") from None
-    for topic, log in found.items():
-        if not log:
+    for topic, messages in found.items():
+        if not messages:
             raise FormatError(f"{path} has no message on the topic {topic!r}.")
     return found
 

@@ -52,7 +52,7 @@ class StaticNets:
     provenance: Mapping[str, object] = field(default_factory=dict)
     activation: Literal["sigmoid", "relu"] = "sigmoid"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in _ARRAYS:
             array = np.array(getattr(self, name), dtype=np.float64)
             array.setflags(write=False)
