@@ -68,6 +68,14 @@ def test_what_it_adds_is_there_and_acts(run_python, site):
     assert found["ice"] != found["plain"]
 
 
+def test_its_learner_learns(run_python, site, tmp_path):
+    words = ["--learner", "climber", "--trials", "4", "--replicates", "2"]
+    words += ["--rerun", "off", "--no-report", "--threads", "1", "--compiled", "no"]
+    out = ["--out", tmp_path / "run"]
+    told = ["-m", "bns", "run", "khepera-simple", *words, *out]
+    assert "4 trials of 2 runs" in run_python(*told, PYTHONPATH=str(site))
+
+
 def test_the_command_line_knows_it(run_python, site):
     shown = run_python("-m", "bns", "effects", "loose_wheel", PYTHONPATH=str(site))
     assert "time constant of the slip" in shown

@@ -130,9 +130,9 @@ def _frames(
 
 def _discs(record: RunRecord) -> list[tuple[float, float, float, float]]:
     """x, y, radius and half height of the objectives [m]."""
-    radius = scene.radius(record.config)
-    places = scene.objectives(record.config).values()
-    return [(float(x), float(y), radius, DISC) for x, y in places]
+    shown = scene.picture(record.config)
+    places = shown.objectives.values()
+    return [(float(at[0]), float(at[1]), shown.radius, DISC) for at in places]
 
 
 def _titled(picture: np.ndarray, text: str, colour: str) -> np.ndarray:

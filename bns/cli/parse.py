@@ -14,6 +14,7 @@ T = TypeVar("T")
 
 SHORT = 30
 """options up to which the short manual is the whole"""
+TITLE_ENDS = (". ", "; ", ": ", " (", ", ")
 HELP, HELP_ALL = ("-h", "--help"), "--help-all"
 
 completing: contextvars.ContextVar[bool] = contextvars.ContextVar(
@@ -217,7 +218,7 @@ def _groups(parser: argparse.ArgumentParser, known: Sequence[Setting]) -> None:
             lines.setdefault(setting.group, []).append(setting)
     more = parser.add_argument_group("settings, so many of each")
     for name, members in lines.items():
-        said = _escaped(f"{len(members)}: {_clause(members[0].title)}")
+        said = _escaped(f"{len(members)}: {_clause(members[0].title, TITLE_ENDS)}")
         more.add_argument(f"--{name}.*", help=said, action="store_true")
     rare = [s for s in known if s.rare]
     if rare:
@@ -225,10 +226,10 @@ def _groups(parser: argparse.ArgumentParser, known: Sequence[Setting]) -> None:
         parser.epilog = f"{HELP_ALL} also has {names}."
 
 
-def _clause(text: str) -> str:
+def _clause(text: str, ends: Sequence[str] = (". ", "; ")) -> str:
     """The beginning of a text, up to where it can end."""
     text = " ".join(text.split())
-    for end in (". ", "; ", ": "):
+    for end in ends:
         text = text.partition(end)[0]
     return text.rstrip(".")
 
