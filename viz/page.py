@@ -49,6 +49,25 @@ def picture(figure: Any) -> Picture:
     return Picture(wide, _address(figure))
 
 
+def portrait(robot: str) -> str:
+    """The picture beside a robot's model as a `data:` address; "" where there is none.
+
+    Args:
+        robot: its name or its directory.
+    """
+    from bns.errors import BnsError
+    from bns.models import places
+
+    try:
+        directory = places.find(robot)
+    except BnsError:  # a run of another machine, whose robot is not here
+        return ""
+    file = directory / f"{directory.name}.png"
+    if not file.is_file():
+        return ""
+    return "data:image/png;base64," + base64.b64encode(file.read_bytes()).decode()
+
+
 def _address(figure: Any) -> str:
     buffer = io.BytesIO()
     with style.plotting():
