@@ -60,7 +60,8 @@ def test_it_says_what_happened(page, record):
 
 def test_every_figure_has_a_caption_and_a_text_for_who_cannot_see_it(page):
     assert page.count("<figcaption>") == page.count("<picture>") == 7
-    assert page.count('alt="') == 7
+    assert page.count('alt="') == page.count("<img") == 1 + 7, "the robot, and figures"
+    assert "data:image/png;base64," in page and 'alt="The robot khepera3."' in page
 
 
 def test_it_can_be_reproduced(page):
