@@ -32,6 +32,7 @@ DAMAGES = {
 }
 LATER = ("learner", "light", "walk", "watch")  # newer than the first stored runs
 NEWER = (
+    ("adaptation", "simulator_reset_untrained"),
     ("light", "readings"),
     ("light", "renewed"),
     ("walk", "repeat"),

@@ -6,7 +6,22 @@ import pytest
 
 from tests.sources import modules
 
-BASE = {"bns", "bns.errors", "bns.seeding"}
+BASE = {"bns", "bns.errors", "bns.seeding", "bns.storage"} | {
+    f"bns.storage.{name}"
+    for name in (
+        "arrays",
+        "csv_table",
+        "files",
+        "journal",
+        "lock",
+        "numbers",
+        "parquet",
+        "reading",
+        "seal",
+    )
+}
+"""what knows no robot and no world; of the storage all that knows no run"""
+
 LOW = {"base", "models", "worlds"}
 HIGH = LOW | {"gap", "hardware", "learner", "experiment"}
 MAY_IMPORT = {

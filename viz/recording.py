@@ -13,7 +13,7 @@ import numpy as np
 from bns.experiment import loading
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
-from bns.viz import charts, moments, scene
+from bns.viz import charts, moments, rrd, scene
 from bns.viz.blueprint import blueprint
 from bns.viz.choices import Choice, choose, typical
 from bns.worlds.trial import Trial
@@ -61,25 +61,23 @@ def write(
         readings="readings" in record.extra,
         charts=charts.chart_titles(record.columns, shown),
     )
-    stream.save(str(path), default_blueprint=layout)
-    stream.send_recording_name(
-        f"{record.config.preset or shown.name} / replicate {replicate}"
-    )
-    stream.send_property("run", rr.AnyValues(**_properties(record, replicate)))
-    scene.log_static(stream, record.config, model)
-    moments.send(stream, record, replicate, chosen, _by_number(trials), model)
-    charts.log_bars(stream, record, replicate, chosen)
-    numbers = np.arange(record.trials)
-    columns = {name: values[replicate] for name, values in record.columns.items()}
-    charts.log_curve_styles(stream)
-    charts.send_curves(stream, numbers, columns)
-    moments.send_paths(
-        stream, numbers, record.poses[replicate], record.predicted[replicate]
-    )
-    moments.send_ends(stream, numbers, record.poses[replicate], model)
-    stream.log("about", _about(record, replicate, chosen), static=True)
-    stream.flush()
-    stream.disconnect()
+    with rrd.saved(stream, path, layout):
+        stream.send_recording_name(
+            f"{record.config.preset or shown.name} / replicate {replicate}"
+        )
+        stream.send_property("run", rr.AnyValues(**_properties(record, replicate)))
+        scene.log_static(stream, record.config, model)
+        moments.send(stream, record, replicate, chosen, _by_number(trials), model)
+        charts.log_bars(stream, record, replicate, chosen)
+        numbers = np.arange(record.trials)
+        columns = {name: values[replicate] for name, values in record.columns.items()}
+        charts.log_curve_styles(stream)
+        charts.send_curves(stream, numbers, columns)
+        moments.send_paths(
+            stream, numbers, record.poses[replicate], record.predicted[replicate]
+        )
+        moments.send_ends(stream, numbers, record.poses[replicate], model)
+        stream.log("about", _about(record, replicate, chosen), static=True)
     return Path(path)
 
 

@@ -19,9 +19,16 @@ def execute(given: Any) -> int:
     """
     from bns.hardware.line import check_port
     from bns.hardware.priority import urgent
+    from bns.storage.lock import Lock
 
     check_port(given.port)
     urgent()
+    with Lock(given.out) as lock:
+        return _locked(given, lock)
+
+
+def _locked(given: Any, lock: Any) -> int:
+    """Train into a directory in which nobody else writes."""
     from bns.cli import outputs
     from bns.experiment.run import train
     from bns.hardware.errors import LinkError, SafetyStop
@@ -41,6 +48,7 @@ def execute(given: Any) -> int:
                 progress=True,
                 on_trial=on_trial,
                 background=not tasks.of(config).closed_loop,
+                lock=lock,
             )
     except (SafetyStop, LinkError) as error:
         if not (out / "run.json").exists():

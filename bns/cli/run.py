@@ -5,12 +5,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from bns.cli.fields import Flat, Positional, Rare
 from bns.cli.parse import HELP, HELP_ALL, parse
 from bns.errors import BnsError, FormatError, UnknownNameError
 from bns.experiment.config import RunConfig
+
+if TYPE_CHECKING:
+    from bns.storage.lock import Lock
 
 _SHORT = {"world": "world.name", "damage": "world.damage"}
 """settings that have a short name on the command line"""
@@ -136,10 +139,18 @@ def execute(given: Arguments) -> int:
         from bns.cli import hardware_run
 
         return hardware_run.execute(given)
+    from bns.storage.lock import Lock
+
+    out = Path(given.out)
+    with Lock(out) as lock:
+        return _locked(given, out, lock)
+
+
+def _locked(given: Arguments, out: Path, lock: "Lock") -> int:
+    """Train into a directory in which nobody else writes."""
     from bns.cli import outputs
     from bns.experiment.run import train
 
-    out = Path(given.out)
     with (
         outputs.live(given.rerun, given.config) as on_trial,
         until_interrupted() as stop,
@@ -151,6 +162,7 @@ def execute(given: Arguments) -> int:
             progress=True,
             on_trial=on_trial,
             stop=stop,
+            lock=lock,
         )
     if record.trials < given.config.trials:
         print(

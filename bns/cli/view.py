@@ -29,6 +29,8 @@ class Arguments:
     """of the film, times real time"""
     web: bool = False
     """open it in a browser instead of the viewer's own window"""
+    bind: str = "127.0.0.1"
+    """address that the viewer listens on; 0.0.0.0 lets other machines send to it"""
 
 
 def main(verb: str, argv: list[str]) -> int:
@@ -48,7 +50,7 @@ def main(verb: str, argv: list[str]) -> int:
             print(f"bns: the viewer says: {report}", file=sys.stderr)
         print(given.png)
         return 0
-    return show(recording, web=given.web)
+    return show(recording, given.bind, web=given.web)
 
 
 def film(given: Arguments) -> Path:
@@ -120,11 +122,12 @@ def find(path: Path) -> Path:
     return write_recording(record, recording)
 
 
-def show(recording: Path, *, web: bool = False) -> int:
-    """Open the viewer and leave it open.
+def show(recording: Path, bind: str, *, web: bool = False) -> int:
+    """Open the viewer, which listens on an address, and leave it open.
 
     Args:
         recording: what to show.
+        bind: the address.
         web: serve it to a browser on this machine, until Ctrl-C.
 
     Raises:
@@ -149,5 +152,5 @@ def show(recording: Path, *, web: bool = False) -> int:
         raise MissingDependencyError(
             "bns view", "rerun-sdk", "pip install 'bns-testbed[view]'"
         )
-    words = ["--web-viewer", "--bind", "127.0.0.1"] if web else []
+    words = ["--bind", bind, *(["--web-viewer"] if web else [])]
     return subprocess.call([viewer, *words, str(recording)])

@@ -133,6 +133,9 @@ class AdaptationConfig:
     """fresh random population on damage"""
     simulator_reset: bool = False
     """fresh random SNN on damage (data kept)"""
+    simulator_reset_untrained: bool = False
+    """the SNN of simulator_reset is trained after the next trial only, and evolution
+    goes on in it untrained until then (4.3.5 may be read so); else at once"""
     simulator_reset_every: int = 0
     """fresh random SNN every so many trials; 0 = never"""
     data_reset: bool = False

@@ -1,15 +1,17 @@
 """Configurations from TOML, from JSON and back; unknown keys are errors."""
 
 import json
-import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
-from bns.errors import BnsError, FormatError, UnknownNameError
+import tomli_w
+
+from bns.errors import BnsError, UnknownNameError
 from bns.experiment.config import BNS_SECTIONS, LearnerSettings, PriorConfig, RunConfig
 from bns.experiment.validate import check
+from bns.storage import reading
 
 TABLES = ("damage", "reality")
 """settings whose entries may be tables instead of text"""
@@ -128,10 +130,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises:
         FormatError: not there, or not TOML.
     """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise FormatError(f"{path} cannot be read as TOML: {error}.") from error
+    return reading.read_toml(path)
 
 
 def to_mapping(config: RunConfig) -> dict[str, Any]:
@@ -150,12 +149,7 @@ def to_toml(config: RunConfig) -> str:
     """The whole configuration as TOML; `from_file` reads it back."""
     content = to_mapping(config)
     content.pop("preset")
-    top = [f"{key} = {_toml(v)}" for key, v in content.items() if type(v) is not dict]
-    for name, table in content.items():
-        if type(table) is dict:
-            top += ["", f"[{name}]"]
-            top += [f"{key} = {_toml(value)}" for key, value in table.items()]
-    return "\n".join(top) + "\n"
+    return tomli_w.dumps(content)
 
 
 def differences(one: RunConfig, other: RunConfig) -> dict[str, tuple[Any, Any]]:
@@ -220,9 +214,3 @@ def _texts(name: str, given: Any) -> tuple[str, ...]:
             raise BnsError(f"{name}: {entry!r} is not allowed: give text.")
         texts.append(entry)
     return tuple(texts)
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, list):
-        return f"[{', '.join(_toml(item) for item in value)}]"
-    return json.dumps(value)

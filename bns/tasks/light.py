@@ -211,6 +211,7 @@ class LightTask(Task):
     columns: ClassVar[Mapping[str, str]] = {
         "edge_turns": "how often it was turned at the board's edge",
         "lamp_stops": "how often it was stopped, or turned, at a lamp",
+        "turned": "net turn, counter-clockwise positive [rad]",
     }
     closed_loop = True
 
@@ -297,6 +298,7 @@ class LightTask(Task):
             "reached": self.goal.reached(went).astype(np.float64),
             "solved": np.array(solved, np.float64),
             "commands": np.array([_moving(trial) for trial in tried], np.float64),
+            "turned": np.array([_turned(trial) for trial in tried]),
             **counted,
         }
 
@@ -332,6 +334,13 @@ def readings(trial: Trial) -> np.ndarray:
     seen = np.stack([trial.channel(name) for name in READINGS], axis=1)
     found: np.ndarray = seen[trial.boundaries]
     return found
+
+
+def _turned(trial: Trial) -> float:
+    """Net turn over all command ends; less than half a turn a command [rad]."""
+    yaw = trial.command_poses_world[:, 2]
+    yaw = np.unwrap(yaw[np.isfinite(yaw)])
+    return float(yaw[-1] - yaw[0]) if len(yaw) else 0.0
 
 
 def _moving(trial: Trial) -> int:

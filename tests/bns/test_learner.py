@@ -175,6 +175,21 @@ def test_simulator_reset_keeps_the_data_and_retrains():
     assert not torch.equal(made.learner.theta, before)
 
 
+@pytest.mark.parametrize("untrained", [True, False])
+def test_a_reset_simulator_is_trained_at_once_or_after_the_next_trial(untrained):
+    made = schedule(simulator_reset=True, simulator_reset_untrained=untrained)
+    resets = made.resets(11)
+    assert resets.simulator.tolist() == [True, False]
+    assert resets.trained.tolist() == [not untrained, False]
+    told = AdaptationConfig(simulator_reset=True, simulator_reset_untrained=untrained)
+    damaged = replace(SMALL.world, damage=("wheel_gain:wheel=left,factor=0.8@1",))
+    playing = batch(replace(SMALL, adaptation=told, world=damaged))
+    play(playing, 2)
+    fitted = playing.learner.loss.clone()
+    playing.learner.propose(2)
+    assert torch.equal(playing.learner.loss, fitted) == untrained
+
+
 def test_draws_restore():
     draws = Draws(3)
     draws.uniform(7)

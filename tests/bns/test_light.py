@@ -11,7 +11,7 @@ from bns.errors import BnsError
 from bns.experiment.config_light import LightConfig
 from bns.learners.bns.light import patterns
 from bns.learners.bns.light.simulator import Simulator, Thetas
-from bns.tasks.light import LampGoal, LightTask, lost
+from bns.tasks.light import LampGoal, lost
 from bns.tasks.light_controller import Controllers, GenomePolicy, brightness, counts
 from tests.bns.light_fakes import FakeLightWorld, small
 
@@ -103,9 +103,9 @@ class TestTask:
         path = np.array([[1.0, 0], [0.5, 0], [0.1, 0], [0.1, 0], [0.1, 0]])
         charged = TASK.cost(path, np.array([False, False, True, True]))
         assert charged == pytest.approx(0.2 + 0.2 + 2 * 0.7)
-        stand = LightTask(TASK.lamp, replace(TASK.config, charge_stopped="stand"))
+        stand = LampGoal(TASK.lamp, replace(TASK.config, charge_stopped="stand"))
         assert stand.cost(path) == pytest.approx(0.2 + 0.2 + 2 * 0.2)
-        far = LightTask(TASK.lamp, replace(TASK.config, charge_stopped="far"))
+        far = LampGoal(TASK.lamp, replace(TASK.config, charge_stopped="far"))
         lost = np.array([False, False, True, True])
         assert far.cost(path, lost) == pytest.approx(0.2 + 0.2 + 2 * 1.0)
 
@@ -259,3 +259,14 @@ class TestPatterns:
         read = np.array([0.0, 1000.0, 4095.0])
         np.testing.assert_allclose(counts(brightness(read)), read, atol=1e-9)
         assert brightness(np.array(0.0)) == 1.0
+
+
+def test_the_net_turn_of_a_trial_goes_on_beyond_half_a_turn():
+    from bns.light.observing import _turned
+    from bns.worlds.trial import Commands, Trial
+
+    yaw = np.array([3.0, 4.0, 5.0, 6.0, 7.0])
+    poses = np.column_stack([yaw * 0, yaw * 0, (yaw + np.pi) % (2 * np.pi) - np.pi])
+    commands = Commands([[0.1, 0.1]] * 4, [1.0] * 4)
+    trial = Trial(commands, np.arange(5.0), poses, np.arange(5))
+    assert _turned(trial) == pytest.approx(4.0)

@@ -79,8 +79,9 @@ class TestEvolution:
         size = before.shape[1]
         cost = torch.arange(8.0)[:, None].expand(8, size).clone()
         cost[5, 0] = -1.0  # an island counts by its best: of run 1 it is the second
-        learner._settle(1, cost)
-        kept = (learner.population.genes == before).flatten(1).all(1)
+        state = learner.memories, learner.population
+        after, _ = learner.problem.settle(1, *state, cost)
+        kept = (after.genes == before).flatten(1).all(1)
         assert kept.tolist() == [True, *[False] * 4, True, False, False]
 
     def test_weights_stay_within_their_limit(self):

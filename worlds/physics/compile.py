@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from bns import models
+from bns.models import mjcf
 from bns.worlds.active import Placed
 from bns.worlds.effects.base import ModelEdit
 from bns.worlds.physics import control, servo_joint
@@ -33,7 +34,7 @@ def compiled(robot: str, effects: tuple[ModelEdit, ...] = ()) -> Compiled:
         effect.edit(spec)
     if spec.memory < 0:  # not said in the model
         spec.memory = ARENA
-    return Compiled(spec.compile())
+    return Compiled(mjcf.compiled(spec, f"the model of {robot}"))
 
 
 @lru_cache(maxsize=256)

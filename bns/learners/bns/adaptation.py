@@ -18,10 +18,18 @@ from bns.units import metres_per_second
 
 @dataclass(frozen=True)
 class Resets:
-    """Which runs reset what before a trial; boolean arrays ``(R,)``."""
+    """Which runs reset what before a trial; boolean arrays ``(R,)``.
+
+    Attributes:
+        population: a fresh population.
+        simulator: a fresh SNN.
+        trained: of those, which train it at once on the patterns they have.
+        data: no patterns.
+    """
 
     population: np.ndarray
     simulator: np.ndarray
+    trained: np.ndarray
     data: np.ndarray
 
 
@@ -63,14 +71,14 @@ class Adaptations:
         every = self._setting("simulator_reset_every")
         due = (every > 0) & (trial > 0) & (trial % np.maximum(every, 1) == 0)
         extra = self._extra(trial)
+        fresh = told & self._setting("simulator_reset")
+        other = restart | due | extra["simulator"]
         return Resets(
             population=restart
             | (told & self._setting("population_reset"))
             | extra["population"],
-            simulator=restart
-            | (told & self._setting("simulator_reset"))
-            | due
-            | extra["simulator"],
+            simulator=other | fresh,
+            trained=other | (fresh & ~self._setting("simulator_reset_untrained")),
             data=restart | (told & self._setting("data_reset")) | extra["data"],
         )
 

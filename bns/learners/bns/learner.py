@@ -208,7 +208,7 @@ class Bns(Learner):
             for memory in self.memories:
                 fresh = memory.fresh()
                 memory.theta = torch.where(which[:, None], fresh, memory.theta)
-                memory.train(self.problem, resets.simulator)
+                memory.train(self.problem, resets.trained)
 
     def observe(
         self, trial: int, tried: Sequence[Trial], best: Sequence[Trial] | None

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from bns.draws import Draws, whole_below
+from bns.errors import FormatError
 from bns.snn import fitting
 from bns.snn.network import Shape, forward, predict
 
@@ -106,8 +107,18 @@ class PatternBuffer:
         }
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Go on from `state`."""
-        edges = np.cumsum(arrays["pattern_counts"])[:-1]
+        """Go on from `state`.
+
+        Raises:
+            FormatError: the counts are not those of the patterns.
+        """
+        counts, held = arrays["pattern_counts"], len(arrays["pattern_inputs"])
+        sums = {int(counts.sum()), len(arrays["pattern_targets"])}
+        if (counts < 0).any() or sums != {held}:
+            raise FormatError(
+                f"A stored state counts {counts.sum()} of {held} patterns."
+            )
+        edges = np.cumsum(counts)[:-1]
         self.inputs = np.split(arrays["pattern_inputs"], edges)
         self.targets = np.split(arrays["pattern_targets"], edges)
 
