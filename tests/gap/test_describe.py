@@ -12,7 +12,7 @@ from bns.gap.models.mjcf.model import OwnModel
 from bns.gap.recordings import load_recordings
 
 ARM = """
-<mujoco model="arm"><option timestep="0.005" integrator="implicitfast"/>
+<mujoco model="arm"><compiler angle="radian"/><option timestep="0.005" integrator="implicitfast"/>
   <default><joint damping="0.6" armature="0.01"/></default>
   <worldbody><body name="upper">
     <joint name="FL_hip_joint" axis="1 0 0" range="-1.5 1.5" limited="true"/>
@@ -36,7 +36,7 @@ def goals(times):
 
 
 def recorded(path, *, seconds=12.0, unit=1.0, names="hip_goal,calf_goal,hip,calf"):
-    """A log of the arm with servos at 100 Hz, its columns told, told, seen, seen, toe."""
+    """A log of the arm with servos at 100 Hz: two goals, two joints, the toe."""
     model = mujoco.MjModel.from_xml_string(ARM.replace("ACTUATORS", SERVOS))
     data, rng = mujoco.MjData(model), np.random.default_rng(1)
     times = np.arange(0, seconds, 0.01)
