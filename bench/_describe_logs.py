@@ -1,8 +1,8 @@
 """Logs of four robots as people have them, made with bare MuJoCo at half their step.
 
 A reaching arm with motors that have no names, a crane with a position servo (the log
-calls its parts otherwise), a leg in the air with a PD loop that its MJCF lacks (one long
-curve), and the example quadruped (degrees, milliseconds). One thing of each is changed.
+calls its parts otherwise), a leg in the air with a PD loop that its MJCF lacks (one
+long curve), and the example quadruped (degrees, milliseconds). One thing is changed.
 """
 
 from collections.abc import Callable

@@ -12,7 +12,8 @@ from bns.gap.models.mjcf.model import OwnModel
 from bns.gap.recordings import load_recordings
 
 ARM = """
-<mujoco model="arm"><compiler angle="radian"/><option timestep="0.005" integrator="implicitfast"/>
+<mujoco model="arm"><compiler angle="radian"/>
+  <option timestep="0.005" integrator="implicitfast"/>
   <default><joint damping="0.6" armature="0.01"/></default>
   <worldbody><body name="upper">
     <joint name="FL_hip_joint" axis="1 0 0" range="-1.5 1.5" limited="true"/>
