@@ -14,7 +14,7 @@ from bns.hardware.rig import Rig, battery
 from bns.hardware.schedule import GRID
 from bns.hardware.steering import Rules, Steered, Steering
 from bns.hardware.world import HardwareWorld
-from bns.worlds import given
+from bns.worlds import checks
 from bns.worlds.active import Stages
 from bns.worlds.checks import bounded
 from bns.worlds.closed_loop import CYCLE, CYCLES, Policy
@@ -59,8 +59,8 @@ class HardwareLight(HardwareWorld):
         """Check the settings."""
         super().__post_init__(threads, rig)
         told = {} if self.supervisor is None else self.supervisor
-        self.supervisor = given.one(Supervisor, "supervisor", told)
-        self.field = LightField(given.several(Lamp, "lamp", self.lights), self.ambient)
+        self.supervisor = checks.one(Supervisor, "supervisor", told)
+        self.field = LightField(checks.several(Lamp, "lamp", self.lights), self.ambient)
         self._places = self.field.positions[:, :2]
         if rig is not None:
             rig.limits = self._limits()

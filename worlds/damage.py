@@ -22,7 +22,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 from bns.errors import BnsError
 from bns.worlds.effects import registry
@@ -94,7 +94,7 @@ class Event:
     period: int = 0
     on_for: int = 0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("onset_trial", "end_trial", "ramp", "period", "on_for"):
             value = getattr(self, name)
             optional = name == "end_trial" and value is None
@@ -118,7 +118,7 @@ class Event:
                 "give 0 < ON < PERIOD, or leave the recurrence away",
             )
 
-    def _refuse(self, given: str, remedy: str):
+    def _refuse(self, given: str, remedy: str) -> NoReturn:
         raise BnsError(f"Damage {self.effect}: {given} is not allowed: {remedy}.")
 
     @property
@@ -143,7 +143,7 @@ class Event:
                 f"trial or trial:seconds, as in {EXAMPLE!r} or '...@30:2.5s..60'."
             )
         given = {key: value for key, value in match.groupdict().items() if value}
-        schedule = {
+        schedule: dict[str, Any] = {
             key: float(value) if key.endswith("_time") else int(value)
             for key, value in given.items()
             if key != "effect"
@@ -195,7 +195,9 @@ class Event:
         start = self.onset_time if trial == self.onset_trial else 0.0
         if severity == 0.0 or start >= duration:
             return ()
-        effect = self.effect.scaled(severity)
+        since = trial - self.onset_trial
+        since = since % self.period if self.period else since
+        effect = self.effect.scaled(severity).in_trial(since)
         if effect.is_nominal:
             return ()
         stop = self.end_time if trial == self.end_trial else math.inf
@@ -205,7 +207,7 @@ class Event:
     def first_trial(self) -> int:
         """First trial in which anything is changed; -1 = none ever is."""
         span = max(self.ramp, 1) * max(self.period, 1)
-        trials = range(self.onset_trial, self.onset_trial + span)
+        trials = range(self.onset_trial, self.onset_trial + span + 1)
         return next((trial for trial in trials if self.at(trial)), -1)
 
 

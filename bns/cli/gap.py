@@ -2,6 +2,7 @@
 
 from importlib import import_module
 
+from bns.cli.parse import HELP, HELP_ALL
 from bns.errors import UnknownNameError
 
 VERBS = {
@@ -19,7 +20,7 @@ VERBS = {
 def main(verb: str, argv: list[str]) -> int:
     """Run a verb of the gap diagnosis; gives the exit code."""
     del verb
-    if not argv or argv[0] in ("-h", "--help"):
+    if not argv or argv[0] in (*HELP, HELP_ALL):
         print(_manual())
         raise SystemExit(0)
     if argv[0] not in VERBS:

@@ -3,8 +3,7 @@
 import math
 from dataclasses import dataclass
 
-import tyro
-
+from bns.cli.fields import Positional
 from bns.cli.parse import parse
 
 
@@ -16,9 +15,9 @@ class Describe:
     bns gap diagnose LOG --model OUT
     """
 
-    model: tyro.conf.Positional[str]
+    model: Positional[str]
     """MJCF file of the robot"""
-    log: tyro.conf.Positional[str]
+    log: Positional[str]
     """CSV, PACE (.pt) or MCAP file, or directory of a SAGE motion or LeRobotDataset"""
     out: str = ""
     """file for the description; default: MODEL.toml in the working directory"""

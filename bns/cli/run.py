@@ -5,13 +5,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
-import tyro
-
-from bns.cli.parse import parse
+from bns.cli.fields import Flat, Positional, Rare
+from bns.cli.parse import HELP, HELP_ALL, parse
 from bns.errors import BnsError, FormatError, UnknownNameError
 from bns.experiment.config import RunConfig
+
+if TYPE_CHECKING:
+    from bns.storage.lock import Lock
 
 _SHORT = {"world": "world.name", "damage": "world.damage"}
 """settings that have a short name on the command line"""
@@ -28,7 +30,7 @@ class Arguments:
     --resume goes on from there.
     """
 
-    source: tyro.conf.Positional[str]
+    source: Positional[str]
     """a preset (see `bns presets`), a TOML file, or a run directory"""
     out: str = ""
     """directory for the results (default: runs/NAME)"""
@@ -38,19 +40,17 @@ class Arguments:
     """save: write recording.rrd; live: stream to a viewer as well; off: neither"""
     report: bool = True
     """write report.html at the end"""
-    port: str = ""
+    port: Rare[str] = ""
     """device of a real or emulated robot, for --world hardware"""
-    camera: str = "emulated"
+    camera: Rare[str] = "emulated"
     """number of the camera above it, or emulated; for --world hardware"""
-    calibration: str = ""
+    calibration: Rare[str] = ""
     """of that camera, see `bns hardware calibrate`"""
-    wheels: str = ""
+    wheels: Rare[str] = ""
     """a Khepera's file of wheels, see `bns hardware calibrate`"""
-    servos: str = ""
+    servos: Rare[str] = ""
     """a hexapod's file of servos, see `bns hardware calibrate`"""
-    config: Annotated[RunConfig, tyro.conf.arg(name="")] = field(
-        default_factory=RunConfig
-    )
+    config: Flat[RunConfig] = field(default_factory=RunConfig)
 
 
 def main(verb: str, argv: list[str]) -> int:
@@ -62,7 +62,7 @@ def main(verb: str, argv: list[str]) -> int:
             f"Nothing to run: give a preset ({', '.join(presets.names())}), a TOML "
             "file or a run directory. See bns run --help."
         )
-    if argv[0] in ("-h", "--help"):
+    if argv[0] in (*HELP, HELP_ALL):
         parse(Arguments, argv, prog="bns run")
     if argv[0].startswith("-"):
         raise BnsError(
@@ -70,9 +70,25 @@ def main(verb: str, argv: list[str]) -> int:
             f"`bns run demo {argv[0]} ...`. See bns run --help."
         )
     config, out = source(argv[0])
+    config = _for_learner(config, argv[1:])
     start = Arguments(source=argv[0], config=config, out=out)
     given = parse(Arguments, list(map(_long, argv)), prog="bns run", default=start)
     return execute(replace(given, config=expanded(given.config)))
+
+
+def _for_learner(config: RunConfig, words: list[str]) -> RunConfig:
+    """The experiment for the learner that the words name, with its own settings."""
+    from bns.experiment.loading import OLD_LEARNERS, with_learner
+
+    named = [
+        value or after
+        for word, after in zip(words, [*words[1:], ""], strict=True)
+        for flag, _, value in [word.partition("=")]
+        if flag == "--learner"
+    ]
+    if not named or named[-1] in (config.learner, *OLD_LEARNERS):
+        return config
+    return with_learner(config, named[-1])
 
 
 def _long(word: str) -> str:
@@ -123,10 +139,18 @@ def execute(given: Arguments) -> int:
         from bns.cli import hardware_run
 
         return hardware_run.execute(given)
+    from bns.storage.lock import Lock
+
+    out = Path(given.out)
+    with Lock(out) as lock:
+        return _locked(given, out, lock)
+
+
+def _locked(given: Arguments, out: Path, lock: "Lock") -> int:
+    """Train into a directory in which nobody else writes."""
     from bns.cli import outputs
     from bns.experiment.run import train
 
-    out = Path(given.out)
     with (
         outputs.live(given.rerun, given.config) as on_trial,
         until_interrupted() as stop,
@@ -138,6 +162,7 @@ def execute(given: Arguments) -> int:
             progress=True,
             on_trial=on_trial,
             stop=stop,
+            lock=lock,
         )
     if record.trials < given.config.trials:
         print(

@@ -9,19 +9,21 @@ nominal value; at the nominal values the effect changes nothing, bit for bit. Th
 library serves as damage, as imperfect reality, as candidate explanation of a
 sim-to-real gap, and as correction of a simulator.
 
-One effect, one file in this directory; `registry` finds it by its `name`.
+An effect is a class in a file of one of the folders here; `registry` finds it by its
+`name`.
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
 from bns.errors import BnsError, UnknownNameError
-from bns.worlds.effects.legs import SERVO, chosen
+from bns.worlds.effects.leg_sets import SERVO, chosen
 from bns.worlds.effects.parameter import Choice, Parameter
 from bns.worlds.effects.signals import ControlSignal, PoseSignal
+from bns.worlds.physics.servo_law import clipped
 
 __all__ = [
     "ActuatorEffect",
@@ -30,6 +32,7 @@ __all__ = [
     "CommandEffect",
     "ControlSignal",
     "Effect",
+    "ModelEdit",
     "OpticsEffect",
     "Parameter",
     "PoseSignal",
@@ -66,7 +69,8 @@ class Effect(ABC):
 
     def __init__(self, values: Mapping[str, Any] | None = None):
         given = dict(values or {})
-        known = {item.name: item for item in (*self.parameters, *self.choices)}
+        known = [item.name for item in self.parameters]
+        known += [item.name for item in self.choices]
         for name in given:
             if name not in known:
                 raise UnknownNameError(f"parameter of {self.name}", name, known)
@@ -82,7 +86,9 @@ class Effect(ABC):
         return self.values[name]
 
     def __eq__(self, other: object) -> bool:
-        return type(self) is type(other) and self.values == other.values  # type: ignore[attr-defined]
+        if not isinstance(other, Effect) or type(self) is not type(other):
+            return False
+        return self.values == other.values
 
     def __hash__(self) -> int:
         return hash((self.name, tuple(self.values.items())))
@@ -125,6 +131,11 @@ class Effect(ABC):
             value = p.nominal + severity * (values[p.name] - p.nominal)
             values[p.name] = round(value) if p.integer else value
         return type(self)(values)
+
+    def in_trial(self, since: int) -> "Effect":
+        """The effect so many trials after it set in, where it depends on them."""
+        del since
+        return self
 
     def lost(self) -> frozenset[int]:
         """Numbers of the legs that no longer carry a walking robot."""
@@ -188,21 +199,29 @@ class BodyEffect(Effect):
 
 
 class ServoEffect(Effect):
-    """Changes numbers of the servo law (`bns.worlds.physics.servo_law`).
+    """Changes a number of the servo law (`bns.worlds.physics.servo_law`).
 
     A servo closes a loop around its own encoder, so its gain, friction, delay or play
     can not be written as a transform of a signal that is known beforehand, nor as an
     edit of a model alone. All of them are numbers of one law, at whatever stage of the
     signal path they act; `stage` says which. Subclasses set it. On a walking robot the
     choice `servo` says which of its servos.
+
+    Attributes:
+        number: of the law; the effect's parameter is multiplied by it where the nominal
+            is 1, else added, and the result stays inside the number's bounds.
     """
 
-    robots = ("servo",)
+    robots: ClassVar[tuple[str, ...]] = ("servo",)
     choices = (SERVO,)
+    number: ClassVar[str]
 
-    @abstractmethod
     def change(self, law: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """The law after the effect: every number by name, arrays of any shape."""
+        (parameter,) = self.parameters
+        before, strength = law[self.number], self[parameter.name]
+        after = before * strength if parameter.nominal == 1 else before + strength
+        return {**law, self.number: clipped(self.number, after)}
 
     def edit(self, spec: Any) -> None:
         """Write the effect into the chosen servos of a walking robot's `MjSpec`."""
@@ -213,6 +232,10 @@ class ServoEffect(Effect):
         for actuator in chosen(spec, self["servo"]):
             law, powered = servo_joint.read(actuator)
             servo_joint.write(spec, actuator, self.change(law), powered)
+
+
+ModelEdit: TypeAlias = BodyEffect | ServoEffect
+"""What is written into a model before compilation."""
 
 
 class OpticsEffect(Effect):

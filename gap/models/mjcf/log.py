@@ -9,6 +9,7 @@ from bns.gap.importers import tables
 from bns.gap.importers.tables import SENT, TIME, TRIAL, Column, Table
 from bns.gap.models.mjcf import cuts
 from bns.gap.models.mjcf.config import OwnConfig
+from bns.worlds.data import dataset_checks as checks
 from bns.worlds.data.column_map import FACTORS
 from bns.worlds.trial import Commands, Trial
 
@@ -96,7 +97,7 @@ def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> 
     begins = begins[np.diff(times[np.append(begins, len(times) - 1)]) > 0]
     bounds = np.append(begins, len(times) - 1)
     kinds = tuple(item.channel for item in config.told)
-    return Trial(
+    made = Trial(
         commands=Commands(told[begins], np.diff(times[bounds]), kinds),
         times=times,
         observed=seen,
@@ -105,6 +106,8 @@ def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> 
         robot=config.name,
         world="imported",
     )
+    checks.plausible(made, where)
+    return made
 
 
 def _exact(

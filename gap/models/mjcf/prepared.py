@@ -7,6 +7,7 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.gap.models.mjcf.config import OwnConfig, Told
+from bns.models import mjcf as mjcf_file
 
 
 def spec(config: OwnConfig) -> mujoco.MjSpec:
@@ -20,7 +21,7 @@ def spec(config: OwnConfig) -> mujoco.MjSpec:
         BnsError: a loop on what is no joint.
         ValueError: MuJoCo refuses the file.
     """
-    made = mujoco.MjSpec.from_file(str(config.model))
+    made = mjcf_file.load(config.model)
     name_actuators(made)
     for told in config.told:
         if told.kp:
