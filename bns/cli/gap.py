@@ -6,6 +6,7 @@ from bns.cli.parse import HELP, HELP_ALL
 from bns.errors import UnknownNameError
 
 VERBS = {
+    "describe": ("gap_describe", "write the description of a robot of your own"),
     "check": ("gap_diagnose", "is the recording sound? repairs and faults, one a line"),
     "diagnose": ("gap_diagnose", "is there a gap, where, which effect, how far closed"),
     "plan": ("gap_after", "the next command, which separates what is still tied"),

@@ -12,7 +12,7 @@ from bns.gap.candidates import mjcf
 from bns.gap.core import segments
 from bns.gap.models.base import Windows
 from bns.gap.models.mjcf import effects as own_effects
-from bns.gap.models.mjcf import log, view
+from bns.gap.models.mjcf import log, prepared, start, view
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.records import Candidate
 from bns.models import mjcf as mjcf_file
@@ -86,7 +86,7 @@ class OwnModel:
         """
         if not self.config.model.exists():
             raise FormatError(f"There is no model file {self.config.model}.")
-        made = mjcf_file.load(self.config.model)
+        made = prepared.spec(self.config)
         mjcf_file.compiled(made.copy(), self.config.model)
         for effect in effects:
             if effect.stage == "body" and not effect.is_nominal:
@@ -153,7 +153,7 @@ class OwnModel:
         lead, extra = self._lead(), round(LEAD / dt)
         rest = self._rest(self.compiled(()).model)[self.actuators]
         values = np.repeat(trial.commands.values, counts, axis=0)
-        before = np.tile(rest, (lead + extra, 1))
+        before = start.before(trial, rest, lead + extra, self.config, dt)
         values = np.concatenate([before, values])
         signal = ControlSignal(
             times=np.arange(len(values)) * dt,
@@ -177,8 +177,7 @@ class OwnModel:
             key = _index(model, "key", self.config.keyframe)
             mujoco.mj_resetDataKeyframe(model, data, key)
         if self.config.recorded:
-            seen = trial.observed[np.isfinite(trial.observed).all(axis=1)]
-            self.view.place(data, seen[0])
+            start.place(data, trial, self.view)
         state = np.empty(mujoco.mj_stateSize(model, STATE))
         data.time = 0.0
         mujoco.mj_getState(model, data, state, STATE)
@@ -253,6 +252,7 @@ def _key(trial: Trial, effects: Sequence[Effect]) -> tuple:
         told.durations.tobytes(),
         trial.times.tobytes(),
         trial.observed[:1].tobytes(),
+        str(trial.conditions.get(start.STATE)),
         tuple(str(effect) for effect in effects),
     )
 
