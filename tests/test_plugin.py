@@ -70,7 +70,7 @@ def test_what_it_adds_is_there_and_acts(run_python, site):
 
 def test_its_learner_learns(run_python, site, tmp_path):
     words = ["--learner", "climber", "--trials", "4", "--replicates", "2"]
-    words += ["--rerun", "off", "--no-report", "--threads", "1", "--compiled", "no"]
+    words += ["--rerun", "off", "--no-report", "--threads", "1"]
     out = ["--out", tmp_path / "run"]
     told = ["-m", "bns", "run", "khepera-simple", *words, *out]
     assert "4 trials of 2 runs" in run_python(*told, PYTHONPATH=str(site))

@@ -18,8 +18,8 @@ MANUAL = """usage: bns claims {list,plan,run,take,table} [...]
   run C ...      the same for all claims of an investigation
   run --all      the same for every claim whose preset exists
   take DIR ...   use finished `bns run` directories below DIR
-  table          holds / direction only / null / reversed / stale, with effect sizes:
-                 by your runs, and by published ones where you have fewer
+  table          what they say, with effect sizes: by your runs, and by
+                 published ones where you have fewer
 
 The rule is in docs/claims.md. `bns claims VERB --help` is the manual of a verb."""
 

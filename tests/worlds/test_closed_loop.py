@@ -191,7 +191,7 @@ BAD_LIGHT = {
     "table": ({"sensors": "mine"}, {}, "public, thesis"),
     "supervisor": ({"supervisor": {"saftey": 1}}, {}, "Did you mean 'safety'"),
     "no supervisor": ({"supervisor": 3}, {}, "3 is no supervisor"),
-    "at lamp": ({"supervisor": {"at_lamp": "run"}}, {}, "stop, turn"),
+    "at lamp": ({"supervisor": {"at_lamp": "run"}}, {}, "Did you mean 'turn'"),
     "boundary": ({}, {"starts": [[0.1, 0.0, 0.0]]}, "inside its safety boundary"),
     "inside": ({}, {"starts": [[0.01, 0.0, 0.0]]}, "inside the robot"),
     "outside": ({}, {"starts": [[5.0, 0.0, 0.0]]}, "start x = 5"),
