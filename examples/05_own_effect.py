@@ -2,7 +2,7 @@
 
     python examples/05_own_effect.py
 
-In the package an effect is one file in `worlds/effects/`, found by its name. Outside,
+In the package an effect is a class in `worlds/effects/`, found by its name. Outside,
 an object of the class does: worlds take it wherever they take an effect as text.
 """
 

@@ -181,7 +181,8 @@ def refuse(damage: Damage, *, stages: Iterable[str], kind: str, world: str) -> N
                 f"take another effect or the world {other!r}."
             )
         if kind not in effect.robots:
+            able = " and ".join(item for item in effect.robots if item != "own")
+            able = f"{able} robots" if able else "models without a world (`bns gap`)"
             raise BnsError(
-                f"Effect {effect.name!r} is for {' and '.join(effect.robots)} robots; "
-                f"this one is {kind}."
+                f"Effect {effect.name!r} is for {able}; this robot is {kind}."
             )

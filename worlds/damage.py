@@ -195,7 +195,9 @@ class Event:
         start = self.onset_time if trial == self.onset_trial else 0.0
         if severity == 0.0 or start >= duration:
             return ()
-        effect = self.effect.scaled(severity)
+        since = trial - self.onset_trial
+        since = since % self.period if self.period else since
+        effect = self.effect.scaled(severity).in_trial(since)
         if effect.is_nominal:
             return ()
         stop = self.end_time if trial == self.end_trial else math.inf
@@ -205,7 +207,7 @@ class Event:
     def first_trial(self) -> int:
         """First trial in which anything is changed; -1 = none ever is."""
         span = max(self.ramp, 1) * max(self.period, 1)
-        trials = range(self.onset_trial, self.onset_trial + span)
+        trials = range(self.onset_trial, self.onset_trial + span + 1)
         return next((trial for trial in trials if self.at(trial)), -1)
 
 

@@ -20,7 +20,7 @@ from bns.snn.network import Shape, forward
 from bns.snn.scaling import OUTPUTS
 from bns.walk import scaling, training
 from bns.walk.goals import Goals
-from bns.worlds.effects.leg_raised import RAISED
+from bns.worlds.effects.legs.whole import RAISED
 from bns.worlds.static_snn.nets import StaticNets
 from bns.worlds.trial import Commands
 from bns.worlds.world import World

@@ -107,8 +107,8 @@ def _unlisted(rng: np.random.Generator, model: OwnModel) -> Effect:
         "command_gain": ("factor", 0.7),
         "command_delay": ("delay", 0.1),
         "command_lag": ("time_constant", 0.1),
-        "sensor_gain": ("factor", 0.8),
-        "sensor_delay": ("delay", 0.1),
+        "reading_gain": ("factor", 0.8),
+        "reading_delay": ("delay", 0.1),
     }
     names = [name for name in strengths if name not in listed] or list(strengths)
     name = names[int(rng.integers(len(names)))]

@@ -5,8 +5,8 @@ it is not zero, else from the inertia that the joint moves, so that the largest 
 matters within a second.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import mujoco
@@ -15,14 +15,15 @@ import numpy as np
 from bns.errors import BnsError, UnknownNameError
 from bns.gap.models.mjcf import effects
 from bns.gap.models.mjcf.config import OwnConfig
-from bns.gap.models.mjcf.effect_target import ALL
 from bns.gap.records import Candidate
 from bns.worlds.effects.base import Effect
+from bns.worlds.effects.parts import ALL
 
 RATIOS = (0.4, 0.6, 0.8, 0.9, 1.1, 1.25, 1.6, 2.5)
 SHARES = (0.02, 0.05, 0.12, 0.3, 1.0)  # of the largest value, beyond the nominal
 LOWER = (0.9, 0.5, 0.2)  # of the nominal value, taken off
 LATE = (0.01, 0.03, 0.08, 0.2, 0.5)  # [s]
+PLAY = 0.3  # [rad or m] largest play, or offset of an encoder
 EXCITE = {
     "joint_damping": "fast motion of that joint",
     "joint_friction": "slow motion and reversals of that joint",
@@ -36,9 +37,19 @@ EXCITE = {
     "command_gain": "large commands",
     "command_offset": "any command",
     "command_dead_zone": "small commands",
-    "sensor_gain": "large excursions",
-    "sensor_offset": "any command",
-    "sensor_delay": "fast motion",
+    "reading_gain": "large excursions",
+    "reading_offset": "any command",
+    "reading_delay": "fast motion",
+    "joint_stribeck": "slow motion and reversals of that joint",
+    "joint_backlash": "reversals of that joint under changing load",
+    "encoder_offset": "motion against gravity, or between stops",
+    "body_centre": "motion against gravity, or sudden changes of speed",
+    "body_length": "large excursions",
+    "actuator_kp": "steps, and loads that are held",
+    "actuator_kd": "steps",
+    "actuator_torque_limit": "large and sudden commands",
+    "command_limit": "large commands",
+    "command_rate": "large steps",
 }
 USUAL = (
     "joint_damping",
@@ -48,7 +59,7 @@ USUAL = (
     "actuator_gain",
     "command_delay",
     "command_lag",
-    "sensor_gain",
+    "reading_gain",
 )
 """considered where the user does not say which"""
 
@@ -86,12 +97,16 @@ def candidates(config: OwnConfig, model: mujoco.MjModel) -> tuple[OwnCandidate, 
         BnsError: an effect on a part that the model lacks, or bounds for none.
     """
     wanted = config.effects if config.effects is not None else _usual(config, model)
+    config = replace(
+        config, bounds={effects.current(k): row for k, row in config.bounds.items()}
+    )
     made = []
     for name, parts in wanted.items():
+        name = effects.current(name)
         if name not in effects.CLASSES:
             raise UnknownNameError("effect in [effects]", name, effects.CLASSES)
         for part in parts or (ALL,):
-            made.append(_candidate(name, part, config, model))
+            made += _candidates(name, part, config, model)
     known = [item.name for item in made]
     for name in config.bounds:
         if name not in known:
@@ -114,7 +129,7 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
         kind = effects.OWNERS.get(name)
         seen = tuple(item.channel.name for item in config.seen)
         made[name] = (
-            parts[kind] if kind else (seen if name == "sensor_gain" else (ALL,))
+            parts[kind] if kind else (seen if name == "reading_gain" else (ALL,))
         )
     return {name: parts for name, parts in made.items() if parts}
 
@@ -124,29 +139,35 @@ def _hinged(model: mujoco.MjModel, joint: int) -> bool:
     return int(model.jnt_type[joint]) in map(int, kinds)
 
 
-def _candidate(
+def _candidates(
     name: str, part: str, config: OwnConfig, model: mujoco.MjModel
-) -> OwnCandidate:
-    about = effects.CLASSES[name].parameters[0]
-    low, high, unit = _range(name, part, config, model)
-    given = config.bounds.get(f"{name}[{part}]", {})
-    low, high = given.get("low", low), given.get("high", high)
-    return OwnCandidate(
-        name=f"{name}[{part}]",
-        effect=name,
-        parameter=about.name,
-        unit=unit,
-        nominal=about.nominal,
-        low=min(low, about.nominal),
-        high=max(high, about.nominal),
-        grid=_grid(about.nominal, low, high),
-        fixed={"part": part},
-        slack=given.get("slack", 0.0),
-        excite=EXCITE[name],
-    )
+) -> Iterable[OwnCandidate]:
+    """One for each strength that the effect has."""
+    strengths = [item for item in effects.CLASSES[name].parameters if item.scales]
+    for about in strengths:
+        stem = name if len(strengths) == 1 else f"{name}.{about.name}"
+        low, high, unit = _range(name, part, config, model)
+        given = config.bounds.get(f"{stem}[{part}]", {})
+        low, high = given.get("low", low), given.get("high", high)
+        nominal = high if name == "command_limit" else about.nominal
+        yield OwnCandidate(
+            name=f"{stem}[{part}]",
+            effect=name,
+            parameter=about.name,
+            unit=unit,
+            nominal=nominal,
+            low=min(low, nominal),
+            high=max(high, nominal),
+            grid=_grid(nominal, low, high),
+            fixed={"part": part},
+            slack=given.get("slack", 0.0),
+            excite=EXCITE[name],
+        )
 
 
 def _grid(nominal: float, low: float, high: float) -> tuple[float, ...]:
+    if nominal == high > 0:  # a limit
+        return tuple(low + share * (high - low) for share in (0.0, *SHARES[:-1]))
     if nominal == 1.0:
         inside = [ratio for ratio in RATIOS if low <= ratio <= high]
         return tuple(sorted({*inside, low, high} - {nominal}))
@@ -164,10 +185,10 @@ def _range(
     kind = effects.OWNERS.get(name)
     if kind:
         return _of_model(name, kind, part, model)
-    if name in ("command_delay", "sensor_delay", "command_lag"):
+    if name in ("command_delay", "reading_delay", "command_lag"):
         _channel(part, config)
         return 0.0, LATE[-1], "s"
-    if name in ("command_gain", "sensor_gain"):
+    if name in ("command_gain", "reading_gain"):
         _channel(part, config)
         return RATIOS[0], RATIOS[-1], "1"
     return _of_channel(name, part, config)
@@ -186,6 +207,10 @@ def _of_channel(name: str, part: str, config: OwnConfig) -> tuple[float, float, 
     if part in told:
         item = told[part]
         size = max(abs(item.low), abs(item.high))
+        if name == "command_limit":
+            return 0.1 * size, size, item.channel.unit
+        if name == "command_rate":  # two seconds for the whole way
+            return 0.0, 2.0 / size, f"s/({item.channel.unit})"
         low = 0.0 if name == "command_dead_zone" else -0.3 * size
         return low, 0.3 * size if low else 0.6 * size, item.channel.unit
     if part in seen:
@@ -201,11 +226,16 @@ def _of_model(
     if part not in known:
         raise UnknownNameError(f"{kind} in [effects] {name}", part, known)
     at = known.index(part)
-    if name in ("actuator_gain", "geom_friction"):
+    if kind in ("actuator", "geom"):
         return 0.2, 3.0, "1"
-    if name == "body_mass":
+    if name == "body_length":
+        return 0.7, 1.4, "1"
+    if kind == "body":
         mass = float(model.body_mass[at])
-        return -0.9 * mass, 2.0 * mass, "kg"
+        if name == "body_mass":
+            return -0.9 * mass, 2.0 * mass, "kg"
+        size = float(np.sqrt(model.body_inertia[at].max() / max(mass, 1e-9)))
+        return -size, size, "m"
     return _of_joint(name, at, model)
 
 
@@ -217,9 +247,13 @@ def _of_joint(name: str, joint: int, model: mujoco.MjModel) -> tuple[float, floa
     mujoco.mj_fullM(model, data, full)
     inertia = float(full[dof, dof])
     slide = int(model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
+    if name in ("encoder_offset", "joint_backlash"):
+        low = -PLAY if name == "encoder_offset" else 0.0
+        return low, PLAY, "m" if slide else "rad"
     now, high, unit = {
         "joint_damping": (model.dof_damping[dof], 10.0 * inertia, "N m s/rad"),
         "joint_friction": (model.dof_frictionloss[dof], 5.0 * inertia, "N m"),
+        "joint_stribeck": (0.0, 5.0 * inertia, "N m"),
         "joint_armature": (model.dof_armature[dof], inertia, "kg m2"),
         "joint_stiffness": (model.jnt_stiffness[joint], 20.0 * inertia, "N m/rad"),
     }[name]

@@ -9,7 +9,7 @@ from bns import models
 from bns.errors import BnsError
 from bns.experiment import static_walk as static
 from bns.worlds import registry
-from bns.worlds.effects.leg_raised import RAISED
+from bns.worlds.effects.legs.whole import RAISED
 from bns.worlds.static_snn.nets import StaticNets, kinematic_nets
 from bns.worlds.trial import Commands
 from tests.bns.walkers import Slider, small

@@ -169,7 +169,7 @@ def test_effects_are_considered_where_none_are_listed(arm):
     names = {item.name for item in OwnModel(config, threads=1).candidates()}
     assert {
         "joint_damping[elbow]",
-        "sensor_gain[shoulder]",
+        "reading_gain[shoulder]",
         "command_delay[all]",
     } < names
 

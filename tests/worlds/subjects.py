@@ -8,10 +8,12 @@ import numpy as np
 
 from bns import models
 from bns.worlds.effects.base import ControlSignal
+from bns.worlds.effects.parts import Part
 from bns.worlds.light import sensors
 from bns.worlds.light.field import Lamp, LightField
 
 ROVER = (Path(__file__).parent / "rover.xml").read_text()
+ARM = (Path(__file__).parent / "arm.xml").read_text()
 STEPS, DT = 600, 0.005
 LEGGED = ("legged",)  # robots of effects that need legs
 
@@ -74,8 +76,14 @@ def bare(kind) -> mujoco.MjModel:
 
 
 def _spec(kind):
-    walks = kind.robots == LEGGED
-    return models.spec("phantomx") if walks else mujoco.MjSpec.from_string(ROVER)
+    if kind.robots == LEGGED:
+        return models.spec("phantomx")
+    return mujoco.MjSpec.from_string(ARM if on_part(kind) else ROVER)
+
+
+def on_part(kind) -> bool:
+    """Whether an effect acts on a part that it names, of any model."""
+    return any(isinstance(item, Part) for item in kind.choices)
 
 
 def compiled(effect) -> mujoco.MjModel:

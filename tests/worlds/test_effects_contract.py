@@ -1,5 +1,7 @@
 """What every effect must keep to; a new effect is tested by being there."""
 
+import re
+
 import mujoco
 import numpy as np
 import pytest
@@ -15,16 +17,17 @@ from bns.worlds.effects.base import (
     SensorEffect,
     ServoEffect,
 )
+from bns.worlds.effects.parts import Part
 from bns.worlds.physics import servo_law
 from tests.worlds.subjects import (
     DT,
-    LEGGED,
     STEPS,
     as_bytes,
     bare,
     compiled,
     frozen,
     light,
+    on_part,
     read,
     signal_of,
     told,
@@ -43,6 +46,12 @@ OF_WHEELS = [
 ]
 LASTING = {"clock_drift"}  # what a clock has gained stays when the drift ends
 SAMPLES = 31
+FOLDERS = {  # beside the one of the same name
+    "command": ("command", "legs", "servo"),
+    "actuator": ("actuator", "servo"),
+    "body": ("body", "legs", "servo"),
+    "sensor": ("sensor", "light", "servo"),
+}
 
 
 @pytest.fixture
@@ -130,7 +139,8 @@ def unchanged(effect, signals) -> bool:
 class TestEveryEffect:
     def test_says_what_it_is(self, name):
         effect = registry.get(name)
-        assert effect.name == effect.__module__.rpartition(".")[2]
+        folder = effect.__module__.split(".")[-2]
+        assert folder in FOLDERS.get(effect.stage, (effect.stage,))
         assert effect.stage in STAGES
         assert effect.doc and "\n" not in effect.doc
         assert effect.source and effect.robots and effect.parameters
@@ -172,8 +182,20 @@ class TestEveryEffect:
         with pytest.raises(UnknownNameError, match=f"parameter of {name} 'strenght'"):
             registry.make(name, strenght=1)
         for choice in registry.get(name).choices:
+            if isinstance(choice, Part):
+                continue  # known when there is a model
             with pytest.raises(UnknownNameError, match=choice.options[0]):
                 registry.make(name, **{choice.name: "nowhere"})
+
+    @pytest.mark.parametrize("part", ["nowhere", "no*"])
+    def test_unknown_parts_are_refused_where_they_are_looked_for(
+        self, name, part, signals
+    ):
+        if not on_part(registry.get(name)):
+            return
+        values = listing.example(registry.get(name)).values | {"part": part}
+        with pytest.raises(UnknownNameError, match=re.escape(part)):
+            unchanged(registry.make(name, **values), signals)
 
     def test_text_and_table_read_back(self, name):
         rng = np.random.default_rng(3)
@@ -259,9 +281,9 @@ def test_body_effects_keep_the_sizes_and_the_physics_sound(name):
     if not kind.resizes:
         assert len(as_bytes(model)) == len(as_bytes(bare(kind)))
     data = mujoco.MjData(model)
-    if kind.robots == LEGGED:
+    if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
-    data.ctrl[:] = 0.2 if kind.robots == LEGGED else 3.0  # [rad], [rad/s]
+    data.ctrl[:] = 0.2 if model.nkey else 3.0  # [rad], [rad/s]
     mujoco.mj_step(model, data, nstep=200)
     assert np.isfinite(data.qpos).all()
     assert not any(warning.number for warning in data.warning)

@@ -9,7 +9,8 @@ from bns.errors import BnsError
 from bns.models import ax12a
 from bns.worlds import registry as worlds
 from bns.worlds.damage import Damage
-from bns.worlds.effects import legs, registry
+from bns.worlds.effects import leg_sets as legs
+from bns.worlds.effects import registry
 from bns.worlds.physics import servo_joint
 from bns.worlds.trial import Channel, Commands
 

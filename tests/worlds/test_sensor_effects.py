@@ -14,6 +14,7 @@ from tests.worlds import subjects
 from tests.worlds.subjects import DT, light, read
 
 EVERY = [registry.get(name) for name in registry.names()]
+EVERY = [kind for kind in EVERY if "wheeled" in kind.robots]
 ON_READINGS = [kind.name for kind in EVERY if issubclass(kind, SensorEffect)]
 ON_LIGHT = [kind.name for kind in EVERY if issubclass(kind, OpticsEffect)]
 MEMORYLESS = [

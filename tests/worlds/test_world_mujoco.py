@@ -211,7 +211,7 @@ def test_mujoco_writes_no_log(tmp_path, monkeypatch):
 
 def test_effects_of_another_stage_or_robot_are_refused(monkeypatch):
     monkeypatch.setattr(Pull, "robots", ("legged",))
-    with pytest.raises(BnsError, match="this one is wheeled"):
+    with pytest.raises(BnsError, match="this robot is wheeled"):
         registry.make("mujoco", damage=gravity(2.0))
     monkeypatch.setattr(Pull, "stage", "sensor")
     with pytest.raises(BnsError, match="an effect on the sensor"):

@@ -9,7 +9,8 @@ nominal value; at the nominal values the effect changes nothing, bit for bit. Th
 library serves as damage, as imperfect reality, as candidate explanation of a
 sim-to-real gap, and as correction of a simulator.
 
-One effect, one file in this directory; `registry` finds it by its `name`.
+An effect is a class in a file of one of the folders here; `registry` finds it by its
+`name`.
 """
 
 from abc import ABC, abstractmethod
@@ -19,9 +20,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from bns.errors import BnsError, UnknownNameError
-from bns.worlds.effects.legs import SERVO, chosen
+from bns.worlds.effects.leg_sets import SERVO, chosen
 from bns.worlds.effects.parameter import Choice, Parameter
 from bns.worlds.effects.signals import ControlSignal, PoseSignal
+from bns.worlds.physics.servo_law import clipped
 
 __all__ = [
     "ActuatorEffect",
@@ -126,6 +128,11 @@ class Effect(ABC):
             values[p.name] = round(value) if p.integer else value
         return type(self)(values)
 
+    def in_trial(self, since: int) -> "Effect":
+        """The effect so many trials after it set in, where it depends on them."""
+        del since
+        return self
+
     def lost(self) -> frozenset[int]:
         """Numbers of the legs that no longer carry a walking robot."""
         return frozenset()
@@ -188,21 +195,29 @@ class BodyEffect(Effect):
 
 
 class ServoEffect(Effect):
-    """Changes numbers of the servo law (`bns.worlds.physics.servo_law`).
+    """Changes a number of the servo law (`bns.worlds.physics.servo_law`).
 
     A servo closes a loop around its own encoder, so its gain, friction, delay or play
     can not be written as a transform of a signal that is known beforehand, nor as an
     edit of a model alone. All of them are numbers of one law, at whatever stage of the
     signal path they act; `stage` says which. Subclasses set it. On a walking robot the
     choice `servo` says which of its servos.
+
+    Attributes:
+        number: of the law; the effect's parameter is multiplied by it where the nominal
+            is 1, else added, and the result stays inside the number's bounds.
     """
 
-    robots = ("servo",)
+    robots: ClassVar[tuple[str, ...]] = ("servo",)
     choices = (SERVO,)
+    number: ClassVar[str]
 
-    @abstractmethod
     def change(self, law: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """The law after the effect: every number by name, arrays of any shape."""
+        (parameter,) = self.parameters
+        before, strength = law[self.number], self[parameter.name]
+        after = before * strength if parameter.nominal == 1 else before + strength
+        return {**law, self.number: clipped(self.number, after)}
 
     def edit(self, spec: Any) -> None:
         """Write the effect into the chosen servos of a walking robot's `MjSpec`."""

@@ -1,4 +1,4 @@
-"""All effects by name: one file per effect in this directory, no list to edit.
+"""All effects by name: classes in the folders here, by stage; no list to edit.
 
 An effect is written in text as ``wheel_gain:wheel=left,factor=0.8`` and in TOML as a
 table ``{effect = "wheel_gain", wheel = "left", factor = 0.8}``.
@@ -6,9 +6,10 @@ table ``{effect = "wheel_gain", wheel = "left", factor = 0.8}``.
 
 import inspect
 import pkgutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
+from types import ModuleType
 from typing import Any
 
 from bns.errors import BnsError, UnknownNameError
@@ -16,13 +17,18 @@ from bns.worlds import effects as package
 from bns.worlds.effects.base import Effect
 
 EXAMPLE = "wheel_gain:wheel=left,factor=0.8"
+FORMER = {
+    "sensor_gain": "reading_gain",
+    "sensor_offset": "reading_offset",
+    "sensor_delay": "reading_delay",
+}
+"""Names that effects on a `part` had before; their texts are still read."""
 
 
 @cache
 def _classes() -> dict[str, type[Effect]]:
     found: dict[str, type[Effect]] = {}
-    for info in pkgutil.iter_modules(package.__path__):
-        module = import_module(f"{package.__name__}.{info.name}")
+    for module in _modules():
         for _, item in inspect.getmembers(module, inspect.isclass):
             if (
                 issubclass(item, Effect)
@@ -34,6 +40,15 @@ def _classes() -> dict[str, type[Effect]]:
                     raise BnsError(f"Two effects are called {item.name!r}; rename one.")
                 found[item.name] = item
     return dict(sorted(found.items()))
+
+
+def _modules() -> Iterator[ModuleType]:
+    """All files in the folders here."""
+    for folder in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+        if folder.ispkg:
+            inside = import_module(folder.name)
+            for info in pkgutil.iter_modules(inside.__path__, f"{folder.name}."):
+                yield import_module(info.name)
 
 
 def names() -> tuple[str, ...]:
@@ -59,7 +74,12 @@ def make(name: str, **values: Any) -> Effect:
         UnknownNameError: unknown effect, parameter or option.
         OutOfBoundsError: a value outside its bounds.
     """
-    return get(name)(values)
+    return get(current(name) if "part" in values else name)(values)
+
+
+def current(name: str) -> str:
+    """The name of an effect on a part today, if it had another one before."""
+    return FORMER.get(name, name)
 
 
 def parse(text: str) -> Effect:
@@ -101,4 +121,4 @@ def from_table(table: Mapping[str, Any]) -> Effect:
             f"Effect table {dict(table)!r} has no name: give "
             '{effect = "wheel_gain", wheel = "left", factor = 0.8}.'
         )
-    return get(name)(values)
+    return make(name, **values)

@@ -12,7 +12,7 @@ from bns.models import RobotModel, legs
 from bns.worlds.active import Stages
 from bns.worlds.damage import Damage
 from bns.worlds.effects.base import ControlSignal
-from bns.worlds.effects.legs import joints_named, named
+from bns.worlds.effects.leg_sets import joints_named, named
 from bns.worlds.physics import (
     compile,
     control,

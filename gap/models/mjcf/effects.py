@@ -1,48 +1,39 @@
-"""Effects on any MJCF model, by name.
-
-They are like those of the library (`bns.worlds.effects`), except that the part they
-act on is a name of the user's own model; hence they are no part of its registry.
-"""
+"""Effects on parts of any MJCF model: those of the library that have a `part`."""
 
 from collections.abc import Mapping
 from typing import Any
 
 from bns.errors import BnsError, UnknownNameError
-from bns.gap.models.mjcf import bodies, signals
+from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect
+from bns.worlds.effects.parts import Part
+
+
+def _kind(effect: type[Effect]) -> str:
+    """What an effect acts on: "joint", ..., "channel"; "" = on no part."""
+    kinds = [item.kind for item in effect.choices if isinstance(item, Part)]
+    return kinds[0] if kinds else ""
+
 
 CLASSES: Mapping[str, type[Effect]] = {
-    item.name: item
-    for item in (
-        bodies.JointDamping,
-        bodies.JointFriction,
-        bodies.JointArmature,
-        bodies.JointStiffness,
-        bodies.BodyMass,
-        bodies.ActuatorGain,
-        bodies.GeomFriction,
-        signals.CommandDelay,
-        signals.CommandLag,
-        signals.CommandGain,
-        signals.CommandOffset,
-        signals.CommandDeadZone,
-        signals.SensorGain,
-        signals.SensorOffset,
-        signals.SensorDelay,
-    )
+    name: registry.get(name)
+    for name in registry.names()
+    if _kind(registry.get(name)) and "own" in registry.get(name).robots
 }
 """all of them by name"""
 
 OWNERS = {
-    "joint_damping": "joint",
-    "joint_friction": "joint",
-    "joint_armature": "joint",
-    "joint_stiffness": "joint",
-    "body_mass": "body",
-    "actuator_gain": "actuator",
-    "geom_friction": "geom",
+    name: _kind(effect)
+    for name, effect in CLASSES.items()
+    if _kind(effect) != "channel"
 }
 """kind of part of the effects on the model; the others act on channels"""
+
+
+def current(name: str) -> str:
+    """The name of an effect or candidate today, if it had another one before."""
+    effect, bracket, part = name.partition("[")
+    return registry.current(effect) + bracket + part
 
 
 def make(name: str, values: Mapping[str, Any]) -> Effect:
@@ -52,9 +43,9 @@ def make(name: str, values: Mapping[str, Any]) -> Effect:
         UnknownNameError: no such effect or parameter.
         OutOfBoundsError: a value that is not allowed.
     """
-    if name not in CLASSES:
+    if current(name) not in CLASSES:
         raise UnknownNameError("effect on a model of your own", name, CLASSES)
-    return CLASSES[name](values)
+    return CLASSES[current(name)](values)
 
 
 def parse(text: str) -> Effect:

@@ -1,0 +1,173 @@
+"""Bodies of any model: mass, centre of mass, length and what they grip."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from bns.errors import BnsError
+from bns.worlds.effects import parts
+from bns.worlds.effects.base import BodyEffect, Parameter
+from bns.worlds.effects.bodies import Inertial
+from bns.worlds.effects.parts import ANY, WIDE
+
+
+class BodyMass(BodyEffect):
+    """A mass added to a body at its centre of mass; its inertia stays."""
+
+    name = "body_mass"
+    doc = "a body is heavier, or lighter, than the model says"
+    source = "rigid-body mechanics; a point mass at the centre of mass is assumed"
+    robots = ANY
+    choices = parts.part("body")
+    parameters = (
+        Parameter(
+            "added",
+            unit="kg",
+            nominal=0.0,
+            low=-WIDE,
+            high=WIDE,
+            doc="mass added; 1 % of the body's stays at least",
+            example=0.2,
+        ),
+    )
+
+    def edit(self, spec: Any) -> None:
+        if self.is_nominal:
+            return
+        for body in parts.bodies(spec, self["part"]):
+            inertial = Inertial.of(spec, body)
+            added = max(self["added"], -0.99 * inertial.mass)
+            inertial.plus_point(added, inertial.centre).write(body)
+
+
+def _shift(axis: str) -> Parameter:
+    return Parameter(
+        f"d{axis}",
+        unit="m",
+        nominal=0.0,
+        low=-10.0,
+        high=10.0,
+        doc=f"shift along the body's own {axis} axis; bounds assumed",
+        example=0.02,
+    )
+
+
+class BodyCentre(BodyEffect):
+    """A body's centre of mass is moved; mass and inertia about it stay."""
+
+    name = "body_centre"
+    doc = "a body's centre of mass lies elsewhere than in the model"
+    source = "rigid-body mechanics"
+    robots = ANY
+    choices = parts.part("body")
+    parameters = (_shift("x"), _shift("y"), _shift("z"))
+
+    def edit(self, spec: Any) -> None:
+        if self.is_nominal:
+            return
+        for body in parts.bodies(spec, self["part"]):
+            inertial = Inertial.of(spec, body)
+            centre = inertial.centre + np.array([self["dx"], self["dy"], self["dz"]])
+            replace(inertial, centre=centre).write(body)
+
+
+class BodyLength(BodyEffect):
+    """A body is stretched along its length, and its mass with it.
+
+    Its length runs from its joint to the body that it carries, or to its centre of
+    mass where it carries none or several. Mass stays; the centre of mass, the inertia,
+    and all that sits on the body move as the stretch says.
+    """
+
+    name = "body_length"
+    doc = "a link is longer or shorter than in the model"
+    source = "inertia of a mass that is stretched evenly; bounds assumed"
+    robots = ANY
+    choices = parts.part("body")
+    parameters = (
+        Parameter(
+            "factor",
+            unit="1",
+            nominal=1.0,
+            low=0.1,
+            high=10.0,
+            doc="length over the model's",
+            example=1.1,
+        ),
+    )
+
+    def edit(self, spec: Any) -> None:
+        if self.is_nominal:
+            return
+        for body in parts.bodies(spec, self["part"]):
+            inertial = Inertial.of(spec, body)
+            along = _along(body, inertial)
+            stretch = np.eye(3) + (self["factor"] - 1) * np.outer(along, along)
+            for item in (*body.sites, *body.bodies):
+                item.pos = stretch @ item.pos
+            for geom in body.geoms:
+                _stretch(geom, stretch, along, self["factor"])
+            spread = np.trace(inertial.inertia) / 2 * np.eye(3) - inertial.inertia
+            spread = stretch @ spread @ stretch  # second moments of the mass
+            inertia = np.trace(spread) * np.eye(3) - spread
+            centre = stretch @ inertial.centre
+            replace(inertial, centre=centre, inertia=inertia).write(body)
+
+
+def _along(body: Any, inertial: Inertial) -> np.ndarray:
+    """Unit vector along a body, in its frame."""
+    children = [np.array(child.pos) for child in body.bodies]
+    way = children[0] if len(children) == 1 else np.array(inertial.centre)
+    length = np.linalg.norm(way)
+    if length < 1e-9:
+        raise BnsError(f"Body {body.name!r} has no length to change.")
+    return way / length
+
+
+def _stretch(geom: Any, stretch: np.ndarray, along: np.ndarray, factor: float) -> None:
+    """Move a geom with its body, and lengthen one that lies along it."""
+    import mujoco
+
+    if np.isfinite(geom.fromto[0]) and np.any(geom.fromto):
+        ends = np.array(geom.fromto).reshape(2, 3) @ stretch
+        geom.fromto = ends.ravel()
+        return
+    geom.pos = stretch @ geom.pos
+    turned = np.empty(9)
+    mujoco.mju_quat2Mat(turned, np.array(geom.quat))
+    shares = np.abs(turned.reshape(3, 3).T @ along)
+    long = {mujoco.mjtGeom.mjGEOM_CAPSULE: 1, mujoco.mjtGeom.mjGEOM_CYLINDER: 1}
+    if geom.type == mujoco.mjtGeom.mjGEOM_BOX:
+        geom.size[int(shares.argmax())] *= factor
+    elif geom.type in long and shares[2] > 0.9:
+        geom.size[1] *= factor
+
+
+class GeomFriction(BodyEffect):
+    """A surface is more slippery, or less."""
+
+    name = "geom_friction"
+    doc = "a surface slides more, or less, easily than the model says"
+    source = "MuJoCo's contact model: the sliding coefficient is scaled"
+    robots = ANY
+    choices = parts.part("geom")
+    parameters = (
+        Parameter(
+            "factor",
+            unit="1",
+            nominal=1.0,
+            low=0.0,
+            high=WIDE,
+            doc="sliding friction over the model's",
+            example=0.5,
+        ),
+    )
+
+    def edit(self, spec: Any) -> None:
+        if self.is_nominal:
+            return
+        for geom in parts.geoms(spec, self["part"]):
+            friction = np.array(geom.friction, dtype=float)
+            friction[0] *= self["factor"]
+            geom.friction = friction

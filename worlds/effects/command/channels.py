@@ -1,0 +1,166 @@
+"""Commands of any robot, channel by channel: delay, lag, gain, offset and limits."""
+
+from abc import abstractmethod
+
+import numpy as np
+
+from bns.worlds.effects import parts
+from bns.worlds.effects.base import CommandEffect, ControlSignal, Parameter
+from bns.worlds.effects.parts import ANY, WIDE
+
+
+def _number(
+    name: str, unit: str, nominal: float, doc: str, example: float, low: float = 0.0
+) -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            name,
+            unit=unit,
+            nominal=nominal,
+            low=low,
+            high=WIDE,
+            doc=doc,
+            example=example,
+        ),
+    )
+
+
+class _Channel(CommandEffect):
+    """What one channel is told becomes something else."""
+
+    robots = ANY
+    choices = parts.part("channel")
+    source = "a transform of the command signal"
+
+    def apply(
+        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        """The signal with the columns of the part changed."""
+        values = signal.values.copy()
+        if self.is_nominal:
+            return values
+        for column in parts.among(signal.channels, self["part"], "command channel"):
+            made = self.change(values[:, column], signal.dt)
+            values[active, column] = made[active]
+        return values
+
+    @abstractmethod
+    def change(self, told: np.ndarray, dt: float) -> np.ndarray:
+        """One channel of the signal, ``(S,)``, after the effect."""
+
+
+class CommandDelay(_Channel):
+    """Commands arrive late; before the signal begins its first value holds."""
+
+    name = "command_delay"
+    doc = "commands reach the actuators late"
+    parameters = _number(
+        "delay", "s", 0.0, "from command to actuator; negative: early", 0.2, -WIDE
+    )
+
+    def change(self, told: np.ndarray, dt: float) -> np.ndarray:
+        """The signal shifted."""
+        at = np.arange(len(told)) - self["delay"] / dt
+        return np.interp(at, np.arange(len(told)), told)
+
+
+class CommandLag(_Channel):
+    """Commands are followed gradually: a first-order lag that starts settled."""
+
+    name = "command_lag"
+    doc = "commands are followed gradually"
+    parameters = _number("time_constant", "s", 0.0, "of a first-order lag", 0.2)
+
+    def change(self, told: np.ndarray, dt: float) -> np.ndarray:
+        """The signal through a first-order filter."""
+        from scipy.signal import lfilter
+
+        keep = np.exp(-dt / max(self["time_constant"], 1e-9))
+        return lfilter([1 - keep], [1, -keep], told, zi=[keep * told[0]])[0]
+
+
+class CommandGain(_Channel):
+    """A command means more, or less, than it should."""
+
+    name = "command_gain"
+    doc = "a command is scaled on its way"
+    memoryless = True
+    parameters = _number("factor", "1", 1.0, "what arrives over what was told", 0.8)
+
+    def change(self, told: np.ndarray, dt: float) -> np.ndarray:
+        """The signal scaled."""
+        return told * self["factor"]
+
+
+class CommandOffset(_Channel):
+    """A constant is added to a command."""
+
+    name = "command_offset"
+    doc = "a command is shifted by a constant on its way"
+    memoryless = True
+    parameters = _number(
+        "added", "unit of the command", 0.0, "added to the command", 0.05, -WIDE
+    )
+
+    def change(self, told: np.ndarray, dt: float) -> np.ndarray:
+        """The signal shifted in value."""
+        return told + self["added"]
+
+
+class CommandDeadZone(_Channel):
+    """Small commands do nothing."""
+
+    name = "command_dead_zone"
+    doc = "small commands do nothing"
+    memoryless = True
+    parameters = _number(
+        "size", "unit of the command", 0.0, "largest magnitude of no effect", 0.05
+    )
+
+    def change(self, told: np.ndarray, dt: float) -> np.ndarray:
+        """The signal with what is small set to zero."""
+        return np.where(np.abs(told) < self["size"], 0.0, told)
+
+
+class CommandLimit(_Channel):
+    """Commands beyond a limit, either way, are cut to it."""
+
+    name = "command_limit"
+    doc = "a command is cut to a limit: a speed or torque limit of its drive"
+    memoryless = True
+    parameters = _number(
+        "limit", "unit of the command", WIDE, "largest magnitude; 1e9 is none", 0.06
+    )
+
+    def scaled(self, severity: float) -> "CommandLimit":
+        """Milder means a wider limit: half the severity doubles it."""
+        limit = self["limit"] / severity if severity > 0 else WIDE
+        values = {**super().scaled(severity).values, "limit": min(limit, WIDE)}
+        return type(self)(values)
+
+    def change(self, told: np.ndarray, dt: float) -> np.ndarray:
+        """The signal within the limit."""
+        return np.clip(told, -self["limit"], self["limit"])
+
+
+class CommandRate(_Channel):
+    """A command changes no faster than a limit: a speed limit of a position servo."""
+
+    name = "command_rate"
+    doc = "a command changes no faster than a limit: a servo's speed limit"
+    parameters = _number(
+        "time_per_unit",
+        "s per unit of the command",
+        0.0,
+        "time that a change by one unit takes at least; 0.2 s/rad is 5 rad/s",
+        2.0,
+    )
+
+    def change(self, told: np.ndarray, dt: float) -> np.ndarray:
+        """The signal followed at the largest rate, from its first value on."""
+        most = dt / self["time_per_unit"]
+        made, now = np.empty_like(told), told[0]
+        for at, goal in enumerate(told):
+            now = min(max(goal, now - most), now + most)
+            made[at] = now
+        return made

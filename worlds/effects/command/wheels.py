@@ -1,0 +1,269 @@
+"""What wheels are told: gains, dead bands, limits, and wheels that are stuck."""
+
+import numpy as np
+
+from bns.worlds.effects.base import Choice, CommandEffect, ControlSignal, Parameter
+from bns.worlds.effects.common import (
+    MAXIMUM_SPEED,
+    MINIMUM_SPEED,
+    TOP_SPEED,
+    WHEEL,
+    columns,
+    rarer,
+)
+
+
+class WheelGain(CommandEffect):
+    """The command of one or both wheels is scaled, hidden from the learner."""
+
+    name = "wheel_gain"
+    doc = "a wheel turns at a share of the speed it is told"
+    source = "thesis 4.2.3 and 6.2.1: a wheel slowed to a share of its intended speed"
+    memoryless = True
+    choices = (WHEEL,)
+    parameters = (
+        Parameter(
+            "factor",
+            unit="1",
+            nominal=1.0,
+            low=0.0,
+            high=2.0,
+            doc="speed reached over speed told; bounds assumed",
+            example=0.8,
+        ),
+    )
+
+    def apply(
+        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        values = signal.values.copy()
+        for column in columns(self, signal):
+            values[active, column] *= self["factor"]
+        return values
+
+
+class DeadBand(CommandEffect):
+    """Speeds of a magnitude below a threshold give a stop."""
+
+    name = "dead_band"
+    doc = "speeds below a magnitude give a stop"
+    source = "regulated minimum 2,000 units (13.9 mm/s): Khepera III manual 2.2 p. 14"
+    memoryless = True
+    choices = (WHEEL,)
+    parameters = (
+        Parameter(
+            "speed",
+            unit="m/s",
+            nominal=0.0,
+            low=0.0,
+            high=0.2,
+            doc="smallest magnitude that still moves the wheel; bounds assumed",
+            example=0.08,
+        ),
+    )
+
+    def apply(
+        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        values = signal.values.copy()
+        for column in columns(self, signal):
+            slow = np.abs(values[:, column]) < self["speed"]
+            values[active & slow, column] = 0.0
+        return values
+
+
+class DeadZone(CommandEffect):
+    """Speeds are reduced by a constant magnitude; slower ones give a stop."""
+
+    name = "dead_zone"
+    doc = "a wheel turns slower than it is told by a constant"
+    source = "the dead zone of control engineering; bounds assumed"
+    memoryless = True
+    choices = (WHEEL,)
+    parameters = (
+        Parameter(
+            "speed",
+            unit="m/s",
+            nominal=0.0,
+            low=0.0,
+            high=0.2,
+            doc="taken off every speed; bounds assumed",
+            example=0.02,
+        ),
+    )
+
+    def apply(
+        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        values = signal.values.copy()
+        if self.is_nominal:
+            return values
+        for column in columns(self, signal):
+            told = values[active, column]
+            left = np.maximum(np.abs(told) - self["speed"], 0.0)
+            values[active, column] = np.sign(told) * left
+        return values
+
+
+class SpeedSaturation(CommandEffect):
+    """Speeds beyond a limit, forward or backward, are cut to it."""
+
+    name = "speed_saturation"
+    doc = "a wheel turns no faster than a limit"
+    source = "limits of 48,000 and 43,000 units: Khepera III manual 2.2 p. 14"
+    memoryless = True
+    choices = (WHEEL,)
+    parameters = (
+        Parameter(
+            "limit",
+            unit="m/s",
+            nominal=TOP_SPEED,
+            low=0.0,
+            high=TOP_SPEED,
+            doc="largest magnitude; the nominal is the limit of the drive",
+            example=0.06,
+        ),
+    )
+
+    def apply(
+        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        values = signal.values.copy()
+        if self.is_nominal:
+            return values
+        limit = self["limit"]
+        for column in columns(self, signal):
+            values[active, column] = np.clip(values[active, column], -limit, limit)
+        return values
+
+
+class WheelIntermittent(CommandEffect):
+    """In every m-th command of a trial the wheel turns at its minimum instead."""
+
+    name = "wheel_intermittent"
+    doc = "a wheel stops (or slows to a minimum) in every m-th command"
+    source = "thesis 6.2.1 (stops spinning) and 6.3.1 (set to the minimum); m is silent"
+    memoryless = True
+    choices = (WHEEL,)
+    parameters = (
+        Parameter(
+            "every",
+            unit="1",
+            nominal=0,
+            low=0,
+            high=1000,
+            doc="m: commands m, 2m, ... of a trial are hit; 0 = never; bounds assumed",
+            example=3,
+            integer=True,
+        ),
+        Parameter(
+            "speed",
+            unit="m/s",
+            nominal=0.0,
+            low=0.0,
+            high=TOP_SPEED,
+            doc="speed in the commands hit; 0 = stops, 0.0555 = 8,000 speed units",
+            example=0.0,
+            scales=False,
+        ),
+    )
+
+    def scaled(self, severity: float) -> "WheelIntermittent":
+        """Milder means rarer: half the severity hits half as many commands."""
+        every = rarer(self, severity)
+        return type(self)({**super().scaled(severity).values, "every": every})
+
+    def apply(
+        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        values = signal.values.copy()
+        if self.is_nominal:
+            return values
+        number = signal.command + 1  # counted from 1; 0 after the last command
+        hit = active & (number > 0) & (number % int(self["every"]) == 0)
+        for column in columns(self, signal):
+            values[hit, column] = self["speed"]
+        return values
+
+
+DIRECTION = Choice(
+    "direction",
+    ("forward", "backward", "commanded"),
+    "forward",
+    "which way the stuck wheel turns; commanded = the way it is told, or not at all",
+)
+
+BLEND = Parameter(
+    "blend",
+    unit="1",
+    nominal=0.0,
+    low=0.0,
+    high=1.0,
+    doc="from the speed told (0) to the stuck speed (1)",
+    example=1.0,
+)
+
+
+def stuck_speed(nominal: float, doc: str) -> Parameter:
+    """The parameter for the speed at which a wheel is stuck [m/s]."""
+    return Parameter(
+        "speed",
+        unit="m/s",
+        nominal=nominal,
+        low=0.0,
+        high=TOP_SPEED,
+        doc=doc,
+        example=nominal,
+        scales=False,
+    )
+
+
+class StuckWheel(CommandEffect):
+    """A wheel turns at one speed whatever it is told, as long as commands last."""
+
+    choices = (WHEEL, DIRECTION)
+    memoryless = True
+
+    def apply(
+        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        values = signal.values.copy()
+        if self.is_nominal:
+            return values
+        on = active & (signal.command >= 0)
+        signs = {"forward": 1.0, "backward": -1.0}
+        for column in columns(self, signal):
+            told = values[on, column]
+            sign = signs.get(self["direction"], np.sign(told))
+            values[on, column] += self["blend"] * (sign * self["speed"] - told)
+        return values
+
+
+class WheelStuckMax(StuckWheel):
+    """A wheel is only able to turn at the maximum speed."""
+
+    name = "wheel_stuck_max"
+    doc = "a wheel turns at the maximum speed whatever it is told"
+    source = "thesis 6.2.1; maximum of 17,500 speed units: the lab's controller files"
+    parameters = (
+        BLEND,
+        stuck_speed(
+            MAXIMUM_SPEED,
+            "maximum speed; 17,500 units by the lab's files (the drive reaches 48,000)",
+        ),
+    )
+
+
+class WheelStuckMin(StuckWheel):
+    """A wheel is only able to turn at the minimum speed."""
+
+    name = "wheel_stuck_min"
+    doc = "a wheel turns at the minimum speed whatever it is told"
+    source = "thesis 6.2.1; minimum of 8,000 speed units: the lab's controller files"
+    parameters = (
+        BLEND,
+        stuck_speed(
+            MINIMUM_SPEED,
+            "minimum speed; 8,000 units by the lab's files (0 is the other reading)",
+        ),
+    )

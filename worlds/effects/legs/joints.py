@@ -1,0 +1,120 @@
+"""Joints of legs: weak, locked, or loose."""
+
+from typing import Any
+
+from bns.worlds.effects.base import BodyEffect, Parameter
+from bns.worlds.effects.leg_sets import JOINT, chosen
+from bns.worlds.effects.parts import loosen
+from bns.worlds.physics import servo_joint
+
+
+class JointWeak(BodyEffect):
+    """At every error, and at most, the servo's torque is a share of what it was."""
+
+    name = "joint_weak"
+    doc = "the servo of a joint gives a share of its torque"
+    source = "worn motor or gears; bounds assumed"
+    robots = ("legged",)
+    choices = (JOINT,)
+    parameters = (
+        Parameter(
+            "factor",
+            unit="1",
+            nominal=1.0,
+            low=0.02,
+            high=1.0,
+            doc="torque left over torque before",
+            example=0.4,
+        ),
+    )
+
+    def edit(self, spec: Any) -> None:
+        if self.is_nominal:
+            return
+        for actuator in chosen(spec, self["joint"]):
+            law, powered = servo_joint.read(actuator)
+            weak = {name: law[name] * self["factor"] for name in ("gain", "duty_limit")}
+            servo_joint.write(spec, actuator, {**law, **weak}, powered)
+
+
+SLACK = 1e-4  # [rad] by which the stops stay apart, as MuJoCo needs
+
+
+class JointLocked(BodyEffect):
+    """The joint's end stops close in on one angle, where a seized joint stands.
+
+    A trial starts with the joint there; setting in within a trial forces it there.
+    """
+
+    name = "joint_locked"
+    doc = "a joint is seized at an angle, or moves in a part of its range"
+    source = "bounds: end stops of the maker's robot"
+    robots = ("legged",)
+    choices = (JOINT,)
+    parameters = (
+        Parameter(
+            "loss",
+            unit="1",
+            nominal=0.0,
+            low=0.0,
+            high=1.0,
+            doc="share of the range that is lost; 1 = locked",
+            example=1.0,
+        ),
+        Parameter(
+            "angle",
+            unit="rad",
+            nominal=0.0,
+            low=-1.5,
+            high=1.5,
+            doc="where it stands, from half-way; beyond an end stop: there",
+            example=0.3,
+            scales=False,
+        ),
+    )
+
+    def edit(self, spec: Any) -> None:
+        if self.is_nominal:
+            return
+        joint = spec.joint(self["joint"])
+        low, high = joint.range
+        angle, loss = min(max(self["angle"], low), high), self["loss"]
+        joint.range = [
+            low + loss * (angle - low) - SLACK,
+            high + loss * (angle - high) + SLACK,
+        ]
+
+
+ARMATURE = 1e-4  # [kg m2] of the play's joint, so that it can be computed; assumed
+DAMPING = 1e-3  # [N m s/rad] in the play; assumed
+
+
+class LooseHorn(BodyEffect):
+    """A second joint behind the servo's moves freely between two stops.
+
+    The servo reports its own shaft, not what the horn does.
+    """
+
+    name = "loose_horn"
+    doc = "a loose horn: play between a servo and the part that it moves"
+    source = "backlash as a joint of its own with stops; bounds assumed"
+    robots = ("legged",)
+    choices = (JOINT,)
+    resizes = True
+    parameters = (
+        Parameter(
+            "angle",
+            unit="rad",
+            nominal=0.0,
+            low=0.0,
+            high=0.6,
+            doc="full play",
+            example=0.15,
+        ),
+    )
+
+    def edit(self, spec: Any) -> None:
+        if self.is_nominal:
+            return
+        joint = spec.joint(self["joint"])
+        loosen(spec, joint, self["angle"], armature=ARMATURE, damping=DAMPING)

@@ -1,0 +1,156 @@
+"""Parts of any MJCF model, which effects name: joints, bodies, actuators, channels.
+
+``part=elbow`` is one of them, ``part=*_knee`` all whose names match, ``part=all`` all
+that there are.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import Any
+
+import numpy as np
+
+from bns.errors import BnsError, UnknownNameError
+from bns.worlds.effects.parameter import Choice
+
+ALL = "all"
+WIDE = 1e9  # bounds of what has none on a model of any size; candidates narrow them
+ANY = ("wheeled", "legged", "own")
+"""robots of effects on the parts of any model, "own" being models without a world"""
+UNSERVOED = ("wheeled", "own")
+"""... on numbers that the servo law sets in walking robots; there it has the effect"""
+
+SLIDE, HINGE = 2, 3  # mjtJoint
+
+
+@dataclass(frozen=True)
+class Part(Choice):
+    """A choice among the names of a model that is known later.
+
+    Attributes:
+        kind: "joint", "body", "actuator", "geom" or "channel".
+    """
+
+    kind: str = "channel"
+
+    @property
+    def shown(self) -> str:
+        """The alternatives for a listing."""
+        return f"{ALL}, a name, or a pattern such as *_knee"
+
+    def check(self, effect: str, value: object) -> str:
+        """The name as text.
+
+        Raises:
+            BnsError: it is empty or can not be written in text.
+        """
+        name = str(value)
+        if not name or set(name) & set(",=:@%~ "):
+            raise BnsError(f"{effect}:{self.name} = {value!r} names no part.")
+        return name
+
+
+def part(kind: str) -> tuple[Part]:
+    """The choice of a part of a kind."""
+    return (Part("part", (ALL,), ALL, f"which {kind}", kind=kind),)
+
+
+def among(names: Sequence[str], which: str, kind: str) -> list[int]:
+    """Indices of the names that a part stands for.
+
+    Raises:
+        UnknownNameError: it stands for none.
+    """
+    fits = [at for at, name in enumerate(names) if _fits(name, which)]
+    if not fits:
+        raise UnknownNameError(kind, which, [name for name in names if name])
+    return fits
+
+
+def _fits(name: str, which: str) -> bool:
+    return which in (ALL, name) or ("*" in which and fnmatchcase(name, which))
+
+
+def joints(spec: Any, which: str) -> list[Any]:
+    """Hinges and slides of an `MjSpec` that a part stands for."""
+    some = [joint for joint in spec.joints if joint.type in (SLIDE, HINGE)]
+    return _of(some, which, "joint (hinge or slide) of the model")
+
+
+def bodies(spec: Any, which: str) -> list[Any]:
+    """Bodies of an `MjSpec` that a part stands for; "all" are those with a mass."""
+    some = [body for body in spec.bodies[1:] if body.name]
+    if which == ALL:
+        model = spec.copy().compile()
+        some = [body for body in some if model.body(body.name).mass[0] > 0]
+    return _of(some, which, "body of the model")
+
+
+def actuators(spec: Any, which: str) -> list[Any]:
+    """Actuators of an `MjSpec` that a part stands for."""
+    return _of(list(spec.actuators), which, "actuator of the model")
+
+
+def geoms(spec: Any, which: str) -> list[Any]:
+    """Geoms of an `MjSpec` that a part stands for; "all" are those that can touch."""
+    some = [g for g in spec.geoms if which != ALL or g.contype or g.conaffinity]
+    return _of(some, which, "geom of the model")
+
+
+def _of(some: list[Any], which: str, kind: str) -> list[Any]:
+    return [some[at] for at in among([item.name for item in some], which, kind)]
+
+
+def in_file(spec: Any, joint: Any, value: float) -> float:
+    """A position of a joint [rad or m] in the units of the model's file."""
+    hinge = joint.type == HINGE
+    return float(np.rad2deg(value)) if hinge and spec.compiler.degree else value
+
+
+def loosen(spec: Any, joint: Any, play: float, **soft: float) -> None:
+    """Put play behind a joint, as a joint of its own with stops; more if it has some.
+
+    Args:
+        spec: a `mujoco.MjSpec`.
+        joint: of it.
+        play: full [rad or m].
+        soft: `armature` and `damping` in the play, so that it can be computed; by
+            default a thousandth of the inertia that the joint moves, and as much
+            damping as stops it within ten milliseconds.
+    """
+    half = in_file(spec, joint, play / 2)
+    name = f"{joint.name}_play"
+    wide = spec.joint(name)
+    if wide is not None:
+        wide.range = [wide.range[0] - half, wide.range[1] + half]
+        return
+    model = spec.copy().compile()
+    inertia = 1e-3 * float(model.dof_M0[model.joint(joint.name).dofadr[0]])
+    joint.parent.add_joint(
+        name=name,
+        type=joint.type,
+        axis=joint.axis,
+        pos=joint.pos,
+        range=[-half, half],
+        limited=True,
+        armature=soft.get("armature", inertia),
+        damping=[soft.get("damping", inertia / 0.01), 0.0, 0.0],
+    )
+    _make_room(spec, model, joint.name)
+
+
+def _make_room(spec: Any, before: Any, joint: str) -> None:
+    """Put a zero behind a joint in the keyframes of a spec.
+
+    Args:
+        spec: with a joint more, behind `joint`.
+        before: the compiled model without it.
+        joint: name.
+    """
+    place = before.joint(joint)
+    for key in spec.keys:
+        if len(key.qpos):
+            key.qpos = np.insert(np.array(key.qpos), place.qposadr[0] + 1, 0.0)
+        if len(key.qvel):
+            key.qvel = np.insert(np.array(key.qvel), place.dofadr[0] + 1, 0.0)

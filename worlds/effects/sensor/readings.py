@@ -1,0 +1,260 @@
+"""Readings of light sensors, one at a time."""
+
+from abc import abstractmethod
+
+import numpy as np
+
+from bns.models.light_sites import twin
+from bns.worlds.effects.base import Parameter, SensorEffect
+from bns.worlds.effects.common import rarer
+from bns.worlds.effects.sensors import FULL_SCALE, SENSOR, columns, limited
+
+
+class _EachReading(SensorEffect):
+    """A reading of the chosen sensors becomes another one, whatever came before."""
+
+    choices = (SENSOR,)
+
+    def apply(
+        self,
+        times: np.ndarray,
+        readings: np.ndarray,
+        channels: tuple[str, ...],
+        active: np.ndarray,
+        rng: np.random.Generator,
+    ) -> np.ndarray:
+        changed = readings.copy()
+        if self.is_nominal:
+            return changed
+        on = np.ix_(active, np.array(columns(self, channels), dtype=int))
+        changed[on] = self.read(readings, on)
+        return changed
+
+    @abstractmethod
+    def read(self, readings: np.ndarray, on: tuple[np.ndarray, ...]) -> np.ndarray:
+        """What is read instead of ``readings[on]``."""
+
+
+class SensorGain(_EachReading):
+    """A reading is multiplied by a factor, within the converter's range."""
+
+    name = "sensor_gain"
+    doc = "a sensor's readings are scaled"
+    source = "assumed: a supply or amplifier that has changed"
+    parameters = (
+        Parameter(
+            "factor",
+            unit="1",
+            nominal=1.0,
+            low=0.0,
+            high=4.0,
+            doc="reading after over reading before; bounds assumed",
+            example=0.8,
+        ),
+    )
+
+    def read(self, readings: np.ndarray, on: tuple[np.ndarray, ...]) -> np.ndarray:
+        return limited(readings[on] * self["factor"])
+
+
+class SensorOffset(_EachReading):
+    """A constant is added to a reading, within the converter's range."""
+
+    name = "sensor_offset"
+    doc = "a sensor's readings are shifted"
+    source = "assumed: a dirty or heated sensor"
+    parameters = (
+        Parameter(
+            "counts",
+            unit="count",
+            nominal=0.0,
+            low=-4095.0,
+            high=4095.0,
+            doc="added to each reading; the whole range",
+            example=-500.0,
+        ),
+    )
+
+    def read(self, readings: np.ndarray, on: tuple[np.ndarray, ...]) -> np.ndarray:
+        return limited(readings[on] + self["counts"])
+
+
+class SensorSaturation(_EachReading):
+    """A sensor saturates early: no reading is below a level (bright is small)."""
+
+    name = "sensor_saturation"
+    doc = "a sensor saturates before full light"
+    source = "assumed: a load resistor or supply that has changed"
+    parameters = (
+        Parameter(
+            "level",
+            unit="count",
+            nominal=0.0,
+            low=0.0,
+            high=FULL_SCALE,
+            doc="smallest reading; 0 = down to full light",
+            example=1500.0,
+        ),
+    )
+
+    def read(self, readings: np.ndarray, on: tuple[np.ndarray, ...]) -> np.ndarray:
+        return np.maximum(readings[on], self["level"])
+
+
+def _stuck(extreme: str, reading: float) -> tuple[Parameter, ...]:
+    """The parameters of a sensor that is stuck at an extreme reading."""
+    return (
+        Parameter(
+            "blend",
+            unit="1",
+            nominal=0.0,
+            low=0.0,
+            high=1.0,
+            doc=f"from the reading (0) to the {extreme} (1)",
+            example=1.0,
+        ),
+        Parameter(
+            "reading",
+            unit="count",
+            nominal=reading,
+            low=0.0,
+            high=FULL_SCALE,
+            doc=f"the {extreme}",
+            example=reading,
+            scales=False,
+        ),
+    )
+
+
+class _StuckSensor(_EachReading):
+    def read(self, readings: np.ndarray, on: tuple[np.ndarray, ...]) -> np.ndarray:
+        return readings[on] + self["blend"] * (self["reading"] - readings[on])
+
+
+class SensorStuckMax(_StuckSensor):
+    """A sensor always returns the maximum value (dark)."""
+
+    name = "sensor_stuck_max"
+    doc = "a sensor always reads the maximum: it reads dark"
+    source = "thesis 6.2.1: always returns the maximum sensor value"
+    parameters = _stuck("maximum", FULL_SCALE)
+
+
+class SensorStuckMin(_StuckSensor):
+    """A sensor always returns the minimum value (bright)."""
+
+    name = "sensor_stuck_min"
+    doc = "a sensor always reads the minimum: it reads bright"
+    source = "thesis 6.2.1: always returns the minimum sensor value"
+    parameters = _stuck("minimum", 0.0)
+
+
+class SensorCrosstalk(_EachReading):
+    """A share of a reading comes from the two sensors beside it on the ring."""
+
+    name = "sensor_crosstalk"
+    doc = "neighbouring sensors leak into a reading"
+    source = "assumed: one multiplexer serves all sensors"
+    parameters = (
+        Parameter(
+            "share",
+            unit="1",
+            nominal=0.0,
+            low=0.0,
+            high=0.5,
+            doc="of the reading that is the neighbours' mean; bounds assumed",
+            example=0.2,
+        ),
+    )
+
+    def read(self, readings: np.ndarray, on: tuple[np.ndarray, ...]) -> np.ndarray:
+        beside = (np.roll(readings, 1, axis=1) + np.roll(readings, -1, axis=1)) / 2
+        return readings[on] + self["share"] * (beside[on] - readings[on])
+
+
+class SensorIntermittent(SensorEffect):
+    """Every m-th reading of a trial is the minimum value instead."""
+
+    name = "sensor_intermittent"
+    doc = "every m-th reading of a sensor is the minimum"
+    source = "thesis 6.2.1 and 6.3.1: once every m readings; m is silent"
+    choices = (SENSOR,)
+    parameters = (
+        Parameter(
+            "every",
+            unit="1",
+            nominal=0,
+            low=0,
+            high=1000,
+            doc="m: readings m, 2m, ... of a trial are hit; 0 = never; assumed",
+            example=3,
+            integer=True,
+        ),
+        Parameter(
+            "reading",
+            unit="count",
+            nominal=0.0,
+            low=0.0,
+            high=FULL_SCALE,
+            doc="what is read then",
+            example=0.0,
+            scales=False,
+        ),
+    )
+
+    def apply(
+        self,
+        times: np.ndarray,
+        readings: np.ndarray,
+        channels: tuple[str, ...],
+        active: np.ndarray,
+        rng: np.random.Generator,
+    ) -> np.ndarray:
+        changed = readings.copy()
+        if self.is_nominal:
+            return changed
+        number = np.arange(1, len(times) + 1)
+        hit = np.flatnonzero(active & (number % int(self["every"]) == 0))
+        changed[hit[:, None], columns(self, channels)] = self["reading"]
+        return changed
+
+    def scaled(self, severity: float) -> "SensorIntermittent":
+        """Milder means rarer: half the severity hits half as many readings."""
+        every = rarer(self, severity)
+        return type(self)({**super().scaled(severity).values, "every": every})
+
+
+class SensorSwapped(SensorEffect):
+    """What the left sensors read is given for the right ones, and vice versa."""
+
+    name = "sensor_swapped"
+    doc = "left and right sensors are exchanged"
+    source = "assumed: a plug in the wrong socket"
+    parameters = (
+        Parameter(
+            "blend",
+            unit="1",
+            nominal=0.0,
+            low=0.0,
+            high=1.0,
+            doc="from their own reading (0) to that of their twin (1)",
+            example=1.0,
+        ),
+    )
+
+    def apply(
+        self,
+        times: np.ndarray,
+        readings: np.ndarray,
+        channels: tuple[str, ...],
+        active: np.ndarray,
+        rng: np.random.Generator,
+    ) -> np.ndarray:
+        changed = readings.copy()
+        if self.is_nominal:
+            return changed
+        from_there = [channels.index(twin(name)) for name in channels]
+        changed[active] += self["blend"] * (
+            readings[active][:, from_there] - readings[active]
+        )
+        return changed

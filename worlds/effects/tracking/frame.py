@@ -1,0 +1,127 @@
+"""Where the tracker sees the robot: its frame, its unit of length."""
+
+import numpy as np
+
+from bns.worlds.effects.base import Parameter, PoseSignal, TrackingEffect
+
+
+class TrackerRotation(TrackingEffect):
+    """Poses are turned about the middle of the board."""
+
+    name = "tracker_rotation"
+    doc = "the tracker's frame is turned against the board's"
+    source = "assumed: a camera mounted askew"
+    robots = ("wheeled", "legged")
+    parameters = (
+        Parameter(
+            "angle",
+            unit="rad",
+            nominal=0.0,
+            low=-0.8,
+            high=0.8,
+            doc="turn of the reported poses, counter-clockwise; bounds assumed",
+            example=0.1,
+        ),
+    )
+
+    def apply(
+        self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray]:
+        poses = signal.poses.copy()
+        if self.is_nominal:
+            return signal.times.copy(), poses
+        cos, sin = np.cos(self["angle"]), np.sin(self["angle"])
+        x, y, yaw = signal.poses[active].T
+        poses[active] = np.stack(
+            [cos * x - sin * y, sin * x + cos * y, yaw + self["angle"]], axis=1
+        )
+        return signal.times.copy(), poses
+
+
+class TrackerScale(TrackingEffect):
+    """Positions are scaled about the middle of the board; headings are right."""
+
+    name = "tracker_scale"
+    doc = "the tracker's unit of length is wrong"
+    source = "assumed: wrong camera height or tag height"
+    robots = ("wheeled", "legged")
+    parameters = (
+        Parameter(
+            "factor",
+            unit="1",
+            nominal=1.0,
+            low=0.8,
+            high=1.25,
+            doc="length reported over true length; bounds assumed",
+            example=1.05,
+        ),
+    )
+
+    def apply(
+        self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray]:
+        poses = signal.poses.copy()
+        poses[active, :2] *= self["factor"]
+        return signal.times.copy(), poses
+
+
+def _off(name: str, unit: str, high: float, doc: str, example: float) -> Parameter:
+    return Parameter(
+        name,
+        unit=unit,
+        nominal=0.0,
+        low=-high,
+        high=high,
+        doc=f"{doc}; bounds assumed",
+        example=example,
+    )
+
+
+class TrackerShift(TrackingEffect):
+    """The camera's middle is not the board's: poses are shifted by a constant."""
+
+    name = "tracker_shift"
+    doc = "the tracker's frame lies beside the board's"
+    source = "assumed: a camera mounted off-centre"
+    robots = ("wheeled", "legged")
+    parameters = (
+        _off("dx", "m", 1.0, "added to x", 0.05),
+        _off("dy", "m", 1.0, "added to y", -0.03),
+    )
+
+    def apply(
+        self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray]:
+        poses = signal.poses.copy()
+        if not self.is_nominal:
+            poses[active, :2] += np.array([self["dx"], self["dy"]])
+        return signal.times.copy(), poses
+
+
+class MarkerMount(TrackingEffect):
+    """The marker sits elsewhere on the robot, or is turned; it is what is seen."""
+
+    name = "marker_mount"
+    doc = "the marker on the robot is off its centre, or turned"
+    source = "rigid-body kinematics; a marker glued askew"
+    robots = ("wheeled", "legged")
+    parameters = (
+        _off("dx", "m", 0.2, "ahead of the robot's centre", 0.01),
+        _off("dy", "m", 0.2, "to the left of the robot's centre", -0.005),
+        _off("yaw", "rad", np.pi, "turned counter-clockwise", 0.05),
+    )
+
+    def apply(
+        self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray]:
+        poses = signal.poses.copy()
+        if self.is_nominal:
+            return signal.times.copy(), poses
+        x, y, yaw = signal.poses[active].T
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        dx, dy = self["dx"], self["dy"]
+        poses[active] = np.stack(
+            [x + cos * dx - sin * dy, y + sin * dx + cos * dy, yaw + self["yaw"]],
+            axis=1,
+        )
+        return signal.times.copy(), poses
