@@ -16,6 +16,8 @@ from bns.gap.core.reference import Reference
 from bns.gap.core.select import Search
 from bns.gap.core.signatures import Curves
 from bns.gap.core.uncertainty import intervals
+from bns.gap.decomposition.diagnosis import diagnose as decomposed
+from bns.gap.decomposition.model import DecomposableModel
 from bns.gap.models.base import GapModel
 from bns.gap.models.light import model as light_model
 from bns.gap.recordings import check
@@ -75,6 +77,14 @@ def diagnose(
         "most": most,
         "reference": reference,
     }
+    if isinstance(model, DecomposableModel) and not light_model.told_by(
+        model, (*trials, *reference)
+    ):
+        usable, faults = _checked(trials, model)
+        names = None if candidates is None else [item.name for item in candidates]
+        return decomposed(
+            usable, model, seed=seed, faults=faults, full=full, rows=names
+        )
     if light_model.told_by(model, (*trials, *reference)):
         from bns.gap.models.light import diagnosis
 

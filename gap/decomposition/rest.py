@@ -1,0 +1,113 @@
+"""How large a gap is beyond what measuring it scatters, and whether it recurs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bns import seeding
+from bns.gap.decomposition.problem import Problem
+
+THIRD = np.sqrt(20.0)  # third differences of noise: 1 + 9 + 9 + 1
+NORMAL = 1.4826
+DRAWS = 8  # of measurement noise, for what it does to features
+WILD = 8.0  # deviations of a full fit beyond which a window is left out
+APART = (0.6, 2.0)  # [s] between windows whose errors are compared: beyond a window's
+# length, so that they share no sample
+SURE = 3.0  # standard errors from which an error is said to recur
+
+
+@dataclass(frozen=True, eq=False)
+class Floor:
+    """What measuring alone scatters.
+
+    Attributes:
+        sigma: of each observed channel, ``(n_channels,)``.
+        sd: of each feature of each window, ``(N, C)``.
+    """
+
+    sigma: np.ndarray
+    sd: np.ndarray
+
+
+def floor(problem: Problem, *, seed: int = 0) -> Floor:
+    """The measurement's scatter, from third differences of the recording.
+
+    What moves slowly against the sampling drops out of these, jitter of the time stamps
+    does not.
+    """
+    count = len(problem.model.channels)
+    found = []
+    for trial in problem.trials:
+        seen = trial.observed[:, :count]
+        seen = seen[np.isfinite(seen).all(axis=1)]
+        found.append(np.abs(np.diff(seen, n=3, axis=0)))
+    sigma = NORMAL * np.median(np.concatenate(found), axis=0) / THIRD
+    rng = seeding.generator(seed, "gap", "floor")
+    squares = np.zeros_like(problem.recorded)
+    for _ in range(DRAWS):
+        parts = []
+        for trial, windows in zip(problem.trials, problem.windows, strict=True):
+            seen = trial.observed[:, :count]
+            moved = seen + sigma * rng.standard_normal(seen.shape)
+            parts.append(problem.model.compare(trial, moved, windows))
+        squares += (np.concatenate(parts) - problem.recorded) ** 2
+    mean = np.nanmean(squares / DRAWS, axis=0)
+    sd = np.sqrt(np.broadcast_to(mean, squares.shape))
+    return Floor(sigma, np.maximum(sd, problem.model.least))
+
+
+def kept(problem: Problem, left: np.ndarray, sd: np.ndarray) -> np.ndarray:
+    """Windows that are no wild points in a full fit's rest, ``(N, C)``."""
+    with np.errstate(invalid="ignore"):
+        return problem.seen & (np.abs(left) < WILD * sd)
+
+
+def excess(rest: np.ndarray, known: Floor, inside: np.ndarray) -> float:
+    """Mean square of residuals in units of the floor, beyond the floor's own."""
+    units = np.where(inside, np.nan_to_num(rest) / known.sd, 0.0)
+    return float((units**2).sum() / max(inside.sum(), 1) - 1.0)
+
+
+def recurrence(problem: Problem, rest: np.ndarray, sd: np.ndarray) -> float:
+    """Standard errors by which errors of windows that share no sample go together.
+
+    Products of a residual with later ones of its trial, and with those at the same time
+    of trials that were told the same, are 0 in the mean for what only scatters; their
+    sums by stretch are as many independent values.
+    """
+    units = np.clip(np.nan_to_num(rest) / sd, -4, 4)
+    sums = np.zeros(int(problem.block.max()) + 1)
+    for number, windows in enumerate(problem.windows):
+        rows = np.flatnonzero(problem.trial == number)
+        if len(rows) < 2:
+            continue
+        step = max(float(np.median(np.diff(windows.times))), 1e-6)
+        first = max(round(APART[0] / step), 1)
+        for lag in range(first, max(round(APART[1] / step), first) + 1):
+            if lag >= len(rows):
+                break
+            product = (units[rows[lag:]] * units[rows[:-lag]]).sum(axis=1)
+            np.add.at(sums, problem.block[rows[:-lag]], product)
+    for first, second in repeats(problem):
+        a, b = (np.flatnonzero(problem.trial == n) for n in (first, second))
+        length = min(len(a), len(b))
+        product = (units[a[:length]] * units[b[:length]]).sum(axis=1)
+        np.add.at(sums, problem.block[a[:length]], product)
+    size = np.sqrt((sums**2).sum())
+    return float(sums.sum() / size) if size > 0 else 0.0
+
+
+def repeats(problem: Problem, tolerance: float = 1e-3) -> list[tuple[int, int]]:
+    """Pairs of trials that were told the same, but for a tolerance and 20 ms."""
+    found = []
+    trials = problem.trials
+    for first in range(len(trials)):
+        for second in range(first + 1, len(trials)):
+            one, other = trials[first].commands, trials[second].commands
+            if one.values.shape != other.values.shape:
+                continue
+            same = np.abs(one.values - other.values).max(initial=0) < tolerance
+            late = np.abs(np.cumsum(one.durations - other.durations))
+            if same and late.max(initial=0) < 0.02:
+                found.append((first, second))
+    return found
