@@ -17,7 +17,7 @@ from bns.gap.core.select import Search
 from bns.gap.core.signatures import Curves
 from bns.gap.core.uncertainty import intervals
 from bns.gap.decomposition.diagnosis import diagnose as decomposed
-from bns.gap.decomposition.model import DecomposableModel
+from bns.gap.decomposition.model import BLOCK, FEW, DecomposableModel
 from bns.gap.models.base import GapModel
 from bns.gap.models.light import model as light_model
 from bns.gap.recordings import check
@@ -219,7 +219,9 @@ def _checked(
     trials: Sequence[Trial], model: GapModel
 ) -> tuple[tuple[Trial, ...], tuple[str, ...]]:
     trials, faults = check.check(trials, model)
-    if len(trials) < LEAST:
+    seconds = sum(trial.commands.duration for trial in trials)
+    enough = isinstance(model, DecomposableModel) and seconds >= FEW * BLOCK
+    if len(trials) < LEAST and not enough:
         raise BnsError(
             f"{len(trials)} usable trial: a diagnosis needs {LEAST} at least, to fit "
             "on some and test on others; record more."

@@ -9,10 +9,12 @@ from bns.gap.decomposition import fit, levels
 from bns.gap.decomposition.fit import Noise, Point, linearised, newton, placed
 from bns.gap.decomposition.linear import Linear
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.shares import HeldOut
 
 TURNS = 4  # of fitting and searching
 SINGLES = 4  # explanations that are tried alone
 ROUNDS = 2  # of levels
+MARGIN = 1.02  # of the held-out error that an autoregression may cost
 WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
 
 
@@ -20,10 +22,25 @@ def nothing(problem: Problem) -> Point:
     """The nominal model."""
     values = problem.nominal.copy()
     rest, made = problem.residual(values)
-    known = fit.first_noise(problem, rest, made)
-    order = problem.model.memory
-    linear, known, slopes = linearised(problem, values, rest, known, order=order)
-    return Point(values, frozenset(), rest, linear, slopes, known)
+    first = fit.first_noise(problem, rest, made)
+    linear, known, slopes = linearised(problem, values, rest, first)
+    plain = Point(values, frozenset(), rest, linear, slopes, known)
+    if not problem.model.memory:
+        return plain
+    linear, known, slopes = linearised(
+        problem, values, rest, first, slopes, problem.model.memory
+    )
+    remembering = Point(values, frozenset(), rest, linear, slopes, known)
+    worse = _held_out(problem, remembering) > MARGIN * _held_out(problem, plain)
+    return plain if worse else remembering
+
+
+def _held_out(problem: Problem, point: Point) -> float:
+    """Plain held-out error of the set of highest evidence: whether an autoregression
+    helps is for this to say. It does where errors are random walks, not where they are
+    the model's."""
+    _, support = point.linear.search()
+    return float(HeldOut.of(problem, point).error(support).sum())
 
 
 def descend(
@@ -31,13 +48,12 @@ def descend(
 ) -> Point:
     """Fit a set, make the problem linear there, search again, until the set stays."""
     support, slopes, at = frozenset(support), None, None
-    order = problem.model.memory
     for _ in range(TURNS):
         values, rest = newton(problem, values, _fitted(problem, support), known)
         values, rest = levels.zoomed(problem, values, rest, support, known)
         near = at is not None and np.abs((values - at) / problem.sd).max() <= fit.FAR
         slopes, at = (slopes, at) if near else (None, values.copy())
-        linear, known, slopes = linearised(problem, values, rest, known, slopes, order)
+        linear, known, slopes = linearised(problem, values, rest, known, slopes)
         found = linear.search(start=support)[1]
         point = Point(values, found, rest, linear, slopes, known)
         if found == support:
@@ -131,13 +147,10 @@ def _others(problem: Problem, start: Point, first: Point) -> list[Point]:
 def _from_all(problem: Problem, start: Point) -> Point:
     """From everything at once, fitted until it stays."""
     linear, known, values = start.linear, start.noise, start.values
-    slopes = None
     everything = set(linear.free) | fit.nuisances(problem)
     for _ in range(3):
         values, rest = newton(problem, values, everything, known)
-        linear, known, slopes = linearised(
-            problem, values, rest, known, order=problem.model.memory
-        )
+        linear, known, _ = linearised(problem, values, rest, known)
     found = linear.search()[1]
     values = placed(problem, linear, found, values)
     return descend(problem, values, found, known)

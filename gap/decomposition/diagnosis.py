@@ -20,6 +20,7 @@ from bns.worlds.trial import Trial
 
 MOST = 0.5  # share of the gap beyond which what is left is most of it
 FELT = 0.02  # of the floor's variance: a gap below shows in no picture
+LARGE = 2.0  # variances of the floor: more than heavy tails of any camera's noise
 SINGLES = 8  # explanations whose share alone is reported
 
 
@@ -58,10 +59,17 @@ class Decomposition:
         return max(self.after, 0.0) / max(self.before, self.after, 1e-9)
 
     @property
+    def lasting(self) -> bool:
+        """Whether the rest is more than scatter: it recurs, or it is far beyond what
+        measuring scatters and there are no repeats that could show it to be scatter."""
+        if self.recurs > rest.SURE:
+            return self.after > FELT
+        return self.after > LARGE and not rest.repeats(self.problem)
+
+    @property
     def kind(self) -> str:
         """Kind of the verdict, one of `records.KINDS`."""
-        lasting = self.recurs > rest.SURE and self.after > FELT
-        if lasting and self.left > MOST:
+        if self.lasting and self.left > MOST:
             return "none of the library"
         if not self.point.support:
             return "no gap"
@@ -116,9 +124,7 @@ def refitted(problem: Problem, point: Point, support: Support) -> Point:
     values = fit.placed(problem, point.linear, support, point.values)
     fitted = set(support) | fit.nuisances(problem)
     values, left = fit.newton(problem, values, fitted, point.noise)
-    linear, known, slopes = fit.linearised(
-        problem, values, left, point.noise, order=problem.model.memory
-    )
+    linear, known, slopes = fit.linearised(problem, values, left, point.noise)
     return Point(values, support, left, linear, slopes, known)
 
 
@@ -276,11 +282,10 @@ def statements(made: Decomposition) -> list[str]:
     if made.onset:
         date = f"{made.onset.name} sets in at trial {made.onset.trial}."
     swapped = [" with ".join(_ordered(made, s)) for s in made.tied[1:]]
-    lasting = made.recurs > rest.SURE and made.after > FELT
     return [
         words.size(before, beyond, features, window),
         words.explained(listed, made.closed, date, swapped),
-        words.left(made.left, lasting, words.sized(left, features)),
+        words.left(made.left, made.lasting, words.sized(left, features)),
     ]
 
 

@@ -29,6 +29,11 @@ class Noise:
     memory: Memory
     lam: float
 
+    @property
+    def order(self) -> int:
+        """Order of the autoregression."""
+        return self.memory.factors.shape[1]
+
     def loss(self, rest: np.ndarray) -> float:
         """Pseudo-Huber loss of residuals."""
         return noise.loss(self.memory(np.nan_to_num(rest)), self.sd)
@@ -124,7 +129,7 @@ def linearised(
     rest: np.ndarray,
     known: Noise,
     slopes: Mapping[int, np.ndarray] | None = None,
-    order: int = 0,
+    order: int | None = None,
 ) -> tuple[Linear, Noise, Mapping[int, np.ndarray]]:
     """The linear model around values, with the noise that all rows together leave.
 
@@ -134,8 +139,9 @@ def linearised(
         rest: residuals there.
         known: noise to start from.
         slopes: derivatives from before, None = taken anew.
-        order: of the autoregression.
+        order: of the autoregression, None = as in the noise.
     """
+    order = known.order if order is None else order
     wanted = smooth(problem, values)
     if slopes is None or any(k not in slopes for k in wanted):
         slopes = columns(problem, values)

@@ -13,6 +13,8 @@ DRAWS = 8  # of measurement noise, for what it does to features
 WILD = 8.0  # deviations of a full fit beyond which a window is left out
 APART = (0.6, 2.0)  # [s] between windows whose errors are compared: beyond a window's
 # length, so that they share no sample
+PIECE = 2.0  # [s] of a trial that count as independent
+SEARCHED = 1.0  # standard errors that the best of some ten lags exceeds by chance
 SURE = 3.0  # standard errors from which an error is said to recur
 
 
@@ -72,29 +74,50 @@ def recurrence(problem: Problem, rest: np.ndarray, sd: np.ndarray) -> float:
     """Standard errors by which errors of windows that share no sample go together.
 
     Products of a residual with later ones of its trial, and with those at the same time
-    of trials that were told the same, are 0 in the mean for what only scatters; their
-    sums by stretch are as many independent values.
+    of trials that were told the same, are 0 in the mean for what only scatters. Either
+    all lags say it together or one of them does, positive or negative: an error that
+    swings recurs, too. Sums over `PIECE` seconds are as many independent values.
     """
     units = np.clip(np.nan_to_num(rest) / sd, -4, 4)
-    sums = np.zeros(int(problem.block.max()) + 1)
+    piece = _pieces(problem)
+    count = int(piece.max()) + 1
+    lags: dict[int, np.ndarray] = {}
     for number, windows in enumerate(problem.windows):
         rows = np.flatnonzero(problem.trial == number)
         if len(rows) < 2:
             continue
         step = max(float(np.median(np.diff(windows.times))), 1e-6)
         first = max(round(APART[0] / step), 1)
-        for lag in range(first, max(round(APART[1] / step), first) + 1):
-            if lag >= len(rows):
-                break
+        last = min(max(round(APART[1] / step), first), len(rows) - 1)
+        for lag in range(first, last + 1):
             product = (units[rows[lag:]] * units[rows[:-lag]]).sum(axis=1)
-            np.add.at(sums, problem.block[rows[:-lag]], product)
-    for first, second in repeats(problem):
-        a, b = (np.flatnonzero(problem.trial == n) for n in (first, second))
+            sums = lags.setdefault(lag, np.zeros(count))
+            np.add.at(sums, piece[rows[:-lag]], product)
+    same = np.zeros(count)
+    for one, other in repeats(problem):
+        a, b = (np.flatnonzero(problem.trial == n) for n in (one, other))
         length = min(len(a), len(b))
         product = (units[a[:length]] * units[b[:length]]).sum(axis=1)
-        np.add.at(sums, problem.block[a[:length]], product)
+        np.add.at(same, piece[a[:length]], product)
+    every = [*lags.values(), same]
+    alone = max(abs(_errors(sums)) for sums in every) - SEARCHED
+    return max(_errors(np.sum(every, axis=0)), alone)
+
+
+def _errors(sums: np.ndarray) -> float:
+    """A sum of independent values over its standard error."""
     size = np.sqrt((sums**2).sum())
     return float(sums.sum() / size) if size > 0 else 0.0
+
+
+def _pieces(problem: Problem) -> np.ndarray:
+    """Number of the stretch of `PIECE` seconds that each window lies in, ``(N,)``."""
+    made, first = [], 0
+    for trial, windows in zip(problem.trials, problem.windows, strict=True):
+        number = ((windows.times - trial.times[0]) / PIECE).astype(int)
+        made.append(first + number)
+        first += int(number.max(initial=0)) + 1
+    return np.concatenate(made)
 
 
 def repeats(problem: Problem, tolerance: float = 1e-3) -> list[tuple[int, int]]:

@@ -1,10 +1,11 @@
 """What each explanation of a fit closes, how sure it is, and what it ties with."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from bns.gap.decomposition import fit
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Linear, Support
 from bns.gap.decomposition.problem import Problem
@@ -110,12 +111,11 @@ class HeldOut:
     @classmethod
     def of(cls, problem: Problem, point: Point) -> "HeldOut":
         """For a point's linear model."""
-        sd = np.sqrt((point.noise.sd**2).mean(axis=0))
+        sd = np.sqrt(np.nanmean(point.rest**2, axis=0))
         weight = np.where(problem.seen, 1 / sd**2, 0.0)
-        plain = replace(point.linear, weight=weight)
-        return cls(
-            point.linear, plain._summed(point.linear.design, point.linear.target)
-        )
+        units = fit.units(problem, point.values)
+        whole = fit.target(problem, point.values, point.rest, point.slopes)
+        return cls(point.linear, Linear.of(problem, point.slopes, units, whole, weight))
 
     def error(self, support: Iterable[str]) -> np.ndarray:
         """Squared error of each stretch, the rows fitted to the others, ``(B,)``."""

@@ -1,0 +1,123 @@
+"""Numbers of a model of the user's own that may be off, and how far they may be."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bns.gap.candidates.mjcf import EXCITE, OwnCandidate
+from bns.gap.decomposition.row import Row
+from bns.worlds.effects.parts import ALL
+from bns.worlds.trial import Trial
+
+LEAD = "step_lead"
+"""shift of the simulation in time that no effect is"""
+GROUPED = ("joint_damping", "joint_friction", "joint_armature")
+"""effects that may be on all joints alike"""
+LATE = ("command_delay", "command_lag", "reading_delay")
+TOLD = (0.05, 0.12, 0.2, 0.3, 0.4, 0.55)  # quantiles of what was told, for dead zones
+QUARTER, EIGHTH = 0.25, 0.125
+
+# plausible departure and slack of what has no scale of its own (assumed): a gain of a
+# motor is known to 10 %, of a sensor to 3 %, a delay to 40 ms
+PLAUSIBLE = {
+    "actuator_gain": (0.1, 0.003),
+    "actuator_kp": (0.05, 0.003),
+    "actuator_kd": (0.15, 0.01),
+    "command_gain": (0.1, 0.003),
+    "reading_gain": (0.03, 0.001),
+    "geom_friction": (0.3, 0.0),
+    "command_delay": (0.04, 0.0),
+    "command_lag": (0.04, 0.0),
+    "reading_delay": (0.04, 0.0),
+    "body_length": (0.03, 0.001),
+}
+SHARE = 0.02  # slack of a number over its plausible departure
+
+
+def rows(
+    candidates: Sequence[OwnCandidate], trials: Sequence[Trial], dt: float
+) -> tuple[Row, ...]:
+    """All numbers that may be off, with those of all joints alike.
+
+    Args:
+        candidates: of the model.
+        trials: a recording; levels of dead zones lie between what it was told.
+        dt: physics step [s].
+    """
+    made = [row for item in candidates for row in _of(item, trials)]
+    lead = max(0.002, 0.5 * dt)
+    made.append(Row(LEAD, 0.0, lead, -0.02, 0.02, unit="s", nuisance=True, step=0.001))
+    return tuple(made)
+
+
+def grouped(candidates: Sequence[OwnCandidate]) -> list[OwnCandidate]:
+    """Further candidates: an effect alike on all joints that are considered singly."""
+    made = []
+    for name in GROUPED:
+        parts = [item for item in candidates if item.effect == name]
+        if len(parts) > 1 and all(item.fixed["part"] != ALL for item in parts):
+            low = max(item.low for item in parts)
+            high = max(item.high for item in parts)
+            grid = tuple(value for value in parts[0].grid if low <= value <= high)
+            made.append(
+                replace(
+                    parts[0],
+                    name=f"{name}[{ALL}]",
+                    low=low,
+                    high=high,
+                    grid=grid or (high,),
+                    fixed={"part": ALL},
+                    slack=0.0,
+                )
+            )
+    return made
+
+
+def _of(item: OwnCandidate, trials: Sequence[Trial]) -> Iterable[Row]:
+    name, span = item.effect, item.high - item.low
+    excite = EXCITE.get(name, "any command")
+    if name == "command_dead_zone":
+        if levels := _levels(item, trials):
+            yield Row(item.name, 0.0, span / 3, 0.0, item.high, unit=item.unit,
+                      smooth=False, stepped=True, levels=levels, excite=excite)  # fmt: skip
+        return
+    if name == "command_limit":
+        levels = tuple(v for v in item.grid if item.low < v < item.high)
+        yield Row(item.name, item.nominal, span / 3, item.low, item.high,
+                  unit=item.unit, smooth=False, levels=levels, excite=excite)  # fmt: skip
+        return
+    sd, slack = PLAUSIBLE.get(name, (0.0, 0.0))
+    if name.startswith("joint_") or name == "body_mass":
+        sd = QUARTER * item.high if name.startswith("joint_") else EIGHTH * item.high
+        slack = SHARE * sd
+    sd = sd or EIGHTH * span
+    if item.fixed["part"] == ALL and name in GROUPED:
+        slack = 0.0
+    yield Row(
+        item.name,
+        item.nominal,
+        sd,
+        item.low,
+        item.high,
+        unit=item.unit,
+        slack=item.slack or slack,
+        levels=(0.15, 0.3) if name in LATE else (),
+        step=0.01 if name in LATE else 0.0,
+        excite=excite,
+    )
+
+
+def _levels(item: OwnCandidate, trials: Sequence[Trial]) -> tuple[float, ...]:
+    """Sizes of a dead zone between the magnitudes that were told."""
+    names = [channel.name for channel in trials[0].commands.channels]
+    part = item.fixed["part"]
+    chosen = slice(None) if part == ALL else [names.index(part)]
+    told = np.concatenate([trial.commands.values[:, chosen] for trial in trials])
+    sizes = np.unique(np.abs(told).round(9))
+    sizes = sizes[sizes > 0]
+    if not len(sizes):
+        return ()
+    between = (sizes[:-1] + sizes[1:]) / 2 if len(sizes) > 1 else sizes
+    found = np.minimum(np.quantile(between, TOLD), item.high)
+    return tuple(np.unique(found).tolist())
