@@ -16,7 +16,9 @@ GROUPED = ("joint_damping", "joint_friction", "joint_armature")
 """effects that may be on all joints alike"""
 LATE = ("command_delay", "command_lag", "reading_delay")
 TOLD = (0.05, 0.12, 0.2, 0.3, 0.4, 0.55)  # quantiles of what was told, for dead zones
-QUARTER, EIGHTH = 0.25, 0.125
+EIGHTH = 0.125  # of the largest value: the plausible one
+MASS = 0.1  # of a body's mass
+OFFSET = 0.0625  # of the span of an offset
 
 # plausible departure and slack of what has no scale of its own (assumed): a gain of a
 # motor is known to 10 %, of a sensor to 3 %, a delay to 40 ms
@@ -31,6 +33,7 @@ PLAUSIBLE = {
     "command_lag": (0.04, 0.0),
     "reading_delay": (0.04, 0.0),
     "body_length": (0.03, 0.001),
+    "encoder_offset": (0.01, 0.0),
 }
 SHARE = 0.02  # slack of a number over its plausible departure
 
@@ -88,9 +91,12 @@ def _of(item: OwnCandidate, trials: Sequence[Trial]) -> Iterable[Row]:
                   unit=item.unit, smooth=False, levels=levels, excite=excite)  # fmt: skip
         return
     sd, slack = PLAUSIBLE.get(name, (0.0, 0.0))
-    if name.startswith("joint_") or name == "body_mass":
-        sd = QUARTER * item.high if name.startswith("joint_") else EIGHTH * item.high
-        slack = SHARE * sd
+    if name.startswith("joint_"):
+        sd, slack = EIGHTH * item.high, SHARE * EIGHTH * item.high
+    elif name == "body_mass":  # the largest value is twice the mass, see `mjcf`
+        sd, slack = MASS * item.high / 2, SHARE * MASS * item.high
+    elif name.endswith("_offset") and not sd:
+        sd = OFFSET * span
     sd = sd or EIGHTH * span
     if item.fixed["part"] == ALL and name in GROUPED:
         slack = 0.0

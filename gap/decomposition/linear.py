@@ -295,14 +295,20 @@ class Linear:
             for pair in itertools.combinations(inside, 2):
                 yield from ((support - set(pair)) | {other} for other in outside)
 
+    def _weighed(self) -> None:
+        if not self._costs:
+            self.search()
+
     def near(self, within: float) -> list[tuple[float, Support]]:
         """Sets that were weighed and cost no more than so much beyond the best."""
+        self._weighed()
         least = min(self._costs.values())
         found = [(c - least, s) for s, c in self._costs.items() if c <= least + within]
         return sorted(found, key=lambda item: (item[0], sorted(item[1])))
 
     def inclusion(self, name: str) -> float:
         """Posterior probability of an explanation over all sets that were weighed."""
+        self._weighed()
         costs = np.array(list(self._costs.values()))
         inside = np.array([name in support for support in self._costs])
         odds = np.exp(costs.min() - costs)
