@@ -78,40 +78,43 @@ def grouped(candidates: Sequence[OwnCandidate]) -> list[OwnCandidate]:
 
 
 def _of(item: OwnCandidate, trials: Sequence[Trial]) -> Iterable[Row]:
-    name, span = item.effect, item.high - item.low
-    excite = EXCITE.get(name, "any command")
-    if name == "command_dead_zone":
+    excite = EXCITE.get(item.effect, "any command")
+    edges = {"low": item.low, "high": item.high, "unit": item.unit, "excite": excite}
+    third = (item.high - item.low) / 3
+    if item.effect == "command_dead_zone":
         if levels := _levels(item, trials):
-            yield Row(item.name, 0.0, span / 3, 0.0, item.high, unit=item.unit,
-                      smooth=False, stepped=True, levels=levels, excite=excite)  # fmt: skip
+            yield Row(item.name, 0.0, third, smooth=False, stepped=True,
+                      levels=levels, **edges)  # fmt: skip
         return
-    if name == "command_limit":
+    if item.effect == "command_limit":
         levels = tuple(v for v in item.grid if item.low < v < item.high)
-        yield Row(item.name, item.nominal, span / 3, item.low, item.high,
-                  unit=item.unit, smooth=False, levels=levels, excite=excite)  # fmt: skip
+        yield Row(item.name, item.nominal, third, smooth=False, levels=levels, **edges)
         return
-    sd, slack = PLAUSIBLE.get(name, (0.0, 0.0))
-    if name.startswith("joint_"):
-        sd, slack = EIGHTH * item.high, SHARE * EIGHTH * item.high
-    elif name == "body_mass":  # the largest value is twice the mass, see `mjcf`
-        sd, slack = MASS * item.high / 2, SHARE * MASS * item.high
-    elif name.endswith("_offset") and not sd:
-        sd = OFFSET * span
-    sd = sd or EIGHTH * span
-    if item.fixed["part"] == ALL and name in GROUPED:
-        slack = 0.0
+    sd, slack = _plausible(item)
+    late = item.effect in LATE
     yield Row(
         item.name,
         item.nominal,
         sd,
-        item.low,
-        item.high,
-        unit=item.unit,
         slack=item.slack or slack,
-        levels=(0.15, 0.3) if name in LATE else (),
-        step=0.01 if name in LATE else 0.0,
-        excite=excite,
+        levels=(0.15, 0.3) if late else (),
+        step=0.01 if late else 0.0,
+        **edges,
     )
+
+
+def _plausible(item: OwnCandidate) -> tuple[float, float]:
+    """Plausible departure of a number, and how well it is known."""
+    sd, slack = PLAUSIBLE.get(item.effect, (0.0, 0.0))
+    if item.effect.startswith("joint_"):
+        sd, slack = EIGHTH * item.high, SHARE * EIGHTH * item.high
+    elif item.effect == "body_mass":  # the largest value is twice the mass
+        sd, slack = MASS * item.high / 2, SHARE * MASS * item.high
+    elif item.effect.endswith("_offset") and not sd:
+        sd = OFFSET * (item.high - item.low)
+    if item.fixed["part"] == ALL and item.effect in GROUPED:
+        slack = 0.0
+    return sd or EIGHTH * (item.high - item.low), slack
 
 
 def _levels(item: OwnCandidate, trials: Sequence[Trial]) -> tuple[float, ...]:

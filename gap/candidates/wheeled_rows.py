@@ -17,8 +17,8 @@ WAYS = ("forward", "backward", "commanded")
 
 # name, plausible departure (standard deviation), low, high, per wheel?, settings. The
 # departures are what published figures and repairs of such robots show; slack is how
-# well a nominal model is known: 0.3 to 0.4 % of a length, 1 ms, 10 g, 0.5 mm of a centre
-# of mass, 0.2 mm and 1 mrad of a marker (all assumed).
+# well a nominal model is known: 0.3 to 0.4 % of a length, 1 ms, 10 g, 0.5 mm of a
+# centre of mass, 0.2 mm and 1 mrad of a marker (all assumed).
 _SMOOTH = (
     ("wheel_gain", 0.06, 0, 2, True, {"slack": 0.003, "levels": (0.0, 0.5, 0.85)}),
     ("wheel_diameter", 0.04, 0.7, 1.3, True, {"levels": (0.93, 0.96, 1.04, 1.07)}),
@@ -60,10 +60,18 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
         for side in SIDES[:2] if sided else ("",):
             term = f"{name}[{side}]" if side else name
             made += [
-                Row(f"{term}.{axis}", 0.0, sd, -high, high, group=term, unit=_unit(name),
-                    excite=EXCITE.get(name, "any drive"))
+                Row(
+                    f"{term}.{axis}",
+                    0.0,
+                    sd,
+                    -high,
+                    high,
+                    group=term,
+                    unit=_unit(name),
+                    excite=EXCITE.get(name, "any drive"),
+                )
                 for axis in "xy"
-            ]  # fmt: skip
+            ]
     for side in SIDES:
         made += _rough(side, trials)
     made.append(

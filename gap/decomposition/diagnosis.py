@@ -112,7 +112,12 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         floor=known,
         before=rest.excess(start.rest, known, inside),
         after=rest.excess(plain, known, inside),
-        recurs=rest.recurrence(problem, left, point.noise.sd),
+        recurs=rest.recurrence(
+            problem,
+            left,
+            point.noise.sd,
+            piece=rest.SHORT if point.noise.order else rest.PIECE,
+        ),
         closed=float((none - some) / max(none - min(least, some), 1e-9)),
     )
 

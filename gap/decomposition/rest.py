@@ -14,6 +14,7 @@ WILD = 8.0  # deviations of a full fit beyond which a window is left out
 APART = (0.6, 2.0)  # [s] between windows whose errors are compared: beyond a window's
 # length, so that they share no sample
 PIECE = 2.0  # [s] of a trial that count as independent
+SHORT = 0.5  # [s] that do once an autoregression is taken out
 SEARCHED = 1.0  # standard errors that the best of some ten lags exceeds by chance
 SURE = 3.0  # standard errors from which an error is said to recur
 
@@ -70,17 +71,25 @@ def excess(rest: np.ndarray, known: Floor, inside: np.ndarray) -> float:
     return float((units**2).sum() / max(inside.sum(), 1) - 1.0)
 
 
-def recurrence(problem: Problem, rest: np.ndarray, sd: np.ndarray) -> float:
+def recurrence(
+    problem: Problem, rest: np.ndarray, sd: np.ndarray, *, piece: float = PIECE
+) -> float:
     """Standard errors by which errors of windows that share no sample go together.
 
     Products of a residual with later ones of its trial, and with those at the same time
     of trials that were told the same, are 0 in the mean for what only scatters. Either
     all lags say it together or one of them does, positive or negative: an error that
-    swings recurs, too. Sums over `PIECE` seconds are as many independent values.
+    swings recurs, too.
+
+    Args:
+        problem: the recording.
+        rest: residuals, ``(N, C)``.
+        sd: of them.
+        piece: seconds whose sum counts as one independent value.
     """
     units = np.clip(np.nan_to_num(rest) / sd, -4, 4)
-    piece = _pieces(problem)
-    count = int(piece.max()) + 1
+    part = _pieces(problem, piece)
+    count = int(part.max()) + 1
     lags: dict[int, np.ndarray] = {}
     for number, windows in enumerate(problem.windows):
         rows = np.flatnonzero(problem.trial == number)
@@ -92,16 +101,16 @@ def recurrence(problem: Problem, rest: np.ndarray, sd: np.ndarray) -> float:
         for lag in range(first, last + 1):
             product = (units[rows[lag:]] * units[rows[:-lag]]).sum(axis=1)
             sums = lags.setdefault(lag, np.zeros(count))
-            np.add.at(sums, piece[rows[:-lag]], product)
+            np.add.at(sums, part[rows[:-lag]], product)
     same = np.zeros(count)
     for one, other in repeats(problem):
         a, b = (np.flatnonzero(problem.trial == n) for n in (one, other))
         length = min(len(a), len(b))
         product = (units[a[:length]] * units[b[:length]]).sum(axis=1)
-        np.add.at(same, piece[a[:length]], product)
+        np.add.at(same, part[a[:length]], product)
     every = [*lags.values(), same]
     alone = max(abs(_errors(sums)) for sums in every) - SEARCHED
-    return max(_errors(np.sum(every, axis=0)), alone)
+    return max(_errors(np.sum(every, axis=0)), _errors(same), alone)
 
 
 def _errors(sums: np.ndarray) -> float:
@@ -110,11 +119,11 @@ def _errors(sums: np.ndarray) -> float:
     return float(sums.sum() / size) if size > 0 else 0.0
 
 
-def _pieces(problem: Problem) -> np.ndarray:
-    """Number of the stretch of `PIECE` seconds that each window lies in, ``(N,)``."""
+def _pieces(problem: Problem, length: float) -> np.ndarray:
+    """Number of the stretch of a length [s] that each window lies in, ``(N,)``."""
     made, first = [], 0
     for trial, windows in zip(problem.trials, problem.windows, strict=True):
-        number = ((windows.times - trial.times[0]) / PIECE).astype(int)
+        number = ((windows.times - trial.times[0]) / length).astype(int)
         made.append(first + number)
         first += int(number.max(initial=0)) + 1
     return np.concatenate(made)
