@@ -217,7 +217,8 @@ def shared(trials: list[Any]) -> dict[str, float]:
 
 def _say(found: Any) -> None:
     """The verdict in words, then the best fits."""
-    print(found.verdict.sentence)
+    for line in found.decomposition.get("statements") or (found.verdict.sentence,):
+        print(line)
     if found.verdict.change:
         print(found.verdict.change)
     for line in _closed(found):

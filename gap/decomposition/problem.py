@@ -148,6 +148,11 @@ class Problem:
         rest = np.where(self.seen & lost, FAR, self.recorded - made)
         return rest, made
 
+    @cached_property
+    def gap(self) -> np.ndarray:
+        """Residuals of the nominal model, ``(N, C)``."""
+        return self.residual(self.nominal)[0]
+
     def slopes(self, values: np.ndarray, which: Sequence[int]) -> dict[int, np.ndarray]:
         """Derivatives of the features by some rows, ``(N, C)`` each.
 
