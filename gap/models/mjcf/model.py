@@ -1,5 +1,6 @@
 """Any MJCF model, with a TOML file that maps its channels, as a nominal model."""
 
+import math
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -24,6 +25,7 @@ from bns.worlds.trial import Trial
 LEAD = 1.0  # [s] of rest before a trial, so that what is late has something before it
 KEPT, MODELS = 20_000, 2000  # simulated trials and compiled models kept in memory
 FINE = 0.005  # [s] between kept states; the step if that is longer
+FINEST = 0.0025  # [s] steps beyond which a simulation lags visibly; assumed
 LEAST = 0.3  # of the noise that is told: the smallest that is believed
 
 
@@ -106,14 +108,29 @@ class OwnModel(DecomposableModel):
                 effect.edit(made)
         return made
 
-    def compiled(self, effects: Sequence[Effect]) -> Compiled:
-        """The compiled model with the effects on its parts."""
+    def compiled(self, effects: Sequence[Effect], parts: int = 1) -> Compiled:
+        """The compiled model with the effects on its parts.
+
+        Args:
+            effects: of any stage.
+            parts: into how many its step is cut.
+        """
         body = tuple(str(e) for e in effects if e.stage == "body" and not e.is_nominal)
-        if body not in self._compiled:
-            self._compiled[body] = Compiled(self.spec(effects).compile())
+        key = (parts, *body)
+        if key not in self._compiled:
+            made = self.spec(effects).compile()
+            made.opt.timestep /= parts
+            self._compiled[key] = Compiled(made)
             while len(self._compiled) > MODELS:
                 self._compiled.popitem(last=False)
-        return self._compiled[body]
+        return self._compiled[key]
+
+    def _parts(self) -> int:
+        """Into how many parts the step is cut where a simulation has to be fine."""
+        model = self.compiled(()).model
+        if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+            return 1
+        return math.ceil(model.opt.timestep / FINEST - 1e-9)
 
     @property
     def least(self) -> np.ndarray:
@@ -137,15 +154,15 @@ class OwnModel(DecomposableModel):
         *,
         fine: bool = True,
     ) -> list[list[np.ndarray]]:
-        """Predicted samples, see `DecomposableModel.paths`; there is one step."""
-        del fine
+        """Predicted samples, see `DecomposableModel.paths`; the coarse step is that of
+        the model."""
         pairs, leads = [], []
         for row in sets:
             for trial, values in zip(trials, row, strict=True):
                 made = [self.effect(name, values) for name in values]
                 pairs.append((trial, tuple(e for e in made if e is not None)))
                 leads.append(values.get(mjcf_rows.LEAD, 0.0))
-        seen = self._predicted(pairs)
+        seen = self._predicted(pairs, self._parts() if fine else 1)
         moved = [
             _led(trial, path, lead)
             for (trial, _), path, lead in zip(pairs, seen, leads, strict=True)
@@ -170,21 +187,21 @@ class OwnModel(DecomposableModel):
         return [made[at * count : (at + 1) * count] for at in range(len(effects))]
 
     def _predicted(
-        self, pairs: Sequence[tuple[Trial, Sequence[Effect]]]
+        self, pairs: Sequence[tuple[Trial, Sequence[Effect]]], parts: int = 1
     ) -> list[np.ndarray]:
         """Predicted samples of trials, each under effects of its own."""
-        keys = [_key(trial, items) for trial, items in pairs]
+        keys = [(parts, *_key(trial, items)) for trial, items in pairs]
         wanted = {
             key: pair
             for key, pair in zip(keys, pairs, strict=True)
             if key not in self._cache
         }
-        jobs = [self._job(trial, items) for trial, items in wanted.values()]
+        jobs = [self._job(trial, items, parts) for trial, items in wanted.values()]
         motions = self._pool.map(jobs) if jobs else []
         fresh = {}
         for (key, (trial, items)), motion in zip(wanted.items(), motions, strict=True):
-            states = motion.states[self._lead() :]
-            fresh[key] = self._samples(trial, items, states)
+            states = motion.states[self._lead(self.dt / parts) :]
+            fresh[key] = self._samples(trial, items, states, self.dt / parts)
         made = [fresh[key] if key in fresh else self._cache[key] for key in keys]
         self._cache.update(fresh)
         while len(self._cache) > KEPT:
@@ -196,12 +213,12 @@ class OwnModel(DecomposableModel):
         """Physics step [s]."""
         return float(self.compiled(()).model.opt.timestep)
 
-    def _lead(self) -> int:
-        return round(self.config.settle / self.dt)
+    def _lead(self, dt: float) -> int:
+        return round(self.config.settle / dt)
 
-    def _job(self, trial: Trial, effects: Sequence[Effect]) -> Job:
-        scene = self.compiled(effects)
-        told = self._told(trial, effects)
+    def _job(self, trial: Trial, effects: Sequence[Effect], parts: int) -> Job:
+        scene = self.compiled(effects, parts)
+        told = self._told(trial, effects, self.dt / parts)
         begin = self._start(trial, scene.model)
         ctrl = np.tile(self._rest(scene.model), (len(told), 1))
         ctrl[:, self.actuators] = told
@@ -213,12 +230,11 @@ class OwnModel(DecomposableModel):
             return np.array(model.key_ctrl[key])
         return np.zeros(model.nu)
 
-    def _told(self, trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
+    def _told(self, trial: Trial, effects: Sequence[Effect], dt: float) -> np.ndarray:
         """Commands at each physics step after the effects, settling included."""
-        dt = self.dt
         ends = np.rint(np.cumsum(trial.commands.durations) / dt).astype(int)
         counts = np.diff(ends, prepend=0)  # steps add up to the whole trial
-        lead, extra = self._lead(), round(LEAD / dt)
+        lead, extra = self._lead(dt), round(LEAD / dt)
         rest = self._rest(self.compiled(()).model)[self.actuators]
         values = np.repeat(trial.commands.values, counts, axis=0)
         before = np.tile(rest, (lead + extra, 1))
@@ -253,11 +269,15 @@ class OwnModel(DecomposableModel):
         return state
 
     def _samples(
-        self, trial: Trial, effects: Sequence[Effect], states: np.ndarray
+        self,
+        trial: Trial,
+        effects: Sequence[Effect],
+        states: np.ndarray,
+        dt: float,
     ) -> np.ndarray:
-        every = max(1, int(FINE / self.dt + 1e-9))
+        every = max(1, int(FINE / dt + 1e-9))
         grid = np.arange(0, len(states), every)
-        times = grid * self.dt
+        times = grid * dt
         scene = self.compiled(effects)
         read = self.view.read(scene.model, states[grid])
         names = tuple(channel.name for channel in self.channels)
