@@ -30,6 +30,7 @@ test: env
 lint: env
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	$(BIN)/mypy --python-executable $(BIN)/python -p bns.worlds -p bns.models
 
 # importing glfw starts a process, which pdoc forbids unless it is told
 api: env

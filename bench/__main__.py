@@ -49,8 +49,8 @@ def _run(benches, *, quick: bool) -> int:
     broken = False
     for bench in benches:
         row = measure(bench, quick=quick)
-        store(row)
         print(json.dumps(row, allow_nan=False), flush=True)
+        store(row)
         broken = broken or row["holds"] is False
     return int(broken)
 

@@ -1,57 +1,44 @@
-"""Claims of one investigation, run where they are missing, and judged."""
+"""Claims as they stand in a world: by runs here, and by published findings."""
 
-from collections.abc import Sequence
-
-from bench import experiments
 from bench.result import Result
 from bench.versions import ROOT
 from bns.claims import report, runner
-from bns.claims.claim import claims
+from bns.claims.claim import INVESTIGATIONS, claims
+from bns.claims.report import Judged
 
-WORLD = "mujoco"
+
+def judged(world: str) -> list[Judged]:
+    """All claims in a world; nothing is trained."""
+    place = runner.directory(world, quick=False, root=ROOT / "runs" / "claims")
+    return report.judged(list(claims().values()), place, world=world, own=False)
 
 
-def judged(wanted: Sequence[str], *, runs: int, quick: bool) -> Result:
-    """How many of some claims have a verdict; runs are kept, so a run goes on.
+def settled(world: str, *, bar: int) -> Result:
+    """Claims whose comparisons all have the runs that the design asks for.
 
-    Claims of which as many runs a side are published are not run again:
-    `bns claims run ID --runs N` does that.
+    Commit and seconds are those of the findings, not of this reading.
 
     Args:
-        wanted: identifiers of claims.
-        runs: a side, at least; the bar is judged from 30 on.
-        quick: small and short runs, all of them made here.
+        world: where.
+        bar: how many there are to be.
     """
-    from bns.campaign.engines import registry
-
-    chosen = [claims()[name] for name in wanted]
-    root = ROOT / "runs" / "claims"
-    engine = registry.make("local", workers=experiments.WORKERS)
-    least = 0 if quick else runs
-    place = runner.directory(WORLD, quick=quick, root=root)
-
-    def judge() -> list[report.Judged]:
-        return report.judged(chosen, place, world=WORLD, quick=quick, own=False)
-
-    rows = judge()
-    due = [r.claim for r in rows if not r.complete or r.fewest < max(least, 1)]
-    if due:
-        runner.run(due, engine, world=WORLD, quick=quick, runs=least, root=root)
-        rows = judge()
-    found = [row for row in rows if row.findings]
-    few = quick or runs < experiments.REPLICATES
+    rows = judged(world)
+    made = [each.made for row in rows for each in row.findings if each.made]
+    done = [row for row in rows if row.settled]
+    details: dict[str, object] = {"all": report.counts(rows)}
+    for letter in INVESTIGATIONS:
+        part = [row for row in rows if row.claim.investigation == letter]
+        details[letter] = report.counts(part)
+    details["not settled"] = {
+        row.claim.id: row.note or "more runs" for row in rows if not row.settled
+    }
+    details["verdicts"] = {row.claim.id: row.verdict for row in done}
     return Result(
-        figure=len(found),
-        unit=f"of {len(wanted)}",
-        holds=None if few else len(found) == len(wanted),
-        n=min((row.fewest for row in found), default=0),
-        details={
-            row.claim.id: {
-                "says": row.claim.says,
-                "verdict": row.verdict,
-                "cells": [list(cell) for cell in report.cells(row)],
-                "published": sum(finding.published for finding in row.findings),
-            }
-            for row in rows
-        },
+        figure=len(done),
+        unit=f"of {len(rows)}",
+        holds=len(done) >= bar,
+        n=min((row.fewest for row in done), default=0),
+        details=details,
+        commits=tuple(sorted({c for each in made for c in each.commits})),
+        seconds=sum(each.seconds for each in made) if made else None,
     )

@@ -1,43 +1,131 @@
 """Robots on the move, for the bench that stops them: what drives, what the log says."""
 
+import json
+import subprocess
+import sys
+import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import NamedTuple
 
 HEAD = """
-import sys
+import sys, threading
 from bns.hardware.priority import urgent
 urgent()
 from bns.worlds import alarm
 from bns.worlds.trial import Channel, Commands
-def ready(world):
-    world.connected()
-    if sys.argv[2] == "learner":
-        import threading, time
-        def fail():
-            sys.stdin.readline()
-            print("now", time.monotonic(), flush=True)
-            alarm.ring("the learner failed")
-        threading.Thread(target=fail, daemon=True).start()
-    print("ready", flush=True)
+def fail():
+    sys.stdin.readline()
+    alarm.ring("the learner failed")
+threading.Thread(target=fail, daemon=True).start()
+def begin(world, look):
+    rig = world.connected()
+    x, y, yaw = look(rig).wait_for_sight().pose
+    world.start = (x, y, yaw) if max(abs(x), abs(y)) < 0.4 else (0.0, 0.0, yaw)
+    print("watchdog", rig.watchdog.pid, flush=True)
+    return rig
 """
 KHEPERA = """
 from bns.hardware.world import HardwareWorld
-world = HardwareWorld(port=sys.argv[1], start=(-0.9, 0.0, 0.0))
-ready(world)
-world.run([Commands([[0.06, 0.07]], [25.0])])
+world = HardwareWorld(port=sys.argv[1])
+begin(world, lambda rig: rig.mover())
+try:
+    world.run([Commands([[0.04, 0.10]], [25.0])])
+finally:
+    world.close()
 """
 HEXAPOD = """
 import numpy as np
 from bns.hardware.hexapod_world import HardwareHexapod
 world = HardwareHexapod(port=sys.argv[1])
-ready(world)
+walker = begin(world, lambda rig: rig.walker).walker
+perform = walker.perform
+def performed(*words):
+    print("moving", flush=True)
+    return perform(*words)
+walker.perform = performed
 names = tuple(Channel(*channel) for channel in world.model.channels)
 goals = np.zeros((40, 18))
 goals[::2, 1::3] = 0.3
-world.run([Commands(goals, np.full(40, 2.0), names)])
+try:
+    world.run([Commands(goals, np.full(40, 2.0), names)])
+finally:
+    world.close()
 """
-DRIVEN = [8641, 10081]  # speed units of 0.06 and 0.07 m/s, firmware 2
+DRIVEN = [5760, 14401]  # speed units of 0.04 and 0.10 m/s, firmware 2
+
+
+class Log:
+    """What an emulated robot has noted, read as it grows.
+
+    Args:
+        path: file of JSON lines.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path, self._rows, self._read = path, [], 0
+
+    def rows(self) -> list[dict]:
+        """All rows so far."""
+        if self.path.exists():
+            with open(self.path, encoding="utf-8") as file:
+                file.seek(self._read)
+                for line in iter(file.readline, ""):
+                    if not line.endswith("\n"):
+                        break
+                    self._rows.append(json.loads(line))
+                    self._read += len(line)
+        return self._rows
+
+    def newest(self, key: str, begin: float, end: float) -> dict:
+        """The newest row with a key between two times, empty if there is none."""
+        rows = reversed(self.rows())
+        return next((r for r in rows if key in r and begin < r["at"] <= end), {})
+
+    def first(self, key: str, at: float) -> float | None:
+        """When something was first so from a time on [s]; None: never."""
+        return next(
+            (r["at"] for r in self.rows() if r.get(key) and r["at"] >= at), None
+        )
+
+
+class Driver:
+    """A process that drives an emulated robot.
+
+    Args:
+        script: what it does.
+        port: of the robot.
+        env: its environment.
+    """
+
+    def __init__(self, script: str, port: Path, env: dict[str, str]) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", script, str(port)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=env,
+        )
+        self.said: list[tuple[float, str]] = []
+        self.began = time.monotonic()
+        for stream in (self.process.stdout, self.process.stderr):
+            threading.Thread(target=self._listen, args=(stream,), daemon=True).start()
+
+    def _listen(self, stream) -> None:
+        for line in stream:
+            self.said.append((time.monotonic(), line.strip()))
+
+    @property
+    def watchdog(self) -> int:
+        """Number of its watchdog's process, 0 while there is none."""
+        words = [text.split() for _, text in self.said if text.startswith("watchdog ")]
+        return int(words[-1][1]) if words else 0
+
+    def moving(self) -> float | None:
+        """When it said that the trial began."""
+        return next((at for at, text in self.said if text == "moving"), None)
 
 
 class Drive(NamedTuple):
@@ -45,69 +133,38 @@ class Drive(NamedTuple):
 
     Attributes:
         robot: its name.
-        words: more for `bns hardware emulate`.
         script: drives it.
-        steady: whether a drive that began at a time has gone on for a moment.
-        driven: whether it was still driven at a time.
-        times: moments of the stop by name, after a time.
-        ended: whether there is nothing more to wait for.
+        steady: whether a drive has gone on for a moment.
+        driven: whether the robot was driven at a time.
     """
 
     robot: str
-    words: tuple[str, ...]
     script: str
-    steady: Callable[[list, float], bool]
-    driven: Callable[[list, float], bool]
-    times: Callable[[list, float], dict]
-    ended: Callable[[list, float], bool]
+    steady: Callable[[Log, Driver], bool]
+    driven: Callable[[Log, float], bool]
 
 
-def _last(rows: list, key: str, begin: float, end: float) -> dict:
-    """The newest row with a key between two times, empty if there is none."""
-    return next((r for r in reversed(rows) if key in r and begin < r["at"] < end), {})
-
-
-def _rolling(rows: list, begin: float) -> bool:
+def _rolling(log: Log, driver: Driver) -> bool:
     now = time.monotonic()
-    row = _last(rows, "told", begin, now)
+    row = log.newest("told", driver.began, now)
     return row.get("told") == DRIVEN and now - row["at"] > 0.7
 
 
-def _wheels(rows: list, at: float) -> dict:
-    later = [row for row in rows if row["at"] >= at]
-    return {
-        "told": [row["at"] for row in later if row.get("told") == [0, 0]],
-        "stands": [row["at"] for row in later if row.get("stands")],
-    }
+def _rolled(log: Log, at: float) -> bool:
+    return log.newest("told", 0.0, at).get("told") == DRIVEN
 
 
-def _walking(rows: list, begin: float) -> bool:
-    now = time.monotonic()
-    row = _last(rows, "powered", begin, now)
-    return row.get("powered") == 18 and now - row["at"] > 8.0  # up, and at the start
+def _walking(log: Log, driver: Driver) -> bool:
+    since = driver.moving()
+    return since is not None and time.monotonic() - since > 1.0
 
 
-def _servos(rows: list, at: float) -> dict:
-    return {"told": [r["at"] for r in rows if r.get("powered") == 0 and r["at"] >= at]}
+def _walked(log: Log, at: float) -> bool:
+    row = log.newest("powered", 0.0, at)
+    return row.get("powered", 0) > 0 and not log.newest("stop", row["at"], at)
 
 
 DRIVES = (
-    Drive(
-        "khepera3",
-        ("--start", "-0.9", "0", "0"),
-        HEAD + KHEPERA,
-        _rolling,
-        lambda rows, at: _last(rows, "told", 0.0, at).get("told") == DRIVEN,
-        _wheels,
-        lambda rows, at: bool(_wheels(rows, at)["stands"]),
-    ),
-    Drive(
-        "phantomx",
-        (),
-        HEAD + HEXAPOD,
-        _walking,
-        lambda rows, at: _last(rows, "powered", 0.0, at).get("powered", 0) > 0,
-        _servos,
-        lambda rows, at: bool(_servos(rows, at)["told"]),
-    ),
+    Drive("khepera3", HEAD + KHEPERA, _rolling, _rolled),
+    Drive("phantomx", HEAD + HEXAPOD, _walking, _walked),
 )

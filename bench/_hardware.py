@@ -1,14 +1,49 @@
 """What the benches of the hardware mode share."""
 
 import contextlib
+import hashlib
+import json
 import os
 import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+
+from bench.runner import write
+
+KEPT = Path("runs") / "bench"  # where parts of long benches are kept
+
+
+def resumed(name: str) -> Callable[[str, Callable[[], dict]], dict]:
+    """What measures a part of a long bench, or reads it where it was measured.
+
+    Args:
+        name: of the bench.
+
+    Parts that were measured with other code are not taken.
+    """
+    folder = KEPT / name / _code()
+
+    def part(label: str, measure: Callable[[], dict]) -> dict:
+        path = folder / f"{label}.json"
+        if path.exists():
+            return json.loads(path.read_text())
+        row = measure()
+        folder.mkdir(parents=True, exist_ok=True)
+        write(path, json.dumps(row))
+        return row
+
+    return part
+
+
+def _code() -> str:
+    """What the code of robots and of their benches is, in a few letters."""
+    files = [*Path("hardware").rglob("*.py"), *Path("bench").glob("*.py")]
+    texts = (path.read_bytes() for path in sorted(files))
+    return hashlib.sha256(b"".join(texts)).hexdigest()[:12]
 
 
 @contextlib.contextmanager

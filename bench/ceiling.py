@@ -14,13 +14,12 @@ import torch
 from bench import experiments
 from bench.result import Result
 from bns import seeding
-from bns.chromosome import Encoding, Population
 from bns.draws import Draws
+from bns.evolution.chromosome import Encoding, Population
 from bns.evolution.generation import Breeder, Rates
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
-from bns.tasks import NavigationTask
-from bns.tasks.trials import score_trials
+from bns.tasks.navigation import Route, score_trials
 from bns.units import metres_per_second
 
 RUNS, POPULATION, GENERATIONS = 1, 100, 12
@@ -86,7 +85,7 @@ def _search(config: RunConfig) -> dict[str, object]:
     world = make_world(replace(config, world=replace(config.world, damage=always)))
     config = replace(config, evolution=replace(config.evolution, population=POPULATION))
     encoding = Encoding.of(config.controller)
-    task = NavigationTask.of(config.task)
+    task = Route.of(config.task)
     draws = Draws(seeding.integer(config.seed, "ceiling"))
     breeder = Breeder(config.evolution, encoding, False)
     population = _tried(record, encoding)
@@ -133,7 +132,7 @@ def _rates(config: RunConfig) -> Rates:
 
 
 def _in_world(
-    world, encoding: Encoding, task: NavigationTask, population: Population
+    world, encoding: Encoding, task: Route, population: Population
 ) -> tuple[torch.Tensor, np.ndarray]:
     """Cost ``(R, P)`` and objectives reached of every individual, in the world."""
     runs, size = population.lengths.shape

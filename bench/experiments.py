@@ -18,6 +18,7 @@ from bench.versions import ROOT
 from bns import presets
 from bns.experiment.config import AdaptationConfig, RunConfig, WorldConfig
 from bns.experiment.record import RunRecord
+from bns.tasks import registry as tasks
 
 RUNS = ROOT / "runs" / "bench"
 WORKERS = 2
@@ -31,6 +32,7 @@ DAMAGES = {
 }
 LATER = ("learner", "light", "walk", "watch")  # newer than the first stored runs
 NEWER = (
+    ("adaptation", "simulator_reset_untrained"),
     ("light", "readings"),
     ("light", "renewed"),
     ("walk", "repeat"),
@@ -98,13 +100,18 @@ def directory(config: RunConfig) -> Path:
 def known(config: RunConfig) -> dict[str, Any]:
     """A configuration as plain values, without newer settings that change nothing."""
     settings, plain = asdict(config), RunConfig()
+    kind = tasks.kind(config.task.name)
+    del settings["prior"], settings["settings"]  # of other learners
+    settings["learner"] = kind  # as stored runs have it
+    if kind != "navigation":
+        settings["task"]["name"] = plain.task.name
     for section, name in NEWER:
         if settings[section][name] == getattr(getattr(plain, section), name):
             del settings[section][name]
     if not config.watch.detect:
         for name in ("floor", "grow", "reach", "near", "largest"):
             del settings["watch"][name]
-    if not config.watch.forget or config.learner == "walk":
+    if not config.watch.forget or kind == "walk":
         settings["watch"]["forget_factor"] = 3.0  # does nothing; as stored runs have it
     return settings
 

@@ -19,6 +19,7 @@ from bns.experiment.record import RunRecord
 ON_DAMAGE = (
     "population_reset",
     "simulator_reset",
+    "simulator_reset_untrained",
     "data_reset",
     "restart",
     "mutation_rate_after",

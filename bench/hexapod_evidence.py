@@ -4,7 +4,8 @@ import numpy as np
 import torch
 
 from bns.experiment.record import RunRecord
-from bns.walk import forgetting, scaling
+from bns.learners.bns.change_evidence import changed
+from bns.learners.bns.walking import MOVED, goal_inputs
 from bns.worlds.trial import body_displacements
 
 
@@ -17,12 +18,12 @@ def forgets(record: RunRecord) -> np.ndarray:
     found = np.zeros(record.sent.shape[:2], dtype=bool)
     for run in range(record.replicates):
         goals = torch.from_numpy(record.sent[run].copy())
-        seen = scaling.inputs(goals).numpy().astype(np.float32)
-        moved = body_displacements(record.poses[run]) / np.array(scaling.MOVED)
+        seen = goal_inputs(goals).numpy().astype(np.float32)
+        moved = body_displacements(record.poses[run]) / np.array(MOVED)
         for trial in range(record.trials):
             rows = [
                 part[: trial + 1].reshape(-1, part.shape[-1])[-window:]
                 for part in (seen, moved.astype(np.float32))
             ]
-            found[run, trial] = forgetting.changed(*rows, walk.commands) > 0
+            found[run, trial] = changed(*rows, walk.commands) > 0
     return found

@@ -12,7 +12,7 @@ from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
 
 if TYPE_CHECKING:
-    from bns.walk.learner import WalkLearner
+    from bns.learners.bns.learner import Bns
 
 DOC = "repaired fitness: correlation of predicted and real displacement by trial 50"
 BAR = ">= 0.8 and no zero-distance optimum"
@@ -82,7 +82,7 @@ def _alike(foreseen: np.ndarray, real: np.ndarray) -> np.ndarray:
     return np.array([np.corrcoef(a, b)[0, 1] for a, b in pairs])
 
 
-def unseen(learner: "WalkLearner", record: RunRecord) -> dict[str, object]:
+def unseen(learner: "Bns", record: RunRecord) -> dict[str, object]:
     """Correlations of walks that a run's SNN has not been trained on."""
     own = learner.population.genes[:, : SOME * 4 : 4].double().numpy()
     found = {"of its own population": [_told(learner, i, g) for i, g in enumerate(own)]}
@@ -98,43 +98,41 @@ def unseen(learner: "WalkLearner", record: RunRecord) -> dict[str, object]:
     return {f"correlation {k}": spread(np.array(v)) for k, v in found.items()}
 
 
-def _told(learner: "WalkLearner", run: int, goals: np.ndarray) -> float:
+def _told(learner: "Bns", run: int, goals: np.ndarray) -> float:
     """Correlation of what a run's SNN foresees of walks `(N, K, 18)` and the world."""
     import torch
 
-    from bns.chromosome import Population
-    from bns.walk import observing
+    from bns.evolution.chromosome import Population
+    from bns.tasks import walk
 
     genes = torch.from_numpy(np.ascontiguousarray(goals)).float()[None]
     lengths = torch.full(genes.shape[:2], genes.shape[2])
-    poses = learner.evaluator.poses(
+    poses = learner.problem.evaluator.poses(
         learner.theta[run : run + 1], Population(genes, lengths)
     )
-    foreseen = observing.distance(poses[0].double().numpy())
+    foreseen = walk.distance(poses[0].double().numpy())
     real = hexapod_runs.ways(hexapod_runs.walked(goals))
     return float(np.corrcoef(foreseen, real)[0, 1])
 
 
-def _at_the_end(config: RunConfig) -> "WalkLearner":
+def _at_the_end(config: RunConfig) -> "Bns":
     """The learner of a batch that `experiments` has stored, after its last trial."""
+    from bns.learners.bns.learner import Bns
     from bns.storage import files
-    from bns.walk.learner import WalkLearner
 
     count = config.replicates
-    learner = WalkLearner(
-        [config] * count, replicates=range(count), onsets=[-1] * count
-    )
+    learner = Bns([config] * count, replicates=range(count), onsets=[-1] * count)
     learner.restore(files.read_npz(experiments.directory(config) / "state.npz"))
     return learner
 
 
-def standing(learner: "WalkLearner") -> dict[str, object]:
+def standing(learner: "Bns") -> dict[str, object]:
     """What standing still is worth inside the SNNs."""
     import torch
 
-    from bns.chromosome import Population
+    from bns.evolution.chromosome import Population
 
-    evaluator, population = learner.evaluator, learner.population
+    evaluator, population = learner.problem.evaluator, learner.population
     cost = evaluator.cost(learner.theta, population)
     still = Population(
         torch.zeros_like(population.genes[:, :1]), population.lengths[:, :1]

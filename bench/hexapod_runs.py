@@ -233,9 +233,9 @@ def standing_by(lists: Iterable[np.ndarray], *, damage: str = ""):
 
 def ways(trials: Sequence[Trial]) -> np.ndarray:
     """How far trials got, as the learner counts it, ``(N,)`` [m]."""
-    from bns.walk import observing
+    from bns.tasks import walk
 
-    return observing.of_trials(trials)
+    return walk.of_trials(trials)
 
 
 def in_time(record: RunRecord, seconds: float) -> np.ndarray:

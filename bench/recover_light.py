@@ -11,7 +11,7 @@ from bench import forking, light_runs, solving
 from bench.result import Result
 from bns import stats
 from bns.experiment.record import RunRecord
-from bns.light.task import LightTask
+from bns.tasks.light import LampGoal
 
 DOC = "most trials to recover (median, over four damages) in light following, T6.7"
 BAR = "slow wheel / noisy / minimum / maximum sensor: median <= 12 / 10 / 12 / 10"
@@ -76,7 +76,7 @@ def _circling(record: RunRecord) -> dict[str, object]:
 
     `circle_sweep` is what the slowest robot makes that has nothing wrong.
     """
-    task = LightTask.of(record.config.light)
+    task = LampGoal.of(record.config.light)
     off, sweep = task.circling(record.poses[:, -5:, :, :2])
     there = off <= record.config.light.circle_within
     round_it = np.degrees(sweep[there])

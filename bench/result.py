@@ -23,6 +23,9 @@ class Result:
         holds: whether the bar holds; None where there is none to hold.
         n: what it rests on (runs, repeats, cases).
         details: further figures, JSON-serialisable.
+        commits: of the code that made what was measured, where that was made before
+            and only read here; empty = it was made now.
+        seconds: that making it took, then; None = it was made now.
     """
 
     figure: float
@@ -30,3 +33,5 @@ class Result:
     holds: bool | None
     n: int
     details: Mapping[str, object] = field(default_factory=dict)
+    commits: tuple[str, ...] = ()
+    seconds: float | None = None

@@ -52,20 +52,18 @@ def run(quick: bool) -> Result:
 
 
 def _population() -> tuple[Any, Any, Any]:
-    from bns.chromosome import Encoding
     from bns.draws import Draws
-    from bns.evaluation import Evaluator
+    from bns.evolution.chromosome import Encoding
     from bns.experiment.config import RunConfig
+    from bns.learners.bns.navigation import Evaluator
     from bns.snn.network import Shape
     from bns.snn.scaling import Scaling
-    from bns.tasks import NavigationTask
+    from bns.tasks.navigation import Route
 
     torch.set_num_threads(1)
     config, draws = RunConfig(), Draws(0)
     encoding, shape = Encoding.of(config.controller), Shape.of(config.snn)
-    evaluator = Evaluator(
-        encoding, Scaling.of(encoding), shape, NavigationTask.of(config.task)
-    )
+    evaluator = Evaluator(encoding, Scaling.of(encoding), shape, Route.of(config.task))
     population = encoding.random(PHYSICS, POPULATION // PHYSICS, draws)
     return evaluator, population, shape.random(PHYSICS, draws)
 

@@ -68,6 +68,12 @@ def measure(bench: Bench, *, quick: bool) -> dict[str, object]:
     with redirect_stdout(sys.stderr):
         result = bench.run(quick=quick)
     seconds = time.perf_counter() - started
+    if result.commits:
+        at = ", ".join(
+            each[:12] + "-dirty" * each.endswith("+") for each in result.commits
+        )
+    if result.seconds is not None:
+        seconds = result.seconds
     if not math.isfinite(result.figure):
         raise BnsError(f"Bench {bench.name} measured {result.figure}, not a number.")
     return {
@@ -88,8 +94,22 @@ def measure(bench: Bench, *, quick: bool) -> dict[str, object]:
     }
 
 
+def keeps(row: Mapping[str, object]) -> bool:
+    """Whether a row is one to keep: quick, or of code that a commit has."""
+    return bool(row["quick"]) or "-dirty" not in str(row["commit"])
+
+
 def store(row: Mapping[str, object], directory: Path = RESULTS) -> Path:
-    """Write a row; a quick one goes to `quick/` and never replaces a full one."""
+    """Write a row; a quick one goes to `quick/` and never replaces a full one.
+
+    Raises:
+        BnsError: a full row of code that no commit has.
+    """
+    if not keeps(row):
+        raise BnsError(
+            f"{row['name']} was measured with files that differ from the commit: it "
+            "is not kept. Commit them and measure again, or give --quick."
+        )
     folder = directory / "quick" if row["quick"] else directory
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{row['name']}.json"

@@ -1,6 +1,6 @@
 """Trials until the undamaged Khepera III circles the lamp (table 5.19).
 
-What counts as circling is `bns.light.task.LightTask.solved`; the trial is one, from a
+What counts as circling is `bns.tasks.light.LightTask.solved`; the trial is one, from a
 random start, as the dissertation judged its robot runs. Beside it stands the count for
 half a round in the same time, which the slowest robot on the goal radius does not make.
 """
@@ -11,7 +11,7 @@ from bench import experiments, light_runs, solving
 from bench.result import Result
 from bns import stats
 from bns.experiment.record import RunRecord
-from bns.light.task import LightTask
+from bns.tasks.light import LampGoal
 
 DOC = "median trials until the robot circles the lamp, undamaged, settings T5.19"
 BAR = "median <= 6 trials, >= 27 of 30 runs within 15"
@@ -47,7 +47,7 @@ def run(quick: bool) -> Result:
 def half_rounds(record: RunRecord) -> np.ndarray:
     """Trials that solved the task and got half round the lamp, ``(R, T)`` bool."""
     light = record.config.light
-    lamp = LightTask.of(light).lamp
+    lamp = LampGoal.of(light).lamp
     way = record.poses[..., -light.circle_cycles - 1 :, :2] - np.asarray(lamp)
     azimuth = np.unwrap(np.arctan2(way[..., 1], way[..., 0]))
     far = np.abs(azimuth[..., -1] - azimuth[..., 0]) >= np.radians(HALF)

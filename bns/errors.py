@@ -7,9 +7,25 @@ on one line and exits with code 2, without a traceback.
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+LONGEST = 400
+"""characters of a message; what is longer loses its middle"""
+
 
 class BnsError(ValueError):
-    """Base of every error that a user's input can cause."""
+    """Base of every error that a user's input can cause: one short line of text."""
+
+    def __init__(self, message: object = ""):
+        super().__init__(one_line(str(message)))
+
+
+def one_line(text: str, longest: int = LONGEST) -> str:
+    """Text without control characters, its middle left out where it is too long."""
+    plain = "".join(c if c.isprintable() else " " for c in text)
+    line = " ".join(plain.split())
+    if len(line) <= longest:
+        return line
+    end = longest // 3
+    return f"{line[: longest - end - 5]} ... {line[-end:]}"
 
 
 class UnknownNameError(BnsError):
@@ -27,9 +43,14 @@ class UnknownNameError(BnsError):
         close = get_close_matches(given, self.known, n=1, cutoff=0.5)
         hint = f" Did you mean {close[0]!r}?" if close else ""
         end = f" {also}" if also else ""
-        super().__init__(
-            f"Unknown {kind} {given!r}.{hint} Available: {', '.join(self.known)}.{end}"
-        )
+        said = f"Unknown {kind} {one_line(given, 60)!r}.{hint} Available: "
+        room = LONGEST - len(said) - len(end) - len(", ... (10000 in all).")
+        listed, left = ", ".join(self.known), len(self.known)
+        if len(listed) > room:
+            listed = (
+                f"{listed[: max(room, 0)].rpartition(', ')[0]}, ... ({left} in all)"
+            )
+        super().__init__(f"{said}{listed}.{end}")
 
 
 class OutOfBoundsError(BnsError):

@@ -7,8 +7,7 @@ python examples/03_train_a_learner.py --quick  (too short to solve anything)
 import argparse
 from dataclasses import replace
 
-from bns import presets, stats
-from bns.experiment.run import train
+from bns import presets, stats, train
 
 parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
 parser.add_argument("--quick", action="store_true", help="three trials")

@@ -8,8 +8,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from bns import presets, stats
-from bns.experiment.run import train
+from bns import presets, stats, train
 from bns.storage.store import load
 from bns.viz import figures, report
 

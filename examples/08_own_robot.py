@@ -14,8 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bns import models, presets, stats
-from bns.experiment.run import train
+from bns import models, presets, stats, train
 from bns.models import check
 from bns.worlds import registry
 from bns.worlds.trial import Commands

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from bns.errors import BnsError, FormatError
+from bns.storage import reading
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect, Parameter
 
@@ -264,19 +265,25 @@ class Diagnosis:
         Raises:
             FormatError: it is something else, or of another version.
         """
-        try:
-            content = json.loads(text)
-            schema, version = content.pop("schema"), content.pop("version")
-            if (schema, version) != (SCHEMA, VERSION):
-                raise FormatError(
-                    f"This is {schema!r} version {version}; {SCHEMA!r} version "
-                    f"{VERSION} can be read."
-                )
-            content["verdict"] = Verdict(**_tuples(content["verdict"]))
-            content["fits"] = tuple(Fit(**_tuples(item)) for item in content["fits"])
-            return cls(**_tuples(content, deep=False))
-        except (KeyError, TypeError, AttributeError, json.JSONDecodeError) as error:
-            raise FormatError(f"This is no diagnosis ({error}).") from error
+        return cls.of(reading.json(text, "A diagnosis"))
+
+    @classmethod
+    def of(cls, content: Any) -> "Diagnosis":
+        """A diagnosis from what `to_json` writes, parsed.
+
+        Raises:
+            FormatError: it is something else, or of another version.
+        """
+        given = dict(content) if isinstance(content, dict) else {}
+        schema, version = given.pop("schema", None), given.pop("version", None)
+        if (schema, version) != (SCHEMA, VERSION):
+            raise FormatError(
+                f"This is {schema!r} version {version}; {SCHEMA!r} version {VERSION} "
+                "can be read."
+            )
+        for key in ("verdict", "fits", "seconds"):
+            given[key] = _numbers(given.get(key))
+        return reading.typed(given, cls, "A diagnosis")
 
 
 def plain(value: Any) -> Any:
@@ -292,10 +299,10 @@ def plain(value: Any) -> Any:
     return value
 
 
-def _tuples(content: Mapping[str, Any], deep: bool = True) -> dict[str, Any]:
-    def change(value: Any) -> Any:
-        if isinstance(value, list):
-            return tuple(change(item) if deep else item for item in value)
-        return math.nan if value is None else value
-
-    return {key: change(value) for key, value in content.items()}
+def _numbers(value: Any) -> Any:
+    """A value from JSON with NaN for null."""
+    if isinstance(value, dict):
+        return {key: _numbers(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_numbers(item) for item in value]
+    return math.nan if value is None else value

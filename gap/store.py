@@ -1,21 +1,26 @@
 """A diagnosis in a directory, and what of it can be simulated again."""
 
+import json
 from pathlib import Path
 
 from bns.errors import BnsError, FormatError, UnknownNameError
 from bns.gap.models.base import GapModel
 from bns.gap.records import Candidate, Diagnosis, Fit
+from bns.storage import files, reading, seal
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect
 
 FILE = "diagnosis.json"
+HEAD = 256 << 20  # [bytes] of it
 
 
 def save(found: Diagnosis, directory: str | Path) -> Path:
     """Write a diagnosis into a directory, which is created; gives the file."""
     directory = Path(directory)
-    directory.mkdir(parents=True, exist_ok=True)
-    (directory / FILE).write_text(found.to_json(), encoding="utf-8")
+    files.make_directory(directory)
+    content = seal.sealed(json.loads(found.to_json()))
+    text = json.dumps(content, indent=1, sort_keys=True) + "\n"
+    files.write_text(directory / FILE, text)
     return directory / FILE
 
 
@@ -26,12 +31,16 @@ def load(directory: str | Path) -> Diagnosis:
         FormatError: there is none, or it is not to be read.
     """
     path = Path(directory) / FILE
-    if not path.is_file():
+    if not path.exists():
         raise FormatError(
             f"{directory} holds no {FILE}: make one with bns gap diagnose DATA --out "
             f"{directory}."
         )
-    return Diagnosis.from_json(path.read_text(encoding="utf-8"))
+    content = seal.opened(reading.read_json(path, most=HEAD), path)
+    try:
+        return Diagnosis.of(content)
+    except FormatError as error:
+        raise FormatError(f"{path}: {error}") from error
 
 
 def parse(text: str, model: GapModel) -> Effect:

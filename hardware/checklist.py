@@ -9,6 +9,7 @@ from bns.hardware import homing
 from bns.hardware.motion import Point
 from bns.hardware.rig import Rig, battery
 
+ENOUGH = 12.0  # pictures a second, so that one that is late stops no robot
 PICTURES = 20  # looked at for rate and scatter
 
 
@@ -34,7 +35,7 @@ def report(rig: Rig, *, move: bool = False) -> Iterator[str]:
     yield f"proximity  {robot.proximity()}"
     yield f"ambient    {robot.ambient()}"
     yield from _tracking(rig)
-    yield "watchdog   running" if rig.leash else "watchdog   none (virtual time)"
+    yield "watchdog   running" if rig.watchdog else "watchdog   none (virtual time)"
     if move:
         yield from _motion(rig)
 
@@ -61,7 +62,8 @@ def _tracking(rig: Rig) -> Iterator[str]:
         f"tag        at {x:.3f}, {y:.3f} m, {np.degrees(yaw):.1f} deg; scatter "
         f"{max(spread[:2]):.2f} mm, {spread[2]:.2f} deg"
     )
-    yield f"camera     {rate:.1f} pictures a second, {late * 1e3:.0f} ms old"
+    slow = "; TOO FEW: a moving robot must be seen every 0.15 s" * (rate < ENOUGH)
+    yield f"camera     {rate:.1f} pictures a second, {late * 1e3:.0f} ms old{slow}"
 
 
 def _motion(rig: Rig) -> Iterator[str]:

@@ -1,5 +1,6 @@
 """What goes wrong on a line or in a trial, noted one by one."""
 
+import contextlib
 import json
 from collections import Counter
 from pathlib import Path
@@ -51,9 +52,13 @@ class FaultLog:
         if self.path:
             self._unwritten.append(fault)
         if self.path and self.path.parent.is_dir():
-            with open(self.path, "a", encoding="utf-8") as file:
-                file.writelines(json.dumps(f._asdict()) + "\n" for f in self._unwritten)
-            self._unwritten.clear()
+            with contextlib.suppress(OSError):  # a full disk stops no robot
+                self._write(self.path)
+
+    def _write(self, path: Path) -> None:
+        with open(path, "a", encoding="utf-8") as file:
+            file.writelines(json.dumps(f._asdict()) + "\n" for f in self._unwritten)
+        self._unwritten.clear()
 
     def __len__(self) -> int:
         return sum(self.counts.values())

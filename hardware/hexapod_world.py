@@ -1,5 +1,6 @@
 """The real hexapod as a world: one at a time, in real time."""
 
+import contextlib
 from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from bns.hardware.dynamixel import rig as rigs
 from bns.hardware.dynamixel.bus import Overload
 from bns.hardware.dynamixel.rig import HexapodRig
 from bns.hardware.dynamixel.walker import SPEED
-from bns.hardware.errors import LinkError, SafetyStop, Void
+from bns.hardware.errors import Void
 from bns.hardware.limits import Limits
 from bns.hardware.real_robot import RealRobot
 from bns.worlds import active
@@ -75,7 +76,7 @@ class HardwareHexapod(RealRobot[HexapodRig]):
             self.camera,
             calibration=self.calibration,
             servos=self.servos,
-            limits=Limits(arena=self.arena),
+            limits=Limits(arena=(self.arena[0], self.arena[1])),
             log=self.log or None,
         )
 
@@ -85,17 +86,16 @@ class HardwareHexapod(RealRobot[HexapodRig]):
         walker = rig.walker
         goals, before = told(given, stages, seed, trial)
         try:
-            volts = rigs.charged(rig.bus) if not walker.up else _lowest(rig)
-            stand = home.go(walker, self.start)
-            walker.go(before, 2.0)
-            done = walker.perform(goals, given.durations)
-            walker.rest()
+            with contextlib.ExitStack() as failed:
+                failed.callback(walker.halt)
+                volts = rigs.charged(rig.bus) if not walker.up else _lowest(rig)
+                stand = home.go(walker, self.start)
+                walker.go(before, 2.0)
+                done = walker.perform(goals, given.durations.tolist())
+                walker.rest()
+                failed.pop_all()
         except Overload as error:  # on the way home; in a trial it ends the trial
-            walker.halt()
             raise Void(error.reason) from error
-        except (SafetyStop, LinkError):
-            walker.halt()
-            raise
         conditions = stages.conditions(trial, seed) | {
             "battery": volts,
             "start": [round(float(v), 5) for v in stand.pose],

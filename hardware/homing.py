@@ -118,8 +118,9 @@ def _approach(mover: Mover, target: Sequence[float], speed: float, begin: float)
         ahead = -ahead if back else ahead
         pair = np.array([ahead - turn, ahead + turn])
         pair *= min(1.0, speed / max(np.abs(pair).max(), 1e-9))
+        now = mover.clock.now()
         mover.drive(float(pair[0]), float(pair[1]), times=1)
-        mover.clock.sleep(TICK)
+        mover.clock.sleep(TICK - (mover.clock.now() - now))
 
 
 def _turn(mover: Mover, off: float) -> None:

@@ -9,13 +9,12 @@ import numpy as np
 from bns import seeding
 from bns.errors import BnsError
 from bns.hardware import homing, records
-from bns.hardware.errors import LinkError
 from bns.hardware.limits import Limits
 from bns.hardware.rig import Rig, battery
 from bns.hardware.schedule import GRID
 from bns.hardware.steering import Rules, Steered, Steering
 from bns.hardware.world import HardwareWorld
-from bns.worlds import given
+from bns.worlds import checks
 from bns.worlds.active import Stages
 from bns.worlds.checks import bounded
 from bns.worlds.closed_loop import CYCLE, CYCLES, Policy
@@ -60,8 +59,8 @@ class HardwareLight(HardwareWorld):
         """Check the settings."""
         super().__post_init__(threads, rig)
         told = {} if self.supervisor is None else self.supervisor
-        self.supervisor = given.one(Supervisor, "supervisor", told)
-        self.field = LightField(given.several(Lamp, "lamp", self.lights), self.ambient)
+        self.supervisor = checks.one(Supervisor, "supervisor", told)
+        self.field = LightField(checks.several(Lamp, "lamp", self.lights), self.ambient)
         self._places = self.field.positions[:, :2]
         if rig is not None:
             rig.limits = self._limits()
@@ -102,11 +101,7 @@ class HardwareLight(HardwareWorld):
             stand = homing.go(mover, start, lamps=self._places, keep=keep)
             steering = self._steering(mover, stages, seed, trial, cycles, cycle)
             begin = rig.clock.now()
-            try:
-                done = steering.perform(policy)
-            except LinkError:
-                self._rig = None if rig.leash is not None else rig
-                raise
+            done = steering.perform(policy)
             about = self._about(rig, volts, float(begin), stand, done)
             conditions = stages.conditions(trial, seed) | about | self._light()
             return self._made(done, cycle, float(start[2]), conditions)

@@ -23,7 +23,7 @@ class Limits:
         speed: of a wheel over the floor [m/s].
         arena: size of the board [m], its centre the origin.
         rim: kept free along its edge while a trial goes on [m].
-        blind: longest time without a sighting while the robot moves [s].
+        blind: greatest age of the newest sighting while the robot moves [s].
         battery: lowest voltage to start a trial with [V] (two LiPo cells; assumed).
         lamps: where lamps stand on the board [m].
         lamp: a moving robot whose centre is nearer to a lamp is stopped, whatever it
@@ -33,7 +33,7 @@ class Limits:
     speed: float = 0.15
     arena: tuple[float, float] = (2.7, 1.8)
     rim: float = 0.10
-    blind: float = 0.3
+    blind: float = 0.15
     battery: float = 7.0
     lamps: tuple[tuple[float, float], ...] = ()
     lamp: float = 0.08

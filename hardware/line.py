@@ -1,11 +1,14 @@
 """The line to a robot: bytes out, bytes in, over a serial port."""
 
+import contextlib
 import errno
 import os
 from typing import Any, Protocol
 
 from bns.errors import BnsError, MissingDependencyError
 from bns.hardware.errors import LinkError
+from bns.hardware.openers import Openers
+from bns.hardware.watchdog import LARGEST, send
 
 INSTALL = 'pip install "bns-testbed[hardware]"'
 
@@ -15,6 +18,14 @@ class Line(Protocol):
 
     def write(self, data: bytes) -> None:
         """Send.
+
+        Raises:
+            LinkError: the line is dead.
+        """
+        ...
+
+    def order(self, data: bytes) -> None:
+        """Send at once, before what may still wait to be sent; never waits.
 
         Raises:
             LinkError: the line is dead.
@@ -31,6 +42,10 @@ class Line(Protocol):
 
     def discard(self) -> None:
         """Forget what has arrived."""
+        ...
+
+    def intruder(self) -> bool:
+        """Whether another program has opened the line; told once for each."""
         ...
 
     def close(self) -> None:
@@ -56,8 +71,10 @@ class SerialLine:
         check_port(port)
         try:
             self._serial = serial.Serial(
-                port, baud, timeout=0.1, write_timeout=0.3, exclusive=True
+                port, baud, timeout=0.1, write_timeout=0.05, exclusive=True
             )
+            claim(self._serial.fileno())
+            self._openers = Openers(port)
         except (OSError, ValueError) as error:  # SerialException is an OSError
             raise _explained(port, error) from error
 
@@ -72,12 +89,21 @@ class SerialLine:
         except OSError as error:
             raise self._dead(error) from error
 
+    def order(self, data: bytes) -> None:
+        """Send at once, see `Line.order`."""
+        try:
+            send(self._serial.fileno(), data)
+        except _errors() as error:
+            raise self._dead(error) from error
+
     def read(self, timeout: float) -> bytes:
         """What has arrived, see `Line.read`."""
         try:
             self._serial.timeout = max(timeout, 0.0)
             first = self._serial.read(1)
-            return first + self._serial.read(self._serial.in_waiting) if first else b""
+            if not first:
+                return b""
+            return first + self._serial.read(min(self._serial.in_waiting, LARGEST))
         except (OSError, TypeError) as error:  # TypeError: closed while reading
             raise self._dead(error) from error
 
@@ -88,8 +114,13 @@ class SerialLine:
         except _errors() as error:
             raise self._dead(error) from error
 
+    def intruder(self) -> bool:
+        """See `Line.intruder`."""
+        return self._openers.intruder()
+
     def close(self) -> None:
         """Give the port back."""
+        self._openers.close()
         self._serial.close()
 
     def _dead(self, error: BaseException) -> LinkError:
@@ -97,6 +128,22 @@ class SerialLine:
             f"The line on {self.port} is dead ({error}): check cable, power and "
             "Bluetooth; a robot that was moving may still be."
         )
+
+
+def claim(fd: int) -> None:
+    """Let no other program open a port that is open here.
+
+    It holds for programs without the administrator's rights, where the device knows of
+    it (`TIOCEXCL`); else the lock that well-behaved programs ask for is all there is.
+
+    Args:
+        fd: open file of the port.
+    """
+    import fcntl
+    import termios
+
+    with contextlib.suppress(OSError):
+        fcntl.ioctl(fd, termios.TIOCEXCL)
 
 
 def check_port(port: str) -> None:
@@ -156,4 +203,4 @@ def _pyserial() -> Any:
 def _errors() -> tuple[type[BaseException], ...]:
     import termios
 
-    return (OSError, termios.error)
+    return (OSError, termios.error, TypeError, ValueError)  # the last: closed

@@ -9,12 +9,13 @@ from bns.hardware.errors import LinkError, Void
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera.driver import Drive, Khepera3
 from bns.hardware.limits import Limits, Operator
-from bns.hardware.lookout import Lookout
+from bns.hardware.motion_check import MotionCheck
+from bns.hardware.safety_monitor import SafetyMonitor
 from bns.hardware.tracking.eyes import Eyes
 from bns.hardware.tracking.tracker import Sighting
 from bns.hardware.wheels import Following, Wheels
 
-TICK = 0.03  # s between two looks at everything
+TICK = 0.02  # s between two looks at everything
 ASTRAY = 0.018  # m that a wrong or mistimed set point may lead a wheel astray
 LATE = 0.25  # s by which a command may be late before the trial is void
 AFTER = 0.25  # s of looking on after the last command
@@ -54,7 +55,7 @@ class Performed:
     notes: list[str] = field(default_factory=list)
 
 
-class Mover(Lookout):
+class Mover(SafetyMonitor):
     """Drives a robot under the limits.
 
     Args:
@@ -87,12 +88,17 @@ class Mover(Lookout):
         self.robot, self.following = robot, following or Following()
         self.points: list[Drive] = []
         self._moving = False
+        self._check = MotionCheck()
 
     def look(self) -> list[Sighting]:
-        """New sightings, see `Lookout.look`; tells the watchdog that all is well."""
+        """New sightings, see `SafetyMonitor.look`; feeds the watchdog."""
         seen = self._seen(moving=self._moving)
-        if self._moving and self.robot.guard is not None:
-            self.robot.guard.feed(moving=True)
+        for sighting in seen:
+            stands = self._check.stands(sighting, self.following.shares)
+            if stands and self._moving:
+                self._unmoved()
+        if self._moving:
+            self.robot.alive()
         return seen
 
     def tick(self) -> None:
@@ -103,12 +109,29 @@ class Mover(Lookout):
         """Set the speeds [m/s] and remember them."""
         self._moving = self._moving or bool(left or right)
         drive = self.robot.drive(left, right, times=times)
+        self._check.told(drive.at, left, right)
         self.points = self.points[-20:]
         self.points.append(drive)
         return drive
 
+    def _unmoved(self) -> None:
+        """Stop a robot that is seen to stand; where it does stand, let it try on.
+
+        Raises:
+            Void: its wheels turn, so that the picture does not show it as it is.
+        """
+        if self.robot.paused():
+            self.faults.note("seen to stand", "tag", "wheels turn")
+            raise Void("it drives and the picture does not change")
+        self.faults.note("stands", "told to move", str(self.points[-1].units))
+        units, robot = self.points[-1].units, self.robot
+        speeds = map(robot.speed, units)
+        self.drive(*(v * f for v, f in zip(speeds, robot.wheels, strict=True)))
+        self._check.excuse()
+
     def halt(self) -> None:
         """Stop the robot, whatever happened; a dead line is left to the watchdog."""
+        self._check.told(self.clock.now(), 0.0, 0.0)  # from then on it need not move
         try:
             self.robot.stop()
         except LinkError:
@@ -133,7 +156,7 @@ class Mover(Lookout):
         stand = self.begin()
         done = Performed(sightings=[stand])
         try:
-            begin = None
+            begin: float | None = None
             for point in schedule:
                 lead = self.robot.lead(point.left, point.right)
                 if begin is not None and not self._inside(
@@ -148,6 +171,7 @@ class Mover(Lookout):
                 if point.command >= 0:
                     done.switched.append(drive.at)
             else:
+                begin = self.clock.now() if begin is None else begin
                 self._inside(begin + total - self.robot.lead(0.0, 0.0), done)
             done.switched.append(self.drive(0.0, 0.0).at)
         finally:
@@ -181,9 +205,12 @@ class Mover(Lookout):
                 done.sightings.append(sighting)
                 if ends(sighting):
                     return False
+            begin = self.clock.now()
             self._wheels.look(left)
-            left = moment - self.clock.now()
-            self.clock.sleep(min(TICK, max(left, 0.0)))
+            now = self.clock.now()
+            self.clock.sleep(
+                min(max(TICK - (now - begin), 0.0), max(moment - now, 0.0))
+            )
         return True
 
     def _inside(self, moment: float, done: Performed) -> bool:

@@ -1,16 +1,19 @@
 """Wheel odometry: what encoders and tracker together say of wheels and axle."""
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Literal
 
+import msgspec
 import numpy as np
 
 from bns.errors import BnsError, FormatError
 from bns.hardware import homing
 from bns.hardware.motion import Mover, Point
 from bns.models.khepera3.units import WHEEL_DIAMETER
+from bns.storage import files, reading, seal
+from bns.storage.numbers import Least, Positive
 from bns.worlds.trial import body_displacements
 
 NOMINAL_AXLE = 0.0884  # m (khepera3toolbox, Sim.I.am)
@@ -45,8 +48,7 @@ class Wheels:
 
     def write(self, path: Path | str) -> None:
         """Save as JSON."""
-        text = json.dumps({"format": "bns-wheels", **asdict(self)}, indent=1)
-        Path(path).write_text(text + "\n", encoding="utf-8")
+        files.write_json(path, {"format": "bns-wheels", **asdict(self)})
 
     @classmethod
     def read(cls, path: Path | str) -> "Wheels":
@@ -55,24 +57,27 @@ class Wheels:
         Raises:
             FormatError: there is none, or it is something else.
         """
-        try:
-            held = json.loads(Path(path).read_text(encoding="utf-8"))
-            if held.pop("format") != "bns-wheels":
-                raise KeyError("format")
-            error = tuple(float(v) for v in held.pop("error"))
-            made = cls(**{k: float(v) for k, v in held.items()}, error=error)
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as cause:
-            raise FormatError(
-                f"{path} is no calibration of wheels ({cause}): make one with "
-                "`bns hardware calibrate --what wheels --move`."
-            ) from cause
-        for factor in made.factors:
+        todo = "Make one with `bns hardware calibrate --what wheels --move`."
+        content = seal.opened(reading.read_json(path), path)
+        held = reading.typed(content, Sizes, path, todo=todo)
+        made = cls(left=held.left, right=held.right, axle=held.axle, error=held.error)
+        for factor in (*made.factors, made.axle / NOMINAL_AXLE):
             if not 1 - OFF <= factor <= 1 + OFF:
                 raise FormatError(
-                    f"{path}: a wheel is {factor:.2f} times its nominal size; measure "
-                    "again."
+                    f"{path}: a wheel or the axle is {factor:.2f} times its nominal "
+                    "size; measure again."
                 )
         return made
+
+
+class Sizes(msgspec.Struct, forbid_unknown_fields=True):
+    """The file of wheels [m], see `Wheels`."""
+
+    format: Literal["bns-wheels"]
+    left: Positive
+    right: Positive
+    axle: Positive
+    error: tuple[Least, Least, Least]
 
 
 def fit(ways: np.ndarray, moved: np.ndarray) -> Wheels:

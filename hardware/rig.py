@@ -8,13 +8,13 @@ from bns.hardware.clock import Clock, RealClock
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera import protocol
 from bns.hardware.khepera.driver import Khepera3
-from bns.hardware.leash import Leash
 from bns.hardware.limits import Limits, Operator
 from bns.hardware.line import Line, SerialLine, check_port
 from bns.hardware.motion import Mover
 from bns.hardware.odometry import Wheels
 from bns.hardware.priority import urgent
 from bns.hardware.tracking.eyes import Eyes
+from bns.hardware.watchdog_client import WatchdogClient
 from bns.hardware.wheels import Following
 
 EMULATED = "emulated"
@@ -33,7 +33,7 @@ class Rig:
         operator: who may stop it.
         faults: what went wrong so far.
         line: to the robot.
-        leash: to the watchdog; None in virtual time.
+        watchdog: to the watchdog; None in virtual time.
         following: how the wheels follow, as far as was seen.
     """
 
@@ -44,7 +44,7 @@ class Rig:
     operator: Operator
     faults: FaultLog
     line: Line
-    leash: Leash | None = None
+    watchdog: WatchdogClient | None = None
     following: Following = field(default_factory=Following)
 
     def mover(self) -> Mover:
@@ -62,8 +62,8 @@ class Rig:
     def close(self) -> None:
         """Give port and camera back; the robot stands."""
         self.eyes.close()
-        if self.leash is not None:
-            self.leash.release()
+        if self.watchdog is not None:
+            self.watchdog.release()
         self.line.close()
 
 
@@ -102,15 +102,15 @@ def connect(
         battery(robot, limits)
         eyes = look(port, camera, calibration)
         try:
-            leash = Leash(line.fileno(), port, protocol.BAUD, "khepera3")
+            watchdog = WatchdogClient(line.fileno(), port, protocol.BAUD, "khepera3")
         except BnsError:
             eyes.close()
             raise
     except BnsError:
         line.close()
         raise
-    robot.guard = leash
-    return Rig(robot, eyes, clock, limits, Operator(), faults, line, leash)
+    robot.guard = watchdog
+    return Rig(robot, eyes, clock, limits, Operator(), faults, line, watchdog)
 
 
 def battery(robot: Khepera3, limits: Limits) -> float:

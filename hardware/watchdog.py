@@ -5,13 +5,15 @@
 
 It holds the open port (`fd`) as well as the process that drives. Bytes on its standard
 input feed it: `m` the robot moves (another byte has to come within the silence), `i` it
-stands, `q` all is done. Silence while moving, or the end of the input at any time (the
-driving process is gone, however it died), makes it send the stop until the robot has
-acknowledged it twice; where the line is dead it opens the port anew, for as long as its
-patience lasts. It says what it does in lines on its standard output.
+stands, `q` all is done. Each time it is fed it answers with the line `BEAT`, by which
+the driving process knows that it is watched. Silence while moving, or the end of the
+input at any time (the driving process is gone, however it died), makes it send the stop
+order until the robot has acknowledged it, see `bns.hardware.stop_order`; where the line
+is dead it opens the port anew, for as long as its patience lasts. It says what it does
+in lines on its standard output.
 
 Little but the standard library is imported, and Ctrl-C and hang-ups are ignored, so it
-starts fast and outlives the terminal.
+starts fast and outlives the terminal. All times are monotonic.
 """
 
 import argparse
@@ -25,16 +27,11 @@ import time
 import tty
 
 from bns.hardware.priority import urgent
+from bns.hardware.stop_order import KINDS, StopOrder, insist, order_for
 
-KINDS = {
-    "khepera3": (b"D,l0,l0\n", b"d"),
-    # broadcast WRITE, torque enable (24) = 0; servos do not answer a broadcast
-    "phantomx": (b"\xff\xff\xfe\x04\x03\x18\x00\xe2", b""),
-}
-"""kind of robot -> what stops it, and how the acknowledgement begins (empty: none)"""
-
-ANSWER = 0.12  # s to wait for the acknowledgement
+BEAT = "."
 SPEEDS = {115200: termios.B115200, 1000000: termios.B1000000, 57600: termios.B57600}
+LARGEST = 4096  # bytes read at once
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -43,7 +40,10 @@ def main(argv: list[str] | None = None) -> int:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     urgent()
-    dog = Watchdog(given.fd, given.port, given.baud, given.stop, given.patience)
+    os.set_blocking(given.fd, False)
+    os.set_blocking(1, False)
+    order = order_for(given.stop, given.servo)
+    dog = Watchdog(given.fd, given.port, given.baud, order, given.patience)
     _say("ready")
     moving = False
     while True:
@@ -59,76 +59,70 @@ def main(argv: list[str] | None = None) -> int:
         if b"q" in data:
             return 0
         moving = data[-1:] == b"m"
+        _write(f"{BEAT}\n")
 
 
 class Watchdog:
     """Sends the stop on a port.
 
     Args:
-        fd: open file of the port.
+        fd: open file of the port, not blocking.
         port: device, to open anew where the line is dead.
         baud: bits per second.
-        kind: key of `KINDS`.
+        order: that stops the robot.
         patience: how long to try [s].
     """
 
-    def __init__(self, fd: int, port: str, baud: int, kind: str, patience: float):
-        self.fd, self.port, self.baud, self.patience = fd, port, baud, patience
-        self.command, self.answer = KINDS[kind]
+    def __init__(
+        self, fd: int, port: str, baud: int, order: StopOrder, patience: float
+    ) -> None:
+        self.fd, self.port, self.baud = fd, port, baud
+        self.order, self.patience = order, patience
+        self._tries = 0
 
     def stop(self, why: str) -> bool:
-        """Stop the robot; whether the stop got through."""
-        begin = time.monotonic()
+        """Stop the robot; whether it has acknowledged the order."""
+        begin, self._tries = time.monotonic(), 0
+        self._try_to_write()  # before a word is said
         _say(f"stopping: {why}")
-        done, tries = 0, 0
-        while time.monotonic() - begin < self.patience:
-            tries += 1
+        while (left := begin + self.patience - time.monotonic()) > 0:
             try:
-                done = done + 1 if self._once() else 0
-            except OSError:
-                done = 0
+                if insist(
+                    self.order, self._write, self._read, time.monotonic, patience=left
+                ):
+                    took = time.monotonic() - begin
+                    _say(f"stopped after {took:.3f} s, {self._tries} tries")
+                    return True
+            except (OSError, termios.error):
                 self._reopen()
-            if done == (2 if self.answer else 3):
-                _say(f"stopped after {time.monotonic() - begin:.3f} s, {tries} tries")
-                return True
-        _say(f"no stop got through in {self.patience:g} s")
+        _say(f"no stop was acknowledged in {self.patience:g} s")
         return False
 
-    def _once(self) -> bool:
-        if self.fd < 0:
-            raise OSError("the port is not there")
-        self._drain(0.0)
-        if self.answer:
-            os.write(self.fd, b"\n")  # ends a line that was cut
-            self._drain(0.02)
-        os.write(self.fd, self.command)
-        if not self.answer:
-            time.sleep(0.005)
-            return True
-        heard, until = b"", time.monotonic() + ANSWER
-        while (left := until - time.monotonic()) > 0:
-            if not select.select([self.fd], [], [], left)[0]:
-                break
-            heard += self._read()
-            if any(line.strip() == self.answer for line in heard.split(b"\n")[:-1]):
-                return True
-        return False
+    def _try_to_write(self) -> None:
+        with contextlib.suppress(OSError, termios.error):
+            self._write(self.order.command)
 
-    def _drain(self, seconds: float) -> None:
-        while select.select([self.fd], [], [], seconds)[0]:
-            self._read()
+    def _write(self, data: bytes) -> None:
+        self._tries += 1
+        send(self.fd, data)
 
-    def _read(self) -> bytes:
-        data = os.read(self.fd, 4096)
+    def _read(self, seconds: float) -> bytes:
+        if not select.select([self.fd], [], [], seconds)[0]:
+            return b""
+        try:
+            data = os.read(self.fd, LARGEST)
+        except BlockingIOError:  # somebody else has read it
+            return b""
         if not data:
             raise OSError("the line is dead")
         return data
 
     def _reopen(self) -> None:
         """Take the port again, once it is there."""
-        time.sleep(0.05)
-        with contextlib.suppress(OSError):
-            os.close(self.fd)
+        time.sleep(0.02)
+        if self.fd >= 0:
+            with contextlib.suppress(OSError):
+                os.close(self.fd)
         self.fd = -1
         try:
             self.fd = os.open(self.port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
@@ -143,9 +137,31 @@ class Watchdog:
             self.fd = -1
 
 
+def send(fd: int, data: bytes) -> None:
+    """Write to a port at once, before what may still wait there to be sent.
+
+    Args:
+        fd: open file of the port.
+        data: a few bytes.
+
+    Raises:
+        OSError: the line is dead.
+    """
+    if fd < 0:
+        raise OSError("the port is not there")
+    if not select.select([], [fd], [], 0.0)[1]:
+        termios.tcflush(fd, termios.TCOFLUSH)
+    with contextlib.suppress(BlockingIOError):  # written again in a moment
+        os.write(fd, data)
+
+
 def _say(text: str) -> None:
+    _write(f"{time.monotonic():.4f} {text}\n")
+
+
+def _write(text: str) -> None:
     with contextlib.suppress(OSError):
-        os.write(1, f"{time.monotonic():.4f} {text}\n".encode())
+        os.write(1, text.encode())
 
 
 def _arguments(argv: list[str] | None) -> argparse.Namespace:
@@ -153,8 +169,9 @@ def _arguments(argv: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--fd", type=int, required=True)
     parser.add_argument("--port", required=True)
     parser.add_argument("--baud", type=int, required=True)
-    parser.add_argument("--stop", choices=sorted(KINDS), required=True)
-    parser.add_argument("--silence", type=float, default=0.3)
+    parser.add_argument("--stop", choices=KINDS, required=True)
+    parser.add_argument("--servo", type=int, default=1)
+    parser.add_argument("--silence", type=float, required=True)
     parser.add_argument("--patience", type=float, default=60.0)
     return parser.parse_args(argv)
 

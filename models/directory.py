@@ -3,9 +3,10 @@
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from bns.errors import BnsError
+from bns.storage import files as writing
 
 DIGITS = 5  # of what is computed
 
@@ -55,12 +56,26 @@ def make(directory: Path, files: Mapping[str, str]) -> None:
     Raises:
         BnsError: it cannot be written.
     """
-    try:
-        directory.mkdir(parents=True)
+
+    def fill(temporary: Path) -> None:
+        temporary.mkdir()
         for name, content in files.items():
-            (directory / name).write_text(content, encoding="utf-8")
-    except OSError as error:
-        raise BnsError(f"{directory} cannot be written: {error.strerror}.") from error
+            writing.write_text(temporary / name, content)
+
+    writing.make_directory(directory.parent)
+    writing.replace(directory, fill)
+
+
+@overload
+def short(value: float) -> float: ...
+
+
+@overload
+def short(value: list[float]) -> list[float]: ...
+
+
+@overload
+def short(value: float | list[float]) -> float | list[float]: ...
 
 
 def short(value: float | list[float]) -> float | list[float]:

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from bns.errors import FormatError, UnknownNameError
+from bns.errors import UnknownNameError
+from bns.models import mjcf
 from bns.models.robot_model import RobotModel
 
 
@@ -18,18 +19,13 @@ def load(
         UnknownNameError: an option or alternative that the robot does not offer.
         FormatError: a file that is missing or that MuJoCo cannot read.
     """
-    import mujoco
-
     for name, value in options.items():
         if name not in robot.options:
             raise UnknownNameError(f"option of {robot.name}", name, robot.options)
         if value not in robot.options[name].headings:
             raise UnknownNameError(name, value, robot.options[name].headings)
     file = robot.scene if scene else robot.xml
-    try:
-        spec = mujoco.MjSpec.from_file(str(file))
-    except ValueError as error:
-        raise FormatError(f"MuJoCo cannot read {file}: {error}") from error
+    spec = mjcf.load(file)
     for name, value in options.items():
         for site, heading in robot.options[name].headings[value].items():
             _look(spec.site(site), np.radians(heading))

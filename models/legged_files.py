@@ -13,9 +13,9 @@ from bns.errors import BnsError
 from bns.models import ax12a, servo_numbers, stance
 from bns.models.directory import make, named, short, text, texts
 from bns.models.joint_numbers import joint_numbers
-from bns.models.legged_masses import masses
-from bns.models.legged_shapes import looks, pairs, shapes
+from bns.models.legged_body import looks, masses, pairs, shapes
 from bns.models.new_legged import AX12A, CLEAR, Legged
+from bns.storage import reading
 
 FILES = {
     "{name}.xml": "legged.xml.jinja",
@@ -74,7 +74,7 @@ def write(directory: Path, known: Legged) -> None:
     content["home"] = _home(known, content)
     files = texts(name, FILES, content)
     if known.servo != AX12A:
-        files[servo_numbers.LAW] = Path(known.servo).read_text(encoding="utf-8")
+        files[servo_numbers.LAW] = reading.read_text(known.servo)
     make(directory, files)
 
 

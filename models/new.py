@@ -10,8 +10,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from bns.errors import BnsError
-from bns.models import solids
 from bns.models.directory import make, named, short, texts
+from bns.models.legged_body import box
 
 GRAVITY = 9.81  # [m/s2]
 FRICTION = 0.8  # rubber on a board; assumed
@@ -71,7 +71,7 @@ class Wheeled:
     light_sensors: bool = False
     """eight of them around the body, for the world `light`"""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in (*NEEDED, *OPTIONAL):
             value = getattr(self, name)
             if not math.isfinite(value) or value < 0 or not (value or name in OPTIONAL):
@@ -115,9 +115,9 @@ def _numbers(known: Wheeled) -> dict[str, float | list[float]]:
     body, spin = known.mass - 2 * wheel, wheel * radius**2 / 2
     felt = known.mass / 2 * radius**2  # by one wheel, when the robot speeds up
     ball = BALL * radius
-    made = {
+    made: dict[str, float | list[float]] = {
         "body_mass": body,
-        "inertia": solids.box(body, known.box),
+        "inertia": box(body, known.box),
         "centre_of_mass": [-BACK * length, 0.0, UP * height],
         "wheel_mass": wheel,
         "wheel_spin_inertia": spin,
@@ -130,7 +130,7 @@ def _numbers(known: Wheeled) -> dict[str, float | list[float]]:
         "servo_gain": (felt * (1 + ROTOR) + spin) / RISE,
         "armature": ROTOR * felt,
     }
-    exact = {
+    exact: dict[str, float | list[float]] = {
         "wheel_speed_limit": known.top_speed / radius,
         "wheel_friction": FRICTION,
         "half_axle": known.axle_length / 2,
@@ -154,7 +154,7 @@ def _looks(known: Wheeled) -> dict[str, float | list[float]]:
     """What only shows: half sizes, places, the camera."""
     length, width, height = known.box
     low, size = 0.5 * known.wheel_radius, max(length, known.axle_length, height)
-    made = {
+    made: dict[str, float | list[float]] = {
         "tyre": known.wheel_radius / 6,
         "lens": 0.02 * known.axle_length,
         "box": [length / 2, width / 2, (height - low) / 2],

@@ -90,7 +90,7 @@ class Legged:
     servo: str = AX12A
     """ax12a, or a file with the law of other servos, see docs/your_robot.md"""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.legs not in COUNTS:
             raise BnsError(
                 f"legs = {self.legs} is not possible: legs stand in pairs, two feet do "

@@ -13,17 +13,29 @@ Each robot directory holds a `numbers.toml` with one table per number:
 is multiplied by there. A test compares the two.
 """
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+import msgspec
 import numpy as np
 
 from bns.errors import FormatError
+from bns.storage import reading
+from bns.storage.numbers import Finite
 
-BASES = ("published", "derived", "calibrated", "assumed")
+Basis = Literal["published", "derived", "calibrated", "assumed"]
+
+
+class Table(msgspec.Struct, forbid_unknown_fields=True):
+    """A number in the file."""
+
+    value: Finite | list[Finite]
+    unit: str
+    basis: Basis
+    source: str
+    at: dict[str, Finite]
 
 
 @dataclass(frozen=True)
@@ -85,15 +97,8 @@ def read(directory: Path) -> dict[str, Number]:
         FormatError: the file is not TOML, an entry is missing, a basis is unknown.
     """
     file = directory / "numbers.toml"
-    try:
-        tables = tomllib.loads(file.read_text(encoding="utf-8"))
-        found = {name: Number(name=name, **table) for name, table in tables.items()}
-    except (tomllib.TOMLDecodeError, TypeError) as error:
-        raise FormatError(f"{file} is not a table of numbers: {error}.") from error
-    for number in found.values():
-        if number.basis not in BASES:
-            raise FormatError(
-                f"{file}: basis {number.basis!r} of {number.name} is not one of "
-                f"{', '.join(BASES)}."
-            )
-    return found
+    tables = reading.tables(reading.read_toml(file), Table, file)
+    return {
+        name: Number(name, t.value, t.unit, t.basis, t.source, t.at)
+        for name, t in tables.items()
+    }

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from bns.errors import MissingDependencyError, UnknownNameError
+from bns.storage import files
 
 PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
 """Debian packages that rendering without a display needs"""
@@ -65,7 +66,7 @@ def picture(
     if path is not None:
         from matplotlib.image import imsave
 
-        imsave(path, pixels)
+        files.replace(path, lambda beside: imsave(beside, pixels))
     return pixels
 
 

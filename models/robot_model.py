@@ -1,14 +1,16 @@
 """What a robot model is to the rest of the project: `RobotModel`."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from bns.errors import FormatError
+from bns.storage import reading
+from bns.storage.numbers import Finite, Name, Positive
 
 FACTS = "robot.toml"
 
@@ -58,6 +60,53 @@ class Option(NamedTuple):
     doc: str
     default: str
     headings: Mapping[str, Mapping[str, float]]
+
+
+class CommandTable(msgspec.Struct, forbid_unknown_fields=True):
+    """A command in the file, see `CommandChannel`."""
+
+    name: Name
+    unit: str
+    low: Finite
+    high: Finite
+    actuator: Name
+
+
+class WheelTable(msgspec.Struct, forbid_unknown_fields=True):
+    """A wheel in the file, see `Wheel`."""
+
+    body: Name
+    joint: Name
+    geom: Name
+    actuator: Name
+
+
+class OptionTable(msgspec.Struct, forbid_unknown_fields=True):
+    """An option in the file, see `Option`."""
+
+    doc: str
+    default: str
+    headings: dict[str, dict[str, Finite]]
+
+
+class Facts(msgspec.Struct, forbid_unknown_fields=True):
+    """The file, see `RobotModel`."""
+
+    kind: str
+    doc: str
+    commands: list[CommandTable]
+    base_body: str
+    base_joint: str
+    tracker_site: str
+    picture: str
+    ctrl_per_command: Positive | None = None
+    nominal_wheel_radius: Positive | None = None
+    sensor_sites: list[str] = []
+    light: dict[str, Finite | str] = {}
+    wheels: dict[str, WheelTable] = {}
+    caster_geom: str = ""
+    options: dict[str, OptionTable] = {}
+    servo: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,19 +190,28 @@ def read(directory: Path) -> RobotModel:
         FormatError: it is not TOML, or an entry is missing or unknown.
     """
     file = directory / FACTS
-    try:
-        facts = tomllib.loads(file.read_text(encoding="utf-8"))
-        facts["commands"] = tuple(CommandChannel(**c) for c in facts["commands"])
-        wheels = facts.get("wheels", {})
-        facts["wheels"] = {side: Wheel(**wheel) for side, wheel in wheels.items()}
-        options = facts.get("options", {})
-        facts["options"] = {name: Option(**item) for name, item in options.items()}
-        facts["sensor_sites"] = tuple(facts.get("sensor_sites", ()))
-        if "nominal_wheel_radius" in facts:
-            facts["ctrl_per_command"] = 1.0 / facts.pop("nominal_wheel_radius")
-        return RobotModel(name=directory.resolve().name, directory=directory, **facts)
-    except (tomllib.TOMLDecodeError, KeyError, TypeError) as error:
+    todo = "Compare it with that of another robot."
+    said = reading.typed(reading.read_toml(file), Facts, file, todo=todo)
+    facts = msgspec.structs.asdict(said)
+    radius = facts.pop("nominal_wheel_radius")
+    if (radius is None) == (said.ctrl_per_command is None):
         raise FormatError(
-            f"{file} does not describe a robot ({error}); compare it with that of "
-            "another robot."
-        ) from error
+            f"{file} needs one of ctrl_per_command and nominal_wheel_radius. {todo}"
+        )
+    for command in said.commands:
+        if not command.low < command.high:
+            raise FormatError(f"{file}: {command.name} needs low < high.")
+    names = [command.name for command in said.commands]
+    if len(set(names)) < len(names) or not names:
+        raise FormatError(f"{file} lists no command, or one twice.")
+    facts["ctrl_per_command"] = 1.0 / radius if radius else said.ctrl_per_command
+    facts["commands"] = tuple(_named(CommandChannel, c) for c in said.commands)
+    facts["wheels"] = {side: _named(Wheel, w) for side, w in said.wheels.items()}
+    facts["options"] = {name: _named(Option, o) for name, o in said.options.items()}
+    facts["sensor_sites"] = tuple(said.sensor_sites)
+    return RobotModel(name=directory.resolve().name, directory=directory, **facts)
+
+
+def _named(kind: type[Any], table: msgspec.Struct) -> Any:
+    """A table of the file as the tuple that it is elsewhere."""
+    return kind(**msgspec.structs.asdict(table))

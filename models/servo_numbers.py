@@ -4,33 +4,40 @@ One table per number, with value, unit, basis and source; where a number is unce
 `low` and `high` say between what it may lie.
 """
 
-import tomllib
-from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
+
+import msgspec
 
 from bns.errors import FormatError
-from bns.models.numbers import BASES
+from bns.models.numbers import Basis
+from bns.storage import reading
+from bns.storage.numbers import Finite
 
 LAW = "law.toml"
 
 
+class Table(msgspec.Struct):
+    """A number in the file."""
+
+    value: Finite
+    unit: str
+    basis: Basis
+    source: str
+    low: Finite | None = None
+    high: Finite | None = None
+
+
 @cache
-def _tables(file: Path) -> dict[str, Mapping[str, Any]]:
-    try:
-        tables = tomllib.loads(file.read_text(encoding="utf-8"))
-        bare = [
-            name
-            for name, table in tables.items()
-            if table["basis"] not in BASES or not (table["source"] and table["unit"])
-        ]
-        for table in tables.values():
-            float(table["value"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise FormatError(f"{file} is not a table of numbers: {error}.") from error
-    if bare:
-        raise FormatError(f"{file}: {bare[0]} lacks a basis, source or unit.")
+def _tables(file: Path) -> dict[str, Table]:
+    tables = reading.tables(reading.read_toml(file), Table, file)
+    for name, table in tables.items():
+        if not (table.source and table.unit):
+            raise FormatError(f"{file}: {name} lacks a source or unit.")
+        if (table.low is None) != (table.high is None):
+            raise FormatError(f"{file}: {name} needs both low and high, or none.")
+        if table.low is not None and not table.low <= table.value <= table.high:
+            raise FormatError(f"{file}: {name} is not between its low and high.")
     return tables
 
 
@@ -52,7 +59,7 @@ def read(file: Path) -> dict[str, float]:
     Raises:
         FormatError: the file is not as it should be.
     """
-    return {name: float(table["value"]) for name, table in _tables(file).items()}
+    return {name: table.value for name, table in _tables(file).items()}
 
 
 def uncertain(directory: Path) -> dict[str, tuple[float, float]]:
@@ -62,7 +69,7 @@ def uncertain(directory: Path) -> dict[str, tuple[float, float]]:
         FormatError: the file is not as it should be.
     """
     return {
-        name: (float(table["low"]), float(table["high"]))
+        name: (table.low, table.high)
         for name, table in _tables(directory / LAW).items()
-        if "low" in table
+        if table.low is not None and table.high is not None
     }

@@ -10,6 +10,7 @@ from bench import runner
 from bench.result import Result
 from bench.runner import Bench, discover, measure, plain, store, stored
 from bench.table import page, table
+from bns.errors import BnsError
 from tests.sources import ROOT
 
 MODULES = sorted((ROOT / "bench").glob("*.py"))
@@ -78,10 +79,29 @@ def test_a_row_holds_everything(small, capsys):
 
 
 def test_a_quick_row_never_replaces_a_full_one(small, tmp_path):
-    store(measure(small, quick=False), tmp_path)
+    store({**measure(small, quick=False), "commit": "abc"}, tmp_path)
     store({**measure(small, quick=True), "figure": 9.0}, tmp_path)
     assert stored(directory=tmp_path)["small"]["figure"] == 1.05
     assert stored(quick=True, directory=tmp_path)["small"]["figure"] == 9.0
+
+
+def test_a_full_row_of_code_that_no_commit_has_is_not_kept(small, tmp_path):
+    row = measure(small, quick=False)
+    with pytest.raises(BnsError, match="not kept"):
+        store({**row, "commit": "abc-dirty"}, tmp_path)
+    store({**row, "commit": "abc-dirty", "quick": True}, tmp_path)
+    assert not stored(directory=tmp_path)
+
+
+def test_a_row_has_the_commit_and_seconds_of_what_it_read(small, monkeypatch):
+    result = Result(
+        figure=1.0, unit="x", holds=None, n=1, commits=("1" * 40, "2" * 40 + "+"),
+        seconds=99.0,
+    )  # fmt: skip
+    monkeypatch.setattr(Bench, "run", lambda self, *, quick: result)
+    row = measure(small, quick=False)
+    assert row["commit"] == f"{'1' * 12}, {'2' * 12}-dirty"
+    assert row["seconds"] == 99.0
 
 
 def test_the_table_has_every_bench_measured_or_not(small):
@@ -126,5 +146,6 @@ def test_the_exit_code_tells_whether_the_bar_holds(
     monkeypatch.setattr(Bench, "run", lambda self, *, quick: result)
     monkeypatch.setattr(command, "find", lambda name: small)
     monkeypatch.setattr(command, "store", lambda row: runner.store(row, tmp_path))
+    monkeypatch.setattr(runner, "commit", lambda: "abc")
     assert command.main(["small"]) == code
     assert json.loads(capsys.readouterr().out)["holds"] is holds

@@ -1,17 +1,11 @@
 """The layout under which a recording opens."""
 
+from collections.abc import Sequence
+
+from bns.tasks import Picture
+
 LIVE_TIMELINE, TRIAL_TIMELINE = "sim_time", "trial"
 """Time within the trials shown [s]; number of the trial."""
-
-CHARTS = (
-    ("charts/fitness", "Fitness over trials (log10, lower is better; brown: damaged)"),
-    ("charts/diversity", "Diversity of the population over trials"),
-    ("charts/snn_error", "SNN position error over trials [mm per command]"),
-)
-"""Static bar charts over trials: entity and title."""
-
-WALKED = "Distance walked over trials [m] (brown: damaged)"
-"""Title of the first chart where the robot walks."""
 
 CURVES = (
     ("curves/fitness", "Fitness"),
@@ -28,40 +22,37 @@ BACKGROUND = (27, 30, 36)
 
 
 def blueprint(
-    half_width: float,
-    half_depth: float,
+    shown: Picture,
     *,
     seconds: float = 0.0,
     follow: bool = False,
     readings: bool = False,
-    walks: bool = False,
+    charts: Sequence[tuple[str, str]] = (),
 ):
     """The layout: the world on the left, learning on the right.
 
     The camera looks from the front (negative y) down on a board of the given size.
 
     Args:
-        half_width: half the extent of what matters along x [m].
-        half_depth: the same along y [m].
+        shown: what is shown of the task.
         seconds: length of what is shown on `sim_time` [s]; 0 = not known.
         follow: open on the timeline `trial` and follow its end (live streams).
         readings: show what light sensors read.
-        walks: the robot has legs: no wheels' speeds, and distances for fitness.
+        charts: static bar charts over trials, entity and title.
     """
     import rerun.blueprint as rrb
 
-    world = _world(rrb, half_width, half_depth)
-    seen = [] if walks else [_wheels(rrb, seconds)]
+    world = _world(rrb, *shown.extent)
+    seen = [_wheels(rrb, seconds)] if shown.wheels else []
     seen += [_readings(rrb, seconds)] if readings else []
     left = _left(rrb, world, seconds, seen)
-    titles = dict(CHARTS) | ({CHARTS[0][0]: WALKED} if walks else {})
     curves = rrb.Vertical(
         *(_curve(rrb, path, name) for path, name in CURVES),
         name="Curves (choose the timeline 'trial')",
     )
     right = rrb.Tabs(
         rrb.Vertical(
-            *(_bars(rrb, path, name) for path, name in titles.items()),
+            *(_bars(rrb, path, name) for path, name in charts),
             name="Over trials",
         ),
         curves,

@@ -9,6 +9,7 @@ from bns.campaign.settings import shortened, text
 from bns.errors import BnsError
 from bns.stats import bootstrap
 from bns.stats.compare import MEASURES, values
+from bns.storage import files
 from bns.viz import style
 
 MOST_CURVES = 7
@@ -21,14 +22,14 @@ def write(found: Results, folder: Path, measure: str) -> list[Path]:
     Raises:
         BnsError: there are no runs yet.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    files.make_directory(folder)
     made = []
     for name, figure in (
         ("curves.png", curves(found)),
         ("sensitivity.png", sensitivity(found, measure)),
     ):
         if figure is not None:
-            figure.savefig(folder / name)
+            files.replace(folder / name, figure.savefig)
             made.append(folder / name)
     if not made:
         raise BnsError(f"{found.store.directory} has no runs yet: let it run.")

@@ -5,12 +5,17 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bns.experiment.record import RunRecord
+from bns.tasks import Picture
+from bns.tasks import registry as tasks
 from bns.viz import style
 from bns.viz.blueprint import TRIAL_TIMELINE
 from bns.viz.choices import Choice
 
 MILLIMETRES = 1000.0
 DEGREES = 180.0 / np.pi
+
+FITNESS, DIVERSITY = "charts/fitness", "charts/diversity"
+SNN_ERROR = "charts/snn_error"
 
 _CURVES = {
     "curves/fitness/tried_in_the_world": (
@@ -48,16 +53,10 @@ def log_bars(stream, record: RunRecord, replicate: int, chosen: Sequence[Choice]
     """
     import rerun as rr
 
-    fitness = np.log10(np.maximum(record["fitness"][replicate], 1.0))
-    if "distance" in record.columns:  # walking: higher is better
-        fitness = record["distance"][replicate]
-    error = np.hypot(record["snn_forward"], record["snn_left"])[replicate]
-    values = {
-        "charts/fitness": fitness,
-        "charts/diversity": record["diversity_41"][replicate],
-        "charts/snn_error": error * MILLIMETRES,
-    }
-    for path, series in values.items():
+    columns = {name: values[replicate] for name, values in record.columns.items()}
+    shown = tasks.of(record.config).picture
+    for path, _ in chart_titles(columns, shown):
+        series = _bar_values(path, columns, shown)
         for name, colour, member in _groups(record, replicate, chosen):
             bars = np.where(member, np.nan_to_num(series), 0.0)
             stream.log(
@@ -65,6 +64,29 @@ def log_bars(stream, record: RunRecord, replicate: int, chosen: Sequence[Choice]
                 rr.BarChart(bars, color=style.rgb(colour)),
                 static=True,
             )
+
+
+def chart_titles(
+    columns: Mapping[str, np.ndarray], shown: Picture
+) -> list[tuple[str, str]]:
+    """The charts that a record's columns allow: entity and title."""
+    found = [(FITNESS, shown.curve.chart)]
+    if "diversity_41" in columns:
+        found.append((DIVERSITY, "Diversity of the population over trials"))
+    if "snn_forward" in columns:
+        found.append((SNN_ERROR, "SNN position error over trials [mm per command]"))
+    return found
+
+
+def _bar_values(
+    path: str, columns: Mapping[str, np.ndarray], shown: Picture
+) -> np.ndarray:
+    if path == DIVERSITY:
+        return columns["diversity_41"]
+    if path == SNN_ERROR:
+        return np.hypot(columns["snn_forward"], columns["snn_left"]) * MILLIMETRES
+    values = columns[shown.curve.column]
+    return np.log10(np.maximum(values, 1.0)) if shown.curve.log else values
 
 
 def _groups(record: RunRecord, replicate: int, chosen: Sequence[Choice]):
@@ -104,5 +126,7 @@ def send_curves(stream, numbers: np.ndarray, columns: Mapping[str, np.ndarray]):
 
     index = [rr.TimeColumn(TRIAL_TIMELINE, sequence=numbers)]
     for path, (column, factor, *_) in _CURVES.items():
+        if column not in columns:
+            continue
         values = np.asarray(columns[column]) * factor
         stream.send_columns(path, index, rr.Scalars.columns(scalars=values))

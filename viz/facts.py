@@ -88,8 +88,9 @@ def sentences(record: RunRecord, facts: Facts) -> list[str]:
     """What was run and what happened, in plain sentences."""
     config = record.config
     runs = "One run" if facts.runs == 1 else f"{facts.runs} runs"
+    name = scene.picture(config).name
     found = [
-        f"{runs} of the {scene.task(config)} task by a {config.world.robot} in the "
+        f"{runs} of the {name} task by a {config.world.robot} in the "
         f"{config.world.name} world, {facts.trials} trials each.",
         _solving(facts),
     ]
@@ -138,7 +139,7 @@ def _recovering(facts: Facts) -> str:
 
 def rows(record: RunRecord, facts: Facts) -> list[tuple[str, str, str]]:
     """The table of key figures: name, value, explanation."""
-    meaning = scene.meaning(record.config)
+    meaning = scene.picture(record.config).solved
     found = [
         (
             "Solved" + ("" if facts.onset is None else " before damage"),
@@ -166,7 +167,9 @@ def rows(record: RunRecord, facts: Facts) -> list[tuple[str, str, str]]:
 
 
 def _errors(record: RunRecord, facts: Facts) -> list[tuple[str, str, str]]:
-    """SNN error at the moments that matter."""
+    """SNN error at the moments that matter, where a learner has one."""
+    if "snn_forward" not in record.columns:
+        return []
     moments = [("in the first trial", 0), ("in the last trial", record.trials - 1)]
     if facts.onset is not None:
         at = facts.onset

@@ -5,6 +5,7 @@ What goes wrong here is said once and never stops the run.
 
 import logging
 import os
+import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -15,7 +16,7 @@ from bns.experiment.config import RunConfig
 from bns.experiment.step import Step
 from bns.viz import charts, moments, scene
 from bns.viz.blueprint import blueprint
-from bns.viz.picture import executable, free_port
+from bns.viz.picture import LOOPBACK, executable, free_port, wait
 from bns.viz.recording import open_stream
 from bns.worlds.trial import Trial
 
@@ -69,7 +70,7 @@ class Stream:
     def _open(self, url: str | None) -> None:
         os.environ.setdefault("RERUN_ANALYTICS", "0")
         made = open_stream(self._config, self._replicate)
-        layout = blueprint(*scene.extent(self._config), follow=True)
+        layout = blueprint(scene.picture(self._config), follow=True)
         made.connect_grpc(url or _spawn(), default_blueprint=layout)
         self._model = scene.compiled(self._config.world.robot)
         scene.log_static(made, self._config, self._model)
@@ -110,12 +111,18 @@ def _spawn() -> str:
             "there is no display to start a viewer on; save the recording instead and "
             "make a picture of it (bns view --png)"
         )
-    from rerun.experimental import ViewerClient
-
-    viewer = ViewerClient.spawn(
-        port=free_port(), hide_welcome_screen=True, executable_path=executable()
+    program, port = executable(), free_port()
+    if program is None:
+        raise RuntimeError("there is no Rerun viewer (pip install rerun-sdk)")
+    where = ["--bind", LOOPBACK, "--port", str(port)]
+    process = subprocess.Popen(
+        [program, *where, "--hide-welcome-screen"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
     )
-    return viewer.url
+    wait(process, port)
+    return f"rerun+http://{LOOPBACK}:{port}/proxy"
 
 
 def _no_display() -> bool:

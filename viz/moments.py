@@ -5,8 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bns.experiment.record import RunRecord
-from bns.viz import geometry, light_view, scene, series, style, walk_view
-from bns.viz.blueprint import TRIAL_TIMELINE
+from bns.tasks import registry as tasks
+from bns.viz import geometry, series, style, walk_view
+from bns.viz.blueprint import READINGS, TRIAL_TIMELINE
 from bns.viz.choices import Choice
 from bns.viz.paths import arcs, dashes, listed
 from bns.worlds.trial import Trial
@@ -43,6 +44,7 @@ def send(
         model: compiled scene.
     """
     start, states, colours = 0.0, [], []
+    task = tasks.of(record.config)
     for choice in chosen:
         at = (replicate, choice.trial)
         times, poses, qpos = samples(record, at, trials.get(choice.trial), model)
@@ -52,11 +54,11 @@ def send(
         geometry.send_poses(stream, model, index, qpos)
         done = _finish(record, at, times)
         foreseen = listed(record.predicted[at])
-        foreseen = foreseen[: scene.finish(record.config, foreseen) + 1]
+        foreseen = foreseen[: task.finish(foreseen) + 1]
         _trails(stream, choice, poses, done, foreseen)
-        if not scene.walks(record.config):
+        if task.picture.wheels:
             _wheels(stream, record.sent[at], start)
-        light_view.send_readings(stream, record, at, start)
+        _readings(stream, record, at, start)
         states.append((start, f"trial {choice.trial}: {choice.label}"))
         colours.append(choice.colour)
         start += float(times[-1]) + GAP
@@ -66,18 +68,13 @@ def send(
 def duration(record: RunRecord, replicate: int, chosen: Sequence[Choice]) -> float:
     """How long the chosen trials take one after another, pauses included [s]."""
     numbers = [choice.trial for choice in chosen]
-    if scene.walks(record.config):
-        told = record["seconds"][replicate, numbers]
-    else:
-        told = record.sent[replicate, numbers, :, 2]
+    told = tasks.of(record.config).durations(record, (replicate, numbers))
     return float(np.nansum(told)) + GAP * len(chosen)
 
 
 def _durations(record: RunRecord, at, count: int) -> np.ndarray:
     """How long each of the first `count` commands took [s]."""
-    if scene.walks(record.config):
-        return walk_view.durations(record, at, count)
-    return record.sent[at][:count, 2]
+    return tasks.of(record.config).durations(record, at)[:count]
 
 
 def samples(record, at, trial: Trial | None, model):
@@ -129,7 +126,7 @@ def _lift(poses: np.ndarray) -> np.ndarray:
 def _finish(record: RunRecord, at, times: np.ndarray) -> int:
     """Sample at which the task was done; the last one if it was not."""
     poses = listed(record.poses[at])
-    done = scene.finish(record.config, poses)
+    done = tasks.of(record.config).finish(poses)
     ends = np.cumsum(_durations(record, at, len(poses) - 1))
     if not 0 < done < len(poses) - 1:
         return len(times) - 1
@@ -180,6 +177,34 @@ def _wheels(stream, sent: np.ndarray, start: float) -> None:
             ),
             static=True,
         )
+
+
+def _readings(stream, record: RunRecord, at: tuple[int, int], start: float) -> None:
+    """Send what the sensors read in a trial, and what the SNNs foresaw."""
+    import rerun as rr
+
+    if "readings" not in record.extra:
+        return
+    ends = start + np.concatenate([[0.0], np.nancumsum(record.sent[at][:, 2])])
+    for column, side in enumerate(("left", "right")):
+        for kind, array, width in (
+            ("real", "readings", 2.5),
+            ("foreseen", "readings_predicted", 1.0),
+        ):
+            if array not in record.extra:
+                continue
+            path = f"{READINGS}/{side}_{kind}"
+            values = record.extra[array][at][:, column]
+            series.send(stream, path, ends, values)
+            stream.log(
+                path,
+                rr.SeriesLines(
+                    names=f"{side}, {kind}",
+                    colors=style.rgb((style.SKY, style.ORANGE)[column]),
+                    widths=width,
+                ),
+                static=True,
+            )
 
 
 def _states(stream, states, colours, end: float) -> None:

@@ -56,27 +56,6 @@ def _along(start: np.ndarray, step: np.ndarray, share: np.ndarray) -> np.ndarray
     return np.stack([x, y, start[2] + share * turn], axis=1)
 
 
-def reached(poses_world: np.ndarray, goals: np.ndarray, radius: float) -> list[int]:
-    """Commands at whose end each objective was reached, in order.
-
-    Args:
-        poses_world: ``(K + 1, 3)`` poses at the start and after each command.
-        goals: objectives in the order in which they are to be reached, ``(G, 2)`` [m].
-        radius: within which one counts as reached [m].
-
-    Returns:
-        Row numbers in `poses_world`, as many as were reached; a command's end counts
-        for one objective at most.
-    """
-    found: list[int] = []
-    for row in range(1, len(poses_world)):
-        if len(found) < len(goals):
-            gap = np.linalg.norm(poses_world[row, :2] - goals[len(found)])
-            if gap < radius:
-                found.append(row)
-    return found
-
-
 def dashes(points: np.ndarray, dash: float = 0.02) -> list[np.ndarray]:
     """Every other piece of length `dash` [m] of a polyline ``(N, D)``."""
     length = np.concatenate(

@@ -12,7 +12,11 @@ from pathlib import Path
 from tempfile import TemporaryFile
 
 from bns.errors import BnsError, FormatError, MissingDependencyError
+from bns.storage import files
 from bns.viz.blueprint import LIVE_TIMELINE, TRIAL_TIMELINE
+
+LOOPBACK = "127.0.0.1"
+"""where viewers listen: this machine alone can reach them"""
 
 INSTALL = "apt-get install mesa-vulkan-drivers"
 """What a Debian system lacks when there is no Vulkan."""
@@ -51,15 +55,25 @@ def save(
         shown.open(str(rrd))
         _go(shown, trial, at)
         time.sleep(_SETTLE)
-        shown.save_screenshot(str(png))
+        files.replace(png, lambda beside: _photograph(shown, beside))
         reports = [
             f"{view.name}: {report}"
             for view in shown.get_state().views
             for report in view.reports
         ]
-    if not png.is_file() or png.stat().st_size == 0:
-        raise BnsError(f"The viewer wrote no picture to {png}; is there disk space?")
     return reports
+
+
+def _photograph(shown, png: Path) -> None:
+    """Have the viewer write a picture, all of it.
+
+    Raises:
+        BnsError: it did not.
+    """
+    shown.save_screenshot(str(png))
+    whole = png.is_file() and png.read_bytes()[-8:-4] == b"IEND"
+    if not whole:
+        raise BnsError(f"The viewer wrote no picture to {png}; is there disk space?")
 
 
 def missing() -> MissingDependencyError | None:
@@ -124,7 +138,7 @@ def viewer() -> Iterator:
     from rerun.experimental import ViewerClient
 
     port = free_port()
-    command = [executable(), "--headless", "--bind", "127.0.0.1", "--port", str(port)]
+    command = [executable(), "--headless", "--bind", LOOPBACK, "--port", str(port)]
     environment = os.environ | {"RERUN_ANALYTICS": "0"}
     with TemporaryFile() as said:
         process = subprocess.Popen(
@@ -134,7 +148,7 @@ def viewer() -> Iterator:
             stderr=said,
         )
         try:
-            _await(process, port)
+            wait(process, port)
             yield ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
         except (RuntimeError, ConnectionError, TimeoutError) as error:
             raise _explain(error, said) from error
@@ -143,8 +157,13 @@ def viewer() -> Iterator:
             process.wait(timeout=_START)
 
 
-def _await(process: subprocess.Popen, port: int) -> None:
-    """Wait until the viewer listens."""
+def wait(process: subprocess.Popen, port: int) -> None:
+    """Wait until the viewer listens.
+
+    Raises:
+        RuntimeError: it ended.
+        TimeoutError: it did not start in time.
+    """
     until = time.monotonic() + _START
     while time.monotonic() < until:
         if process.poll() is not None:

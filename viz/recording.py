@@ -13,7 +13,7 @@ import numpy as np
 from bns.experiment import loading
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
-from bns.viz import charts, moments, scene
+from bns.viz import charts, moments, rrd, scene
 from bns.viz.blueprint import blueprint
 from bns.viz.choices import Choice, choose, typical
 from bns.worlds.trial import Trial
@@ -54,31 +54,30 @@ def write(
     model = scene.compiled(record.config.world.robot) if model is None else model
     stream = open_stream(record.config, replicate)
     seconds = moments.duration(record, replicate, chosen)
+    shown = scene.picture(record.config)
     layout = blueprint(
-        *scene.extent(record.config),
+        shown,
         seconds=seconds,
         readings="readings" in record.extra,
-        walks=scene.walks(record.config),
+        charts=charts.chart_titles(record.columns, shown),
     )
-    stream.save(str(path), default_blueprint=layout)
-    stream.send_recording_name(
-        f"{record.config.preset or scene.task(record.config)} / replicate {replicate}"
-    )
-    stream.send_property("run", rr.AnyValues(**_properties(record, replicate)))
-    scene.log_static(stream, record.config, model)
-    moments.send(stream, record, replicate, chosen, _by_number(trials), model)
-    charts.log_bars(stream, record, replicate, chosen)
-    numbers = np.arange(record.trials)
-    columns = {name: values[replicate] for name, values in record.columns.items()}
-    charts.log_curve_styles(stream)
-    charts.send_curves(stream, numbers, columns)
-    moments.send_paths(
-        stream, numbers, record.poses[replicate], record.predicted[replicate]
-    )
-    moments.send_ends(stream, numbers, record.poses[replicate], model)
-    stream.log("about", _about(record, replicate, chosen), static=True)
-    stream.flush()
-    stream.disconnect()
+    with rrd.saved(stream, path, layout):
+        stream.send_recording_name(
+            f"{record.config.preset or shown.name} / replicate {replicate}"
+        )
+        stream.send_property("run", rr.AnyValues(**_properties(record, replicate)))
+        scene.log_static(stream, record.config, model)
+        moments.send(stream, record, replicate, chosen, _by_number(trials), model)
+        charts.log_bars(stream, record, replicate, chosen)
+        numbers = np.arange(record.trials)
+        columns = {name: values[replicate] for name, values in record.columns.items()}
+        charts.log_curve_styles(stream)
+        charts.send_curves(stream, numbers, columns)
+        moments.send_paths(
+            stream, numbers, record.poses[replicate], record.predicted[replicate]
+        )
+        moments.send_ends(stream, numbers, record.poses[replicate], model)
+        stream.log("about", _about(record, replicate, chosen), static=True)
     return Path(path)
 
 
@@ -104,7 +103,7 @@ def _by_number(trials) -> Mapping[int, Trial]:
 def _properties(record: RunRecord, replicate: int) -> dict:
     config = record.config
     return {
-        "task": scene.task(config),
+        "task": scene.picture(config).name,
         "robot": config.world.robot,
         "world": config.world.name,
         "damage": " + ".join(config.world.damage) or "none",
@@ -118,11 +117,12 @@ def _properties(record: RunRecord, replicate: int) -> dict:
 def _about(record: RunRecord, replicate: int, chosen: Sequence[Choice]):
     import rerun as rr
 
+    shown = scene.picture(record.config)
     lines = [
-        f"# {record.config.preset or scene.task(record.config)}, replicate {replicate}",
+        f"# {record.config.preset or shown.name}, replicate {replicate}",
         "",
         "**World.** Solid trails are where the robot went, dashed trails where its "
-        "simulator network (SNN) said it would go. " + _discs(record.config) + " Press "
+        "simulator network (SNN) said it would go. " + shown.discs + " Press "
         "play: the robot goes through the trials below, one after another.",
         "",
         *(f"- trial {choice.trial}: {choice.label}" for choice in chosen),
@@ -135,23 +135,6 @@ def _about(record: RunRecord, replicate: int, chosen: Sequence[Choice]):
         "`trial` at the bottom left: the paths then are those of each trial.",
     ]
     return rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN)
-
-
-def _discs(config: RunConfig) -> str:
-    if scene.walks(config):
-        return (
-            "An adequate gait gets out of the disc. The body is drawn level, its legs "
-            "as the servos reported them."
-        )
-    if scene.follows_light(config):
-        return (
-            "The disc has the radius at which the robot is to circle the lamp; at the "
-            "orange ring it is stopped."
-        )
-    return (
-        "Discs are the objectives; their size is the distance within which one counts "
-        "as reached; a solid trail gets thin once all are."
-    )
 
 
 def _onset(record: RunRecord, replicate: int) -> str:

@@ -3,27 +3,21 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from bns.errors import BnsError
 from bns.experiment import loading
 from bns.experiment.record import RunRecord
+from bns.learners import registry as learners
+from bns.learners.base import Curves
 from bns.storage import files
+from bns.tasks import registry as tasks
 from bns.viz import comparison, facts, figures, scene
-from bns.viz.captions import CAPTIONS, LIGHT, TITLES, WALK
+from bns.viz.captions import BAND, CAPTIONS, TITLES
 from bns.viz.page import picture, render
 
-ALL_RUNS = ("fitness", "solved", "waits", "snn_error", "diversity")
-"""Figures that lay several batches over one another."""
-
-ONE_RUN = (
-    "path",
-    "fitness",
-    "solved",
-    "waits",
-    "snn_error",
-    "displacement",
-    "diversity",
-)
-"""Figures of the report of a single batch, in order."""
+SHARED = ("fitness", "solved", "waits")
+"""Figures of all tasks and learners; several batches can be laid over one another."""
 
 
 def write(
@@ -71,7 +65,9 @@ def _load(directory: str | Path) -> RunRecord:
 def _labels(records: Sequence[RunRecord]) -> list[str]:
     """Directory names, else presets; numbered where they are the same."""
     names = [
-        Path(record.directory).name or record.config.preset or scene.task(record.config)
+        Path(record.directory).name
+        or record.config.preset
+        or scene.picture(record.config).name
         for record in records
     ]
     return [
@@ -110,7 +106,7 @@ def _batch(label: str, record: RunRecord) -> dict:
     found = facts.Facts.of(record, label)
     return {
         "label": label,
-        "name": record.config.preset or f"{scene.task(record.config)} task",
+        "name": record.config.preset or f"{scene.picture(record.config).name} task",
         "sentences": facts.sentences(record, found),
         "rows": facts.rows(record, found),
         "toml": loading.to_toml(record.config),
@@ -125,53 +121,65 @@ def _batch(label: str, record: RunRecord) -> dict:
 
 def _own_figures(runs: Mapping[str, RunRecord]) -> list[dict]:
     record = next(iter(runs.values()))
-    alone = {
-        "path": figures.path,
-        "displacement": figures.displacement,
-        "readings": figures.readings,
-        "starts": figures.starts,
-    }
-    return [
-        _entry(
-            name,
-            record,
-            alone[name](record) if name in alone else getattr(figures, name)(runs),
-        )
-        for name in _names(record)
-    ]
+    shown = scene.picture(record.config)
+    ours = [*shown.figures, *SHARED, *_of_learner(record)]
+    return [_entry(figure, runs) for figure in ours if _drawable(figure, record)]
 
 
-def _names(record: RunRecord) -> tuple[str, ...]:
-    """Figures of one batch, in order."""
-    if not scene.follows_light(record.config):
-        return ONE_RUN
-    at = ONE_RUN.index("snn_error")
-    own = ("path", "starts", "readings", *ONE_RUN[1 : at + 1], "sensor_error")
-    return (*own, *ONE_RUN[at + 1 :])
+def _of_learner(record: RunRecord) -> list[Curves | str]:
+    """Figures that the learner of a batch declares, and BNS its problem."""
+    learner, task = learners.get(record.config.learner), tasks.of(record.config)
+    return learner.figures_of(task)
+
+
+def _drawable(figure: Curves | str, record: RunRecord) -> bool:
+    """Whether a record has what a figure shows."""
+    if isinstance(figure, Curves):
+        return all(panel.column in record.columns for panel in figure.panels)
+    return figure != "displacement" or bool(np.isfinite(record.predicted).any())
 
 
 def _shared_figures(runs: Mapping[str, RunRecord]) -> list[dict]:
+    """Figures that all batches have."""
     first = next(iter(runs.values()))
-    return [_entry(name, first, getattr(figures, name)(runs)) for name in ALL_RUNS]
+    own = [
+        figure
+        for figure in _of_learner(first)
+        if isinstance(figure, Curves)
+        and figure.compared
+        and all(_drawable(figure, record) for record in runs.values())
+    ]
+    return [_entry(figure, runs) for figure in (*SHARED, *own)]
 
 
-def _entry(name: str, record: RunRecord, figure) -> dict:
-    walks = scene.walks(record.config)
+def _entry(figure: Curves | str, runs: Mapping[str, RunRecord]) -> dict:
+    record = next(iter(runs.values()))
+    if isinstance(figure, Curves):
+        shown = scene.picture(record.config)
+        caption = shown.captions.get(figure.name, figure.caption)
+        drawn = figures.curves(runs, figure)
+        return {
+            "name": figure.name,
+            "title": figure.title,
+            "caption": caption.format(band=BAND),
+            "image": picture(drawn),
+        }
+    draw = getattr(figures, figure)
+    shown = scene.picture(record.config)
     return {
-        "name": name,
-        "title": "Adequate gaits" if name == "solved" and walks else TITLES[name],
-        "caption": _caption(name, record),
-        "image": picture(figure),
+        "name": figure,
+        "title": (TITLES | dict(shown.titles))[figure],
+        "caption": _caption(figure, record),
+        "image": picture(draw(runs if figure in SHARED else record)),
     }
 
 
 def _caption(name: str, record: RunRecord) -> str:
-    goals = scene.order(record.config)
-    own = LIGHT if scene.follows_light(record.config) else {}
-    own = WALK if scene.walks(record.config) else own
-    return (CAPTIONS | own)[name].format(
-        order=", ".join(goals),
-        goals=len(goals),
+    shown = scene.picture(record.config)
+    return (CAPTIONS | dict(shown.captions))[name].format(
+        band=BAND,
+        order=", ".join(shown.order),
+        goals=len(shown.order),
         penalty=record.config.task.penalty,
         adequate=record.config.walk.adequate,
     )

@@ -3,21 +3,18 @@
 import numpy as np
 
 from bns.experiment.config import RunConfig
-from bns.viz import geometry, light_view, style
-from bns.viz.paths import reached
-
-MARGIN = 0.25
-"""m of board shown around the outermost objectives"""
-
-BOARD = (1.35, 0.9)
-"""m; half the arena's board (thesis 4.2.1)"""
-
-LIGHT = "light following"
-WALK = "walking"
-ADEQUATE = ""
+from bns.tasks import Picture
+from bns.tasks import registry as tasks
+from bns.viz import geometry, style
 
 _DISC = 0.001
 """m; height of an objective's disc"""
+
+_BULB = 0.03
+"""m; radius of a lamp as drawn"""
+
+_POST = 0.006
+"""m; radius of the post it stands on, drawn only"""
 
 
 def compiled(robot: str):
@@ -27,81 +24,9 @@ def compiled(robot: str):
     return models.scene_spec(robot).compile()
 
 
-def task(config: RunConfig) -> str:
-    """What the robot has to do, in a word or two."""
-    if walks(config):
-        return WALK
-    return LIGHT if follows_light(config) else config.task.name
-
-
-def meaning(config: RunConfig) -> str:
-    """What it means to have solved it."""
-    if walks(config):
-        return f"{config.walk.adequate:g} m walked"
-    return "the lamp circled" if follows_light(config) else "all objectives reached"
-
-
-def follows_light(config: RunConfig) -> bool:
-    """Whether the run is one of closed-loop light following."""
-    return config.learner == "light"
-
-
-def walks(config: RunConfig) -> bool:
-    """Whether the run is one of a walking robot."""
-    return config.learner == "walk"
-
-
-def radius(config: RunConfig) -> float:
-    """Radius of an objective's disc, at which to circle the lamp, or to leave [m]."""
-    if walks(config):
-        return config.walk.adequate
-    return config.light.goal if follows_light(config) else config.task.radius
-
-
-def objectives(config: RunConfig) -> dict[str, tuple[float, float]]:
-    """Positions of the objectives that the run's task uses [m]."""
-    from bns.tasks import objectives as places
-
-    if walks(config):
-        return {ADEQUATE: (0.0, 0.0)}
-    if follows_light(config):
-        from bns.light.task import LightTask
-
-        return {"lamp": LightTask.of(config.light).lamp}
-
-    used = order(config)
-    return {name: at for name, at in places(config.task).items() if name in used}
-
-
-def order(config: RunConfig) -> tuple[str, ...]:
-    """Names of the objectives in the order in which they are to be reached."""
-    from bns import tasks
-
-    if walks(config):
-        return (ADEQUATE,)
-    return ("lamp",) if follows_light(config) else tuple(tasks.order(config.task.name))
-
-
-def finish(config: RunConfig, poses_world: np.ndarray) -> int:
-    """Row of `poses_world` at which the task was done; the last one if it was not.
-
-    A robot that has found the lamp stays there, and one that walks goes as far as it
-    can, so their tasks end with the trial.
-    """
-    if follows_light(config) or walks(config):
-        return len(poses_world) - 1
-    places = objectives(config)
-    goals = np.array([places[name] for name in order(config)])
-    rows = reached(poses_world, goals, config.task.radius)
-    return rows[-1] if len(rows) == len(goals) else len(poses_world) - 1
-
-
-def extent(config: RunConfig) -> tuple[float, float]:
-    """Half width and half depth of what matters [m]."""
-    if follows_light(config) or walks(config):
-        return BOARD
-    places = np.abs(list(objectives(config).values()))
-    return tuple(float(edge) for edge in places.max(axis=0) + MARGIN)
+def picture(config: RunConfig) -> Picture:
+    """What is shown of a configuration's task."""
+    return tasks.of(config).picture
 
 
 def log_static(stream, config: RunConfig, model) -> None:
@@ -116,17 +41,17 @@ def log_static(stream, config: RunConfig, model) -> None:
 
     stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     geometry.log_static(stream, model)
-    if follows_light(config):
-        light_view.log_lamps(stream, config)
-    places = objectives(config)
-    names = list(places)
+    shown = picture(config)
+    if shown.lamps:
+        _log_lamps(stream, shown)
+    places, names = shown.objectives, list(shown.objectives)
     centres = np.array([(*places[name], _DISC / 2) for name in names])
     count = len(names)
     stream.log(
         "world/objectives",
         rr.Cylinders3D(
             centers=centres,
-            radii=[radius(config)] * count,
+            radii=[shown.radius] * count,
             lengths=[_DISC] * count,
             colors=[(*style.rgb(style.YELLOW), 255)] * count,
             fill_mode=rr.components.FillMode.Solid,
@@ -142,5 +67,42 @@ def log_static(stream, config: RunConfig, model) -> None:
             colors=[style.rgb(style.BLACK)] * count,
             show_labels=True,
         ),
+        static=True,
+    )
+
+
+def _log_lamps(stream, shown: Picture) -> None:
+    """Log the lamps, and the safety boundary around each on the floor."""
+    import rerun as rr
+
+    from bns.worlds.light.field import Lamp
+
+    places = np.array([Lamp(**fields).position for fields in shown.lamps])
+    count, colour = len(places), (*style.rgb(style.YELLOW), 255)
+    stream.log(
+        "world/lamps",
+        rr.Ellipsoids3D(
+            centers=places,
+            radii=[_BULB] * count,
+            colors=[colour] * count,
+            fill_mode=rr.components.FillMode.Solid,
+        ),
+        static=True,
+    )
+    posts = [[(x, y, 0.0), (x, y, z)] for x, y, z in places]
+    stream.log(
+        "world/lamps/posts",
+        rr.LineStrips3D(posts, colors=[style.rgb(style.GREY)] * count, radii=_POST),
+        static=True,
+    )
+    angle = np.linspace(0.0, 2 * np.pi, 73)
+    ring = shown.ring * np.column_stack([np.cos(angle), np.sin(angle)])
+    rings = [
+        np.column_stack([ring + place[:2], np.full(len(ring), 0.002)])
+        for place in places
+    ]
+    stream.log(
+        "world/lamps/safety_boundary",
+        rr.LineStrips3D(rings, colors=[style.rgb(style.ORANGE)] * count, radii=0.003),
         static=True,
     )

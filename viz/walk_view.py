@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from bns.experiment.record import RunRecord
 from bns.viz import geometry
 from bns.worlds.trial import Trial
 
@@ -51,8 +50,3 @@ def _lowest_foot(model, qpos: np.ndarray) -> np.ndarray:
         mujoco.mj_kinematics(model, data)
         lowest[at] = data.site_xpos[feet, 2].min() if feet else 0.0
     return lowest
-
-
-def durations(record: RunRecord, at: tuple[int, int], count: int) -> np.ndarray:
-    """How long each of `count` commands took, all alike [s]."""
-    return np.full(count, record["seconds"][at] / max(count, 1))

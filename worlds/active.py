@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -9,11 +10,21 @@ from bns import seeding
 from bns.errors import BnsError
 from bns.worlds.damage import ActiveEffect, Damage, Event
 from bns.worlds.effects import registry
-from bns.worlds.effects.base import Effect, ServoEffect
+from bns.worlds.effects.base import (
+    CommandEffect,
+    Effect,
+    ModelEdit,
+    OpticsEffect,
+    SensorEffect,
+    ServoEffect,
+    TrackingEffect,
+)
+
+EffectT = TypeVar("EffectT", bound=Effect, covariant=True)
 
 
 @dataclass(frozen=True)
-class Placed:
+class Placed(Generic[EffectT]):
     """An effect with its span in the trial and the name of its random stream.
 
     Attributes:
@@ -22,7 +33,7 @@ class Placed:
         stream: identity of its random stream, beside seed and trial.
     """
 
-    effect: Effect
+    effect: EffectT
     start: float
     stop: float
     stream: tuple[str | int, ...]
@@ -56,10 +67,10 @@ class Stages:
         texts: all of them as text, by origin ("reality", "damage"), for the record.
     """
 
-    control: tuple[Placed, ...]
-    body: tuple[Placed, ...]
-    sensor: tuple[Placed, ...]
-    tracking: tuple[Placed, ...]
+    control: tuple[Placed[CommandEffect], ...]
+    body: tuple[Placed[ModelEdit], ...]
+    sensor: tuple[Placed[SensorEffect | OpticsEffect], ...]
+    tracking: tuple[Placed[TrackingEffect], ...]
     texts: dict[str, list[str]]
 
     @classmethod
@@ -79,7 +90,7 @@ class Stages:
             for origin, given in origins.items()
         }
         both = placed["reality"] + placed["damage"]
-        stage = {
+        stage: dict[str, tuple[Placed[Any], ...]] = {
             name: tuple(item for item in both if _stage(item.effect) == name)
             for name in ("command", "actuator", "body", "sensor", "tracking")
         }
@@ -125,9 +136,9 @@ def as_damage(given: Damage | str | Effect | Iterable[str | Effect]) -> Damage:
     """
     if isinstance(given, Damage):
         return given
-    alone = isinstance(given, str | Effect) or not isinstance(given, Iterable)
-    items: Iterable = (given,) if alone else given
-    return sum((_one(item) for item in items), Damage.none())
+    if isinstance(given, str | Effect) or not isinstance(given, Iterable):
+        return _one(given)
+    return sum((_one(item) for item in given), Damage.none())
 
 
 def _one(item: object) -> Damage:

@@ -1,12 +1,16 @@
 """Checks of what every world is given."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any, TypeVar
 
 import numpy as np
 
-from bns.errors import BnsError, OutOfBoundsError
+from bns.errors import BnsError, OutOfBoundsError, UnknownNameError
 from bns.models.robot_model import RobotModel
 from bns.worlds.damage import Damage
+
+T = TypeVar("T")
 
 WORLDS = {"wheeled": ("mujoco", "khepera3"), "legged": ("hexapod", "phantomx")}
 """by kind of robot, the physics world that it moves in, and a robot of the kind"""
@@ -85,3 +89,37 @@ def shared(
             "non-negative whole number for each, or none."
         )
     return damage, seeds
+
+
+def several(kind: type[T], name: str, given: Any) -> tuple[T, ...]:
+    """One or more of a kind, each as itself or as a table with its fields.
+
+    Args:
+        kind: a dataclass.
+        name: what one of it is called, for messages.
+        given: one, or a sequence of them.
+
+    Raises:
+        BnsError: it is no such thing.
+    """
+    alone = isinstance(given, kind | Mapping) or not isinstance(given, Sequence)
+    return tuple(one(kind, name, item) for item in ((given,) if alone else given))
+
+
+def one(kind: type[T], name: str, given: object) -> T:
+    """One of a kind, as itself or as a table with its fields; see `several`."""
+    if isinstance(given, kind):
+        return given
+    known = [field.name for field in fields(kind)]  # type: ignore[arg-type]
+    if not isinstance(given, Mapping):
+        raise BnsError(
+            f"{given!r} is no {name}: give a {kind.__name__} or a table with "
+            f"{', '.join(known)}."
+        )
+    for key in given:
+        if key not in known:
+            raise UnknownNameError(f"field of a {name}", str(key), known)
+    try:
+        return kind(**given)
+    except TypeError as error:
+        raise BnsError(f"{dict(given)!r} is no {name}: {error}.") from error

@@ -1,7 +1,7 @@
 """Closed loops: what steers robots from their readings, cycle by cycle."""
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 
@@ -66,8 +66,9 @@ def checked(
         values = np.empty(0)
     if values.shape != (n, len(channels)):
         raise BnsError(
-            f"The policy gave commands of shape {np.shape(commands)} in cycle {at}; "
-            f"it needs ({n}, {len(channels)}): a row per robot, a column per channel."
+            f"The policy gave commands of shape {np.shape(cast(Any, commands))} in "
+            f"cycle {at}; it needs ({n}, {len(channels)}): a row per robot, a column "
+            "per channel."
         )
     bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
     if len(bad):

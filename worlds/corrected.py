@@ -12,20 +12,39 @@ in the working directory and in the user's own (`$XDG_CONFIG_HOME/bns`, by defau
 `~/.config/bns`); `$BNS_WORLDS` names one file instead of both. The nearer one wins.
 """
 
-import json
 import os
 import re
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bns.errors import BnsError, FormatError
+import msgspec
+import tomli_w
+
+from bns.errors import BnsError
+from bns.storage import files as writing
+from bns.storage import reading
+from bns.storage.lock import Lock
 
 FILE, VARIABLE = "worlds.toml", "BNS_WORLDS"
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
-_KEYS = {"base": str, "robot": str, "reality": list, "note": str}
+TABLES = "A world has base, robot, note (text) and reality (a list of effects)."
+
+
+class Entry(msgspec.Struct, forbid_unknown_fields=True):
+    """A table of the file."""
+
+    base: str = "mujoco"
+    robot: str = "khepera3"
+    reality: list[str] = []
+    note: str = ""
+
+
+class Kept(msgspec.Struct, forbid_unknown_fields=True):
+    """The file."""
+
+    worlds: dict[str, Any] = {}
 
 
 @dataclass(frozen=True)
@@ -87,18 +106,15 @@ def keep(world: Corrected, *, user: bool = False, replace: bool = False) -> Path
             f"{world.name!r} can not name a world: use letters, digits, _ and -."
         )
     path = files()[-1] if user else files()[0]
-    found = _read(path)
-    if world.name in found and not replace:
-        raise BnsError(
-            f"{path} has a world {world.name!r} already; give another or --replace."
-        )
-    found[world.name] = world
-    text = "\n".join(_text(item) for _, item in sorted(found.items()))
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise BnsError(f"{path} cannot be written: {error.strerror}.") from error
+    with Lock(path.parent):
+        found = _read(path)
+        if world.name in found and not replace:
+            raise BnsError(
+                f"{path} has a world {world.name!r} already; give another or --replace."
+            )
+        found[world.name] = world
+        tables = {name: _table(item) for name, item in sorted(found.items())}
+        writing.write_text(path, tomli_w.dumps({"worlds": tables}))
     return path
 
 
@@ -129,41 +145,19 @@ def factory(world: Corrected, make: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _read(path: Path) -> dict[str, Corrected]:
-    if not path.is_file():
+    if not path.exists():
         return {}
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-        tables = content["worlds"] if content else {}
-        items = {name: dict(table) for name, table in tables.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise FormatError(f"{path} holds no worlds ({error}).") from None
-    return {name: _world(name, table, path) for name, table in items.items()}
+    found = reading.typed(reading.read_toml(path), Kept, path, todo=TABLES)
+    items = reading.tables(found.worlds, Entry, path, todo=TABLES)
+    return {
+        name: Corrected(
+            name, item.base, item.robot, tuple(item.reality), item.note, str(path)
+        )
+        for name, item in items.items()
+    }
 
 
-def _world(name: str, table: dict[str, Any], path: Path) -> Corrected:
-    for key, value in table.items():
-        if key not in _KEYS or not isinstance(value, _KEYS[key]):
-            raise FormatError(
-                f"{path}: world {name!r} has {key} = {value!r}; it takes base, robot, "
-                "note (text) and reality (a list of effects)."
-            )
-    return Corrected(
-        name,
-        table.get("base", "mujoco"),
-        table.get("robot", "khepera3"),
-        tuple(map(str, table.get("reality", ()))),
-        table.get("note", ""),
-        str(path),
-    )
-
-
-def _text(world: Corrected) -> str:
-    lines = [
-        f"[worlds.{world.name}]",
-        f"base = {json.dumps(world.base)}",
-        f"robot = {json.dumps(world.robot)}",
-        f"reality = {json.dumps(list(world.reality))}",
-    ]
-    if world.note:
-        lines.append(f"note = {json.dumps(world.note, ensure_ascii=False)}")
-    return "\n".join(lines) + "\n"
+def _table(world: Corrected) -> dict[str, Any]:
+    """A world as it stands in a file."""
+    held = {"base": world.base, "robot": world.robot, "reality": list(world.reality)}
+    return {**held, "note": world.note} if world.note else held

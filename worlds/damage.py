@@ -22,7 +22,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 from bns.errors import BnsError
 from bns.worlds.effects import registry
@@ -94,7 +94,7 @@ class Event:
     period: int = 0
     on_for: int = 0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in ("onset_trial", "end_trial", "ramp", "period", "on_for"):
             value = getattr(self, name)
             optional = name == "end_trial" and value is None
@@ -118,7 +118,7 @@ class Event:
                 "give 0 < ON < PERIOD, or leave the recurrence away",
             )
 
-    def _refuse(self, given: str, remedy: str):
+    def _refuse(self, given: str, remedy: str) -> NoReturn:
         raise BnsError(f"Damage {self.effect}: {given} is not allowed: {remedy}.")
 
     @property
@@ -143,7 +143,7 @@ class Event:
                 f"trial or trial:seconds, as in {EXAMPLE!r} or '...@30:2.5s..60'."
             )
         given = {key: value for key, value in match.groupdict().items() if value}
-        schedule = {
+        schedule: dict[str, Any] = {
             key: float(value) if key.endswith("_time") else int(value)
             for key, value in given.items()
             if key != "effect"

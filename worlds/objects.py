@@ -41,7 +41,7 @@ class Post:
     radius: float = 0.05
     height: float = 0.3
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for item in fields(self):
             low, high, unit = _BOUNDS[item.name]
             value = bounded(

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
-from typing import Any
+from typing import Any, get_args
 
 from bns.errors import BnsError, UnknownNameError
 from bns.worlds import corrected
@@ -105,7 +105,15 @@ def _parameters(name: str) -> Mapping[str, inspect.Parameter]:
     found = get(name)
     while base := getattr(found, "made_of", ""):
         found = get(base)
-    return inspect.signature(found).parameters
+    known: dict[str, inspect.Parameter] = {}
+    for key, item in inspect.signature(found).parameters.items():
+        if item.kind is not item.VAR_KEYWORD or not get_args(item.annotation):
+            known[key] = item
+            continue
+        (record,) = get_args(item.annotation)  # Unpack[...]: settings by keyword
+        for setting in record.__annotations__:
+            known[setting] = item.replace(name=setting, kind=item.KEYWORD_ONLY)
+    return known
 
 
 def make(name: str, /, **settings: Any) -> World:

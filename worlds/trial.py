@@ -7,9 +7,10 @@ continuous (a full turn adds 2 pi). In the body frame x is forward and y is left
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bns.errors import BnsError
 
@@ -27,12 +28,12 @@ POSE_CHANNELS = (Channel("x", "m"), Channel("y", "m"), Channel("yaw", "rad"))
 WHEEL_CHANNELS = (Channel("left_speed", "m/s"), Channel("right_speed", "m/s"))
 
 
-def _frozen(array, ndim: int, name: str) -> np.ndarray:
-    array = np.array(array, dtype=np.float64, order="C")
-    if array.ndim != ndim:
-        raise BnsError(f"{name} has {array.ndim} dimensions, it needs {ndim}.")
-    array.setflags(write=False)
-    return array
+def _frozen(array: ArrayLike, ndim: int, name: str) -> np.ndarray:
+    made = np.array(array, dtype=np.float64, order="C")
+    if made.ndim != ndim:
+        raise BnsError(f"{name} has {made.ndim} dimensions, it needs {ndim}.")
+    made.setflags(write=False)
+    return made
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +53,16 @@ class Commands:
     durations: np.ndarray
     channels: tuple[Channel, ...] = WHEEL_CHANNELS
 
-    def __post_init__(self):
+    if TYPE_CHECKING:  # lists will do
+
+        def __init__(
+            self,
+            values: ArrayLike,
+            durations: ArrayLike,
+            channels: tuple[Channel, ...] = WHEEL_CHANNELS,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
         values = _frozen(self.values, 2, "Commands.values")
         durations = _frozen(self.durations, 1, "Commands.durations")
         if values.shape != (len(durations), len(self.channels)):
@@ -147,7 +157,7 @@ class Trial:
     truth: Mapping[str, np.ndarray] = field(default_factory=dict)
     handled: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         times = _frozen(self.times, 1, "Trial.times")
         observed = _frozen(self.observed, 2, "Trial.observed")
         if observed.shape != (len(times), len(self.channels)):
@@ -194,7 +204,7 @@ class Trial:
         """Observed pose at the start and after each command, shape ``(K + 1, 3)``."""
         return self.poses_world[self.boundaries]
 
-    def replace(self, **changes) -> "Trial":
+    def replace(self, **changes: Any) -> "Trial":
         """A copy with some attributes changed."""
         return replace(self, **changes)
 

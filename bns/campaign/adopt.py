@@ -47,6 +47,8 @@ def adopt(
         key = digest(["run", name, config.seed, config.replicates], 16)
         made = {name: run.versions.get(name, "") for name in packages()}
         facts = {"seed": config.seed, "world_seed": config.seed, "mode": run.mode}
+        facts["commit"] = run.versions.get("commit", "unknown")
+        facts["revision"] = int(run.versions.get("revision", 0))
         store.add(key, encode(Part(key, (block,), facts | {"versions": made})))
         store.note(adopted=key, seed=config.seed)
         seen.add(name)

@@ -13,7 +13,8 @@ from bns.campaign.progress import Progress
 from bns.campaign.store import FILE, CampaignStore
 from bns.errors import BnsError
 from bns.experiment.batch import check_device, check_world
-from bns.storage import files
+from bns.storage import files, seal
+from bns.storage.lock import Lock
 
 
 @dataclass(frozen=True)
@@ -63,13 +64,14 @@ def run(
     for member in campaign.members:
         check_device(member.config.device)
         check_world(member.config)
-    store = opened(campaign, Path(out), resume=resume)
-    if not mix:
-        store.check_versions()
-    store.lock()
-    try:
+    with Lock(out) as lock:
+        store = opened(campaign, Path(out), resume=resume, lock=lock)
+        if not mix:
+            store.check_versions()
+        store.tidy()
         if campaign.text:
-            files.write_bytes(store.directory / FILE, campaign.text.encode())
+            text = seal.sealed_text(campaign.text)
+            files.write_text(store.directory / FILE, text)
         if retry:
             store.forgive()
         done = replicates_done(store, campaign)
@@ -78,20 +80,19 @@ def run(
         todo = [job for job in jobs if job.key not in known]
         session = _work(campaign, store, engine, todo, done, progress, stop)
         store.compact()
-    finally:
-        store.close()
     return Session(**session, waiting=len(jobs) - len(todo))
 
 
-def opened(campaign: Campaign, out: Path, *, resume: bool) -> CampaignStore:
-    """The store to go on with, or a new one.
+def opened(campaign: Campaign, out: Path, *, resume: bool, lock: Lock) -> CampaignStore:
+    """The store to go on with, or a new one, in a directory that is locked.
 
     Raises:
         BnsError: the directory is not free, or holds a campaign of another seed.
     """
     if not (resume and (out / "campaign.json").exists()):
-        return CampaignStore.create(out, campaign.name, campaign.seed)
+        return CampaignStore.create(out, campaign.name, campaign.seed, lock)
     store = CampaignStore.open(out)
+    store.lock = lock
     if store.seed != campaign.seed:
         raise BnsError(
             f"{out} was made with seed = {store.seed}, the file says {campaign.seed}: "

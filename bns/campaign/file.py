@@ -36,8 +36,8 @@ from bns.campaign import sample, settings
 from bns.campaign.identity import identity
 from bns.errors import BnsError, UnknownNameError
 from bns.experiment.config import RunConfig
-from bns.experiment.loading import read_toml
 from bns.experiment.validate import BOUNDS
+from bns.storage import reading, seal
 
 TOP = ("name", "description", "preset", "replicates", "seed", "batch_runs")
 TABLES = ("settings", "grid", "list", "sample")
@@ -105,9 +105,9 @@ def read(path: Path | str, *, sure: bool = False) -> Campaign:
         BnsError: not there, not TOML, an unknown setting, empty, or very large.
     """
     path = Path(path)
-    content = read_toml(path)
-    text = path.read_text(encoding="utf-8")
-    return replace(from_content(content, path.stem, sure=sure), text=text)
+    text = seal.opened_text(reading.read_text(path), path, wanted=False)
+    made = from_content(reading.toml(text, path), path.stem, sure=sure)
+    return replace(made, text=text)
 
 
 def from_content(

@@ -2,9 +2,10 @@
 
 The identity of a configuration is a digest of the settings in which it differs from
 the defaults. Replicates, seed, threads, device, the preset's name, the settings of
-other learners and those of a watch that is not kept are no part of it. A setting that
-is added later therefore changes no identity; a default that is changed would leave
-them equal, so a store keeps whole configurations and refuses what does not match them.
+other tasks and learners and those of a watch that is not kept are no part of it. A
+setting that is added later therefore changes no identity; a default that is changed
+would leave them equal, so a store keeps whole configurations and refuses what does not
+match them.
 """
 
 import json
@@ -14,16 +15,19 @@ from hashlib import sha256
 from typing import Any
 
 from bns import seeding
-from bns.experiment.config import AdaptationConfig, RunConfig, WorldConfig
+from bns.experiment.config import BNS_SECTIONS, AdaptationConfig, RunConfig, WorldConfig
 from bns.experiment.validate import leaves
-from bns.learners import registry
+from bns.tasks import registry as tasks
+
+TASK_SECTIONS = ("light", "walk")
+"""sections that belong to the tasks of that kind alone"""
 
 NO_PART = {"preset", "seed", "replicates", "record_replicates", "threads", "device"}
 
 
 def settings(config: RunConfig) -> dict[str, Any]:
     """The settings that tell a configuration from the default one."""
-    default = dict(leaves(RunConfig()))
+    default = dict(leaves(replace(RunConfig(), settings=type(config.settings)())))
     return {
         name: value
         for name, value in _own(config)
@@ -32,16 +36,30 @@ def settings(config: RunConfig) -> dict[str, Any]:
 
 
 def foreign(config: RunConfig) -> list[str]:
-    """Sections of the configuration that belong to other learners."""
-    return [name for name in registry.names() if name != config.learner]
+    """Sections of the configuration that belong to other tasks and learners."""
+    others = [name for name in TASK_SECTIONS if name != tasks.kind(config.task.name)]
+    if config.learner != "bns":
+        others += BNS_SECTIONS
+    return others
 
 
 def _own(config: RunConfig) -> Iterator[tuple[str, Any]]:
-    others = foreign(config)
-    idle = {f"watch.{name}" for name in config.watch.idle(config.learner)}
+    others, kind = foreign(config), tasks.kind(config.task.name)
+    idle = {f"watch.{name}" for name in config.watch.idle(kind)}
     for name, value in leaves(config):
-        if name.partition(".")[0] not in others and name not in idle:
-            yield name, value
+        if name.partition(".")[0] in others or name in idle:
+            continue
+        if config.learner == "bns" and kind in TASK_SECTIONS:
+            # as it was called up to version 0.1: identities stay what they are
+            name, value = _named_before(name, value, kind)
+        yield name, value
+
+
+def _named_before(name: str, value: Any, kind: str) -> tuple[str, Any]:
+    """A setting of bns as version 0.1 had it, where `learner` said what is learned."""
+    if name == "learner":
+        return name, kind
+    return (name, "simple") if name == "task.name" else (name, value)
 
 
 def identity(config: RunConfig) -> str:
@@ -79,8 +97,8 @@ def world_seed(seed: int) -> int:
 
 def changed_default(wanted: RunConfig, stored: RunConfig) -> str:
     """A setting in which configurations of one identity differ; empty if none."""
-    theirs = dict(leaves(stored))
+    theirs = dict(_own(stored))
     for name, value in _own(wanted):
-        if name not in NO_PART and theirs[name] != value:
-            return f"{name} = {theirs[name]!r}, now {value!r}"
+        if name not in NO_PART and theirs.get(name) != value:
+            return f"{name} = {theirs.get(name)!r}, now {value!r}"
     return ""

@@ -7,6 +7,7 @@ from pathlib import Path
 from bns.campaign.part import Block, encode
 from bns.campaign.store import CampaignStore
 from bns.errors import BnsError
+from bns.storage.lock import Lock
 
 
 def merge(out: Path, others: Sequence[Path], *, mix: bool = False) -> int:
@@ -26,12 +27,13 @@ def merge(out: Path, others: Sequence[Path], *, mix: bool = False) -> int:
         BnsError: a campaign of another seed or version, one that is being written.
         FormatError: a directory that holds no campaign, or a damaged file.
     """
-    store = CampaignStore.open(out)
-    sources = [CampaignStore.open(other) for other in others]
-    for source in sources:
-        _check(store, source, mix)
-    store.lock()
-    try:
+    CampaignStore.open(out)  # there is one
+    with Lock(out, make=False):
+        store = CampaignStore.open(out)
+        sources = [CampaignStore.open(other) for other in others]
+        for source in sources:
+            _check(store, source, mix)
+        store.tidy()
         held = {run for part in store.read() for b in part.blocks for run in _runs(b)}
         begun = len(held)
         for source in sources:
@@ -42,8 +44,6 @@ def merge(out: Path, others: Sequence[Path], *, mix: bool = False) -> int:
                     held.update(run for block in blocks for run in _runs(block))
         store.note(event="merge", runs=len(held) - begun)
         store.compact()
-    finally:
-        store.close()
     return len(held) - begun
 
 

@@ -7,8 +7,9 @@ same batch gives the same bytes, on every engine (same machine type, versions, m
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
 import numpy as np
 
 from bns.campaign.identity import foreign
@@ -16,10 +17,31 @@ from bns.errors import BnsError, FormatError
 from bns.experiment.config import RunConfig
 from bns.experiment.loading import from_mapping, to_mapping
 from bns.experiment.record import RunRecord
+from bns.storage import parquet, reading
 
 FORMAT, SCHEMA = "bns-campaign-part", 1
 META = b"bns"
 KEYS = ("config", "replicate", "trial")
+
+
+Count = Annotated[int, msgspec.Meta(ge=-1, le=1_000_000_000)]
+
+
+class Entry(msgspec.Struct):
+    """What a head says of a block."""
+
+    identity: str
+    start: Annotated[int, msgspec.Meta(ge=0, le=1_000_000_000)]
+    onset: Count
+    config: dict[str, Any]
+
+
+class Head(msgspec.Struct):
+    """What is said of a part, beside its format and schema."""
+
+    key: str
+    facts: dict[str, Any]
+    blocks: list[Entry]
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +137,7 @@ class Part:
 
 
 def _mapping(config: RunConfig) -> dict[str, Any]:
-    """A configuration without what belongs to other learners."""
+    """A configuration without what belongs to other tasks and learners."""
     others = foreign(config)
     return {
         key: value for key, value in to_mapping(config).items() if key not in others
@@ -124,14 +146,8 @@ def _mapping(config: RunConfig) -> dict[str, Any]:
 
 def encode(part: Part) -> bytes:
     """The bytes of a part."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     text = json.dumps(part.head(), separators=(",", ":"))
-    table = part.table().replace_schema_metadata({META: text.encode()})
-    sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression="zstd")
-    return sink.getvalue().to_pybytes()
+    return parquet.encode(part.table().replace_schema_metadata({META: text.encode()}))
 
 
 def decode(data: bytes, name: str) -> Part:
@@ -142,17 +158,22 @@ def decode(data: bytes, name: str) -> Part:
         name: of the file, for messages.
 
     Raises:
-        FormatError: not such a file, torn, or of a newer version.
+        FormatError: not such a file, torn, damaged, or of a newer version.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
+    table = parquet.decode(data, name)
+    return from_table(content(table.schema, name), table, name)
 
-    try:
-        table = pq.read_table(pa.BufferReader(data))
-        head = json.loads((table.schema.metadata or {})[META])
-    except (pa.ArrowException, OSError, KeyError, ValueError) as error:
-        raise FormatError(f"{name} cannot be read: {error}.") from error
-    return from_table(head, table, name)
+
+def content(schema: Any, name: object) -> dict[str, Any]:
+    """What a file's schema says of the figures in it.
+
+    Raises:
+        FormatError: nothing.
+    """
+    found = reading.json((schema.metadata or {}).get(META, b"null"), name)
+    if not isinstance(found, dict):
+        raise FormatError(f"{name} is no file of a campaign.")
+    return found
 
 
 def from_table(head: Mapping[str, Any], table: Any, name: str) -> Part:
@@ -168,27 +189,30 @@ def from_table(head: Mapping[str, Any], table: Any, name: str) -> Part:
             f"{name} has schema {head['schema']}, this version reads up to {SCHEMA}: "
             "install a newer bns. Nothing was changed."
         )
+    said = reading.typed(head, Head, name)
     figures = [
-        name
-        for name in table.column_names
-        if name not in KEYS and table[name].null_count < table.num_rows
+        column
+        for column in table.column_names
+        if column not in KEYS and table[column].null_count < table.num_rows
     ]
-    arrays = {column: table[column].to_numpy() for column in figures}
+    arrays = parquet.numbers(table, dict.fromkeys(figures, "double"), name)
     blocks, at = [], 0
-    try:
-        for entry in head["blocks"]:
-            config = from_mapping(entry["config"])
-            shape = (config.replicates, config.trials)
-            rows = slice(at, at + shape[0] * shape[1])
-            at = rows.stop
-            columns = {n: values[rows].reshape(shape) for n, values in arrays.items()}
-            blocks.append(
-                Block(
-                    entry["identity"], config, entry["start"], entry["onset"], columns
-                )
-            )
-        return Part(head["key"], tuple(blocks), head["facts"])
-    except (KeyError, TypeError, ValueError) as error:
-        if isinstance(error, BnsError):
+    for entry in said.blocks:
+        try:
+            config = from_mapping(entry.config)
+        except BnsError as error:
             raise FormatError(f"{name} cannot be used: {error}") from error
-        raise FormatError(f"{name} is not whole: {error}.") from error
+        shape = (config.replicates, config.trials)
+        rows = slice(at, at + shape[0] * shape[1])
+        at = rows.stop
+        if at > table.num_rows:
+            break
+        columns = {n: values[rows].reshape(shape) for n, values in arrays.items()}
+        made = Block(entry.identity, config, entry.start, entry.onset, columns)
+        blocks.append(made)
+    if at != table.num_rows or not figures:
+        raise FormatError(
+            f"{name} is not whole: it holds {table.num_rows} rows and {len(figures)} "
+            f"figures, {at} rows are listed."
+        )
+    return Part(said.key, tuple(blocks), said.facts)

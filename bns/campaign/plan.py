@@ -14,6 +14,7 @@ from typing import Any
 
 from bns.campaign.file import Campaign, Member
 from bns.campaign.identity import batch_seed, core, digest, world_seed
+from bns.experiment import versions
 from bns.experiment.config import RunConfig
 from bns.experiment.loading import from_mapping, to_mapping
 
@@ -28,6 +29,10 @@ class Job:
         world_seed: of worlds that are trained.
         start: number of the first replicate.
         configs: identity -> configuration, in the order of the runs.
+        trunk: file of the trials that its one configuration shares with others (see
+            `bns.campaign.trunk`); empty = none.
+        grows: whether it makes that file, and nothing else.
+        commit: of the code, as whoever planned it has it.
     """
 
     key: str
@@ -35,6 +40,9 @@ class Job:
     world_seed: int
     start: int
     configs: Mapping[str, RunConfig]
+    trunk: str = ""
+    grows: bool = False
+    commit: str = ""
 
     @property
     def count(self) -> int:
@@ -54,6 +62,9 @@ class Job:
             "world_seed": self.world_seed,
             "start": self.start,
             "configs": {i: to_mapping(c) for i, c in self.configs.items()},
+            "trunk": self.trunk,
+            "grows": self.grows,
+            "commit": self.commit,
         }
 
     @classmethod
@@ -76,14 +87,13 @@ def plan(campaign: Campaign, done: Mapping[str, int]) -> list[Job]:
         for start, count in _blocks(campaign, done.get(member.identity, 0))
     ]
     blocks.sort(key=lambda block: (*block[:3], block[3].identity))
-    jobs = []
+    jobs, code = [], versions.commit()
     for (_, start, count), group in groupby(blocks, key=lambda block: block[:3]):
         members = [block[3] for block in group]
         together = max(1, campaign.batch_runs // count)
         for first in range(0, len(members), together):
-            jobs.append(
-                _job(campaign.seed, members[first : first + together], start, count)
-            )
+            part = members[first : first + together]
+            jobs.append(replace(_job(campaign.seed, part, start, count), commit=code))
     return sorted(jobs, key=lambda job: job.key)
 
 

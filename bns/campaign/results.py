@@ -11,8 +11,8 @@ from bns.campaign.file import Campaign, Member, from_content
 from bns.campaign.part import Block
 from bns.campaign.store import FILE, CampaignStore
 from bns.errors import FormatError
-from bns.experiment.loading import read_toml
 from bns.experiment.record import RunRecord
+from bns.storage import reading, seal
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,8 @@ def wanted(store: CampaignStore) -> Campaign:
             f"{path} is missing, so nothing says what was wanted: run `bns campaign "
             f"run FILE.toml --out {store.directory} --resume`."
         )
-    return from_content(read_toml(path), store.name, sure=True)
+    text = seal.opened_text(reading.read_text(path), path)
+    return from_content(reading.toml(text, path), store.name, sure=True)
 
 
 def records(store: CampaignStore, known: set[str]) -> dict[str, RunRecord]:

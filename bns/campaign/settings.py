@@ -5,7 +5,7 @@ from typing import Any
 
 from bns.errors import BnsError, UnknownNameError
 from bns.experiment.config import RunConfig
-from bns.experiment.loading import from_mapping
+from bns.experiment.loading import from_mapping, nested
 from bns.experiment.validate import leaves
 
 OWN = ("preset", "seed", "replicates", "record_replicates", "threads")
@@ -37,14 +37,7 @@ def with_settings(base: RunConfig, settings: Mapping[str, Any]) -> RunConfig:
     Raises:
         BnsError: a value that is not allowed.
     """
-    content: dict[str, Any] = {}
-    for name, value in settings.items():
-        *tables, leaf = name.split(".")
-        at = content
-        for table in tables:
-            at = at.setdefault(table, {})
-        at[leaf] = value
-    return from_mapping(content, base)
+    return from_mapping(nested(settings), base)
 
 
 def label(settings: Mapping[str, Any]) -> str:
@@ -86,6 +79,9 @@ def _walk(
             )
         if name in settings:
             yield name, value
+        elif name == "settings" and isinstance(value, Mapping):
+            # which there are is known once the learner is
+            yield from ((f"{name}.{own}", item) for own, item in value.items())
         elif isinstance(value, Mapping) and any(
             s.startswith(f"{name}.") for s in settings
         ):

@@ -7,26 +7,45 @@
     results.parquet   all batches together, made when a session ends
     log.jsonl         sessions and wall times
 
-Every file is written beside its place and renamed, so it is whole or absent, and a
-batch counts as done when its part is there. `results.parquet` is replaced before the
-parts in it are removed; a batch found in both counts once. Batches stand in it in the
-order of their keys, so that an undisturbed and a disturbed campaign end with the same
-bytes in everything but `log.jsonl`.
+Every file is written beside its place and renamed, so it is whole or absent; it carries
+checksums. A batch counts as done when its part is there. `results.parquet` is replaced
+before the parts in it are removed; a batch found in both counts once. Batches stand in
+it in the order of their keys, so that an undisturbed and a disturbed campaign end with
+the same bytes in everything but `log.jsonl`.
 """
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import msgspec
 
 from bns.campaign.compact import FORMAT, SCHEMA, Compact, write
 from bns.campaign.part import Part, decode
 from bns.campaign.work import packages
 from bns.errors import BnsError, FormatError
-from bns.storage import files, journal
-from bns.storage.directory import Lock, read_head
+from bns.storage import files, journal, reading, seal
+from bns.storage.directory import read_head
+from bns.storage.lock import Lock
 
 HEAD, FILE = "campaign.json", "campaign.toml"
+
+
+class Head(msgspec.Struct):
+    """What campaign.json says, beside its format and schema."""
+
+    name: str
+    seed: int
+    versions: dict[str, str]
+
+
+class Failure(msgspec.Struct):
+    """What failed/KEY.json says."""
+
+    key: str
+    reason: str
+    attempts: Annotated[int, msgspec.Meta(ge=0, le=1_000_000)]
 
 
 @dataclass(eq=False)
@@ -38,17 +57,26 @@ class CampaignStore:
         name: of the campaign.
         seed: of the campaign.
         versions: packages that made it.
+        lock: held while it is written.
     """
 
     directory: Path
     name: str
     seed: int
     versions: Mapping[str, str]
-    _lock: Lock | None = field(default=None, repr=False)
+    lock: Lock | None = field(default=None, repr=False)
 
     @classmethod
-    def create(cls, directory: Path, name: str, seed: int) -> "CampaignStore":
+    def create(
+        cls, directory: Path, name: str, seed: int, lock: Lock | None = None
+    ) -> "CampaignStore":
         """A new directory.
+
+        Args:
+            directory: where; locked by who calls.
+            name: of the campaign.
+            seed: of the campaign.
+            lock: of the directory.
 
         Raises:
             BnsError: there is something in it, or it cannot be written.
@@ -68,7 +96,7 @@ class CampaignStore:
                     f"{directory} is not empty and holds no campaign ({min(held)}): "
                     "give another --out. Nothing was changed."
                 )
-        store = cls(directory, name, seed, packages())
+        store = cls(directory, name, seed, packages(), lock)
         files.make_directory(directory)
         files.write_json(
             directory / HEAD,
@@ -92,10 +120,8 @@ class CampaignStore:
         directory = Path(directory)
         path = directory / HEAD
         head = read_head(path, kind="campaign", format=FORMAT, schema=SCHEMA)
-        try:
-            return cls(directory, head["name"], int(head["seed"]), head["versions"])
-        except (KeyError, TypeError, ValueError) as error:
-            raise FormatError(f"{path} is not whole: {error}.") from error
+        said = reading.typed(head, Head, path)
+        return cls(directory, said.name, said.seed, said.versions)
 
     def check_versions(self) -> None:
         """Refuse to add results that other versions would make.
@@ -112,21 +138,15 @@ class CampaignStore:
                     "put results of both into one store."
                 )
 
-    def lock(self) -> None:
-        """Keep other processes from writing here until this one ends.
-
-        Raises:
-            BnsError: another process is writing here.
-        """
-        self._lock = Lock(self.directory)
-        self._lock.take()
+    def tidy(self) -> None:
+        """Remove what a killed writer left half-written."""
         for folder in (self.directory, self.parts, self.failed):
             files.remove_temporary(folder)
 
     def close(self) -> None:
         """Let others write here."""
-        if self._lock is not None:
-            self._lock.release()
+        if self.lock is not None:
+            self.lock.release()
 
     @property
     def parts(self) -> Path:
@@ -156,7 +176,11 @@ class CampaignStore:
     def failures(self) -> dict[str, dict[str, Any]]:
         """Batches that failed, by key."""
         paths = sorted(self.failed.glob("[0-9a-f]*.json"))
-        return {path.stem: files.read_json(path) for path in paths}
+        said = {path: seal.opened(reading.read_json(path), path) for path in paths}
+        return {
+            path.stem: msgspec.structs.asdict(reading.typed(entry, Failure, path))
+            for path, entry in said.items()
+        }
 
     def forgive(self) -> None:
         """Forget all failures, so that they are tried again."""
@@ -177,9 +201,11 @@ class CampaignStore:
                 yield compact.read(key)
                 continue
             try:
-                data = loose[key].read_bytes()
-            except FileNotFoundError:  # compacted since
+                data = reading.read_bytes(loose[key], most=reading.DATA)
+            except FormatError:
                 compact = Compact(self.directory)
+                if key not in compact.parts:  # compacted since, if it is there
+                    raise
                 yield compact.read(key)
             else:
                 yield decode(data, str(loose[key]))

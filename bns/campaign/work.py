@@ -1,8 +1,9 @@
 """One batch, from its job to its bytes: what every engine runs."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from bns.campaign.part import Block, Part, encode
@@ -22,7 +23,47 @@ def run(job: Job, beat: Beat = lambda trials: None) -> bytes:
     Raises:
         BnsError: a setting that is not allowed.
     """
-    from bns.experiment.run import facts, train_many
+    from bns.experiment.run import facts
+
+    if job.trunk:
+        columns, mode = _from_trunk(job, beat)
+    else:
+        columns, mode = _together(job, beat)
+    if job.grows:
+        return b""
+    blocks = [
+        Block(
+            identity,
+            config,
+            job.start,
+            int(facts(config, mode)["damage_onset"][0]),
+            columns[identity],
+        )
+        for identity, config in job.configs.items()
+    ]
+    return encode(Part(job.key, tuple(blocks), made(job, mode)))
+
+
+def made(job: Job, mode: str) -> dict[str, Any]:
+    """From what a batch is made: seeds, mode, and the code."""
+    from bns.experiment.versions import REVISION
+
+    return {
+        "seed": job.seed,
+        "world_seed": job.world_seed,
+        "mode": mode,
+        "versions": packages(),
+        "commit": job.commit,
+        "revision": REVISION,
+    }
+
+
+Columns = Mapping[str, Mapping[str, Any]]
+
+
+def _together(job: Job, beat: Beat) -> tuple[Columns, str]:
+    """Train all configurations as one batch; figures of each, by identity."""
+    from bns.experiment.run import train_many
     from bns.experiment.world_factory import make_world
 
     configs = list(job.configs.values())
@@ -32,18 +73,28 @@ def run(job: Job, beat: Beat = lambda trials: None) -> bytes:
         worlds=[make_world(_for_world(config, job.world_seed)) for config in configs],
         on_trial=lambda trial, step, trials: beat(trial + 1),
     )
-    blocks = [
-        Block(
-            identity,
-            config,
-            job.start,
-            int(facts(config, mode)["damage_onset"][0]),
-            record.columns,
-        )
-        for (identity, config), record in zip(job.configs.items(), records, strict=True)
-    ]
-    made = {"seed": job.seed, "world_seed": job.world_seed, "mode": mode}
-    return encode(Part(job.key, tuple(blocks), made | {"versions": packages()}))
+    named = zip(job.configs, records, strict=True)
+    return {identity: record.columns for identity, record in named}, mode
+
+
+def _from_trunk(job: Job, beat: Beat) -> tuple[Columns, str]:
+    """Train one configuration from its trunk on, or the trunk itself."""
+    from bns.campaign import trunk
+    from bns.experiment.validate import check
+    from bns.experiment.world_factory import make_world
+
+    ((identity, config),) = job.configs.items()
+    _mode([check(config)])
+    path, length = Path(job.trunk), trunk.shared(config)
+    begun = trunk.read(path, seed=config.seed, trials=length)
+    if job.grows and begun is not None:
+        return {}, begun.mode
+    world = make_world(_for_world(config, job.world_seed))
+    until = length if job.grows else config.trials
+    found = trunk.train(config, world, until=until, begun=begun, beat=beat)
+    if job.grows:
+        trunk.write(path, found)
+    return {identity: found.columns}, found.mode
 
 
 def packages() -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -32,6 +32,9 @@ class Cell:
         measure_b: what is measured of b.
         at_most: a's value is claimed to be no larger.
         at_least: a's value is claimed to be no smaller.
+        variant: another reading, or other settings where the dissertation is silent;
+            it stands beside the claim and counts for nothing in its verdict. Empty =
+            the claim itself.
     """
 
     a: str
@@ -42,6 +45,7 @@ class Cell:
     measure_b: str = ""
     at_most: float | None = None
     at_least: float | None = None
+    variant: str = ""
 
     @property
     def sides(self) -> tuple[str, ...]:
@@ -50,7 +54,11 @@ class Cell:
 
     @property
     def text(self) -> str:
-        """The comparison in words."""
+        """The comparison in words; those of a claim differ."""
+        return f"{self._text} [{self.variant}]" if self.variant else self._text
+
+    @property
+    def _text(self) -> str:
         if self.at_most is not None:
             return f"{self.a}: {self.measure} <= {self.at_most:g}"
         if self.at_least is not None:
@@ -102,10 +110,28 @@ def claims() -> Mapping[str, Claim]:
     """All claims by id, in the order of the dissertation."""
     found = {}
     for investigation in INVESTIGATIONS:
-        for name, entry in content(investigation)["claims"].items():
-            cells = tuple(Cell(**cell) for cell in entry.get("cells", ()))
-            found[name] = Claim(id=name, **{**entry, "cells": cells})
+        data = content(investigation)
+        for name, entry in data["claims"].items():
+            cells = [Cell(**cell) for cell in entry.get("cells", ())]
+            for other in data.get("variants", ()):
+                if name in other["claims"]:
+                    cells += _beside(cells, other["says"], other["piece"])
+            found[name] = Claim(id=name, **{**entry, "cells": tuple(cells)})
     return found
+
+
+def _beside(cells: Iterable[Cell], says: str, piece: str) -> list[Cell]:
+    """The cells of a claim with another piece on both sides."""
+    return [
+        replace(
+            cell,
+            a=f"{cell.a} {piece}",
+            b=f"{cell.b} {piece}" if cell.b else "",
+            variant=says,
+        )
+        for cell in cells
+        if not cell.variant
+    ]
 
 
 def find(name: str) -> Claim:

@@ -15,7 +15,7 @@ from bns.experiment.record import RunRecord
 
 Values = Callable[[RunRecord], np.ndarray]
 LAST = 10  # trials
-COST, SNN = "fitness_best", "snn_forward"
+COST, SNN, SENSOR = "fitness_best", "snn_forward", "sensor_left"
 
 
 @dataclass(frozen=True)
@@ -109,6 +109,44 @@ def _dip(every: int) -> Values:
     return values
 
 
+def _peak(record: RunRecord) -> np.ndarray:
+    """Cost around the worst trial after the damage, as the other runs place it.
+
+    Smoothed over five trials. To place it by the run's own cost would pick its noise,
+    and find an improvement in any run that does not change.
+    """
+    start = _onset(record)
+    smooth = np.stack(
+        [np.convolve(cost[start:], np.ones(5) / 5, "valid") for cost in record[COST]]
+    )
+    if len(smooth) == 1:
+        return smooth.max(axis=1)
+    others = (smooth.sum(axis=0) - smooth) / (len(smooth) - 1)
+    return np.take_along_axis(smooth, others.argmax(axis=1)[:, None], 1)[:, 0]
+
+
+def _one_handed(record: RunRecord) -> np.ndarray:
+    """How alike the last trials turn: 1 = all one way, 0 = half each way."""
+    return np.abs(np.sign(record["turned"][:, -LAST:]).mean(axis=1))
+
+
+def _regained(share: float, before: Callable[..., np.ndarray]) -> Values:
+    """Trials from the damage until the robot gets a share as far as before it."""
+
+    def values(record: RunRecord) -> np.ndarray:
+        start, ways = _onset(record), record["distance"]
+        enough = share * before(ways[:, :start], axis=1)
+        there = ways[:, start:] >= enough[:, None]
+        return np.where(there.any(axis=1), there.argmax(axis=1) + 1.0, np.inf)
+
+    return values
+
+
+def _usual(ways: np.ndarray, axis: int) -> np.ndarray:
+    """The median of the last ten trials."""
+    return np.median(ways[:, -LAST:], axis=axis)
+
+
 def onset_of_improvement(record: RunRecord) -> np.ndarray:
     """First trial at which the cost has made up a fifth of its rise; inf = never.
 
@@ -183,9 +221,28 @@ MEASURES: Mapping[str, Measure] = {
         "error of the forward motion, five trials before the damage",
         _over(SNN, lambda r: _onset(r) - 5, 5),
     ),
+    "snn-onset": Measure(
+        "error of the forward motion, first damaged trial", _over(SNN, _onset, 1)
+    ),
     "snn-end": Measure("error of the forward motion, last ten trials", _end(SNN)),
     "snn-first": Measure(
         "error of the forward motion, first trial", _over(SNN, lambda r: 0, 1)
+    ),
+    "sensor-first": Measure(
+        "error of the left sensor, first trial", _over(SENSOR, lambda r: 0, 1)
+    ),
+    "sensor-end": Measure("error of the left sensor, last ten trials", _end(SENSOR)),
+    "peak": Measure("cost around the worst trial after the damage", _peak),
+    "one-handed": Measure(
+        "how alike the last ten trials turn, 0 to 1", _one_handed, low=False
+    ),
+    "regain": Measure(
+        "trials from the damage until 90 % as far as in the ten before it",
+        _regained(0.9, _usual),
+    ),
+    "surpass": Measure(
+        "trials from the damage until farther than ever before",
+        _regained(1.0, np.max),
     ),
     **_diversity("41"),
     **_diversity("51"),

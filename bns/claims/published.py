@@ -1,73 +1,222 @@
 """Findings that come with the package: what has been run, so that nobody has to.
 
-A finding belongs to the settings that its runs had. Where those of a side have changed
-since, what was published on it is as good as not there.
+A finding belongs to the settings and the code that its runs had (`provenance`). One
+that is not of today's is *stale*: it is shown as such and counts as not run.
 """
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
-from bns.claims import verdict
+from bns.claims import provenance, sides
 from bns.claims.claim import Cell, Claim
+from bns.claims.provenance import Made
 from bns.claims.verdict import Finding
+from bns.errors import BnsError, FormatError
+from bns.experiment.versions import REVISION
 from bns.stats import Interval
 from bns.storage.files import write_bytes
 
 FILE = "published.json"
+SCHEMA = 2
+NO_SETTINGS = "made before findings kept the settings of their runs"
 
-Row = Mapping[str, str | float | list]
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Stale:
+    """A finding that is not of today's settings and code.
+
+    Attributes:
+        text: of the comparison.
+        runs: on each side.
+        share: of pairs that a won.
+        p: of it.
+        why: where it differs.
+    """
+
+    text: str
+    runs: tuple[int, ...]
+    share: float
+    p: float
+    why: str
+
+
+@dataclass(frozen=True)
+class Library:
+    """A file of findings.
+
+    Attributes:
+        rows: a finding each, by world, claim and text of the comparison.
+        settings: digest of a side -> its settings.
+    """
+
+    rows: Mapping[tuple[str, str, str], Row]
+    settings: Mapping[str, provenance.Settings]
 
 
 @cache
-def rows() -> Mapping[tuple[str, str, str], Row]:
-    """All that is published, by world, claim and comparison."""
-    text = (files("bns.claims.data") / FILE).read_text(encoding="utf-8")
-    return {(r["world"], r["claim"], r["cell"]): r for r in json.loads(text)}
+def library() -> Library:
+    """The findings that come with the package."""
+    path = files("bns.claims.data") / FILE
+    return parse(path.read_text(encoding="utf-8"), FILE)
+
+
+def parse(text: str, name: str) -> Library:
+    """The findings in the text of a file.
+
+    Raises:
+        FormatError: not such a file, or of a newer version.
+    """
+    try:
+        content = json.loads(text)
+        if isinstance(content, list):  # schema 1 had rows alone
+            content = {"schema": 1, "findings": content, "bases": {}, "sides": {}}
+        if content["schema"] > SCHEMA:
+            raise FormatError(
+                f"{name} has schema {content['schema']}, this version reads up to "
+                f"{SCHEMA}: install a newer bns."
+            )
+        rows = {(r["world"], r["claim"], r["cell"]): r for r in content["findings"]}
+        bases = content["bases"]
+        known = {
+            digest: _whole(bases[base], differing)
+            for digest, (base, differing) in content["sides"].items()
+        }
+    except (KeyError, TypeError, ValueError) as error:
+        raise FormatError(f"{name} holds no findings: {error}.") from error
+    return Library(rows, known)
 
 
 def finding(
-    claim: Claim, cell: Cell, names: Sequence[str], *, world: str
-) -> Finding | None:
-    """What was published on a comparison; None = nothing, or of other settings.
+    claim: Claim, cell: Cell, *, world: str, among: Library | None = None
+) -> Finding | Stale | None:
+    """What was published on a comparison; None = nothing.
 
     Args:
         claim: whose comparison it is.
         cell: what is compared.
-        names: identities of its sides.
-        world: where they ran.
+        world: where it ran.
+        among: the findings; those of the package by default.
     """
-    row = rows().get((world, claim.id, cell.text))
-    if row is None or row["sides"] != list(names):
+    among = among or library()
+    row = among.rows.get((world, claim.id, cell.text))
+    if row is None:
         return None
-    share = Interval(*row["share"])
-    found = verdict.finding(cell, tuple(row["runs"]), row["p"], share)
-    return replace(found, published=True)
+    why = _why_stale(row, claim, cell, world, among)
+    if why:
+        share = float(row["share"][0])
+        return Stale(cell.text, tuple(row["runs"]), share, float(row["p"]), why)
+    made = {key: _tuples(row[key]) for key in Made.__dataclass_fields__}
+    return Finding(
+        cell=cell,
+        runs=tuple(row["runs"]),
+        p_look=row["p_look"],
+        p=row["p"],
+        p_equivalent=row["p_equivalent"],
+        share=Interval(*row["share"]),
+        stopped=row["stopped"],
+        power=row["power"],
+        published=True,
+        made=Made(**made),
+    )
 
 
-def row(
-    claim: Claim, found: Finding, names: Sequence[str], *, world: str
-) -> dict[str, str | float | list]:
-    """A finding as it is published; arguments as for `finding`."""
+def _why_stale(row: Row, claim: Claim, cell: Cell, world: str, among: Library) -> str:
+    """Why a row is not of today's settings and code; empty where it is."""
+    if "revision" not in row:
+        return NO_SETTINGS
+    if row["revision"] != REVISION:
+        return f"of revision {row['revision']} of the code, today's is {REVISION}"
+    for side, digest in zip(cell.sides, row["sides"], strict=True):
+        try:
+            now = sides.settings_of(claim.investigation, side, world)
+        except BnsError as error:
+            return str(error)
+        if provenance.of(now) != digest:
+            then = among.settings.get(digest, {})
+            return f"{side}: {provenance.difference(now, then)}"
+    return ""
+
+
+def row(claim: Claim, found: Finding, *, world: str) -> dict[str, Any]:
+    """A finding as it is published, nothing rounded.
+
+    Raises:
+        BnsError: it is not known from what it was made.
+    """
+    if found.made is None:
+        raise BnsError(f"{claim.id}: {found.cell.text} has no provenance to publish.")
     return {
         "world": world,
         "claim": claim.id,
         "cell": found.cell.text,
-        "sides": list(names),
         "runs": list(found.runs),
+        "p_look": found.p_look,
         "p": found.p,
+        "p_equivalent": found.p_equivalent,
         "share": list(found.share),
+        "stopped": found.stopped,
+        "power": found.power,
+        **json.loads(json.dumps(asdict(found.made))),
     }
 
 
-def write(path: Path, findings: Sequence[Row]) -> None:
-    """Publish findings, a line each.
+def text(rows: Sequence[Row], settings: Mapping[str, provenance.Settings]) -> str:
+    """The file of findings, a line each.
+
+    Args:
+        rows: the findings.
+        settings: digest of a side -> its settings, of all sides in `rows` of which
+            they are known.
+    """
+    used = sorted({d for r in rows if "revision" in r for d in r["sides"]})
+    bases: dict[str, Mapping[str, Any]] = {}
+    lines = []
+    for digest in (d for d in used if d in settings):
+        whole = settings[digest]
+        kind = provenance.of({"keys": list(whole)})
+        base = bases.setdefault(kind, whole)
+        differing = {k: v for k, v in whole.items() if base[k] != v}
+        lines.append(f'"{digest}": {json.dumps([kind, differing])}')
+    parts = [
+        f'"schema": {SCHEMA}',
+        _block("bases", (f'"{k}": {json.dumps(v)}' for k, v in bases.items()), "{}"),
+        _block("sides", lines, "{}"),
+        _block("findings", (json.dumps(each) for each in rows), "[]"),
+    ]
+    return "{\n" + ",\n".join(parts) + "\n}\n"
+
+
+def write(
+    path: Path, rows: Sequence[Row], settings: Mapping[str, provenance.Settings]
+) -> None:
+    """Publish findings; arguments as for `text`.
 
     Raises:
         StorageError: no space, or no permission.
     """
-    lines = ",\n".join(json.dumps(each) for each in findings)
-    write_bytes(path, f"[\n{lines}\n]\n".encode())
+    write_bytes(path, text(rows, settings).encode())
+
+
+def _block(name: str, lines: Iterable[str], brackets: str) -> str:
+    inside = ",\n".join(lines)
+    opened, closed = brackets
+    return (
+        f'"{name}": {opened}\n{inside}\n{closed}'
+        if inside
+        else (f'"{name}": {brackets}')
+    )
+
+
+def _whole(base: Mapping[str, Any], differing: Mapping[str, Any]) -> dict[str, Any]:
+    return {**base, **differing}
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value

@@ -1,20 +1,23 @@
 """Findings on claims, as rows and as the page docs/claims.md."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from bns.campaign.results import records
-from bns.campaign.store import CampaignStore
-from bns.claims import published, sides, verdict
-from bns.claims.claim import KINDS, Cell, Claim
+from bns.campaign.file import Member
+from bns.claims import held, provenance, published, sides, verdict
+from bns.claims.claim import KINDS, Cell, Claim, claims, content
+from bns.claims.held import Held
+from bns.claims.published import Library, Stale
 from bns.claims.verdict import Finding
 from bns.errors import BnsError
-from bns.experiment.record import RunRecord
+from bns.stats.sequential import Design, up_to
 
-NOT_RUN, NOT_TESTED = "not run", "not tested"
-VERDICTS = ("holds", "direction only", "null", "reversed", NOT_RUN, NOT_TESTED)
+NOT_RUN, NOT_TESTED, STALE = "not run", "not tested", "stale"
+VERDICTS = (
+    "holds", "direction only", "null", "reversed", STALE, NOT_RUN, NOT_TESTED
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -23,140 +26,234 @@ class Judged:
 
     Attributes:
         claim: what the dissertation says.
-        findings: of the cells that have runs.
-        verdict: the least favourable of theirs, "not run" or "not tested".
+        findings: of the cells that have runs of today's settings.
+        stale: findings of other settings or other code, of cells without a finding.
+        verdict: one of `VERDICTS`.
         note: why some or all of it is missing.
     """
 
     claim: Claim
     findings: tuple[Finding, ...]
+    stale: tuple[Stale, ...]
     verdict: str
     note: str = ""
 
     @property
+    def own(self) -> tuple[Finding, ...]:
+        """The findings that are no variants."""
+        return tuple(each for each in self.findings if not each.cell.variant)
+
+    @property
     def complete(self) -> bool:
-        """Whether every cell has a finding."""
-        return len(self.findings) == len(self.claim.cells)
+        """Whether every cell that is no variant has a finding."""
+        return len(self.own) == sum(not cell.variant for cell in self.claim.cells)
+
+    @property
+    def settled(self) -> bool:
+        """Whether all of them have the runs that the design asks for."""
+        return bool(self.own) and self.complete and not self.provisional
 
     @property
     def fewest(self) -> int:
         """Runs of the side that has fewest, of the cells with a finding; 0 = none."""
-        return min((min(finding.runs) for finding in self.findings), default=0)
+        return min((min(finding.runs) for finding in self.own), default=0)
 
     @property
     def provisional(self) -> bool:
-        """Whether cells are missing, or rest on fewer runs than the rule asks for."""
-        return bool(self.findings) and (
-            not self.complete or any(finding.provisional for finding in self.findings)
+        """Whether cells are missing, or the design asks for more runs of some."""
+        return bool(self.own) and (
+            not self.complete or any(finding.provisional for finding in self.own)
         )
 
 
 def judged(
-    claims: Sequence[Claim],
+    wanted: Sequence[Claim],
     directory: Path,
     *,
     world: str,
     quick: bool = False,
     own: bool = True,
+    runs: int = 0,
+    among: Library | None = None,
 ) -> list[Judged]:
-    """All claims, judged by the runs in a store; without a store none has runs.
+    """Claims, judged by the runs in a store; without a store none has runs.
+
+    p values are adjusted over the whole investigation, whichever of its claims are
+    asked for.
 
     Args:
-        claims: to be judged.
+        wanted: claims to be judged.
         directory: the store.
         world: where its runs are of.
         quick: whether they are the small and short ones.
         own: by these runs alone; else a comparison of which more runs are published
             than there are has the published finding (never a quick one).
+        runs: the last look at most, instead of that of the design; 0 = the design's.
+        among: published findings; by default those of the package.
 
     Raises:
         FormatError: the store is damaged or of a newer version.
     """
-    found: dict[str, RunRecord] = {}
+    letters = {claim.investigation for claim in wanted}
+    family = [c for c in claims().values() if c.investigation in letters]
+    members = {
+        member.label: member
+        for claim in family
+        for cell in claim.cells
+        for member in _members(claim, cell, world, quick)
+    }
+    have = {}
     if (directory / "campaign.json").exists():
-        wanted = {
-            name
-            for claim in claims
-            for cell in claim.cells
-            for name in _names(claim, cell.sides, world, quick)
-        }
-        found = records(CampaignStore.open(directory), wanted)
-    rows = [_judge(claim, found, world, quick, own or quick) for claim in claims]
-    flat = [finding for row in rows for finding in row.findings]
-    adjusted = iter(verdict.adjusted(flat))
-    return [
-        Judged(
-            row.claim,
-            tuple(next(adjusted) for _ in row.findings),
-            row.verdict,
-            row.note,
-        )
-        for row in rows
-    ]
+        have = held.read(directory, identities(members.values()))
+    rows: dict[str, Judged] = {}
+    for letter in sorted(letters):
+        part = [claim for claim in family if claim.investigation == letter]
+        judge = _Judge(have, world, quick, own or quick, runs, among)
+        rows |= {row.claim.id: row for row in _adjusted([judge(c) for c in part])}
+    return [rows[claim.id] for claim in wanted]
 
 
-def _names(
-    claim: Claim, pieces: tuple[str, ...], world: str, quick: bool
-) -> tuple[str, ...]:
-    """Identities of sides; none where one of them cannot run."""
+def _adjusted(rows: Sequence[Judged]) -> list[Judged]:
+    """With Holm's p over all of them, and the verdicts that follow."""
+    flat = iter(verdict.adjusted([each for row in rows for each in row.findings]))
+    done = []
+    for row in rows:
+        found = tuple(next(flat) for _ in row.findings)
+        said = row.verdict
+        if any(not each.cell.variant for each in found):
+            said = verdict.of_claim(row.claim.kind, found)
+        done.append(replace(row, findings=found, verdict=said))
+    return done
+
+
+def identities(members: Iterable[Member]) -> dict[str, tuple[str, Sequence[str]]]:
+    """Identity of sides -> digest of their settings, sections that are no part of it.
+
+    Args:
+        members: as `bns.claims.sides.member` gives them.
+    """
+    found = {}
+    for member in members:
+        ignored = tuple(content(member.label[0])["ignored"])
+        settings = provenance.resolved(member.config, ignored)
+        found[member.identity] = (provenance.of(settings), ignored)
+    return found
+
+
+def _members(claim: Claim, cell: Cell, world: str, quick: bool) -> tuple[Member, ...]:
+    """The sides of a comparison; none where one of them cannot run."""
+    letter = claim.investigation
     try:
         return tuple(
-            sides.member(claim.investigation, side, world=world, quick=quick).identity
-            for side in pieces
+            sides.member(letter, side, world=world, quick=quick) for side in cell.sides
         )
     except BnsError:
         return ()
 
 
-def _judge(
-    claim: Claim, found: dict[str, RunRecord], world: str, quick: bool, own: bool
-) -> Judged:
-    if claim.untested:
-        return Judged(claim, (), NOT_TESTED, claim.untested)
-    findings, missing = [], []
-    for cell in claim.cells:
-        names = _names(claim, cell.sides, world, quick)
-        finding = _finding(cell, [found[name] for name in names if name in found])
-        kept = None if own else published.finding(claim, cell, names, world=world)
-        if finding is None or (kept and min(kept.runs) > min(finding.runs)):
-            finding = kept
-        if finding:
-            findings.append(finding)
-        elif not names:
-            missing.append(sides.missing(claim.investigation, cell, world=world))
-        elif not all(name in found for name in names):
-            missing.append("no runs yet")
-    if not findings:
-        return Judged(claim, (), NOT_RUN, missing[0] if missing else "no such figures")
-    note = f"{len(missing)} of {len(claim.cells)} cells not run" if missing else ""
-    said = verdict.of_claim(claim.kind, findings)
-    return Judged(claim, tuple(findings), said, note)
+@dataclass(frozen=True)
+class _Judge:
+    """Judges claims one by one; p values are not adjusted yet."""
+
+    have: Mapping[str, Held]
+    world: str
+    quick: bool
+    own: bool
+    runs: int
+    among: Library | None
+
+    def __call__(self, claim: Claim) -> Judged:
+        if claim.untested:
+            return Judged(claim, (), (), NOT_TESTED, claim.untested)
+        findings, stale, missing = [], [], []
+        for cell in claim.cells:
+            found = self.of(claim, cell)
+            if isinstance(found, Finding):
+                findings.append(found)
+            elif isinstance(found, Stale):
+                stale.append(found)
+            if not isinstance(found, Finding) and not cell.variant:
+                why = sides.missing(claim.investigation, cell, world=self.world)
+                missing.append(why or "no runs yet")
+        own = sum(not cell.variant for cell in claim.cells)
+        if len(missing) == own:
+            said = STALE if stale else NOT_RUN
+            why = stale[0].why if stale else missing[0]
+            return Judged(claim, tuple(findings), tuple(stale), said, why)
+        note = f"{len(missing)} of {own} cells not run" if missing else ""
+        return Judged(claim, tuple(findings), tuple(stale), "", note)
+
+    def of(self, claim: Claim, cell: Cell) -> Finding | Stale | None:
+        """What is known of a cell."""
+        mine = self._mine(claim, cell)
+        if self.own:
+            return mine
+        kept = published.finding(claim, cell, world=self.world, among=self.among)
+        if not isinstance(kept, Finding):
+            return mine or kept
+        more = mine is not None and (
+            mine.stopped or (min(mine.runs) >= min(kept.runs) and not kept.stopped)
+        )
+        return mine if more else kept
+
+    def _mine(self, claim: Claim, cell: Cell) -> Finding | None:
+        if not self.have:
+            return None
+        members = _members(claim, cell, self.world, self.quick)
+        have = [self.have[m.identity] for m in members if m.identity in self.have]
+        if not have or len(have) < len(cell.sides):
+            return None
+        records = [each.record() for each in have]
+        found = verdict.judge(
+            cell,
+            records[0],
+            records[1] if cell.b else None,
+            looks=looks(cell, self.runs),
+        )
+        if found is None:
+            return None
+        return replace(found, made=held.made(have, min(found.runs)))
 
 
-def _finding(cell: Cell, have: Sequence[RunRecord]) -> Finding | None:
-    """What runs say of a cell; None where a side has none."""
-    if not have or len(have) < len(cell.sides):
-        return None
-    return verdict.judge(cell, have[0], have[1] if cell.b else None)
+def looks(cell: Cell, runs: int = 0) -> Design:
+    """The looks at a comparison, the last one at `runs` at most; 0 = as designed."""
+    design = verdict.design(cell)
+    if not runs or runs >= design.looks[-1]:
+        return design
+    return up_to(runs)
 
 
-def publishable(worlds: Mapping[str, Sequence[Judged]]) -> list[published.Row]:
-    """All findings as they are published.
+def publishable(
+    worlds: Mapping[str, Sequence[Judged]], among: Library | None = None
+) -> list[published.Row]:
+    """All findings as they are published, and the stale ones that nothing replaces.
 
     Args:
-        worlds: name of the world -> all claims, judged.
+        worlds: name of the world -> claims, judged.
+        among: what was published before; by default what is in the package.
     """
-    return [
-        published.row(
-            row.claim,
-            finding,
-            _names(row.claim, finding.cell.sides, world, False),
-            world=world,
-        )
-        for world, rows in worlds.items()
-        for row in rows
-        for finding in row.findings
-    ]
+    before = (among or published.library()).rows
+    rows: list[published.Row] = []
+    for world, judged_ in worlds.items():
+        for row in judged_:
+            rows += [published.row(row.claim, f, world=world) for f in row.findings]
+            rows += [before[world, row.claim.id, s.text] for s in row.stale]
+    return rows
+
+
+def settings(
+    worlds: Mapping[str, Sequence[Judged]], among: Library | None = None
+) -> dict[str, Mapping]:
+    """Digest -> settings of all sides in `publishable`; arguments as there."""
+    found = dict((among or published.library()).settings)
+    for world, rows in worlds.items():
+        for row in rows:
+            for each in row.findings:
+                for side in each.cell.sides:
+                    letter = row.claim.investigation
+                    digest = sides.digest_of(letter, side, world)
+                    found[digest] = sides.settings_of(letter, side, world)
+    return found
 
 
 def counts(rows: Sequence[Judged]) -> dict[str, int]:
@@ -169,7 +266,7 @@ HEAD = ("comparison", "p (diss.)", "runs", "p", "p (Holm)", "share", "verdict")
 
 
 def cells(row: Judged) -> list[tuple[str, ...]]:
-    """A row of texts for each finding of a claim."""
+    """A row of texts for each finding of a claim, then for each stale one."""
     return [
         (
             finding.cell.text,
@@ -182,6 +279,17 @@ def cells(row: Judged) -> list[tuple[str, ...]]:
             finding.verdict,
         )
         for finding in row.findings
+    ] + [
+        (
+            stale.text,
+            "",
+            " v ".join(map(str, stale.runs)),
+            number(stale.p),
+            "",
+            f"{stale.share:.2f}",
+            f"{STALE}: {stale.why}",
+        )
+        for stale in row.stale
     ]
 
 

@@ -1,34 +1,45 @@
-"""Run what claims need and is missing, in a store of its own for each world."""
+"""Run what claims need, look by look, in a store of its own for each world."""
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from bns.campaign import drive
 from bns.campaign.adopt import adopt
 from bns.campaign.engines.base import Engine
 from bns.campaign.file import Campaign, Member
-from bns.claims import sides, verdict
+from bns.campaign.plan import Job
+from bns.campaign.progress import Progress
+from bns.campaign.store import CampaignStore
+from bns.claims import held, price, report, schedule, sides
 from bns.claims.claim import Claim
+from bns.claims.report import Judged
+from bns.experiment.batch import check_device
+from bns.storage.lock import Lock
 
 ROOT = Path("runs/claims")
 QUICK_RUNS = 6
-SEED = 0
+
+Stop = Callable[[], bool]
+Found = Callable[[], None]
 
 
-@dataclass(frozen=True)
-class Need:
-    """Members that claims need, and how many runs of each.
+@dataclass
+class Session:
+    """What a call of `run` did.
 
     Attributes:
-        members: each once.
-        runs: identity -> runs wanted.
-        impossible: claim -> why none of it can run.
+        done: batches it ran, trunks among them.
+        failed: batches that failed, by key, with the reason.
+        waiting: batches that failed before and were not tried again.
+        stopped: whether it was told to stop before the end.
     """
 
-    members: tuple[Member, ...]
-    runs: dict[str, int]
-    impossible: dict[str, str]
+    done: int = 0
+    failed: dict[str, str] = field(default_factory=dict)
+    waiting: int = 0
+    stopped: bool = False
 
 
 def directory(world: str, *, quick: bool, root: Path = ROOT) -> Path:
@@ -36,35 +47,15 @@ def directory(world: str, *, quick: bool, root: Path = ROOT) -> Path:
     return root / (f"{world}-quick" if quick else world)
 
 
-def needed(
-    claims: Iterable[Claim], *, world: str, quick: bool = False, runs: int = 0
-) -> Need:
-    """What claims need.
-
-    Args:
-        claims: to be tested.
-        world: name of the world.
-        quick: small and short versions.
-        runs: runs a side, instead of those of the rule; 0 = the rule.
-    """
-    members: dict[str, Member] = {}
-    wanted: dict[str, int] = {}
-    impossible = {}
+def impossible(claims: Iterable[Claim], *, world: str) -> dict[str, str]:
+    """Claims of which comparisons cannot run in a world, and why."""
+    found: dict[str, str] = {}
     for claim in claims:
         for cell in claim.cells:
             why = sides.missing(claim.investigation, cell, world=world)
             if why:
-                impossible.setdefault(claim.id, why)
-                continue
-            count = runs or (QUICK_RUNS if quick else verdict.runs_wanted(cell))
-            for side in cell.sides:
-                member = sides.member(
-                    claim.investigation, side, world=world, quick=quick
-                )
-                name = member.identity
-                members.setdefault(name, member)
-                wanted[name] = max(count, wanted.get(name, 0))
-    return Need(tuple(members.values()), wanted, impossible)
+                found.setdefault(claim.id, why)
+    return found
 
 
 def run(
@@ -75,50 +66,124 @@ def run(
     quick: bool = False,
     runs: int = 0,
     root: Path = ROOT,
+    own: bool = True,
     mix: bool = False,
     retry: bool = False,
-    stop: Callable[[], bool] = lambda: False,
+    stop: Stop = lambda: False,
     progress: bool = True,
-) -> list[drive.Session]:
-    """Run what is missing; first 30 runs of everything, then more where they are due.
+    found: Found = lambda: None,
+) -> Session:
+    """Run what is missing: all comparisons to their first look, then those that go on.
 
     Args:
         claims: to be tested.
         engine: where batches run.
         world: name of the world.
         quick: small and short versions, in a store of their own.
-        runs: runs a side, instead of those of the rule.
+        runs: runs a side at most, instead of those of the design; 0 = the design's.
         root: where stores are.
-        mix, retry, stop, progress: as for `bns.campaign.drive.run`.
+        own: by runs of this store alone; else what is published of today's settings
+            need not be run.
+        mix: allow results of several package versions in one store.
+        retry: try batches again that failed before.
+        stop: asked after every batch; True ends the session there.
+        progress: show it on the standard error stream.
+        found: called after every batch, when there may be new findings, and at the end.
 
     Raises:
-        BnsError: as `bns.campaign.drive.run`.
+        BnsError: a store of another version, or one that is being written.
     """
-    need = needed(claims, world=world, quick=quick, runs=runs)
     out = directory(world, quick=quick, root=root)
-    sessions = []
-    for count in sorted(set(need.runs.values())):
-        members = tuple(m for m in need.members if need.runs[m.identity] >= count)
-        campaign = _campaign(members, count, world)
-        sessions.append(
-            drive.run(
-                campaign,
-                out,
-                engine,
-                resume=True,
-                retry=retry,
-                mix=mix,
-                progress=progress,
-                stop=stop,
+    last = runs or (QUICK_RUNS if quick else 0)
+    check_device("cpu")
+    store = drive.opened(_campaign((), world), out, resume=True)
+    if not mix:
+        store.check_versions()
+    store.lock()
+    session = Session()
+    try:
+        if retry:
+            store.forgive()
+        while not session.stopped:
+            rows = report.judged(
+                claims, out, world=world, quick=quick, own=own, runs=last
             )
-        )
-        if sessions[-1].missing:
-            break
-    return sessions
+            todo = _round(rows, store, world, quick, last, session)
+            if not todo:
+                break
+            if progress and not quick:
+                print(price.left(rows, world=world))
+            _work(todo, store, engine, session, stop, progress, world, found)
+        store.compact()
+    finally:
+        store.close()
+    return session
 
 
-def _campaign(members: tuple[Member, ...], count: int, world: str) -> Campaign:
-    return Campaign(f"claims in {world}", members, count, SEED)
+def _round(
+    rows: Sequence[Judged],
+    store: CampaignStore,
+    world: str,
+    quick: bool,
+    runs: int,
+    session: Session,
+) -> list[Job]:
+    """The batches to run next; none that failed."""
+    wanted = schedule.due(rows, world=world, quick=quick, runs=runs)
+    members = {m.identity: m for each in wanted for m in each.members}
+    have = held.read(store.directory, report.identities(members.values()))
+    done = {name: each.runs for name, each in have.items()}
+    jobs = schedule.jobs(wanted, done, store.directory)
+    known = {*store.failures(), *session.failed}
+    session.waiting = sum(job.key in known for job in jobs)
+    return [job for job in jobs if job.key not in known]
+
+
+def _work(
+    jobs: Sequence[Job],
+    store: CampaignStore,
+    engine: Engine,
+    session: Session,
+    stop: Stop,
+    progress: bool,
+    world: str,
+    found: Found,
+) -> None:
+    """Run batches, trunks before the sides that begin with them."""
+    for part in _phases(jobs):
+        shown = Progress(f"claims in {world}", part, 0, enabled=progress)
+        with shown.start(), closing(engine.run(part, beat=shown.beat)) as outcomes:
+            for outcome in outcomes:
+                if outcome.data is None:
+                    session.failed[outcome.key] = outcome.reason
+                    store.fail(
+                        outcome.key, reason=outcome.reason, attempts=outcome.attempts
+                    )
+                elif outcome.data:
+                    store.add(outcome.key, outcome.data)
+                    found()
+                session.done += outcome.data is not None
+                store.note(
+                    batch=outcome.key,
+                    seconds=round(outcome.seconds, 3),
+                    computed=round(outcome.computed, 3),
+                    attempts=outcome.attempts,
+                )
+                shown.end(outcome.key, failed=outcome.data is None)
+                if stop():
+                    session.stopped = True
+                    return
+
+
+def _phases(jobs: Sequence[Job]) -> Iterator[list[Job]]:
+    for grows in (True, False):
+        part = [job for job in jobs if job.grows == grows]
+        if part:
+            yield part
+
+
+def _campaign(members: tuple[Member, ...], world: str) -> Campaign:
+    return Campaign(f"claims in {world}", members, 1, schedule.SEED)
 
 
 def take(
@@ -139,18 +204,23 @@ def take(
     Raises:
         BnsError: no such folder, or a run that cannot be read.
     """
-    need = needed(claims, world=world)
-    campaign = _campaign(need.members, 1, world)
+    members = {
+        member.identity: member
+        for claim in claims
+        for cell in claim.cells
+        if not sides.missing(claim.investigation, cell, world=world)
+        for side in cell.sides
+        for member in [sides.member(claim.investigation, side, world=world)]
+    }
+    campaign = _campaign(tuple(members.values()), world)
     out = directory(world, quick=False, root=root)
-    store = drive.opened(campaign, out, resume=True)
-    store.check_versions()
-    store.lock()
-    try:
+    with Lock(out) as lock:
+        store = drive.opened(campaign, out, resume=True, lock=lock)
+        store.check_versions()
+        store.tidy()
         taken = []
         for folder in folders:
-            held = drive.replicates_done(store, campaign)
-            taken += adopt(store, folder, need.runs, held)
+            have = held.read(out, report.identities(members.values()))
+            taken += adopt(store, folder, set(members), set(have))
         store.compact()
-        return taken
-    finally:
-        store.close()
+    return taken

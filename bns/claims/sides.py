@@ -1,14 +1,19 @@
 """Sides of comparisons as configurations, as far as what they need exists."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
+from typing import Any
 
 from bns import presets
 from bns.campaign.file import Member
 from bns.campaign.settings import flatten, with_settings
-from bns.claims.claim import Cell, content
+from bns.claims import provenance
+from bns.claims.claim import Cell, claims, content
 from bns.errors import BnsError, UnknownNameError
 from bns.experiment.config import EvolutionConfig, RunConfig
+from bns.worlds.damage import Damage
 
 QUICK_TRIALS, QUICK_DIVISOR = 12, 5
 
@@ -25,6 +30,16 @@ def member(investigation: str, side: str, *, world: str, quick: bool = False) ->
     Raises:
         BnsError: a preset, piece, setting or effect that does not exist (yet).
     """
+    config, settings = _whole(investigation, side, world)
+    config = shrunk(config) if quick else config
+    return Member(f"{investigation}: {side}", config, settings)
+
+
+@cache
+def _whole(
+    investigation: str, side: str, world: str
+) -> tuple[RunConfig, Mapping[str, Any]]:
+    """A side's configuration, and the settings that make it."""
     from bns.experiment.batch import check_world
 
     data = content(investigation)
@@ -48,8 +63,65 @@ def member(investigation: str, side: str, *, world: str, quick: bool = False) ->
     )
     config = with_settings(base, settings)
     check_world(config)
-    config = shrunk(config) if quick else config
-    return Member(f"{investigation}: {side}", config, settings)
+    enough = trials_needed(investigation, side, onset=onset(config))
+    if enough and enough < config.trials:
+        settings["trials"] = enough
+        config = replace(config, trials=enough)
+    return config, settings
+
+
+def onset(config: RunConfig) -> int:
+    """First damaged trial, counted from 0; -1 = none."""
+    return Damage.parse(config.world.damage).first_trial
+
+
+def trials_needed(investigation: str, side: str, *, onset: int) -> int:
+    """Trials after which a side has shown all that is asked of it; 0 = all it has.
+
+    A side of which only is asked whether it recovers (or solves the task) within k
+    trials need not go on after those.
+    """
+    most = 0
+    for cell in _cells(investigation, side):
+        counted = {"recover": max(onset, 0), "solve": 0}.get(cell.measure)
+        if counted is None or cell.b:
+            return 0
+        limit = cell.at_most if cell.at_most is not None else (cell.at_least or 1) - 1
+        most = max(most, counted + int(limit))
+    return most
+
+
+@cache
+def _cells(investigation: str, side: str) -> tuple[Cell, ...]:
+    """All comparisons of an investigation in which a side is."""
+    return tuple(
+        cell
+        for claim in claims().values()
+        if claim.investigation == investigation
+        for cell in claim.cells
+        if side in cell.sides
+    )
+
+
+@cache
+def settings_of(investigation: str, side: str, world: str) -> Mapping[str, Any]:
+    """All settings of a side, defaults included; see `bns.claims.provenance`.
+
+    Raises:
+        BnsError: as `member`.
+    """
+    config, _ = _whole(investigation, side, world)
+    return provenance.resolved(config, content(investigation)["ignored"])
+
+
+@cache
+def digest_of(investigation: str, side: str, world: str) -> str:
+    """The digest of `settings_of`.
+
+    Raises:
+        BnsError: as `member`.
+    """
+    return provenance.of(settings_of(investigation, side, world))
 
 
 def missing(investigation: str, cell: Cell, *, world: str) -> str:

@@ -1,6 +1,7 @@
 """`bns claims`: the dissertation's claims, run and judged."""
 
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -10,20 +11,22 @@ from bns.cli.parse import dispatch
 from bns.cli.tables import show
 from bns.errors import BnsError
 
-MANUAL = """usage: bns claims {list,run,take,table} [...]
+MANUAL = """usage: bns claims {list,plan,run,take,table} [...]
 
   list           all 157 claims: where, what is compared, what the dissertation says
+  plan           what all of it costs: sides, runs, processor hours
   run ID ...     run what a claim needs and is missing, then say what it says
   run C ...      the same for all claims of an investigation
   run --all      the same for every claim whose preset exists
   take DIR ...   use finished `bns run` directories below DIR
-  table          holds / direction only / null / reversed, with effect sizes: by
-                 your runs, and by published ones where you have fewer
+  table          holds / direction only / null / reversed / stale, with effect sizes:
+                 by your runs, and by published ones where you have fewer
 
 The rule is in docs/claims.md. `bns claims VERB --help` is the manual of a verb."""
 
 WORLDS = ("mujoco", "static-snn")
 PUBLISHED = "published"
+KEEP_EVERY = 300.0  # s
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,9 +40,22 @@ class List:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Plan the processor hours of claims, as if none of them had run."""
+
+    ids: tyro.conf.Positional[tuple[str, ...]] = ()
+    """claims or investigations, as in `A15 C`; none means all"""
+    world: Literal["mujoco", "static-snn"] = "mujoco"
+    """where robots run"""
+    json: bool = False
+    """print JSON instead of a table"""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Run:
-    """Run what claims need and is missing, then judge them. Runs are kept in
-    runs/claims/WORLD and never done twice; more can be added at any time.
+    """Run what claims need and is missing, look by look, then judge them. Runs are kept
+    in runs/claims/WORLD and never done twice; it goes on wherever it was stopped. What
+    is published of today's settings is not run again, unless --own.
     """
 
     ids: tyro.conf.Positional[tuple[str, ...]] = ()
@@ -51,7 +67,12 @@ class Run:
     quick: bool = False
     """six small and short runs a side, kept apart: for a look, not for a verdict"""
     runs: int = 0
-    """runs a side, instead of the 30 or 100 of the rule"""
+    """runs a side at most, instead of the 100 of the design"""
+    own: bool = False
+    """run what is published as well"""
+    findings: str = ""
+    """file that all findings are written to as they come; by default
+    ROOT/findings.json"""
     engine: Literal["local", "inline", "ray"] = "local"
     """local: processes of one thread each; inline: this process; ray: a Ray cluster"""
     workers: int = 0
@@ -97,7 +118,8 @@ class Table:
     json: bool = False
     """print JSON instead of a table"""
     write: str = ""
-    """write the whole page, both worlds, to this file (docs/claims.md)"""
+    """write the whole page, both worlds, to this file (docs/claims.md), and its picture
+    to images/ beside it"""
     publish: str = ""
     """write all findings to this file (bns/claims/data/published.json)"""
     root: str = "runs/claims"
@@ -108,6 +130,7 @@ def main(verb: str, argv: list[str]) -> int:
     """Run a verb of claims; gives the exit code."""
     does = {
         "list": (List, _list),
+        "plan": (Plan, _plan),
         "run": (Run, _run),
         "take": (Take, _take),
         "table": (Table, _table),
@@ -132,6 +155,36 @@ def _list(given: List) -> int:
     return 0
 
 
+def _plan(given: Plan) -> int:
+    from bns.claims import price, runner
+    from bns.claims.claim import INVESTIGATIONS, chosen
+
+    wanted = chosen(given.ids)
+    head = ["investigation", "claims", "sides", "runs", "hours", "without sharing"]
+    rows = []
+    for letter in INVESTIGATIONS:
+        part = [claim for claim in wanted if claim.investigation == letter]
+        if part:
+            cost = price.planned(part, world=given.world)
+            rows.append([letter, len(part), *_costs(cost)])
+    rows.append(["all", len(wanted), *_costs(price.planned(wanted, world=given.world))])
+    show(head, [[str(word) for word in row] for row in rows], json=given.json)
+    if not given.json:
+        lacking = runner.impossible(wanted, world=given.world)
+        print(f"Processor hours in {given.world}, one thread, as expected before.")
+        if lacking:
+            print(f"{len(lacking)} claims have no such world: {_some(lacking)}.")
+    return 0
+
+
+def _costs(price) -> list:
+    return [price.sides, price.runs, f"{price.hours:.1f}", f"{price.apart:.1f}"]
+
+
+def _some(names) -> str:
+    return ", ".join([*names][:3]) + (", ..." if len(names) > 3 else "")
+
+
 def _run(given: Run) -> int:
     from bns.campaign.engines import registry
     from bns.claims import runner
@@ -145,39 +198,83 @@ def _run(given: Run) -> int:
     if not 0 <= given.runs <= 10_000:
         raise BnsError(f"--runs {given.runs} is not allowed: give 1 to 10000.")
     wanted = chosen(given.ids)
-    need = runner.needed(wanted, world=given.world, quick=given.quick, runs=given.runs)
-    for name, why in list(need.impossible.items())[: None if given.ids else 3]:
-        print(f"{name} cannot run yet: {why}.")
+    lacking = runner.impossible(wanted, world=given.world)
+    for name, why in list(lacking.items())[: None if given.ids else 3]:
+        print(f"{name} cannot run: {why}.")
     engine = registry.make(
         given.engine, workers=given.workers, ray_address=given.ray_address
     )
+    keeper = Keeper(given)
     with until_interrupted() as stop:
-        sessions = runner.run(
+        session = runner.run(
             wanted,
             engine,
             world=given.world,
             quick=given.quick,
             runs=given.runs,
             root=Path(given.root),
+            own=given.own or given.quick,
             mix=given.mix,
             retry=given.retry,
             stop=stop,
+            found=keeper,
         )
-    for session in sessions:
-        for key, reason in session.failed.items():
-            print(f"failed: {key}: {reason}")
+    keeper.keep()
+    for key, reason in session.failed.items():
+        print(f"failed: {key}: {reason}")
     _table(
         Table(
             ids=given.ids,
             world=given.world,
             quick=given.quick,
-            own=True,
+            own=given.own or given.quick,
             root=given.root,
         )
     )
-    if any(session.missing for session in sessions):
+    if session.stopped:
         return STOPPED
-    return int(any(session.failed or session.waiting for session in sessions))
+    return int(bool(session.failed or session.waiting))
+
+
+@dataclass
+class Keeper:
+    """Writes the findings of both worlds to a file, every few minutes at most."""
+
+    given: Run
+    wrote: float = field(default_factory=time.monotonic)
+
+    def __call__(self) -> None:
+        if time.monotonic() - self.wrote > KEEP_EVERY:
+            self.keep()
+
+    def keep(self) -> None:
+        """Write them now; of quick runs none."""
+        if self.given.quick:
+            return
+        from bns.claims import published, report
+        from bns.storage import files
+
+        path = Path(self.given.findings or f"{self.given.root}/findings.json")
+        files.make_directory(path.parent)
+        worlds = _both(self.given.root)
+        published.write(path, report.publishable(worlds), report.settings(worlds))
+        self.wrote = time.monotonic()
+
+
+def _both(root: str, *, own: bool = False) -> dict:
+    """World -> all claims, judged."""
+    from bns.claims import report, runner
+    from bns.claims.claim import chosen
+
+    return {
+        world: report.judged(
+            chosen(()),
+            runner.directory(world, quick=False, root=Path(root)),
+            world=world,
+            own=own,
+        )
+        for world in WORLDS
+    }
 
 
 def _take(given: Take) -> int:
@@ -216,7 +313,7 @@ def _table(given: Table) -> int:
             raise BnsError(
                 "--write and --publish take all claims: leave ids and --quick out."
             )
-        _written(given, {world: judged(world) for world in WORLDS})
+        _written(given, _both(given.root, own=given.own))
         return 0
     rows = judged(given.world)
     _show(rows, json=given.json, brief=not given.ids)
@@ -224,7 +321,7 @@ def _table(given: Table) -> int:
         said = ", ".join(f"{n} {name}" for name, n in report.counts(rows).items() if n)
         what = "claim" if len(rows) == 1 else "claims"
         print(f"{len(rows)} {what} in {given.world}: {said}")
-        print("* fewer runs than the rule asks for. The rule: docs/claims.md")
+        print("* the design asks for more runs. The rule: docs/claims.md")
         if any(finding.published for row in rows for finding in row.findings):
             print(f"{PUBLISHED}: came with bns; `bns claims run ID` runs it here.")
     return 0
@@ -234,12 +331,17 @@ def _written(given: Table, worlds: dict) -> None:
     """The page, the findings, or both as files."""
     from bns.claims import page, published, report
     from bns.storage import files
+    from bns.viz import claims
 
     if given.write:
         files.write_bytes(Path(given.write), page.page(worlds).encode())
-        print(given.write)
+        picture = Path(given.write).parent / page.PICTURE
+        claims.write(worlds, picture)
+        print(f"{given.write}\n{picture}")
     if given.publish:
-        published.write(Path(given.publish), report.publishable(worlds))
+        published.write(
+            Path(given.publish), report.publishable(worlds), report.settings(worlds)
+        )
         print(given.publish)
 
 
@@ -249,10 +351,10 @@ def _show(rows: list, *, json: bool, brief: bool) -> None:
     head = ["claim", "claim's verdict", *report.HEAD, "from"]
     lines = []
     for row in rows:
-        found = [
-            (*cell, PUBLISHED if finding.published else "")
-            for cell, finding in zip(report.cells(row), row.findings, strict=True)
-        ]
+        origin = [PUBLISHED if each.published else "" for each in row.findings]
+        origin += [PUBLISHED] * len(row.stale)
+        told = report.cells(row)
+        found = [(*cell, word) for cell, word in zip(told, origin, strict=True)]
         if not found and (json or not brief):
             found = [(row.note, *[""] * len(report.HEAD))]
         for number, cell in enumerate(found):

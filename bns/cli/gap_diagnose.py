@@ -1,14 +1,15 @@
 """`bns gap check` and `bns gap diagnose`."""
 
+import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import tyro
 
 from bns.cli.parse import parse
-from bns.errors import BnsError
+from bns.errors import BnsError, FormatError
 
 LISTED = 8  # faults that are printed at most
 
@@ -122,17 +123,43 @@ def _motion(trials: list[Any], model: Any) -> list[Any]:
 
 
 def _diagnose(given: Diagnose) -> int:
+    if not given.out:
+        return _diagnosed(given, None)
+    from bns.gap import request
+    from bns.storage.files import StorageError
+    from bns.storage.lock import Lock
+
+    with Lock(given.out):
+        out = Path(given.out)
+        request.begin(out, _asked(given))
+        try:
+            code = _diagnosed(given, out)
+        except BnsError as error:
+            if not isinstance(error, StorageError):
+                request.drop(out)  # the same again would only fail again
+            raise
+        request.end(out)
+    return code
+
+
+def _asked(given: Diagnose) -> dict[str, Any]:
+    """What a diagnosis is asked for, as it is kept until it is done."""
+    asked = asdict(given)
+    for name in ("out", "report", "rerun", "threads"):  # change nothing of the result
+        del asked[name]
+    return json.loads(json.dumps(asked))
+
+
+def _diagnosed(given: Diagnose, out: Path | None) -> int:
+    """Diagnose, or go on where the same command was killed after it had."""
     from bns.gap import store
 
-    out = Path(given.out) if given.out else None
-    if out and out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise BnsError(f"{out} exists and is not overwritten; give another --out.")
     if given.importer == "khepera3_odometry" and not given.model:
         found, model, trials = _odometry(given), None, []
     else:
         model = nominal(given, given.threads)
         trials = _some(recorded(given, model))
-        found = _general(given, model, trials, out)
+        found = _before(out) or _general(given, model, trials, out)
     found = replace(
         found, provenance={**found.provenance, **_provenance(given, model, trials)}
     )
@@ -144,10 +171,23 @@ def _diagnose(given: Diagnose) -> int:
     return 0
 
 
+def _before(out: Path | None) -> Any:
+    """The diagnosis that a killed process of the same request had finished, if any."""
+    from bns.gap import store
+
+    if out is None or not (out / store.FILE).exists():
+        return None
+    try:
+        return store.load(out)
+    except FormatError:  # torn or flipped: it is made again
+        return None
+
+
 def _general(given: Diagnose, model: Any, trials: list[Any], out: Path | None) -> Any:
     from bns.gap.diagnose import diagnose
     from bns.gap.recordings import check, load_recordings
     from bns.gap.report import partial, warnings
+    from bns.storage.files import StorageError
 
     load_recordings.tellable(trials, model)
     try:
@@ -162,7 +202,7 @@ def _general(given: Diagnose, model: Any, trials: list[Any], out: Path | None) -
         more = warnings.warnings(found, model)
         return replace(found, warnings=(*found.warnings, *more))
     except BnsError as error:
-        if out:
+        if out and not isinstance(error, StorageError):
             kept = partial.write(trials, model, error, out)
             raise BnsError(f"{error} What was found until then: {kept}") from error
         raise

@@ -50,7 +50,7 @@ class Emulate:
     """probability that a byte is lost"""
     corrupted: float = 0.0
     """probability that a packet is corrupted"""
-    rate: float = 15.0
+    rate: float = 30.0
     """pictures of the camera a second"""
     seed: int = 0
     """of what is random"""

@@ -17,15 +17,22 @@ def execute(given: Any) -> int:
     Args:
         given: what `bns run` was told; one replicate is run, whatever the preset says.
     """
-    from bns.experiment.background import OPEN_LOOP
     from bns.hardware.line import check_port
     from bns.hardware.priority import urgent
+    from bns.storage.lock import Lock
 
     check_port(given.port)
     urgent()
+    with Lock(given.out) as lock:
+        return _locked(given, lock)
+
+
+def _locked(given: Any, lock: Any) -> int:
+    """Train into a directory in which nobody else writes."""
     from bns.cli import outputs
     from bns.experiment.run import train
     from bns.hardware.errors import LinkError, SafetyStop
+    from bns.tasks import registry as tasks
 
     config = replace(given.config, replicates=1, record_replicates=1, threads=1)
     out = Path(given.out)
@@ -40,7 +47,8 @@ def execute(given: Any) -> int:
                 resume=given.resume,
                 progress=True,
                 on_trial=on_trial,
-                background=config.learner in OPEN_LOOP,
+                background=not tasks.of(config).closed_loop,
+                lock=lock,
             )
     except (SafetyStop, LinkError) as error:
         if not (out / "run.json").exists():
@@ -55,8 +63,9 @@ def execute(given: Any) -> int:
 
 def _world(given: Any, config: Any) -> Any:
     """The robot of a configuration as a world."""
-    from bns.learners import registry as learners
+    from bns.tasks import registry as tasks
 
+    task = tasks.of(config)
     settings: dict[str, Any] = {
         "damage": config.world.damage,
         "reality": config.world.reality,
@@ -66,13 +75,13 @@ def _world(given: Any, config: Any) -> Any:
         "calibration": given.calibration,
         "log": str(Path(given.out) / "faults.jsonl"),
         "on_void": _say_void,
-        **learners.get(config.learner).surroundings(config),
+        **task.surroundings(),
     }
     if config.world.robot == "phantomx":
         from bns.hardware.hexapod_world import HardwareHexapod
 
         return HardwareHexapod(servos=given.servos, **settings)
-    if config.learner == "light":
+    if task.closed_loop:
         from bns.hardware.light_world import HardwareLight
 
         return HardwareLight(config.world.robot, wheels=given.wheels, **settings)

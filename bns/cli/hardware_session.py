@@ -2,11 +2,14 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bns.errors import BnsError
+
+if TYPE_CHECKING:
+    from bns.worlds.trial import Trial
 
 AT_REST = 60.0  # s between samples: none but those at which commands begin and end
 
@@ -100,8 +103,7 @@ def record(given: Any) -> int:
         for number in range(given.trials):
             (trial,) = world.run([told(number)], trial=number)
             trials.append(trial)
-            end = np.round(trial.poses_world[-1], 3)
-            print(f"trial {number + 1} of {given.trials}: ends at {end}", flush=True)
+            print(f"trial {number + 1} of {given.trials}: {_end(trial)}", flush=True)
     except BnsError as error:
         if not trials:
             raise
@@ -112,6 +114,15 @@ def record(given: Any) -> int:
     dataset.write(out, trials, provenance={"by": "bns hardware record"})
     print(f"dataset: {out}; bns gap diagnose {out} --model {given.robot}")
     return 0
+
+
+def _end(trial: "Trial") -> str:
+    """Where a robot was last seen: a recording has no pose at its very end."""
+    seen = trial.poses_world[np.isfinite(trial.poses_world).all(1)]
+    if not len(seen):
+        return "never seen"
+    x, y, yaw = seen[-1]
+    return f"last seen at {x:.3f}, {y:.3f} m, {np.degrees(yaw):.1f} deg"
 
 
 def _recorded(given: Any) -> tuple[Any, Callable[[int], Any]]:

@@ -8,6 +8,9 @@ import tyro
 from bns.cli.parse import parse
 from bns.errors import BnsError
 
+TITLE = b" - BNS report</title>"  # of every page that `bns report` makes
+MARK = 4096  # [bytes] from the beginning, within which a page has its title
+
 
 @dataclass(frozen=True, kw_only=True)
 class Arguments:
@@ -17,6 +20,8 @@ class Arguments:
     """run directories, finished or not"""
     out: str = ""
     """file to write; without it report.html in the first directory"""
+    force: bool = False
+    """replace a file that `bns report` did not make"""
 
 
 def main(verb: str, argv: list[str]) -> int:
@@ -32,5 +37,18 @@ def main(verb: str, argv: list[str]) -> int:
         if load(directory).trials == 0:
             raise BnsError(f"{directory} has no trial yet: let it run for a while.")
     path = Path(given.out) if given.out else directories[0] / REPORT
+    if not given.force and path.exists() and not ours(path):
+        raise BnsError(
+            f"{path} was not made by `bns report`: add --force to replace it, or give "
+            "another --out."
+        )
     print(write_report(directories, path))
     return 0
+
+
+def ours(path: Path) -> bool:
+    """Whether a file says that a report of this project is in it."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return TITLE in file.read(MARK)

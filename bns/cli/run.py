@@ -5,13 +5,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
 from bns.cli.parse import parse
 from bns.errors import BnsError, FormatError, UnknownNameError
 from bns.experiment.config import RunConfig
+
+if TYPE_CHECKING:
+    from bns.storage.lock import Lock
 
 _SHORT = {"world": "world.name", "damage": "world.damage"}
 """settings that have a short name on the command line"""
@@ -70,9 +73,25 @@ def main(verb: str, argv: list[str]) -> int:
             f"`bns run demo {argv[0]} ...`. See bns run --help."
         )
     config, out = source(argv[0])
+    config = _for_learner(config, argv[1:])
     start = Arguments(source=argv[0], config=config, out=out)
     given = parse(Arguments, list(map(_long, argv)), prog="bns run", default=start)
     return execute(replace(given, config=expanded(given.config)))
+
+
+def _for_learner(config: RunConfig, words: list[str]) -> RunConfig:
+    """The experiment for the learner that the words name, with its own settings."""
+    from bns.experiment.loading import OLD_LEARNERS, with_learner
+
+    named = [
+        value or after
+        for word, after in zip(words, [*words[1:], ""], strict=True)
+        for flag, _, value in [word.partition("=")]
+        if flag == "--learner"
+    ]
+    if not named or named[-1] in (config.learner, *OLD_LEARNERS):
+        return config
+    return with_learner(config, named[-1])
 
 
 def _long(word: str) -> str:
@@ -123,10 +142,18 @@ def execute(given: Arguments) -> int:
         from bns.cli import hardware_run
 
         return hardware_run.execute(given)
+    from bns.storage.lock import Lock
+
+    out = Path(given.out)
+    with Lock(out) as lock:
+        return _locked(given, out, lock)
+
+
+def _locked(given: Arguments, out: Path, lock: "Lock") -> int:
+    """Train into a directory in which nobody else writes."""
     from bns.cli import outputs
     from bns.experiment.run import train
 
-    out = Path(given.out)
     with (
         outputs.live(given.rerun, given.config) as on_trial,
         until_interrupted() as stop,
@@ -138,6 +165,7 @@ def execute(given: Arguments) -> int:
             progress=True,
             on_trial=on_trial,
             stop=stop,
+            lock=lock,
         )
     if record.trials < given.config.trials:
         print(

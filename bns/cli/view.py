@@ -20,6 +20,8 @@ class Arguments:
     """directory of a run or of a gap diagnosis, or a recording (.rrd)"""
     png: str = ""
     """write a picture to this file instead; needs no display"""
+    bind: str = "127.0.0.1"
+    """address that the viewer listens on; 0.0.0.0 lets other machines send to it"""
 
 
 def main(verb: str, argv: list[str]) -> int:
@@ -34,7 +36,7 @@ def main(verb: str, argv: list[str]) -> int:
             print(f"bns: the viewer says: {report}", file=sys.stderr)
         print(given.png)
         return 0
-    return show(recording)
+    return show(recording, given.bind)
 
 
 def find(path: Path) -> Path:
@@ -68,8 +70,8 @@ def find(path: Path) -> Path:
     return write_recording(record, recording)
 
 
-def show(recording: Path) -> int:
-    """Open the viewer and leave it open.
+def show(recording: Path, bind: str) -> int:
+    """Open the viewer, which listens on an address, and leave it open.
 
     Raises:
         BnsError: there is no display.
@@ -89,4 +91,4 @@ def show(recording: Path) -> int:
     viewer = picture.executable()
     if viewer is None:
         raise MissingDependencyError("bns view", "rerun-sdk", "pip install rerun-sdk")
-    return subprocess.call([viewer, str(recording)])
+    return subprocess.call([viewer, "--bind", bind, str(recording)])

@@ -9,9 +9,9 @@ length the navigation task was never solved (see docs/choices.md).
 import torch
 from torch import Tensor
 
-from bns.chromosome import Population
 from bns.draws import whole_below
 from bns.errors import UnknownNameError
+from bns.evolution.chromosome import Population
 
 KINDS = ("n-point", "sbx", "single-point", "uniform")
 

@@ -9,10 +9,11 @@ exist are summed.
 import torch
 from torch import Tensor
 
-from bns.chromosome import Encoding, Population
+from bns.evolution.chromosome import Population
+from bns.evolution.generation import Genes
 
 
-def deviations(population: Population, encoding: Encoding) -> Tensor:
+def deviations(population: Population, encoding: Genes) -> Tensor:
     """|c_ij - mean_j| for genes that exist, 0 elsewhere, ``(R, P, K, 3)``."""
     valid = population.valid.unsqueeze(-1)
     scaled = (population.genes - encoding.low) / (encoding.high - encoding.low)
@@ -21,7 +22,7 @@ def deviations(population: Population, encoding: Encoding) -> Tensor:
     return torch.where(valid, (scaled - mean).abs(), 0.0)
 
 
-def measures(population: Population, encoding: Encoding) -> dict[str, Tensor]:
+def measures(population: Population, encoding: Genes) -> dict[str, Tensor]:
     """All three measures, each ``(R,)``: sum, sum of squares, log of the sum."""
     apart = deviations(population, encoding)
     total = apart.sum((1, 2, 3))

@@ -5,15 +5,37 @@ beforehand (`Coins`), so that it can be compiled as a whole and tested number by
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import torch
 from torch import Tensor
 
-from bns.chromosome import Encoding, Population
 from bns.draws import Draws
 from bns.evolution import crossover, mutation, selection
+from bns.evolution.chromosome import Population
 from bns.experiment.config import EvolutionConfig
+
+
+class Genes(Protocol):
+    """What genes may be: P individuals of K places, each of so many kinds."""
+
+    @property
+    def low(self) -> Tensor:
+        """Lowest gene of each kind."""
+
+    @property
+    def high(self) -> Tensor:
+        """Highest gene of each kind."""
+
+    @property
+    def gene_shape(self) -> tuple[int, int]:
+        """Genes of an individual: places times kinds."""
+
+    def random(self, runs: int, population: int, draws: Draws) -> Population:
+        """Random individuals."""
+
+    def individuals(self, coins: Tensor, coins_lengths: Tensor) -> Population:
+        """Random individuals from uniform numbers."""
 
 
 class Rates(NamedTuple):
@@ -25,7 +47,7 @@ class Rates(NamedTuple):
         chicken: probability of a fresh second parent, ``(R,)``; None = that of the
             configuration.
         repeat: probability that a walker's child repeats its commands, ``(R,)``, see
-            `bns.walk.repetition`; None = none does.
+            `bns.evolution.repetition`; None = none does.
     """
 
     rate: Tensor
@@ -61,7 +83,7 @@ class Breeder:
     """Makes the next population from the present one and its costs."""
 
     config: EvolutionConfig
-    encoding: Encoding
+    encoding: Genes
     fixed_length: bool
 
     def draw(self, draws: Draws, rates: Rates) -> Coins:

@@ -11,6 +11,10 @@ from bns.errors import BnsError
 from bns.experiment.config import RunConfig
 from bns.experiment.step import Step
 from bns.learners import registry as learners
+from bns.learners.base import Learner
+from bns.tasks import registry as tasks
+from bns.tasks.base import Task
+from bns.worlds.counted import CountedWorld
 from bns.worlds.damage import Damage
 from bns.worlds.trial import Trial
 from bns.worlds.world import World
@@ -25,6 +29,7 @@ class Batch:
         configs: they may differ in `adaptation` and `world` only.
         worlds: one per configuration.
         learner: knows all C * R runs; None makes the one the configuration names.
+        models: a model world for each of the C * R runs, where there is a prior.
 
     Raises:
         BnsError: configurations that cannot share a batch.
@@ -36,20 +41,22 @@ class Batch:
         worlds: Sequence[World],
         *,
         learner: Any = None,
+        models: Sequence[CountedWorld] = (),
     ):
         self.configs, self.worlds = list(configs), list(worlds)
         self.replicates = configs[0].replicates
         self.damages = [Damage.parse(config.world.damage) for config in configs]
-        self._kind = learners.get(configs[0].learner)
-        self.learner = learner or self._make_learner()
+        self.task: Task = tasks.of(configs[0])
+        self.learner: Learner = learner or self._make_learner(models)
 
-    def _make_learner(self) -> Any:
-        return self._kind.make(
+    def _make_learner(self, models: Sequence[CountedWorld]) -> Learner:
+        return learners.get(self.configs[0].learner)(
             [config for config in self.configs for _ in range(self.replicates)],
             replicates=[*range(self.replicates)] * len(self.configs),
             onsets=[
                 d.first_trial for d in self.damages for _ in range(self.replicates)
             ],
+            models=models,
         )
 
     def part(self, index: int) -> slice:
@@ -71,10 +78,23 @@ class Batch:
         best = None
         if proposal.best is not None:
             best = self._execute(proposal.best, trial, "world-best")
-        observed = self.learner.observe(trial, tried, best)
+        observed = self._measured(tried, best)
+        blind = None if best is None else told(best)
+        observed.update(self.learner.observe(trial, told(tried), blind))
+        observed.setdefault("predicted", np.full_like(observed["poses"], np.nan))
+        if models := self.learner.models:
+            observed["evaluations"] = np.array([m.spent for m in models], np.float64)
         on = [float(damage.is_on(trial)) for damage in self.damages]
         observed["damaged"] = np.repeat(on, self.replicates)
         return Step.of(observed, tried[: min(recorded, self.replicates)]), tried
+
+    def _measured(
+        self, tried: Sequence[Trial], best: Sequence[Trial] | None
+    ) -> dict[str, np.ndarray]:
+        """What the task says of the trials; fitness_best is that of `best`."""
+        row = self.task.measured(tried)
+        others = row["fitness"] if best is None else self.task.fitness(best)
+        return {**row, "fitness_best": others}
 
     def _execute(self, tried: Sequence[Any], trial: int, stream: str) -> list[Trial]:
         trials: list[Trial] = []
@@ -86,8 +106,13 @@ class Batch:
                 for replicate in range(self.replicates)
             ]
             part = tried[self.part(index)]
-            trials += self._kind.execute(world, part, trial=trial, seeds=seeds)
+            trials += self.task.execute(world, part, trial=trial, seeds=seeds)
         return trials
+
+
+def told(trials: Sequence[Trial]) -> list[Trial]:
+    """Trials as a learner may see them: without the damage and the truth."""
+    return [trial.replace(conditions={}, truth={}) for trial in trials]
 
 
 def resolve(config: RunConfig, mode: str = "") -> tuple[RunConfig, str]:
@@ -101,9 +126,8 @@ def resolve(config: RunConfig, mode: str = "") -> tuple[RunConfig, str]:
         MissingDependencyError: compiled code is wanted without a compiler.
     """
     if not mode:
-        from bns.inner import should_compile
-
-        mode = "compiled" if should_compile(config) else "eager"
+        compiles = learners.get(config.learner).compiles(config)
+        mode = "compiled" if compiles else "eager"
     return replace(config, compiled="yes" if mode == "compiled" else "no"), mode
 
 
@@ -127,8 +151,8 @@ def check_device(name: str) -> None:
 
 
 def check_world(config: RunConfig, *, named: bool = True) -> None:
-    """Refuse a world, robot, damage or reality that does not exist, and speeds that
-    the robot does not take.
+    """Refuse a learner, task, world, robot, damage or reality that does not exist, and
+    speeds that the robot does not take.
 
     Args:
         config: says which.
@@ -138,6 +162,8 @@ def check_world(config: RunConfig, *, named: bool = True) -> None:
         UnknownNameError: no such name.
         BnsError: a text that cannot be read, a value out of bounds.
     """
+    learners.get(config.learner)
+    tasks.kind(config.task.name)
     if named:
         from bns.experiment import robots
         from bns.worlds import registry

@@ -1,11 +1,12 @@
-"""The configuration of a BNS run: one frozen tree, from TOML or the command line.
+"""The configuration of a run: one frozen tree, from TOML or the command line.
 
 Device units appear here, at the edge, where the dissertation gives them (Khepera
 speed units, 144.01 to the mm/s, firmware < 3); everything inside is SI.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 from bns.experiment.config_light import LightConfig
 from bns.experiment.config_walk import WalkConfig
@@ -24,7 +25,8 @@ class TaskConfig:
     """What the robot has to do, and how it is scored."""
 
     name: str = "simple"
-    """simple: A,B,C,D,A; infinity: A,B,E,D,C,E,A; a file in bns/tasks adds one"""
+    """simple: A,B,C,D,A; infinity: A,B,E,D,C,E,A; light: drive to a lamp; walk: get
+    far on legs; a file in bns/tasks adds one. What follows is of navigation"""
     corner_x: float = 0.30
     """objectives A-D at (+-corner_x, +-corner_y) from the centre E [m] (silent)"""
     corner_y: float = 0.30
@@ -131,6 +133,9 @@ class AdaptationConfig:
     """fresh random population on damage"""
     simulator_reset: bool = False
     """fresh random SNN on damage (data kept)"""
+    simulator_reset_untrained: bool = False
+    """the SNN of simulator_reset is trained after the next trial only, and evolution
+    goes on in it untrained until then (4.3.5 may be read so); else at once"""
     simulator_reset_every: int = 0
     """fresh random SNN every so many trials; 0 = never"""
     data_reset: bool = False
@@ -163,13 +168,46 @@ class WorldConfig:
 
 
 @dataclass(frozen=True, kw_only=True)
+class PriorConfig:
+    """A model world for learners that think in one, counted and limited."""
+
+    world: str = ""
+    """world, see `bns worlds`; empty = no model"""
+    reality: tuple[str, ...] = ()
+    """effects that hold in the model: what it gets wrong, or right, about the robot"""
+    evaluations: int = 4000
+    """executions in the model that a run may spend"""
+
+
+BNS_SECTIONS = (
+    "evolution",
+    "snn",
+    "adaptation",
+    "watch",
+    "choose",
+    "choose_tournament",
+    "evolve_from",
+    "compiled",
+)
+"""sections and settings of the learner `bns`; other learners have `settings`"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LearnerSettings:
+    """The section `settings`: a learner's own; bns has its own sections instead."""
+
+    bounds: ClassVar[Mapping[str, tuple[float, float, str]]] = {}
+    """smallest and largest value allowed of each number, and its unit"""
+
+
+@dataclass(frozen=True, kw_only=True)
 class RunConfig:
     """A batch of replicates of one experiment."""
 
     preset: str = ""
     """name of the preset this came from"""
-    learner: str = "navigation"
-    """what is learned; a file in bns/learners adds one"""
+    learner: str = "bns"
+    """who learns; a file in bns/learners adds one"""
     task: TaskConfig = field(default_factory=TaskConfig)
     controller: ControllerConfig = field(default_factory=ControllerConfig)
     evolution: EvolutionConfig = field(default_factory=EvolutionConfig)
@@ -179,6 +217,8 @@ class RunConfig:
     light: LightConfig = field(default_factory=LightConfig)
     walk: WalkConfig = field(default_factory=WalkConfig)
     watch: WatchConfig = field(default_factory=WatchConfig)
+    prior: PriorConfig = field(default_factory=PriorConfig)
+    settings: LearnerSettings = field(default_factory=LearnerSettings)
     choose: RealChoice = "best"
     """which controller is tried in the world"""
     choose_tournament: float = 0.1
@@ -200,3 +240,17 @@ class RunConfig:
     """torch device of the learner"""
     threads: int = 2
     """threads of the learner and of the physics"""
+
+    def with_(self, changes: Mapping[str, Any]) -> "RunConfig":
+        """This configuration with some settings changed, checked as a file's are.
+
+        Args:
+            changes: values by dotted name, as in ``{"snn.epochs": 50}``.
+
+        Raises:
+            UnknownNameError: a name that no setting has.
+            BnsError: a value that is not allowed.
+        """
+        from bns.experiment.loading import from_mapping, nested
+
+        return from_mapping(nested(changes), self)

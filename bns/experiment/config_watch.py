@@ -43,15 +43,15 @@ class WatchConfig:
     forget_least: int = 8
     """patterns of an old trial that have to be comparable before it is judged"""
 
-    def idle(self, learner: str) -> set[str]:
+    def idle(self, task: str) -> set[str]:
         """The settings that do nothing as `detect` and `forget` are.
 
         Args:
-            learner: name of the learner.
+            task: kind of the task.
         """
         names = {field.name for field in fields(self)} - {"detect", "forget"}
         forgetting = {name for name in names if name.startswith("forget_")}
-        forgets = self.forget and learner != "walk"
+        forgets = self.forget and task != "walk"
         detecting = names - forgetting
         return (set() if forgets else forgetting) | (
             set() if self.detect else detecting

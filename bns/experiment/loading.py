@@ -1,15 +1,17 @@
 """Configurations from TOML, from JSON and back; unknown keys are errors."""
 
 import json
-import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
-from bns.errors import BnsError, FormatError, UnknownNameError
-from bns.experiment.config import RunConfig
+import tomli_w
+
+from bns.errors import BnsError, UnknownNameError
+from bns.experiment.config import BNS_SECTIONS, LearnerSettings, PriorConfig, RunConfig
 from bns.experiment.validate import check
+from bns.storage import reading
 
 TABLES = ("damage", "reality")
 """settings whose entries may be tables instead of text"""
@@ -24,7 +26,73 @@ def from_mapping(
         UnknownNameError: a key that no setting has.
         BnsError: a value of the wrong type, out of bounds, or contradictory.
     """
-    return check(_merge(base or RunConfig(), content, ""))
+    base, content = base or RunConfig(), _of_today(content)
+    learner = content.get("learner", base.learner)
+    if learner != base.learner or not isinstance(base.settings, _settings(learner)):
+        base = with_learner(base, learner)
+    return check(_merge(base, content, ""))
+
+
+def with_learner(config: RunConfig, learner: str) -> RunConfig:
+    """The same experiment for another learner, whose settings are the usual ones.
+
+    Sections that belong to the learner before go back to their defaults.
+
+    Raises:
+        UnknownNameError: no such learner.
+    """
+    from bns.learners import registry
+
+    kind, usual = _settings(learner), RunConfig()
+    fresh: dict[str, Any] = {}
+    if learner != config.learner and config.learner in registry.names():
+        bns = config.learner == "bns"
+        names = BNS_SECTIONS if bns else registry.get(config.learner).sections
+        fresh = {name: getattr(usual, name) for name in names}
+    return replace(config, learner=learner, settings=kind(), **fresh)
+
+
+def _settings(learner: Any) -> type[LearnerSettings]:
+    """The settings of a learner; those of bns are known without loading it.
+
+    Raises:
+        UnknownNameError: no such learner.
+    """
+    from bns.learners import registry
+
+    if learner == "bns":
+        return LearnerSettings
+    if not isinstance(learner, str):
+        raise BnsError(f"learner = {learner!r} is not allowed: give text.")
+    return registry.get(learner).Settings
+
+
+def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Values by dotted name as a tree of mappings."""
+    tree: dict[str, Any] = {}
+    for name, value in flat.items():
+        *path, leaf = name.split(".")
+        place = tree
+        for part in path:
+            place = place.setdefault(part, {})
+        place[leaf] = value
+    return tree
+
+
+OLD_LEARNERS = {"navigation": "", "light": "light", "walk": "walk"}
+"""what `learner` was called up to version 0.1, when it said what is learned: task"""
+
+
+def _of_today(content: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Content of version 0.1, in which `learner` was the task, as today's."""
+    task = OLD_LEARNERS.get(str(content.get("learner")))
+    if task is None:
+        return content
+    table = content.get("task", {})
+    if task and isinstance(table, Mapping):
+        table = {**table, "name": task}
+    changed = {**content, "learner": "bns"}
+    return {**changed, "task": table} if table else changed
 
 
 def from_file(path: Path | str) -> RunConfig:
@@ -62,27 +130,26 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises:
         FormatError: not there, or not TOML.
     """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise FormatError(f"{path} cannot be read as TOML: {error}.") from error
+    return reading.read_toml(path)
 
 
 def to_mapping(config: RunConfig) -> dict[str, Any]:
     """The whole configuration as plain values, ready for JSON."""
-    return json.loads(json.dumps(asdict(config)))
+    content: dict[str, Any] = json.loads(json.dumps(asdict(config)))
+    if config.learner != "bns":
+        content = {k: v for k, v in content.items() if k not in BNS_SECTIONS}
+    if config.prior == PriorConfig():
+        content.pop("prior")
+    if not content["settings"]:
+        content.pop("settings")
+    return content
 
 
 def to_toml(config: RunConfig) -> str:
     """The whole configuration as TOML; `from_file` reads it back."""
     content = to_mapping(config)
     content.pop("preset")
-    top = [f"{key} = {_toml(v)}" for key, v in content.items() if type(v) is not dict]
-    for name, table in content.items():
-        if type(table) is dict:
-            top += ["", f"[{name}]"]
-            top += [f"{key} = {_toml(value)}" for key, value in table.items()]
-    return "\n".join(top) + "\n"
+    return tomli_w.dumps(content)
 
 
 def differences(one: RunConfig, other: RunConfig) -> dict[str, tuple[Any, Any]]:
@@ -147,9 +214,3 @@ def _texts(name: str, given: Any) -> tuple[str, ...]:
             raise BnsError(f"{name}: {entry!r} is not allowed: give text.")
         texts.append(entry)
     return tuple(texts)
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, list):
-        return f"[{', '.join(_toml(item) for item in value)}]"
-    return json.dumps(value)

@@ -1,11 +1,16 @@
-"""The record of a batch of BNS runs: what analysis, reports and pictures read."""
+"""The record of a batch of runs: what analysis, reports and pictures read."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bns.errors import MissingDependencyError
 from bns.experiment.config import RunConfig
+
+if TYPE_CHECKING:
+    import pandas  # type: ignore[import-untyped]
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,24 +22,22 @@ class RunRecord:
     Attributes:
         config: the resolved configuration.
         versions: package versions, machine and commit that made it.
-        columns: per-trial figures, each ``(R, T)``:
+        columns: per-trial figures, each ``(R, T)``. Whatever the task and the learner:
             fitness: of the controller tried, in the world (minimised).
-            fitness_best: of the population's best, in the world.
-            fitness_predicted: of the controller tried, inside the SNN before the trial.
+            fitness_best: of what the learner would drive with, in the world.
             reached: objectives reached in the world.
-            solved: 1 where all objectives were reached.
-            diversity_41, diversity_51, diversity_73: thesis equations 4.1, 5.1, 7.3.
-            snn_forward, snn_left, snn_turn: RMS error of the SNN on this trial's
-                commands before training on them [m, m, rad].
-            snn_loss: mean squared training error after training (scaled outputs).
-            patterns: patterns the SNN was trained on.
-            damaged: 1 where any damage was on.
+            solved: 1 where the task was done.
             commands: commands in the list.
+            damaged: 1 where any damage was on.
+            evaluations: executions in the model world so far, where there is one.
+            Others are declared by the task and the learner (`Task.columns`,
+            `Learner.columns`).
         sent: commands tried as sent, ``(R, T, K, 3)`` (left, right [m/s], duration
             [s]), NaN beyond the list.
         poses: observed pose at the start and after each command,
             ``(R, T, K + 1, 3)`` [m, m, rad], NaN beyond.
-        predicted: the same as the SNN foresaw it, ``(R, T, K + 1, 3)``.
+        predicted: the same as the learner foresaw it, ``(R, T, K + 1, 3)``; NaN where
+            it foresees nothing.
         damage_onset: first damaged trial per replicate, ``(R,)``; -1 = none.
         directory: where it was read from, empty if it was not.
         conditions: what was true of the world, by name.
@@ -55,12 +58,29 @@ class RunRecord:
     @property
     def replicates(self) -> int:
         """Number of runs R."""
-        return self.sent.shape[0]
+        return len(self.sent)
 
     @property
     def trials(self) -> int:
         """Number of trials T done by every run."""
-        return self.sent.shape[1]
+        return int(self.sent.shape[1])
 
     def __getitem__(self, column: str) -> np.ndarray:
         return self.columns[column]
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """The per-trial figures as a table, a row per replicate and trial.
+
+        Raises:
+            MissingDependencyError: pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise MissingDependencyError(
+                "RunRecord.to_pandas", "pandas", "pip install pandas"
+            ) from None
+        runs, trials = np.indices((self.replicates, self.trials))
+        keys = {"replicate": runs.ravel(), "trial": trials.ravel()}
+        figures = {name: array.ravel() for name, array in self.columns.items()}
+        return pandas.DataFrame(keys | figures)

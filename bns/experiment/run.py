@@ -2,12 +2,13 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bns.errors import BnsError
+from bns.errors import BnsError, FormatError
 from bns.experiment import versions
 from bns.experiment.batch import Batch, check_device, check_world, resolve
 from bns.experiment.config import RunConfig
@@ -16,9 +17,11 @@ from bns.experiment.progress import Progress
 from bns.experiment.record import RunRecord
 from bns.experiment.step import Step, assemble
 from bns.experiment.validate import check
-from bns.experiment.world_factory import make_world, surroundings
-from bns.storage import files
+from bns.experiment.world_factory import make_models, make_world, surroundings
+from bns.storage import files, reading
+from bns.storage.arrays import alike
 from bns.storage.directory import check_free
+from bns.storage.lock import Lock
 from bns.storage.store import RunStore
 from bns.worlds.damage import Damage
 from bns.worlds.trial import Trial
@@ -37,6 +40,7 @@ def train(
     on_trial: OnTrial | None = None,
     stop: Callable[[], bool] | None = None,
     background: bool = False,
+    lock: Lock | None = None,
 ) -> RunRecord:
     """Train all replicates of a configuration.
 
@@ -50,8 +54,9 @@ def train(
         on_trial: called after every trial with its number, what was learned, and
             the trial of every replicate.
         stop: asked before every trial; True ends the run there.
-        background: evolution goes on while a trial runs, for a world in real time;
-            generations are then what time allowed, and recorded.
+        background: the learner thinks while a trial runs, for a world in real time;
+            how much is then what time allowed, and recorded.
+        lock: of `out`, held by who calls; None takes it, and lets it go at the end.
 
     Returns:
         The record: all trials, or those done when `stop` said so.
@@ -63,23 +68,36 @@ def train(
     check(config)
     check_device(config.device)
     check_world(config, named=world is None)
-    store = _store(config, Path(out), resume=resume) if out is not None else None
-    try:
-        if store and store.finished:
-            store.clean()
-            return store.record()
-        settled, mode = resolve(config, store.mode if store else "")
-        batch = _batch(settled, store, world, background=background)
-        shown = Progress(config, enabled=progress)
-        steps = _loop(config, batch, store, shown, on_trial, stop or _never)
-        if store is None:
-            made = versions.collect()
-            return assemble(config, steps, versions=made, **facts(config, mode))
-        done, _ = store.read_state()
-        return store.finish() if done == config.trials else store.record()
-    finally:
-        if store:
-            store.close()
+    if out is None:
+        return _train(config, None, world, progress, on_trial, stop, background)
+    with nullcontext(lock) if lock else Lock(out) as held:
+        store = _store(config, Path(out), resume=resume)
+        store.lock = held
+        return _train(config, store, world, progress, on_trial, stop, background)
+
+
+def _train(
+    config: RunConfig,
+    store: RunStore | None,
+    world: World | None,
+    progress: bool,
+    on_trial: OnTrial | None,
+    stop: Callable[[], bool] | None,
+    background: bool,
+) -> RunRecord:
+    """As `train`, into a store that is locked, or none."""
+    if store and store.finished:
+        store.clean()
+        return store.record()
+    settled, mode = resolve(config, store.mode if store else "")
+    batch = _batch(settled, store, world, background=background)
+    shown = Progress(config, enabled=progress)
+    steps = _loop(config, batch, store, shown, on_trial, stop or _never)
+    if store is None:
+        made = versions.collect()
+        return assemble(config, steps, versions=made, **facts(config, mode))
+    done, _ = store.read_state()
+    return store.finish() if done == config.trials else store.record()
 
 
 def train_many(
@@ -104,7 +122,11 @@ def train_many(
         check_device(config.device)
         check_world(check(config))
     settled, mode = _settle(configs)
-    batch = Batch(settled, worlds or [make_world(config) for config in settled])
+    batch = Batch(
+        settled,
+        worlds or [make_world(config) for config in settled],
+        models=[model for config in settled for model in make_models(config)],
+    )
     steps: list[Step] = []
     bar = Progress(configs[0], enabled=progress)
     with bar.start():
@@ -156,7 +178,6 @@ def _store(config: RunConfig, out: Path, *, resume: bool) -> RunStore:
                 f"{out} was made with {key} = {there!r}, not {here!r}: resume with the "
                 f"configuration it has ({out}/config.toml), or give another --out."
             )
-        store.lock()
         files.remove_temporary(out)
         files.remove_temporary(out / "steps")
         return store
@@ -206,14 +227,16 @@ def _batch(
     from bns.experiment.background import behind
 
     learner = behind(config) if background else None
+    models = [] if background else make_models(config)
     if store is None:
-        return Batch([config], [world or make_world(config)], learner=learner)
+        made = world or make_world(config)
+        return Batch([config], [made], learner=learner, models=models)
     keeps_nets = world is None and config.world.name == "static-snn"
     if keeps_nets and not store.exists:
         surroundings(config)  # stops before there is a directory
         store.create()
     made = world or make_world(config, store.directory)
-    batch = Batch([config], [made], learner=learner)
+    batch = Batch([config], [made], learner=learner, models=models)
     if not store.exists:
         store.create()
     return batch
@@ -222,11 +245,36 @@ def _batch(
 def _restore(batch: Batch, store: RunStore | None) -> int:
     """Put the learner where the run stopped; gives the trials done."""
     done, state = store.read_state() if store else (0, {})
-    if done:
-        batch.learner.restore(state)
+    if store and done:
+        path = store.directory / "state.npz"
+        restored(batch.learner, batch.learner.state(), state, path)
     if store:
         store.note(event="resume" if done else "start", trials_done=done)
     return done
+
+
+def restored(
+    learner: Any,
+    fresh: Mapping[str, np.ndarray],
+    state: Mapping[str, np.ndarray],
+    path: Path,
+) -> None:
+    """Put a stored state into a learner.
+
+    Args:
+        learner: made for the same configuration.
+        fresh: its own state before it did anything.
+        state: as read.
+        path: of the file, for messages.
+
+    Raises:
+        FormatError: it is no state of such a learner.
+    """
+    alike(state, fresh, path)
+    try:
+        learner.restore(state)
+    except reading.UNREADABLE as error:
+        raise FormatError(f"{path} is no state of this learner: {error}.") from error
 
 
 def _keep(

@@ -12,13 +12,15 @@ from functools import partial
 import numpy as np
 import torch
 
-from bns import patterns, seeding
-from bns.chromosome import Encoding
+from bns import seeding
 from bns.draws import Draws
+from bns.evolution.chromosome import Encoding
 from bns.experiment.config import RunConfig, SnnConfig
+from bns.learners.bns.navigation import of_trial
 from bns.snn import training
 from bns.snn.network import Shape, predict
 from bns.snn.scaling import Scaling
+from bns.tasks import registry as tasks
 from bns.worlds.static_snn.nets import StaticNets
 from bns.worlds.world import World
 
@@ -31,7 +33,7 @@ def nets_for(config: RunConfig) -> StaticNets:
     """Nets that imitate the undamaged MuJoCo world of a configuration's robot."""
     from bns.worlds import registry
 
-    if config.learner == "walk":
+    if tasks.kind(config.task.name) == "walk":
         from bns.experiment import static_walk
 
         return static_walk.nets_for(config)
@@ -66,7 +68,7 @@ def fit(
     )
     seeds = [seeding.integer(config.seed, "static-snn", i) for i in range(lists)]
     pairs = [
-        patterns.of_trial(trial)
+        of_trial(trial)
         for trial in source.run(encoding.commands(sent), trial=0, seeds=seeds)
     ]
     held = max(1, lists * HELD_OUT // LISTS)

@@ -13,13 +13,14 @@ import torch
 
 from bns import seeding
 from bns.draws import Draws
+from bns.evolution.goals import Goals
 from bns.experiment.config import RunConfig
+from bns.learners.bns.walking import GOAL, MOVED, of_trial
 from bns.models.legs import parts
+from bns.snn import adam
 from bns.snn.fitting import Patterns
 from bns.snn.network import Shape, forward
 from bns.snn.scaling import OUTPUTS
-from bns.walk import scaling, training
-from bns.walk.goals import Goals
 from bns.worlds.effects.legs.whole import RAISED
 from bns.worlds.static_snn.nets import StaticNets
 from bns.worlds.trial import Commands
@@ -59,9 +60,7 @@ def fit(
     torch.set_num_threads(config.threads)
     tried = commands(config, lists)
     seeds = [seeding.integer(config.seed, "static-snn", i) for i in range(lists)]
-    pairs = [
-        scaling.of_trial(trial) for trial in source.run(tried, trial=0, seeds=seeds)
-    ]
+    pairs = [of_trial(trial) for trial in source.run(tried, trial=0, seeds=seeds)]
     held = max(1, round(lists * HELD_OUT))
     theta, shape = _trained(pairs[:-held], config, steps)
     provenance = {
@@ -97,7 +96,7 @@ def commands(config: RunConfig, lists: int) -> list[Commands]:
 def _tensors(pairs: list) -> tuple[torch.Tensor, torch.Tensor]:
     """Inputs ``(1, I, N)`` and scaled displacements ``(1, 3, N)``."""
     seen = np.concatenate([inputs for inputs, _ in pairs]).astype(np.float32)
-    moved = np.concatenate([moved for _, moved in pairs]) / np.array(scaling.MOVED)
+    moved = np.concatenate([moved for _, moved in pairs]) / np.array(MOVED)
     both = seen.T, moved.T.astype(np.float32)
     return tuple(torch.from_numpy(np.ascontiguousarray(item))[None] for item in both)
 
@@ -112,7 +111,7 @@ def _trained(pairs: list, config: RunConfig, steps: int) -> tuple[torch.Tensor, 
     )
     draws = Draws(seeding.integer(config.seed, "static-snn"))
     known = Patterns(inputs, targets, torch.ones(1, 1, 1, inputs.shape[2]))
-    theta, _ = training.fit(shape, config, shape.random(1, draws), known, draws)
+    theta, _ = adam.fit(shape, config, shape.random(1, draws), known, draws)
     return theta, shape
 
 
@@ -134,8 +133,8 @@ def _static(
         b1=np.tile(b1[:, 0], (OUTPUTS, 1)),
         w2=w2[0],
         b2=b2[0, :, 0],
-        input_scale=np.full(shape.inputs, 1.0 / scaling.GOAL),
-        output_scale=np.array(scaling.MOVED),
+        input_scale=np.full(shape.inputs, 1.0 / GOAL),
+        output_scale=np.array(MOVED),
         provenance=provenance,
         activation="relu",
     )

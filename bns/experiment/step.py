@@ -10,6 +10,7 @@ import numpy as np
 from bns.errors import FormatError
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
+from bns.storage import reading
 from bns.worlds.trial import Channel, Commands, Outcome, Trial
 
 ARRAYS = ("sent", "poses", "predicted")
@@ -62,20 +63,22 @@ class Step:
         return stored
 
     @classmethod
-    def from_arrays(cls, stored: Mapping[str, np.ndarray]) -> "Step":
-        """The step that `to_arrays` stored.
+    def from_arrays(
+        cls, stored: Mapping[str, np.ndarray], name: str = "A stored step"
+    ) -> "Step":
+        """The step that `to_arrays` stored; `name` is the file's, for messages.
 
         Raises:
-            FormatError: something is missing.
+            FormatError: something is missing, or not as it was stored.
         """
         try:
-            meta = json.loads(stored["trials"].tobytes())
+            meta = reading.json(stored["trials"].tobytes(), name)
             trials = [
                 _trial(item, stored, f"trial{index}.")
                 for index, item in enumerate(meta)
             ]
-        except (KeyError, ValueError) as error:
-            raise FormatError(f"A stored step is not complete: {error}.") from error
+        except reading.UNREADABLE as error:
+            raise FormatError(f"{name} is not complete: {error}.") from error
         return cls(_under("column.", stored), _under("array.", stored), trials)
 
 

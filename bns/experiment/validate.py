@@ -6,7 +6,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any, NamedTuple
 
 from bns.errors import BnsError, OutOfBoundsError
-from bns.experiment.config import RunConfig
+from bns.experiment.config import BNS_SECTIONS, RunConfig
 
 
 class Bound(NamedTuple):
@@ -97,6 +97,7 @@ BOUNDS = {
     "watch.forget_floor": Bound(1e-6, 1),
     "watch.forget_reach": Bound(0, 100),
     "watch.forget_least": Bound(1, 100_000, "patterns"),
+    "prior.evaluations": Bound(1, 1_000_000_000, "executions"),
     "world.sample_dt": Bound(0.005, 10, "s"),
     "choose_tournament": Bound(0, 1),
     "evolve_from": Bound(0, 1_000_000, "trials"),
@@ -142,10 +143,12 @@ def check(config: RunConfig) -> RunConfig:
         BnsError: two settings that contradict each other.
     """
     values = dict(leaves(config))
+    own = {f"settings.{n}": Bound(*b) for n, b in config.settings.bounds.items()}
+    bounds = BOUNDS | own
     for name, value in values.items():
         if isinstance(value, bool) or not isinstance(value, int | float):
             continue
-        bound = BOUNDS.get(name, Bound(-math.inf, math.inf))
+        bound = bounds.get(name, Bound(-math.inf, math.inf))
         if not (math.isfinite(value) and bound.low <= value <= bound.high):
             raise OutOfBoundsError(name, value, *bound)
     for lower, upper in _ORDERED:
@@ -155,7 +158,34 @@ def check(config: RunConfig) -> RunConfig:
                 f"raise {upper} or lower {lower}."
             )
     check_choice(config)
+    check_learner(config)
     return config
+
+
+def check_learner(config: RunConfig) -> None:
+    """Refuse settings of a learner that is not the configuration's.
+
+    Raises:
+        UnknownNameError: no such learner.
+        BnsError: settings of another learner.
+    """
+    if config.learner == "bns":
+        return
+    from bns.learners import registry
+
+    kind = registry.get(config.learner)
+    if type(config.settings) is not kind.Settings:
+        raise BnsError(
+            f"These settings are not of learner = {config.learner!r}: make the "
+            "configuration by bns.experiment.loading.with_learner."
+        )
+    usual = RunConfig()
+    for name in BNS_SECTIONS:
+        if name not in kind.sections and getattr(config, name) != getattr(usual, name):
+            raise BnsError(
+                f"`{name}` belongs to the learner 'bns', not to {config.learner!r}, "
+                "which would not heed it: leave it out."
+            )
 
 
 def check_choice(config: RunConfig) -> None:

@@ -11,6 +11,10 @@ PACKAGES = ("mujoco", "numpy", "scipy", "torch", "rerun-sdk", "pyarrow")
 
 UNKNOWN = "unknown"
 
+REVISION = 1
+"""of the code: raised by hand when runs of the same settings come out otherwise than
+before, so that what was found then is known to be of other code"""
+
 
 def package(name: str) -> str:
     """The installed version of a package, empty if it is not installed."""
@@ -58,4 +62,5 @@ def collect() -> dict[str, str]:
     found["machine"] = f"{platform.system()} {platform.machine()}, {processor()}"
     found["cores"] = str(os.cpu_count() or 1)
     found["commit"] = commit()
+    found["revision"] = str(REVISION)
     return found

@@ -1,4 +1,4 @@
-"""The world of a configuration, with what its learner tells it."""
+"""The world of a configuration, with what its task tells it; model worlds."""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -7,9 +7,10 @@ from typing import Any
 
 from bns.errors import BnsError
 from bns.experiment.config import AdaptationConfig, RunConfig, WorldConfig
-from bns.learners import registry as learners
 from bns.storage import files
+from bns.tasks import registry as tasks
 from bns.worlds import registry as worlds
+from bns.worlds.counted import CountedWorld
 from bns.worlds.world import World
 
 
@@ -38,22 +39,39 @@ def make_world(config: RunConfig, directory: Path | None = None) -> World:
 
 
 def surroundings(config: RunConfig) -> dict[str, Any]:
-    """What the learner of a configuration tells its world.
+    """What the task of a configuration tells its world.
 
     Raises:
-        UnknownNameError: no such learner or world.
+        UnknownNameError: no such task or world.
         BnsError: the world takes no such thing.
     """
     name = config.world.name
-    found = learners.get(config.learner).surroundings(config)
+    found = tasks.of(config).surroundings()
     lacks = worlds.lacking(name, found)
     if lacks:
         fit = [item for item in worlds.names() if not worlds.lacking(item, found)]
         raise BnsError(
-            f"The learner {config.learner!r} needs a world with {', '.join(lacks)}, "
+            f"The task {config.task.name!r} needs a world with {', '.join(lacks)}, "
             f"which {name!r} has not: give --world.name {' or '.join(fit)}."
         )
     return found
+
+
+def make_models(config: RunConfig) -> list[CountedWorld]:
+    """A model world for each replicate, see `PriorConfig`; none without a prior.
+
+    A model has no damage, and its own share of evaluations.
+
+    Raises:
+        UnknownNameError: no such world.
+        BnsError: a world that the task cannot be in, an effect it cannot have.
+    """
+    prior = config.prior
+    if not prior.world:
+        return []
+    world = replace(config.world, name=prior.world, reality=prior.reality, damage=())
+    made = make_world(replace(config, world=world))
+    return [CountedWorld(made, prior.evaluations) for _ in range(config.replicates)]
 
 
 def _nets(config: RunConfig, directory: Path | None) -> Any:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from bns.chromosome import Encoding
+from bns.evolution.chromosome import Encoding
 
 INPUTS = 5
 OUTPUTS = 3

@@ -81,14 +81,30 @@ def a12(
     Raises:
         BnsError: a sample is empty or holds NaN.
     """
-    a, b = _sample(a), _sample(b)
-    ranks = stats.rankdata(np.concatenate([a, b]))[: len(a)]
-    u = ranks.sum() - len(a) * (len(a) + 1) / 2
-    value = float(u / (len(a) * len(b)))
+    value = a12_value(a, b)
     z = special.ndtri(0.5 + confidence / 2)
     low = _newcombe(value, len(a), len(b), z, upper=False)
     high = _newcombe(value, len(a), len(b), z, upper=True)
     return Interval(value, low, high)
+
+
+def a12_value(a: Sequence[float], b: Sequence[float]) -> float:
+    """A12 without its interval.
+
+    Raises:
+        BnsError: a sample is empty or holds NaN.
+    """
+    a, b = _sample(a), _sample(b)
+    ranks = stats.rankdata(np.concatenate([a, b]))[: len(a)]
+    u = ranks.sum() - len(a) * (len(a) + 1) / 2
+    return float(u / (len(a) * len(b)))
+
+
+def a12_error(theta: float, n_a: int, n_b: int) -> float:
+    """Standard error of A12 where it is `theta`, without ties (Newcombe's method 5)."""
+    mean = (n_a + n_b) / 2 - 1
+    shape = (1 - theta) / (2 - theta) + theta / (1 + theta)
+    return float(np.sqrt(theta * (1 - theta) * (1 + mean * shape) / (n_a * n_b)))
 
 
 def median_interval(
@@ -166,16 +182,10 @@ def _sample(values: Sequence[float]) -> np.ndarray:
 
 def _newcombe(value: float, n_a: int, n_b: int, z: float, *, upper: bool) -> float:
     """The limit: where `value` is z standard errors away, found by bisection."""
-    mean = (n_a + n_b) / 2 - 1
-
-    def error(theta: float) -> float:
-        shape = (1 - theta) / (2 - theta) + theta / (1 + theta)
-        return float(np.sqrt(theta * (1 - theta) * (1 + mean * shape) / (n_a * n_b)))
-
     inside, outside = value, 1.0 if upper else 0.0
     for _ in range(60):
         middle = (inside + outside) / 2
-        if abs(middle - value) <= z * error(middle):
+        if abs(middle - value) <= z * a12_error(middle, n_a, n_b):
             inside = middle
         else:
             outside = middle

@@ -1,11 +1,10 @@
-"""Whether a directory is free for a run, or is one; who may write in it."""
+"""Whether a directory is free for a run, or is one."""
 
-import os
 from pathlib import Path
 from typing import Any
 
 from bns.errors import BnsError, FormatError
-from bns.storage import files
+from bns.storage import files, reading, seal
 
 FORMAT = "bns-run"
 SCHEMA = 1
@@ -36,7 +35,7 @@ def check_free(directory: Path) -> None:
 
 def _harmless(name: str) -> bool:
     """What a run killed before its first whole file leaves behind."""
-    return name.startswith(files.TEMPORARY) or name == "config.toml"
+    return name.startswith(files.TEMPORARY) or name in ("config.toml", "faults.jsonl")
 
 
 def read_head(
@@ -59,7 +58,7 @@ def read_head(
             f"{path.parent} is not a {kind} directory (it has no {path.name}): "
             f"give one that `{made}` made. Nothing was changed."
         )
-    head = files.read_json(path)
+    head = seal.opened(reading.read_json(path), path)
     if head.get("format") != format or type(head.get("schema")) is not int:
         raise FormatError(f"{path} is not a {kind} of bns. Nothing was changed.")
     if head["schema"] > schema:
@@ -68,41 +67,3 @@ def read_head(
             "install a newer bns. Nothing was changed."
         )
     return head
-
-
-class Lock:
-    """Only one process writes in a directory.
-
-    Args:
-        directory: there already.
-    """
-
-    def __init__(self, directory: Path):
-        self.directory = directory
-        self._descriptor: int | None = None
-
-    def take(self) -> None:
-        """Keep other processes from writing here until this one ends.
-
-        Raises:
-            BnsError: another process is writing here.
-        """
-        if os.name != "posix":  # no such lock elsewhere
-            return
-        import fcntl
-
-        self._descriptor = os.open(self.directory, os.O_RDONLY)
-        try:
-            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            self.release()
-            raise BnsError(
-                f"{self.directory} is being written by another process: "
-                "wait for it, or give another --out."
-            ) from error
-
-    def release(self) -> None:
-        """Let others write here."""
-        if self._descriptor is not None:
-            os.close(self._descriptor)
-            self._descriptor = None

@@ -1,18 +1,16 @@
 """Files that are whole or absent: written beside, synchronised, then renamed."""
 
 import errno
-import io
 import json
 import os
 import shutil
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
-import numpy as np
-
-from bns.errors import BnsError, FormatError
+from bns.errors import BnsError
+from bns.storage import seal
 
 TEMPORARY = ".tmp-"
 """prefix of what is not whole yet; a resumed run removes it"""
@@ -29,7 +27,7 @@ def storage_error(path: Path, error: OSError) -> StorageError:
     if error.errno in FULL:
         return StorageError(
             f"No space left to write {path}: what was written before stays readable. "
-            "Free some space, then repeat the command with --resume."
+            "Free some space, then repeat the command, a run or campaign with --resume."
         )
     return StorageError(
         f"Cannot write {path}: {error.strerror}. Give a directory that can be written."
@@ -48,39 +46,51 @@ def make_directory(path: Path) -> None:
         raise storage_error(path, error) from error
 
 
-def write_bytes(path: Path, data: bytes) -> None:
+def write_bytes(path: Path | str, data: bytes) -> None:
     """Write a file so that it is whole or absent at every moment.
 
     Raises:
         StorageError: no space, or no permission.
     """
-
-    def write(temporary: Path) -> None:
-        with open(temporary, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-
-    replace(path, write)
+    replace(path, lambda temporary: temporary.write_bytes(data))
 
 
-def replace(path: Path, write: Callable[[Path], None]) -> None:
-    """Let `write` make a file or directory beside `path`, then move it there.
-
-    A directory is moved only where `path` is absent.
+def write_text(path: Path | str, text: str) -> None:
+    """Write a text file in UTF-8 likewise.
 
     Raises:
         StorageError: no space, or no permission.
     """
-    temporary = path.with_name(f"{TEMPORARY}{path.name}")
+    write_bytes(path, text.encode())
+
+
+def replace(path: Path | str, write: Callable[[Path], object]) -> None:
+    """Let `write` make a file or directory beside `path`, then move it there.
+
+    What was at `path` stays until all of the new is on the disk, and stays if `write`
+    fails. A directory is moved only where `path` is absent.
+
+    Args:
+        path: of the file; a link is followed.
+        write: given where to write; the name ends as that of `path`.
+
+    Raises:
+        StorageError: no space, no permission, or `path` is a device or a pipe.
+    """
+    path = Path(os.path.realpath(path))
+    if path.exists() and not path.is_file():
+        raise StorageError(f"{path} is there and is no file: give another name.")
+    temporary = path.with_name(f"{TEMPORARY}{os.getpid()}-{path.name}")
     try:
         _remove(temporary)
         write(temporary)
+        _sync(temporary)
         os.replace(temporary, path)
         _sync_directory(path.parent)
     except OSError as error:
-        _remove(temporary)
         raise storage_error(path, error) from error
+    finally:
+        remove(temporary)
 
 
 def remove_temporary(directory: Path) -> None:
@@ -94,55 +104,21 @@ def remove_tree(path: Path) -> None:
     shutil.rmtree(path, ignore_errors=True)
 
 
-def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write JSON, keys in the order given."""
-    text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)
-    write_bytes(path, (text + "\n").encode())
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """Read a JSON object.
+def write_json(path: Path | str, content: Mapping[str, Any]) -> None:
+    """Write JSON, keys in the order given, and the digest of it (`bns.storage.seal`).
 
     Raises:
-        FormatError: absent, torn, or not an object.
-    """
-    try:
-        content = json.loads(path.read_bytes())
-    except (OSError, ValueError) as error:
-        raise FormatError(f"{path} cannot be read as JSON: {error}.") from error
-    if not isinstance(content, dict):
-        raise FormatError(f"{path} holds no JSON object.")
-    return content
-
-
-def write_npz(
-    path: Path, arrays: Mapping[str, np.ndarray], *, compressed: bool = False
-) -> None:
-    """Write arrays without pickle; the same arrays give the same bytes.
-
-    Raises:
-        TypeError: an array holds Python objects.
         StorageError: no space, or no permission.
     """
-    objects = [name for name, array in arrays.items() if np.asarray(array).dtype == "O"]
-    if objects:
-        raise TypeError(f"arrays of Python objects cannot be stored: {objects}")
-    buffer = io.BytesIO()
-    (np.savez_compressed if compressed else np.savez)(buffer, **arrays)
-    write_bytes(path, buffer.getvalue())
+    sealed = seal.sealed(content)
+    text = json.dumps(sealed, indent=2, allow_nan=False, ensure_ascii=False)
+    write_text(path, text + "\n")
 
 
-def read_npz(path: Path) -> dict[str, np.ndarray]:
-    """Read arrays, never pickled ones.
-
-    Raises:
-        FormatError: absent, torn, or not such a file.
-    """
-    try:
-        with np.load(path, allow_pickle=False) as content:
-            return {name: content[name] for name in content.files}
-    except (OSError, ValueError, EOFError, BadZipFile, AttributeError) as error:
-        raise FormatError(f"{path} cannot be read: {error}.") from error
+def remove(path: Path) -> None:
+    """Remove a file or a directory, if it is there; what cannot be removed stays."""
+    with suppress(OSError):
+        _remove(path)
 
 
 def _remove(path: Path) -> None:
@@ -150,6 +126,20 @@ def _remove(path: Path) -> None:
         remove_tree(path)
     else:
         path.unlink(missing_ok=True)
+
+
+def _sync(path: Path) -> None:
+    """Bring a file, or all files of a directory, to the disk."""
+    if path.is_dir():
+        for below in path.iterdir():
+            _sync(below)
+        _sync_directory(path)
+        return
+    handle = os.open(path, os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def _sync_directory(path: Path) -> None:

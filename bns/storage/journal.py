@@ -1,11 +1,14 @@
 """A file of JSON lines, one per event: appended to, never rewritten."""
 
 import json
+import os
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from bns.storage import files
+from bns.errors import FormatError
+from bns.storage import files, reading
 
 
 def note(path: Path, **entry: Any) -> None:
@@ -16,8 +19,10 @@ def note(path: Path, **entry: Any) -> None:
     """
     line = json.dumps({"at": round(time.time(), 3), **entry}) + "\n"
     try:
-        with open(path, "a", encoding="utf-8") as file:
-            file.write(line)
+        with open(path, "ab+") as file:
+            if file.tell() and file.seek(-1, os.SEEK_END) >= 0 and file.read() != b"\n":
+                line = "\n" + line  # the last one is torn
+            file.write(line.encode())
     except OSError as error:
         raise files.storage_error(path, error) from error
 
@@ -27,9 +32,8 @@ def entries(path: Path) -> list[dict[str, Any]]:
     if not path.exists():
         return []
     found = []
-    for line in path.read_text(encoding="utf-8").splitlines():
-        try:
-            found.append(json.loads(line))
-        except ValueError:
-            continue
+    for line in reading.read_bytes(path, most=reading.DATA).splitlines():
+        with suppress(FormatError):
+            entry = reading.json(line, path)
+            found += [entry] if isinstance(entry, dict) else []
     return found

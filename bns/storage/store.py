@@ -14,14 +14,16 @@ Every file is written beside, synchronised and renamed, so it is whole or absent
 step is written before the state that follows it. So a run killed at any moment and
 resumed gives, in every file but timing.jsonl, the bytes of an undisturbed one (same
 machine, versions and mode). When the run is finished `steps/` is removed: record,
-arrays and dataset hold all that was in it.
+arrays and dataset hold all that was in it. Every file that is read again carries a
+checksum (`seal`, `parquet`; NPZ has its own); what an older version wrote has none.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
+import msgspec
 import numpy as np
 
 from bns.errors import BnsError, FormatError
@@ -29,10 +31,22 @@ from bns.experiment import loading
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
 from bns.experiment.step import ARRAYS, Step, assemble
-from bns.storage import files, journal
-from bns.storage.directory import FORMAT, SCHEMA, Lock, check_free, read_head
+from bns.storage import arrays as npz
+from bns.storage import files, journal, reading
+from bns.storage.directory import FORMAT, SCHEMA, check_free, read_head
+from bns.storage.lock import Lock
 
 _DONE = "trials_done"
+
+
+class Head(msgspec.Struct):
+    """What run.json says, beside its format and schema."""
+
+    mode: Literal["compiled", "eager"]
+    config: dict[str, Any]
+    conditions: dict[str, Any]
+    damage_onset: list[Annotated[int, msgspec.Meta(ge=-1, le=1_000_000_000)]]
+    versions: dict[str, str]
 
 
 @dataclass(eq=False)
@@ -46,6 +60,7 @@ class RunStore:
         versions: what made it.
         conditions: what was true of the world, by name.
         damage_onset: first damaged trial per replicate, ``(R,)``; -1 = none.
+        lock: held while it is written.
     """
 
     directory: Path
@@ -54,20 +69,18 @@ class RunStore:
     versions: Mapping[str, str]
     conditions: Mapping[str, object]
     damage_onset: Sequence[int]
-    _lock: Lock | None = field(default=None, repr=False)
+    lock: Lock | None = field(default=None, repr=False)
 
     def create(self) -> "RunStore":
-        """Make the directory.
+        """Begin to fill the directory, which is locked.
 
         Raises:
             BnsError: there is something in it already, or it cannot be written.
         """
         check_free(self.directory)
         files.make_directory(self.directory)
-        self.lock()
         files.remove_temporary(self.directory)
-        text = loading.to_toml(self.config)
-        files.write_bytes(self.directory / "config.toml", text.encode())
+        files.write_text(self.directory / "config.toml", loading.to_toml(self.config))
         head = {
             "format": FORMAT,
             "schema": SCHEMA,
@@ -88,34 +101,26 @@ class RunStore:
             FormatError: it is none, it is damaged, or a newer version wrote it.
         """
         directory = Path(directory)
-        head = read_head(directory / "run.json")
+        path = directory / "run.json"
+        head = reading.typed(read_head(path), Head, path)
         try:
-            return cls(
-                directory,
-                loading.from_mapping(head["config"]),
-                head["mode"],
-                head["versions"],
-                head["conditions"],
-                head["damage_onset"],
-            )
-        except (KeyError, BnsError) as error:
+            config = loading.from_mapping(head.config)
+        except BnsError as error:
             raise FormatError(
-                f"{directory}/run.json cannot be used: {error} Nothing was changed."
+                f"{path} cannot be used: {error} Nothing was changed."
             ) from error
-
-    def lock(self) -> None:
-        """Keep other processes from writing here until this one ends.
-
-        Raises:
-            BnsError: another process is writing here.
-        """
-        self._lock = Lock(self.directory)
-        self._lock.take()
+        if len(head.damage_onset) != config.replicates:
+            raise FormatError(
+                f"{path}: damage_onset has {len(head.damage_onset)} entries for "
+                f"{config.replicates} replicates."
+            )
+        known = head.mode, head.versions, head.conditions, head.damage_onset
+        return cls(directory, config, *known)
 
     def close(self) -> None:
         """Let others write here."""
-        if self._lock is not None:
-            self._lock.release()
+        if self.lock is not None:
+            self.lock.release()
 
     @property
     def exists(self) -> bool:
@@ -130,22 +135,23 @@ class RunStore:
     def write_step(self, trial: int, step: Step) -> None:
         """Store trial number `trial`."""
         files.make_directory(self.directory / "steps")
-        files.write_npz(self._step_path(trial), step.to_arrays())
+        npz.write_npz(self._step_path(trial), step.to_arrays())
 
     def write_state(self, done: int, state: Mapping[str, np.ndarray]) -> None:
         """Store the learner's state after `done` trials."""
         arrays = {_DONE: np.array(done, dtype=np.int64), **state}
-        files.write_npz(self.directory / "state.npz", arrays)
+        npz.write_npz(self.directory / "state.npz", arrays)
 
     def read_state(self) -> tuple[int, dict[str, np.ndarray]]:
         """Trials done and the learner's state after them (0, empty at the start)."""
         path = self.directory / "state.npz"
         if not path.exists():
             return 0, {}
-        arrays = files.read_npz(path)
-        if _DONE not in arrays:
+        arrays = npz.read_npz(path)
+        done = arrays.pop(_DONE, None)
+        if done is None or done.shape != () or done.dtype.kind not in "iu":
             raise FormatError(f"{path} is no state of a run. Nothing was changed.")
-        return int(arrays.pop(_DONE)), arrays
+        return int(done), arrays
 
     def steps(self) -> list[Step]:
         """All trials stored so far.
@@ -158,7 +164,24 @@ class RunStore:
         for path in paths:
             if not path.exists():
                 raise FormatError(f"{path} is missing. Nothing was changed.")
-        return [Step.from_arrays(files.read_npz(path)) for path in paths]
+        steps = [self._step(path) for path in paths]
+        for path, step in zip(paths, steps, strict=True):
+            if _form(step) != _form(steps[0]):
+                raise FormatError(f"{path} has other arrays than {paths[0].name}.")
+        return steps
+
+    def _step(self, path: Path) -> Step:
+        """A stored step; it is of this run."""
+        step = Step.from_arrays(npz.read_npz(path), str(path))
+        missing = set(ARRAYS) - set(step.arrays)
+        shapes = {value.shape[:1] for value in step.arrays.values()}
+        shapes |= {value.shape for value in step.columns.values()}
+        if missing or shapes != {(self.config.replicates,)}:
+            raise FormatError(
+                f"{path} is no step of {self.config.replicates} replicates with "
+                f"{', '.join(ARRAYS)}. Nothing was changed."
+            )
+        return step
 
     def record(self) -> RunRecord:
         """What was done so far."""
@@ -175,7 +198,7 @@ class RunStore:
         arrays = {name: getattr(record, name) for name in ARRAYS}
         arrays |= {f"extra.{name}": value for name, value in record.extra.items()}
         arrays["damage_onset"] = record.damage_onset
-        files.write_npz(self.directory / "arrays.npz", arrays, compressed=True)
+        npz.write_npz(self.directory / "arrays.npz", arrays, compressed=True)
         self._write_dataset(steps)
         write_table(self.directory / "record.parquet", record.columns)
         self.clean()
@@ -229,18 +252,41 @@ def load(directory: Path | str) -> RunRecord:
     return RunStore.open(directory).record()
 
 
+def _form(step: Step) -> dict[str, tuple]:
+    """Names, types and shapes of what a step holds."""
+    held = {**step.columns, **step.arrays}
+    return {name: (value.dtype, value.shape) for name, value in held.items()}
+
+
 def _finished_record(store: RunStore) -> RunRecord:
     from bns.storage.table import read_table
 
-    arrays = files.read_npz(store.directory / "arrays.npz")
+    path, config = store.directory / "arrays.npz", store.config
+    arrays = npz.read_npz(path)
     missing = {*ARRAYS, "damage_onset"} - set(arrays)
     if missing:
-        raise FormatError(f"{store.directory}/arrays.npz lacks {min(missing)}.")
+        raise FormatError(f"{path} lacks {min(missing)}.")
+    columns = read_table(store.directory / "record.parquet")
+    shape = (config.replicates, config.trials)
+    onset = arrays.pop("damage_onset")
+    for name, array in {**columns, **arrays}.items():
+        if array.shape[:2] != shape or array.dtype.kind not in "biuf":
+            raise FormatError(
+                f"{store.directory}: {name} is {array.dtype} of shape {array.shape}; "
+                f"it has to begin with {shape}, as run.json says."
+            )
+    if onset.shape != shape[:1] or onset.dtype.kind != "i":
+        raise FormatError(f"{path}: damage_onset is not of {shape[0]} replicates.")
+    for name, axes in {"sent": 4, "poses": 4, "predicted": 4}.items():
+        if arrays[name].ndim != axes:
+            raise FormatError(
+                f"{path}: {name} has {arrays[name].ndim} axes, not {axes}."
+            )
     return RunRecord(
-        config=store.config,
+        config=config,
         versions=store.versions,
-        columns=read_table(store.directory / "record.parquet"),
-        damage_onset=arrays["damage_onset"],
+        columns=columns,
+        damage_onset=onset,
         directory=str(store.directory),
         conditions=store.conditions,
         extra={

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from bns.errors import FormatError
-from bns.storage import files
+from bns.storage import parquet
 
 KEYS = ("replicate", "trial")
 
@@ -17,30 +17,24 @@ def write_table(path: Path, columns: Mapping[str, np.ndarray]) -> None:
     Raises:
         StorageError: no space, or no permission.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     runs, trials = np.indices(next(iter(columns.values())).shape)
     table = {"replicate": runs, "trial": trials} | dict(columns)
-    flat = pa.table({name: pa.array(array.ravel()) for name, array in table.items()})
-    sink = pa.BufferOutputStream()
-    pq.write_table(flat, sink, compression="zstd")
-    files.write_bytes(path, sink.getvalue().to_pybytes())
+    parquet.write(path, {name: array.ravel() for name, array in table.items()})
 
 
 def read_table(path: Path) -> dict[str, np.ndarray]:
     """Read what `write_table` wrote, each column ``(R, T)``.
 
     Raises:
-        FormatError: absent, torn, or not such a table.
+        FormatError: absent, torn, damaged, or not such a table.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        table = pq.read_table(path)
-        columns = {name: table[name].to_numpy() for name in table.column_names}
-        runs, trials = (int(columns.pop(key).max()) + 1 for key in KEYS)
-        return {n: array.reshape(runs, trials) for n, array in columns.items()}
-    except (OSError, pa.ArrowException, KeyError, ValueError) as error:
-        raise FormatError(f"{path} cannot be read: {error}.") from error
+    table = parquet.read(path)
+    kinds = dict.fromkeys(table.column_names, "double") | dict.fromkeys(KEYS, "int64")
+    columns = parquet.numbers(table, kinds, path)
+    shape = tuple(int(columns[key].max(initial=-1)) + 1 for key in KEYS)
+    for key, index in zip(KEYS, np.indices(shape), strict=True):
+        if not np.array_equal(columns.pop(key), index.ravel()):
+            raise FormatError(
+                f"{path}: {key} does not count up over the {table.num_rows} rows."
+            )
+    return {name: array.reshape(shape) for name, array in columns.items()}

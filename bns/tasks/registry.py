@@ -2,10 +2,13 @@
 
 import tomllib
 from functools import cache
+from importlib import import_module
 from importlib.resources import files
 from typing import Any
 
 from bns.errors import UnknownNameError
+from bns.experiment.config import RunConfig
+from bns.tasks.base import Task
 
 
 @cache
@@ -32,6 +35,23 @@ def describe(name: str) -> str:
     return str(content(name)["description"])
 
 
-def order(name: str) -> str:
-    """Letters of the objectives, in the order in which they are to be reached."""
-    return str(content(name)["order"])
+def kind(name: str) -> str:
+    """What sort of task it is: the module of `bns.tasks` that runs and scores it."""
+    return str(content(name)["kind"])
+
+
+def kinds() -> tuple[str, ...]:
+    """The sorts of tasks that exist, sorted."""
+    return tuple(sorted({kind(name) for name in names()}))
+
+
+def of(config: RunConfig) -> Task:
+    """The task of a configuration.
+
+    Raises:
+        UnknownNameError: no such task.
+        BnsError: a setting that the task cannot be with.
+    """
+    module = import_module(f"bns.tasks.{kind(config.task.name)}")
+    made: Task = module.TASK(config)
+    return made

@@ -18,6 +18,7 @@ from bns.gap.bench.cases import Answer, Case
 from bns.gap.diagnose import diagnose
 from bns.gap.models.base import GapModel
 from bns.gap.records import plain
+from bns.storage import files, journal, reading, seal
 from bns.worlds.data import dataset
 
 SCHEMA, VERSION = "bns-gap-answers", 1
@@ -50,7 +51,7 @@ def make(directory: Path, answers: Path, cases: Iterable[tuple[str, Case]]) -> i
         dataset.write(directory / name, trials, provenance={"case": name})
         known[name] = case.answer.as_dict()
     content = {"schema": SCHEMA, "version": VERSION, "cases": known}
-    answers.write_text(json.dumps(plain(content), indent=1) + "\n", encoding="utf-8")
+    files.write_json(answers, plain(content))
     return len(known)
 
 
@@ -71,8 +72,7 @@ def run(directory: Path, model: GapModel, said: Path, *, seed: int = 0) -> int:
             found = json.loads(diagnose(trials, model, seed=seed).to_json())
         except BnsError as error:
             found = {"error": str(error)}
-        with said.open("a", encoding="utf-8") as out:
-            out.write(json.dumps({"name": place.name, "diagnosis": found}) + "\n")
+        journal.note(said, name=place.name, diagnosis=found)
         count += 1
     return count
 
@@ -113,22 +113,23 @@ def read_answers(answers: Path) -> dict[str, Any]:
     Raises:
         FormatError: it is no such file.
     """
+    content = seal.opened(reading.read_json(answers, most=reading.DATA), answers)
     try:
-        content = json.loads(Path(answers).read_text(encoding="utf-8"))
         if (content["schema"], content["version"]) != (SCHEMA, VERSION):
             raise FormatError(f"{answers} is not {SCHEMA} version {VERSION}.")
         return {
             name: plain({**Answer(kind=item["kind"]).as_dict(), **item})
             for name, item in content["cases"].items()
         }
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         if isinstance(error, FormatError):
             raise
         raise FormatError(f"{answers} holds no answers ({error}).") from error
 
 
 def _lines(file: Path) -> list[dict[str, Any]]:
-    if not file.is_file():
-        return []
-    text = file.read_text(encoding="utf-8")
-    return [json.loads(line) for line in text.splitlines() if line]
+    lines = journal.entries(file)
+    for line in lines:
+        if not (isinstance(line.get("name"), str) and "diagnosis" in line):
+            raise FormatError(f"{file} holds a line without name or diagnosis.")
+    return lines

@@ -22,6 +22,8 @@ import numpy as np
 
 from bns.errors import FormatError
 from bns.gap.importers import servo
+from bns.storage import reading
+from bns.worlds.data import dataset_checks as checks
 from bns.worlds.trial import Commands, Trial
 
 TUPLES, RESULTS = "lstraight.tuple", "lstraight_results.json"
@@ -54,11 +56,12 @@ def read(directory: str | Path) -> Trial:
     """
     file = servo.directory(directory, TUPLES) / TUPLES
     rows = []
-    for number, item in enumerate(objects(file.read_text(encoding="utf-8"), str(file))):
+    text = reading.read_text(file, most=reading.DATA)
+    for number, item in enumerate(objects(text, str(file))):
         try:
             row = [item["T"], item["phi_l"], item["phi_r"], *item["sm"]]
             rows.append([float(value) for value in row])
-        except (KeyError, TypeError, ValueError) as error:
+        except reading.UNREADABLE as error:
             raise FormatError(f"{file}: object {number + 1}: {error!r}.") from None
         if len(rows[-1]) != 6:
             raise FormatError(f"{file}: object {number + 1}: sm needs three numbers.")
@@ -68,7 +71,7 @@ def read(directory: str | Path) -> Trial:
             f"{file} holds no interval, NaN, or one that is not positive."
         )
     speeds = table[:, 1:3] * WHEEL_RADIUS
-    return Trial(
+    made = Trial(
         commands=Commands(speeds, table[:, 0]),
         times=np.concatenate([[0.0], np.cumsum(table[:, 0])]),
         observed=chained(table[:, 3:]),
@@ -82,6 +85,8 @@ def read(directory: str | Path) -> Trial:
             "objects": len(table),
         },
     )
+    checks.plausible(made, str(file))
+    return made
 
 
 def published(directory: str | Path) -> Published:
@@ -92,11 +97,17 @@ def published(directory: str | Path) -> Published:
     """
     file = servo.directory(directory, RESULTS) / RESULTS
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        content = reading.read_json(file)
         values = {name: float(content[name]) for name in PARAMETERS}
         covariance = np.array(content["covariance"], dtype=float).reshape(6, 6)
-    except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
+    except (ArithmeticError, KeyError, TypeError, ValueError) as error:
         raise FormatError(f"{file} is no published estimate ({error!r}).") from None
+    known = (np.abs([*values.values(), *covariance.ravel()]) <= checks.STRONGEST).all()
+    if not known or (np.diag(covariance) < 0).any():
+        raise FormatError(
+            f"{file}: NaN, a number beyond {checks.STRONGEST:g}, or a covariance that "
+            "is negative."
+        )
     spread = np.sqrt(np.diag(covariance)).tolist()
     return Published(values, dict(zip(PARAMETERS, spread, strict=True)), covariance)
 
@@ -118,6 +129,8 @@ def objects(text: str, where: str) -> Iterator[dict]:
         except json.JSONDecodeError as error:
             line = text.count("\n", 0, error.pos) + 1
             raise FormatError(f"{where}, line {line}: {error.msg}.") from None
+        except (ValueError, RecursionError) as error:
+            raise FormatError(f"{where} cannot be read as JSON: {error}.") from error
         yield item
 
 

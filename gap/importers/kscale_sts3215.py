@@ -13,6 +13,7 @@ whose units are unclear; lost packets read as -pi for one sample and are mended
 """
 
 import csv
+import io
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -20,6 +21,7 @@ import numpy as np
 
 from bns.errors import FormatError
 from bns.gap.importers import servo
+from bns.storage import arrays, reading
 from bns.worlds.trial import Channel, Trial
 
 INDEX, RUNS, COLUMNS = "index.csv", "runs.npz", "_columns"
@@ -63,29 +65,35 @@ def read(
     rows = _index(home / INDEX)
     repeats: dict[tuple, int] = {}
     trials = []
-    with np.load(home / RUNS, allow_pickle=False) as runs:
-        if COLUMNS not in runs:
-            raise FormatError(f"{home / RUNS} names no columns (entry {COLUMNS!r}).")
-        columns = [str(name) for name in runs[COLUMNS]]
-        missing = set(SOURCES.values()) - set(columns)
-        if missing:
-            raise FormatError(f"{home / RUNS} has no column {sorted(missing)[0]!r}.")
-        for row in rows:
-            cell = tuple(row[key] for key in ("mass", "length", "kp", "trajectory"))
-            repeat = repeats[cell] = repeats.get(cell, -1) + 1
-            if wanted is None or wanted(row):
-                if row["file"] not in runs:
-                    raise FormatError(f"{home / RUNS} has no run {row['file']!r}.")
-                table = np.asarray(runs[row["file"]], np.float64)
-                trials.append(_trial(row, repeat, table, columns))
+    runs = arrays.read_npz(home / RUNS)
+    if COLUMNS not in runs:
+        raise FormatError(f"{home / RUNS} names no columns (entry {COLUMNS!r}).")
+    columns = [str(name) for name in np.atleast_1d(runs[COLUMNS])]
+    for name in SOURCES.values():
+        if columns.count(name) != 1:
+            raise FormatError(f"{home / RUNS} has no column {name!r}, or two of them.")
+    for row in rows:
+        cell = tuple(row[key] for key in ("mass", "length", "kp", "trajectory"))
+        repeat = repeats[cell] = repeats.get(cell, -1) + 1
+        if wanted is None or wanted(row):
+            table = runs.get(row["file"], np.zeros(0))
+            if table.shape[1:] != (len(columns),) or table.dtype.kind not in "biuf":
+                raise FormatError(
+                    f"{home / RUNS} has no run {row['file']!r} of {len(columns)} "
+                    "columns of numbers."
+                )
+            trials.append(_trial(row, repeat, table.astype(np.float64), columns))
     return trials
 
 
 def _index(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="", encoding="utf-8-sig") as file:
-        rows = list(csv.DictReader(file))
+    text = reading.read_text(path)
+    try:
+        rows = list(csv.DictReader(io.StringIO(text, newline="")))
+    except (csv.Error, ValueError) as error:
+        raise FormatError(f"{path} cannot be read as CSV: {error}.") from error
     for key in METADATA:
-        if not rows or key not in rows[0]:
+        if not rows or any(row.get(key) is None for row in rows):
             raise FormatError(f"{path} has no rows with a column {key!r}.")
     return rows
 

@@ -12,15 +12,19 @@ the cameras lost the robot for longer than `GAP` is left out.
 """
 
 import gzip
+import zlib
 from pathlib import Path
 
 import numpy as np
 
 from bns.errors import FormatError
+from bns.storage import reading
+from bns.worlds.data import dataset_checks as checks
 from bns.worlds.trial import Channel, Commands, Trial
 
 CHANNELS = (Channel("forward_speed", "m/s"), Channel("turning_rate", "rad/s"))
 ODOMETRY, TRUTH = "Robot{}_Odometry.dat", "Robot{}_Groundtruth.dat"
+MOST = 256 << 20  # [bytes] of a table, unpacked
 GAP = 0.5  # [s] assumed: longer without a pose, motion can not be compared
 SHORTEST = 0.005  # [s] commands that follow sooner are merged with the one before
 
@@ -47,11 +51,14 @@ def read(directory: str | Path, robot: int, *, seconds: float = 60.0) -> list[Tr
     seen = _table(Path(directory), TRUTH.format(robot), 4)
     start, end = max(told[0, 0], seen[0, 0]), min(told[-1, 0], seen[-1, 0])
     seen[:, 3] = np.unwrap(seen[:, 3])
+    if not 0 <= end - start < checks.LONGEST:
+        raise FormatError(f"{directory}: robot {robot}'s tables share no time.")
     trials = []
     for number in range(int((end - start) // seconds)):
         begin = start + number * seconds
         made = _trial(told, seen, begin, begin + seconds)
         if made is not None:
+            checks.plausible(made, f"{directory}: robot {robot}, part {number}")
             about = {"robot_number": robot, "part": number, "tracked": "markers"}
             trials.append(made.replace(conditions=about))
     return trials
@@ -88,15 +95,13 @@ def _trial(
 
 def _table(directory: Path, name: str, columns: int) -> np.ndarray:
     plain, packed = directory / name, directory / f"{name}.gz"
-    if not (plain.is_file() or packed.is_file()):
+    if not (plain.exists() or packed.exists()):
         raise FormatError(
             f"{directory} holds neither {name} nor {name}.gz; robots there: "
             f"{', '.join(map(str, robots(directory))) or 'none'}."
         )
-    file = plain if plain.is_file() else packed
-    text = file.read_bytes()
-    if file is packed:
-        text = gzip.decompress(text)
+    file = plain if plain.exists() else packed
+    text = _unpacked(file) if file is packed else reading.read_bytes(file, most=MOST)
     try:
         rows = [line.split() for line in text.decode().splitlines() if _data(line)]
         table = np.array(rows, dtype=float)
@@ -108,6 +113,22 @@ def _table(directory: Path, name: str, columns: int) -> np.ndarray:
         at = int(np.argmin(np.diff(table[:, 0]))) + 1
         raise FormatError(f"{file}: time goes backwards at row {at + 1}.")
     return table
+
+
+def _unpacked(file: Path) -> bytes:
+    """The content of a gzipped file.
+
+    Raises:
+        FormatError: it is damaged, or too large.
+    """
+    with reading.regular(file, most=MOST) as packed:
+        try:
+            data = gzip.GzipFile(fileobj=packed).read(MOST + 1)
+        except (*reading.UNREADABLE, zlib.error) as error:
+            raise FormatError(f"{file} cannot be unpacked: {error}.") from error
+    if len(data) > MOST:
+        raise FormatError(f"{file} unpacks to more than {reading.size(MOST)}.")
+    return data
 
 
 def _data(line: str) -> bool:

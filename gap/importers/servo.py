@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from bns.errors import FormatError
+from bns.worlds.data import dataset_checks as checks
 from bns.worlds.trial import Channel, Commands, Trial
 
 GOAL_CHANNELS = (Channel("goal", "rad"), Channel("torque_on", "1"))
@@ -70,6 +71,10 @@ def trial(
     if not (held > 0).all():
         at = int(np.argmin(held))
         raise FormatError(f"{where}: time does not go forward at sample {at + 1}.")
+    for name in wanted:
+        most = np.abs(columns[name]).max()
+        if most > (checks.LONGEST * 10 if name == "time" else checks.STRONGEST):
+            raise FormatError(f"{where}: {name} reaches {most:.3g}, which nothing can.")
     told = np.stack([columns["goal"], columns["torque_on"]], axis=1)
     return Trial(
         commands=Commands(told[:-1], held, GOAL_CHANNELS),
@@ -90,7 +95,7 @@ def directory(path: str | Path, *files: str) -> Path:
         FormatError: it is none, or a file is missing.
     """
     path = Path(path)
-    missing = [file for file in files if not (path / file).is_file()]
+    missing = [file for file in files if not (path / file).exists()]
     if missing:
         raise FormatError(
             f"{path} holds no {missing[0]}: give the directory of the recordings; it "

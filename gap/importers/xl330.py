@@ -9,13 +9,13 @@ Known faults, and what is done: `load` is a signed 16-bit number stored as unsig
 mass is not told (0 is assumed).
 """
 
-import json
 from pathlib import Path
 
 import numpy as np
 
 from bns.errors import FormatError
 from bns.gap.importers import servo
+from bns.storage import reading
 from bns.worlds.trial import Channel, Trial
 
 CHANNELS = (
@@ -67,7 +67,7 @@ def read(directory: str | Path) -> list[Trial]:
 
 def _trial(file: Path) -> Trial:
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        content = reading.read_json(file, most=reading.DATA)
         about = {name: content[name] for name in METADATA}
         columns = {
             key: np.array([float(entry[name]) for entry in content["entries"]])
@@ -81,7 +81,7 @@ def _trial(file: Path) -> Trial:
         gain, told = float(about["kp"]), float(about["vin"])
     except FormatError:
         raise
-    except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
+    except (ArithmeticError, KeyError, TypeError, ValueError) as error:
         raise FormatError(f"{file} is no run of an XL330 ({error!r}).") from None
     columns["current"] = servo.signed(columns["current"]) * 1e-3
     columns["angle"], lost = servo.despiked(columns["angle"])

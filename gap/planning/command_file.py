@@ -5,10 +5,15 @@ in the head as `left_speed [m/s]`.
 """
 
 import csv
+import io
 import re
 from pathlib import Path
 
-from bns.errors import BnsError, FormatError
+import numpy as np
+
+from bns.errors import FormatError
+from bns.storage import files, reading
+from bns.worlds.data.dataset_checks import STRONGEST, channel_units
 from bns.worlds.trial import Channel, Commands
 
 DURATION = "duration [s]"
@@ -23,13 +28,11 @@ def write(commands: Commands, path: str | Path) -> Path:
     """
     head = [DURATION, *(f"{name} [{unit}]" for name, unit in commands.channels)]
     rows = zip(commands.durations.tolist(), commands.values.tolist(), strict=True)
-    try:
-        with Path(path).open("w", newline="", encoding="utf-8") as out:
-            table = csv.writer(out, lineterminator="\n")
-            table.writerow(head)
-            table.writerows([f"{d:.10g}", *(f"{v:.10g}" for v in r)] for d, r in rows)
-    except OSError as error:
-        raise BnsError(f"{path} cannot be written: {error.strerror}.") from error
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow(head)
+    table.writerows([f"{d:.10g}", *(f"{v:.10g}" for v in r)] for d, r in rows)
+    files.write_text(path, out.getvalue())
     return Path(path)
 
 
@@ -39,9 +42,9 @@ def read(path: str | Path) -> Commands:
     Raises:
         FormatError: there is no such file, or it is no such table.
     """
+    text = reading.read_text(path)
     try:
-        with Path(path).open(newline="", encoding="utf-8") as file:
-            head, *rows = list(csv.reader(file))
+        head, *rows = list(csv.reader(io.StringIO(text, newline="")))
         heads = [_HEAD.fullmatch(cell.strip()) for cell in head]
         if not heads or not all(heads) or head[0].strip() != DURATION:
             raise FormatError(
@@ -49,8 +52,17 @@ def read(path: str | Path) -> Commands:
                 "as in 'left_speed [m/s]'."
             )
         channels = tuple(Channel(m["name"], m["unit"]) for m in heads[1:] if m)
+        channel_units(channels, str(path))
         table = [[float(cell) for cell in row] for row in rows if row]
         durations = [row[0] for row in table]
-        return Commands([row[1:] for row in table], durations, channels)
-    except (OSError, ValueError, IndexError) as error:
-        raise FormatError(f"{path} holds no commands ({error}).") from None
+        made = Commands([row[1:] for row in table], durations, channels)
+    except FormatError:
+        raise
+    except (csv.Error, *reading.UNREADABLE) as error:
+        raise FormatError(f"{path} holds no commands: {error}.") from error
+    strongest = max(np.abs(made.values).max(initial=0), made.durations.max(initial=0))
+    if strongest > STRONGEST or not len(made):
+        raise FormatError(
+            f"{path} holds no commands, or one beyond {STRONGEST:g}; units are SI."
+        )
+    return made

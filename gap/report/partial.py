@@ -1,12 +1,12 @@
 """What is known of a recording whose diagnosis could not be finished."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
 from bns.errors import BnsError
 from bns.gap.models.base import GapModel
 from bns.gap.recordings import check
+from bns.storage import files
 from bns.worlds.trial import Trial
 
 FILE = "partial.json"
@@ -28,7 +28,7 @@ def write(trials: Sequence[Trial], model: GapModel, error: BnsError, out: Path) 
         "faults": list(faults),
         "stopped by": str(error),
     }
-    Path(out).mkdir(parents=True, exist_ok=True)
+    files.make_directory(Path(out))
     path = Path(out) / FILE
-    path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    files.write_json(path, content)
     return path

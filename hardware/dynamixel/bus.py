@@ -3,10 +3,14 @@
 What is worked round of dynamixel-sdk 4.1: an exception inside a transaction leaves the
 port marked as in use, so that every later call fails; opening a missing port raises
 instead of saying no; only the first of several error bits is named; there is no bulk
-read on AX servos. It is not safe for several threads: neither is this.
+read on AX servos; a line that goes on talking is read without an end; time-outs are on
+the wall clock. It is not safe for several threads: neither is this.
 """
 
+import contextlib
+import os
 import select
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,15 +18,20 @@ from bns.errors import BnsError, MissingDependencyError
 from bns.hardware.clock import Clock
 from bns.hardware.dynamixel import packets
 from bns.hardware.dynamixel.joints import Joint
-from bns.hardware.errors import LinkError, SafetyStop
+from bns.hardware.errors import LinkError, SafetyStop, Void
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera.driver import Guard
-from bns.hardware.line import INSTALL, check_port
+from bns.hardware.line import INSTALL, check_port, claim
+from bns.hardware.openers import Openers
+from bns.hardware.stop_order import insist, phantomx
+from bns.hardware.watchdog import LARGEST, send
 from bns.worlds.physics.legged_flags import OVERLOAD_TIME, SATURATED, STALLED
 
 TRIES = 4
 HOT, EMPTY = 65, 9.9  # C, V: beyond it the robot rests
 SLOWEST = STALLED / packets.SPEED_UNIT  # units; slower, a servo stands still
+BABBLE = 64  # bytes to one question, after which a robot with torque is stopped
+STOPPING = 0.5  # s for a servo to acknowledge a stop
 LATENCY = 0.02  # s allowed for an answer beside its bytes
 
 
@@ -64,6 +73,7 @@ class Bus:
         self.clock, self.guard = clock, guard
         self.faults = faults if faults is not None else FaultLog(clock)
         self._port = _port(sdk, port, latency)
+        self._openers = Openers(port)
         self._protocol = sdk.PacketHandler(1.0)
         self._goals = sdk.GroupSyncWrite(self._port, self._protocol, packets.GOAL, 2)
         self._sdk = sdk
@@ -81,7 +91,9 @@ class Bus:
         Raises:
             BnsError: one is missing, doubled, or another model. Nothing has moved.
         """
-        missing, garbled, others = [], [], []
+        missing: list[int] = []
+        garbled: list[int] = []
+        others: list[int] = []
         for joint in self.joints:
             results = [self._call("ping", joint.id) for _ in range(3)]
             good = [value for value, result, _ in results if result == 0]
@@ -113,6 +125,7 @@ class Bus:
 
         Raises:
             LinkError: no proper answer in any of the tries.
+            Void: the same, of a robot whose torque is on; the caller stops it.
         """
         for _ in range(TRIES):
             values, result, error = self._call("readTxRx", servo, packets.PRESENT, 8)
@@ -125,7 +138,17 @@ class Bus:
             self.faults.note("no answer" if result else "bad state", str(servo))
             if self.guard is not None and self._on:
                 self.guard.feed(moving=True)
-        raise LinkError(f"Servo {servo} gives no proper answer in {TRIES} tries.")
+        raise self._mute(servo)
+
+    def _mute(self, servo: int) -> BnsError:
+        """What to raise about a servo that does not answer; one that holds is stopped.
+
+        The stop shows whether the bus is dead.
+        """
+        said = f"servo {servo} gave no proper answer in {TRIES} tries"
+        if self._on:
+            return Void(said)
+        return LinkError(f"{said.capitalize()}: check its cable.")
 
     def holds(self, servo: int) -> bool:
         """Whether the torque of a servo is on.
@@ -138,7 +161,21 @@ class Bus:
             if result == 0:
                 return bool(value)
             self.faults.note("no answer", str(servo))
-        raise LinkError(f"Servo {servo} gives no proper answer in {TRIES} tries.")
+            if self.guard is not None and self._on:
+                self.guard.feed(moving=True)
+        raise self._mute(servo)
+
+    def powered(self, count: int = 1) -> None:
+        """See that the next few servos still hold.
+
+        Raises:
+            Void: one does not: it was reset, or had no power for a moment.
+            LinkError: no proper answer.
+        """
+        for shift in range(count):
+            joint = self.joints[(self._next + shift) % len(self.joints)]
+            if not self.holds(joint.id):
+                raise Void(f"{joint.name} has lost its torque")
 
     def look(self, count: int = 2) -> list[tuple[Joint, packets.State]]:
         """Read the next few servos in turn and see that they are well.
@@ -178,10 +215,13 @@ class Bus:
         Raises:
             BnsError: nobody guards.
             LinkError: the line is dead.
+            Void: another program has opened the port.
         """
         if self.guard is None:
             raise BnsError("Nobody guards the robot: it moves with a watchdog only.")
         self.guard.feed(moving=True)
+        if self._on and self._openers.intruder():
+            raise Void("another program has opened the port")
         self._goals.clearParam()
         for joint in self.joints:
             units = joint.units(angles[joint.name])
@@ -204,28 +244,80 @@ class Bus:
         """The lowest voltage that a servo reads [V]."""
         return min(self.read(joint.id).voltage for joint in self.joints)
 
-    def torque(self, on: bool) -> None:
-        """Switch the torque of all servos; off is sent three times."""
-        self._on = on
-        for _ in range(1 if on else 3):
-            self._call("write1ByteTxOnly", packets.BROADCAST, packets.TORQUE, int(on))
-        if not on and self.guard is not None:
-            self.guard.feed(moving=False)
+    def power(self) -> None:
+        """Switch the torque of all servos on."""
+        self._on = True
+        self._call("write1ByteTxOnly", packets.BROADCAST, packets.TORQUE, 1)
+
+    def stop(self) -> None:
+        """Order the torque of all servos off, then see that it is.
+
+        The order is written before anything else is done, and nothing that fails
+        keeps it from being written again. A robot that does not confirm it is left to
+        the watchdog, which goes on.
+
+        Raises:
+            LinkError: the servo that is asked does not confirm it.
+        """
+        import termios
+
+        order = phantomx(self.joints[0].id)
+        try:
+            confirmed = insist(
+                order,
+                lambda data: send(self.fileno(), data),
+                self._heard,
+                self.clock.now,
+                patience=STOPPING,
+                meanwhile=self._calm,
+            )
+        except (OSError, termios.error, TypeError, ValueError) as error:  # closed
+            raise LinkError(f"The bus is dead ({error}): check it.") from error
+        if not confirmed:
+            raise LinkError(
+                "The servos do not confirm that their torque is off: check the bus; "
+                "the watchdog goes on trying."
+            )
+        self._on = False
+        self._calm()
+
+    def _heard(self, seconds: float) -> bytes:
+        """What has arrived within some time."""
+        if not select.select([self.fileno()], [], [], seconds)[0]:
+            return b""
+        try:
+            data = os.read(self.fileno(), LARGEST)
+        except BlockingIOError:  # the watchdog has read it
+            return b""
+        if not data:
+            raise OSError("the line is dead")
+        return data
+
+    def _calm(self) -> None:
+        """Feed the guard; whatever it says, the robot is being stopped already."""
+        if self.guard is not None:
+            with contextlib.suppress(SafetyStop, Void):
+                self.guard.feed(moving=self._on)
 
     def close(self) -> None:
         """Torque off, port given back."""
         try:
-            self.torque(False)
+            self.stop()
         finally:
             self.release()
 
     def release(self) -> None:
         """Give the port back and send nothing."""
+        self._openers.close()
         self._port.closePort()
 
     def _call(self, name: str, *words: int) -> Any:
         function = getattr(self._protocol, name)
-        return self._guarded(lambda: function(self._port, *words))
+        self._port.came = 0
+        made = self._guarded(lambda: function(self._port, *words))
+        if self._on and self._port.came > BABBLE:
+            raise Void(f"the bus goes on talking ({self._port.came} bytes to {name})")
+        return made
 
     def _guarded(self, function: Any) -> Any:
         """A call of the SDK; the port is free afterwards, whatever happened."""
@@ -260,15 +352,27 @@ def _port(sdk: Any, name: str, latency: float) -> Any:
             self.packet_start_time = self.getCurrentTime()
             self.packet_timeout = self.tx_time_per_byte * packet_length + latency * 1e3
 
+        def getCurrentTime(self) -> float:
+            return time.monotonic() * 1e3
+
+        came = 0  # bytes of an answer and of what else came
+
         def readPort(self, length: int) -> bytes:
+            # the SDK looks at the time in a silent moment only; late answers are good
+            if self.came > BABBLE and self.isPacketTimeout():
+                return b""
             # the SDK asks without a pause: one core busy, nobody else's turn
             select.select([self.ser.fileno()], [], [], 0.0005)
-            return super().readPort(length)
+            data = super().readPort(length)
+            self.came += len(data)
+            return data
 
     port = Port(name)
     try:
         good = port.openPort() and port.setBaudRate(packets.BAUD)
         port.ser.exclusive = True
+        port.ser.write_timeout = 0.05
+        claim(port.ser.fileno())
     except (OSError, ValueError) as error:
         raise BnsError(
             f"Port {name} cannot be opened ({error}): end other programs on it, check "

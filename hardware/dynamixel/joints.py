@@ -1,11 +1,14 @@
 """Which servo is which joint, from a robot's file."""
 
-import tomllib
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
+
+import msgspec
+import tomli_w
 
 from bns.errors import FormatError
 from bns.hardware.dynamixel.packets import UNITS
+from bns.storage import files, reading, seal
 
 FILE = Path(__file__).with_name("phantomx.toml")
 
@@ -38,28 +41,45 @@ class Joint(NamedTuple):
         return self.sign * (units - self.zero) / UNITS
 
 
+Place = Annotated[int, msgspec.Meta(ge=0, le=1023)]
+"""a position of the servo [units]"""
+
+
+class Entry(msgspec.Struct, forbid_unknown_fields=True):
+    """A joint in the file, see `Joint`."""
+
+    id: Annotated[int, msgspec.Meta(ge=0, le=252)]
+    sign: Literal[-1, 1]
+    zero: Place
+    low: Place
+    high: Place
+
+
+class Servos(msgspec.Struct, forbid_unknown_fields=True):
+    """The file."""
+
+    joints: dict[str, Any]
+
+
 def read(path: Path | str = FILE) -> tuple[Joint, ...]:
     """The joints of a robot, in the order of its file.
 
     Raises:
         FormatError: not such a file, a number twice, an end stop out of range.
     """
-    try:
-        table = tomllib.loads(Path(path).read_text(encoding="utf-8"))["joints"]
-        joints = tuple(Joint(name, **entry) for name, entry in table.items())
-    except (OSError, tomllib.TOMLDecodeError, KeyError, TypeError) as error:
-        raise FormatError(
-            f"{path} does not say which servo is which ({error}): compare it with "
-            f"{FILE.name}."
-        ) from error
+    text = seal.opened_text(reading.read_text(path), path, wanted=False)
+    todo = f"Compare it with {FILE.name}."
+    found = reading.typed(reading.toml(text, path), Servos, path, todo=todo)
+    entries = reading.tables(found.joints, Entry, path, todo=todo)
+    joints = tuple(
+        Joint(name, t.id, t.sign, t.zero, t.low, t.high) for name, t in entries.items()
+    )
     numbers = [joint.id for joint in joints]
     for joint in joints:
         if numbers.count(joint.id) > 1:
             raise FormatError(f"{path}: servo {joint.id} is given twice.")
-        if not 0 <= joint.low < joint.high <= 1023 or joint.sign not in (-1, 1):
-            raise FormatError(
-                f"{path}: {joint.name} needs 0 <= low < high <= 1023, sign 1 or -1."
-            )
+        if not joint.low < joint.high:
+            raise FormatError(f"{path}: {joint.name} needs low < high.")
     return joints
 
 
@@ -71,10 +91,8 @@ def write(path: Path | str, joints: tuple[Joint, ...], *, said: str) -> None:
         joints: in the order of the file.
         said: a line on where the numbers come from.
     """
-    rows = [
-        f"{joint.name} = {{ id = {joint.id}, sign = {joint.sign}, zero = {joint.zero}, "
-        f"low = {joint.low}, high = {joint.high} }}"
-        for joint in joints
-    ]
-    text = "\n".join([f"# {said}", "[joints]", *rows, ""])
-    Path(path).write_text(text, encoding="utf-8")
+    table = {joint.name: joint._asdict() for joint in joints}
+    for entry in table.values():
+        del entry["name"]
+    text = f"# {said}\n{tomli_w.dumps({'joints': table})}"
+    files.write_text(path, seal.sealed_text(text))

@@ -1,5 +1,6 @@
 """A hexapod, a camera and a watchdog, connected and checked; nothing moves for that."""
 
+import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,13 +9,14 @@ from bns.hardware.clock import Clock, RealClock
 from bns.hardware.dynamixel import joints, packets
 from bns.hardware.dynamixel.bus import EMPTY, Bus
 from bns.hardware.dynamixel.walker import Walker
+from bns.hardware.errors import LinkError
 from bns.hardware.faults import FaultLog
-from bns.hardware.leash import Leash
 from bns.hardware.limits import Limits, Operator
 from bns.hardware.line import check_port
 from bns.hardware.priority import urgent
 from bns.hardware.rig import EMULATED, look
 from bns.hardware.tracking.eyes import Eyes
+from bns.hardware.watchdog_client import WatchdogClient
 
 
 @dataclass
@@ -28,7 +30,7 @@ class HexapodRig:
         limits: bounds that hold.
         operator: who may stop it.
         faults: what went wrong so far.
-        leash: to the watchdog.
+        watchdog: to the watchdog.
         walker: moves it under the limits.
     """
 
@@ -38,16 +40,17 @@ class HexapodRig:
     limits: Limits
     operator: Operator
     faults: FaultLog
-    leash: Leash
+    watchdog: WatchdogClient
     walker: Walker
 
     def close(self) -> None:
-        """Torque off; give port and camera back."""
+        """Torque off; give port and camera back; a dead line is the watchdog's."""
         try:
-            self.bus.close()
+            with contextlib.suppress(LinkError):
+                self.bus.close()
         finally:
             self.eyes.close()
-            self.leash.release()
+            self.watchdog.release()
 
 
 def connect(
@@ -85,14 +88,20 @@ def connect(
         charged(bus)
         eyes = look(port, camera, calibration, "phantomx")
         try:
-            leash = Leash(bus.fileno(), port, packets.BAUD, "phantomx")
+            watchdog = WatchdogClient(
+                bus.fileno(),
+                port,
+                packets.BAUD,
+                "phantomx",
+                servo=table[0].id,
+            )
         except BnsError:
             eyes.close()
             raise
     except BnsError:
         bus.release()
         raise
-    bus.guard = leash
+    bus.guard = watchdog
     operator = Operator()
     walker = Walker(
         bus,
@@ -103,7 +112,7 @@ def connect(
         faults=faults,
         names=names,
     )
-    return HexapodRig(bus, eyes, clock, limits, operator, faults, leash, walker)
+    return HexapodRig(bus, eyes, clock, limits, operator, faults, watchdog, walker)
 
 
 def known(servos: str, camera: str) -> tuple[joints.Joint, ...]:

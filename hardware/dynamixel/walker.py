@@ -6,19 +6,17 @@ of a few servos in turn.
 """
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from bns.errors import BnsError
 from bns.hardware.clock import Clock
 from bns.hardware.dynamixel.bus import Bus, Overload
 from bns.hardware.dynamixel.rest import Rest
-from bns.hardware.errors import LinkError, SafetyStop
 from bns.hardware.faults import FaultLog
 from bns.hardware.limits import Limits, Operator
-from bns.hardware.lookout import Lookout
+from bns.hardware.safety_monitor import SafetyMonitor
 from bns.hardware.tracking.eyes import Eyes
 from bns.hardware.tracking.tracker import Sighting
 from bns.models.ax12a import SPEED_UNIT
@@ -64,7 +62,7 @@ class Walked:
     unrested: bool = False
 
 
-class Walker(Lookout):
+class Walker(SafetyMonitor):
     """Moves a hexapod under the limits.
 
     Args:
@@ -102,7 +100,7 @@ class Walker(Lookout):
         self._rest = Rest()
 
     def look(self, done: Walked | None = None) -> list[Sighting]:
-        """New sightings, see `Lookout.look`."""
+        """New sightings, see `SafetyMonitor.look`."""
         seen = self._seen(moving=self.up)
         if seen:
             self._rest.pose(seen[-1].pose, self.clock.now())
@@ -137,6 +135,7 @@ class Walker(Lookout):
             done.frames += 1
             done.missed += late > LATE
             done.late = max(done.late, late)
+        self.bus.powered()
         for joint, state in self.bus.look(READS):
             at, angle = self.clock.now(), joint.angle(state.position)
             self._rest.servo(joint.id, state.position, at)
@@ -150,22 +149,27 @@ class Walker(Lookout):
         self.wait_for_sight()
         present = self.bus.angles()
         self.goals = np.array([present[name] for name in self.names])
-        self.bus.pace(SLOW)
-        self.bus.write(present)
-        self.bus.torque(True)
-        self.up = True
-        try:
+        with self._or_halt():
+            self.bus.pace(SLOW)
+            self.bus.write(present)
+            self.bus.power()
+            self.up = True
             self.go(np.zeros(len(self.names)), 8.0, speed=SLOW)
             self.bus.pace(SPEED)
             self._side = self.wait_for_sight().side
-        except BnsError:
-            self.halt()
-            raise
 
     def halt(self) -> None:
         """Torque off, whatever happened."""
         self.up = False
-        self.bus.torque(False)
+        self.bus.stop()
+
+    @contextlib.contextmanager
+    def _or_halt(self) -> Iterator[None]:
+        """Torque off where what is done here fails, in whatever way."""
+        with contextlib.ExitStack() as failed:
+            failed.callback(self.halt)
+            yield
+            failed.pop_all()
 
     def rest(self) -> None:
         """It stands, and goes on standing while nobody sends anything."""
@@ -215,26 +219,25 @@ class Walker(Lookout):
 
         Raises:
             SafetyStop: it was stopped, torque is off.
+            Void: it was not carried out as told, torque is off.
             LinkError: the line died.
         """
         done = Walked(sightings=[self.wait_for_sight()])
-        try:
-            for _ in range(-(-len(self.names) // READS)):  # every servo once
-                self.frame(done)
-                self.look(done)
-            for row, limit in zip(goals, limits, strict=True):
-                done.switched.append(self.clock.now())
-                rests = self.go(row, float(limit), done)
-                if done.left or done.fell:
-                    break
-                done.unrested |= not rests
-            self._end(done)
-        except Overload:
-            done.overloaded = True
-            self._end(done)
-        except (SafetyStop, LinkError):
-            self.halt()
-            raise
+        with self._or_halt():
+            try:
+                for _ in range(-(-len(self.names) // READS)):  # every servo once
+                    self.frame(done)
+                    self.look(done)
+                for row, limit in zip(goals, limits, strict=True):
+                    done.switched.append(self.clock.now())
+                    rests = self.go(row, float(limit), done)
+                    if done.left or done.fell:
+                        break
+                    done.unrested |= not rests
+                self._end(done)
+            except Overload:
+                done.overloaded = True
+                self._end(done)
         return done
 
     def _end(self, done: Walked) -> None:

@@ -40,7 +40,7 @@ class PoseServer:
         body: LiveBody,
         port: Path | str,
         *,
-        rate: float = 15.0,
+        rate: float = 30.0,
         latency: float = 0.03,
     ):
         self.body, self.rate, self.latency = body, rate, latency
@@ -57,7 +57,8 @@ class PoseServer:
         self._clients: list[socket.socket] = []
         self._waiting: deque[tuple[float, bytes]] = deque()
         self._next, self._count = 0.0, 0
-        self.covered = False  # the lens; nothing is told
+        self._last = (0.0, 0, [0.0] * 8)  # time, number, pose and attitude
+        self.mode = ""  # see `mishaps`
 
     def serve(self, now: float) -> None:
         """Tell what is due; called in the robot's loop."""
@@ -68,13 +69,24 @@ class PoseServer:
         if now >= self._next:
             self._next = max(self._next + 1 / self.rate, now)
             self._count += 1
-            pose = self.body.pose(now)
-            message = MESSAGE.pack(now, self._count, *pose, *self.body.attitude(now))
+            self._last = self._picture(now)
+            at, number, pose = self._last
+            message = MESSAGE.pack(at, number, *pose)
             self._waiting.append((now + self.latency, message))
         while self._waiting and self._waiting[0][0] <= now:
             message = self._waiting.popleft()[1]
-            if not self.covered:
+            if self.mode != "covered":
                 self._tell(message)
+
+    def _picture(self, now: float) -> tuple[float, int, list[float]]:
+        """Time, number, pose and attitude of the next picture."""
+        at, number, pose = self._last
+        if self.mode == "frozen":
+            return now, number, pose
+        if self.mode == "stuck":
+            return now, self._count, pose
+        seen = [*self.body.pose(now), *self.body.attitude(now)]
+        return at if self.mode == "stale" else now, self._count, seen
 
     def _tell(self, message: bytes) -> None:
         for client in list(self._clients):
@@ -117,6 +129,7 @@ class EmulatedCamera:
                 "`bns hardware emulate khepera3`, or give the number of a real one."
             ) from error
         self._buffer = b""
+        self._number, self._image = -1, np.zeros((0, 0), np.uint8)
 
     def read(self, timeout: float) -> Frame | None:
         """The next picture, see `Source.read`; older ones not yet seen are skipped."""
@@ -137,7 +150,10 @@ class EmulatedCamera:
             newest = self._buffer[whole - MESSAGE.size : whole]
             self._buffer = self._buffer[whole:]
             at, number, *pose = MESSAGE.unpack(newest)
-            return Frame(at, self.painter.paint(pose[:3], pose[3:]), number)
+            if number != self._number:  # else the camera hangs
+                self._image = self.painter.paint(pose[:3], pose[3:])
+            self._number = number
+            return Frame(at, self._image, number)
 
     def close(self) -> None:
         """Hang up."""
@@ -158,4 +174,4 @@ class BodyPainter:
     def paint_at(self, at: float) -> np.ndarray:
         """The picture taken at a time [s]."""
         self.body.advance(at)
-        return self.painter.paint(self.body.pose(at), self.body.attitude(at))
+        return self.painter.paint([*self.body.pose(at)], [*self.body.attitude(at)])

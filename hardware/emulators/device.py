@@ -104,6 +104,10 @@ class VirtualLine:
             self._count += 1
             heapq.heappush(self._due, (reply.at, self._count, reply.data))
 
+    def order(self, data: bytes) -> None:
+        """Send at once, see `Line.order`."""
+        self.write(data)
+
     def read(self, timeout: float) -> bytes:
         """What has arrived, see `Line.read`."""
         self._check()
@@ -119,6 +123,10 @@ class VirtualLine:
         """Forget what has arrived."""
         self._check()
         self._arrived()
+
+    def intruder(self) -> bool:
+        """Nobody else can open it."""
+        return False
 
     def close(self) -> None:
         """Nothing to give back."""

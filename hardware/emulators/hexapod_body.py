@@ -7,6 +7,7 @@ half-way, as a person holds it while servos are calibrated.
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 
 from bns.errors import BnsError
@@ -73,6 +74,9 @@ class HexapodBody(LiveBody):
         self._rates = self.model.jnt_dofadr[hinges]
         self._whole = self.model.actuator_gainprm[:, 0].copy()
         self._damping = self.model.dof_damping[self._rates].copy()
+        free = self.model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
+        first = int(self.model.jnt_dofadr[free][0])
+        self._moves = slice(first, first + 3)
         self.told = np.zeros(len(names))
         self.force = np.zeros(len(names))
         self.pace = np.full(len(names), NO_LOAD_SPEED)
@@ -133,6 +137,11 @@ class HexapodBody(LiveBody):
         speed = float(self.data.qvel[self._rates[column]]) * joint.sign
         load = float(np.clip(push / most, -1, 1)) * joint.sign * self.on[column]
         return Reading(int(np.clip(units, 0, 1023)), speed, load)
+
+    def rests(self, slow: float = 0.01) -> bool:
+        """Whether the trunk is slower than `slow` [m/s], in any direction."""
+        speed = self.data.qvel[self._moves]
+        return bool(self.stand or np.linalg.norm(speed) < slow)
 
     def _angles(self) -> np.ndarray:
         return self.data.qpos[self._places] + self._laws["offset"]

@@ -33,6 +33,7 @@ class KheperaDevice:
 
     Attributes:
         log: accepted set points: (time, left, right) in speed units.
+        stops: when it was told to stand [s], the newest last.
     """
 
     def __init__(
@@ -51,6 +52,7 @@ class KheperaDevice:
         self.units = firmware(version[0])
         self.rng = rng or np.random.default_rng(0)
         self.log: deque[tuple[float, int, int]] = deque(maxlen=200_000)
+        self.stops: deque[float] = deque(maxlen=10_000)
         self._buffer = b""
         self._stale = ["0"] * 6
         self._deaf_until = -1.0
@@ -60,6 +62,18 @@ class KheperaDevice:
     def advance(self, now: float) -> None:
         """Let the physics go on until `now` [s]."""
         self.body.advance(now)
+
+    def restart(self, now: float, *, power: bool) -> None:
+        """Forget everything but the wheels' set point, which motor chips keep.
+
+        Args:
+            now: time [s].
+            power: without it the wheels stop as well.
+        """
+        self._buffer, self._stale, self._stamp_from = b"", ["0"] * 6, now
+        self._zero = (0.0, 0.0)
+        if not power:
+            self.body.tell(now, 0.0, 0.0)
 
     def receive(self, data: bytes, now: float) -> list[Reply]:
         """Take bytes; what comes while an answer is being made is lost."""
@@ -111,6 +125,8 @@ class KheperaDevice:
     def _do_d(self, given: list[str], at: float) -> str:
         left, right = self._wide(given, 2)
         self.log.append((at, left, right))
+        if not (left or right):
+            self.stops.append(at)
         limit = 48_000  # speed units; TBX clamps there
         speeds = [
             self.units.speed(float(np.clip(u, -limit, limit))) for u in (left, right)

@@ -11,9 +11,12 @@ import tty
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from bns.errors import BnsError
 from bns.hardware.emulators.device import Device
 
+GARBAGE = np.random.default_rng(0).bytes(4096)
 IDLE = 0.004  # s; the loop wakes at least that often
 
 RATES = {getattr(termios, name): int(name[1:]) for name in dir(termios)
@@ -31,11 +34,15 @@ class PtyHost:
 
     Attributes:
         late: longest time by which the loop woke too late [s].
+        flooded: whether garbage comes at the line's full rate.
+        deaf_until: until then nothing is heard or answered [s].
     """
 
     def __init__(self, device: Device, link: Path | str, *, baud: int = 0):
         self.device, self.link, self.baud = device, Path(link), baud
         self.late = 0.0
+        self.flooded, self._flooded_to = False, 0.0
+        self.deaf_until = 0.0
         self._master = self._slave = -1
         self._due: list[tuple[float, int, bytes]] = []
         self._count = 0
@@ -100,6 +107,8 @@ class PtyHost:
             if ready:
                 self._take(woke)
             self._send()
+            if self.flooded:
+                self._flood(woke)
             for each in extra:
                 each(woke)
 
@@ -108,11 +117,22 @@ class PtyHost:
             data = os.read(self._master, 4096)
         except OSError:
             return
+        if now < self.deaf_until:
+            self._due.clear()
+            return
         if self._deaf():
             data = bytes((c * 7 + 0x83) & 0xFF | 0x80 for c in data)  # another rate
         for reply in self.device.receive(data, now):
             self._count += 1
             heapq.heappush(self._due, (reply.at, self._count, reply.data))
+
+    def _flood(self, now: float) -> None:
+        """Garbage for the time since the last round."""
+        share = min(now - self._flooded_to, 0.02)
+        self._flooded_to = now
+        noise = GARBAGE[: round(share * (self.baud or 115200) / 10)]
+        with contextlib.suppress(OSError):
+            os.write(self._master, noise)
 
     def _deaf(self) -> bool:
         if not self.baud:

@@ -1,11 +1,9 @@
 """An emulated robot in a process of its own: port, physics, camera, and a log."""
 
 import json
-import signal
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import FrameType
 
 import numpy as np
 
@@ -13,6 +11,7 @@ from bns.hardware.emulators.camera import PoseServer
 from bns.hardware.emulators.device import Noise
 from bns.hardware.emulators.khepera_body import KheperaBody
 from bns.hardware.emulators.khepera_device import KheperaDevice
+from bns.hardware.emulators.mishaps import Mishaps, Restarts
 from bns.hardware.emulators.pty_host import PtyHost
 from bns.hardware.khepera import protocol
 from bns.hardware.priority import urgent
@@ -29,7 +28,7 @@ def khepera3(
     battery: float = 7.9,
     lost: float = 0.0,
     corrupted: float = 0.0,
-    rate: float = 15.0,
+    rate: float = 30.0,
     seed: int = 0,
     log: str = "",
     baud: int = protocol.BAUD,
@@ -39,7 +38,7 @@ def khepera3(
     """Emulate a Khepera III until SIGINT or SIGTERM.
 
     SIGUSR1 pulls the cable out and puts it in again; SIGUSR2 covers and uncovers the
-    camera.
+    camera; for more see `bns.hardware.emulators.mishaps`.
 
     Args:
         port: path of the link to its port.
@@ -52,7 +51,8 @@ def khepera3(
         corrupted: probability that a packet is corrupted.
         rate: of the camera [1/s].
         seed: of what is random.
-        log: file for a line whenever the set point or the wheels' motion changes.
+        log: file for a line at each stop order, and whenever the set point or the
+            wheels' motion changes.
         baud: rate that it talks at.
         lights: lamps on the board; none = an unlit room.
         stop: asked all the time; None = signals decide.
@@ -79,13 +79,14 @@ def khepera3(
     host = PtyHost(noise, port, baud=baud)
     server = PoseServer(body, port, rate=rate)
     diary = _Diary(device, log)
-    serve(host, server, diary.note, stop)
+    serve(host, server, device, diary.note, stop)
 
 
 def serve(
     host: PtyHost,
     server: PoseServer,
-    note: Callable[[float], None],
+    robot: Restarts,
+    note: Callable[[float, float], None],
     stop: Callable[[], bool] | None = None,
 ) -> None:
     """Run an emulated robot with its camera until it is told to end.
@@ -93,73 +94,73 @@ def serve(
     Args:
         host: with the robot's electronics.
         server: its camera.
-        note: called in every round with the time [s].
+        robot: its electronics.
+        note: called in every round with the time, and the time from which on the robot
+            hears [s].
         stop: asked all the time; None = signals decide, see `khepera3`.
     """
-    state = _State()
+    mishaps = Mishaps(host, server, robot)
     if stop is None:
-        state.listen()
+        mishaps.listen()
 
     def handle(at: float) -> None:
-        if state.pulled and host.plugged:
-            host.unplug()
-        elif not state.pulled:
-            host.plug()
-        server.covered = state.covered
+        mishaps.apply(at)
         server.serve(at)
-        note(at)
+        note(at, mishaps.hears)
 
     try:
-        host.serve(stop or (lambda: state.ended), handle)
+        host.serve(stop or (lambda: mishaps.ended), handle)
     finally:
         host.unplug()
         server.close()
+        mishaps.close()
 
 
-class _State:
-    """What signals have asked for."""
+class Diary:
+    """A JSON line for each thing that is worth one.
 
-    def __init__(self):
-        self.ended = self.pulled = self.covered = False
+    Args:
+        path: file; empty = none is kept.
+        stops: when the robot was told to stop [s].
+    """
 
-    def listen(self) -> None:
-        """Take the signals of this process."""
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self.end)
-        signal.signal(signal.SIGUSR1, self.pull)
-        signal.signal(signal.SIGUSR2, self.cover)
+    def __init__(self, path: str, stops: Sequence[float]) -> None:
+        self.path, self._stops, self._newest = path, stops, -1.0
+        self._hears = 0.0
 
-    def end(self, number: int, frame: FrameType | None) -> None:
-        self.ended = True
+    def note(self, at: float, hears: float) -> None:
+        """Write what is new."""
+        if self._stops and self._stops[-1] != self._newest:
+            self._newest = self._stops[-1]
+            self.write(at=self._newest, stop=True)
+        if hears != self._hears and hears < float("inf"):
+            self.write(at=at, hears=hears)
+        self._hears = hears
 
-    def pull(self, number: int, frame: FrameType | None) -> None:
-        self.pulled = not self.pulled
+    def write(self, **entry: object) -> None:
+        """Add a line."""
+        if self.path:
+            with open(self.path, "a", encoding="utf-8") as file:
+                file.write(json.dumps(entry) + "\n")
 
-    def cover(self, number: int, frame: FrameType | None) -> None:
-        self.covered = not self.covered
 
+class _Diary(Diary):
+    """Stop orders, each new set point, and the wheels coming to a stand."""
 
-class _Diary:
-    """A JSON line for each new set point, and for the wheels coming to a stand."""
-
-    def __init__(self, device: KheperaDevice, path: str):
-        self.device, self.path = device, path
+    def __init__(self, device: KheperaDevice, path: str) -> None:
+        super().__init__(path, device.stops)
+        self.device = device
         self._told: tuple[int, int] | None = None
         self._stood = True
 
-    def note(self, at: float) -> None:
+    def note(self, at: float, hears: float) -> None:
         """Write what is new."""
-        if not self.path:
-            return
+        super().note(at, hears)
         if self.device.log and self.device.log[-1][1:] != self._told:
             when, *told = self.device.log[-1]
             self._told = (told[0], told[1])
-            self._write(at=when, told=told)
+            self.write(at=when, told=told)
         stands = max(map(abs, self.device.body.wheel_speeds())) < 0.005
         if stands != self._stood:
             self._stood = stands
-            self._write(at=at, stands=stands)
-
-    def _write(self, **entry: object) -> None:
-        with open(self.path, "a", encoding="utf-8") as file:
-            file.write(json.dumps(entry) + "\n")
+            self.write(at=at, stands=stands)

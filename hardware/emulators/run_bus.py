@@ -1,6 +1,5 @@
 """An emulated hexapod in a process of its own: its bus, physics, camera, and a log."""
 
-import json
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -12,7 +11,7 @@ from bns.hardware.emulators.camera import PoseServer
 from bns.hardware.emulators.device import Noise
 from bns.hardware.emulators.hexapod_body import HexapodBody
 from bns.hardware.emulators.pty_host import PtyHost
-from bns.hardware.emulators.run import serve
+from bns.hardware.emulators.run import Diary, serve
 from bns.hardware.emulators.servo_bank import ServoBank
 from bns.hardware.priority import urgent
 
@@ -30,7 +29,7 @@ def phantomx(
     upset: float = 0.0,
     seed: int = 0,
     battery: float = 11.1,
-    rate: float = 15.0,
+    rate: float = 30.0,
     log: str = "",
     baud: int = packets.BAUD,
     stop: Callable[[], bool] | None = None,
@@ -50,7 +49,8 @@ def phantomx(
         seed: of what is random.
         battery: voltage of the bus [V].
         rate: of the camera [1/s].
-        log: file for a line whenever torque is switched.
+        log: file for a line at each stop order, and whenever torque is switched or
+            the body begins to move or comes to rest.
         baud: rate that it talks at.
         stop: asked all the time; None = signals decide.
     """
@@ -70,19 +70,25 @@ def phantomx(
         bank, lost=lost, corrupted=corrupted, rng=np.random.default_rng([seed, 1])
     )
     host = PtyHost(noise, port, baud=baud)
-    serve(host, PoseServer(body, port, rate=rate), _Diary(body, log).note, stop)
+    diary = _Diary(bank, body, log)
+    serve(host, PoseServer(body, port, rate=rate), bank, diary.note, stop)
 
 
-class _Diary:
-    """A JSON line whenever the number of servos with torque changes."""
+class _Diary(Diary):
+    """Stop orders, how many servos have torque, and when the body comes to rest."""
 
-    def __init__(self, body: HexapodBody, path: str):
-        self.body, self.path, self._on = body, path, 0
+    def __init__(self, bank: ServoBank, body: HexapodBody, path: str) -> None:
+        super().__init__(path, bank.stops)
+        self.body, self._on, self._stood = body, 0, True
 
-    def note(self, at: float) -> None:
+    def note(self, at: float, hears: float) -> None:
         """Write what is new."""
+        super().note(at, hears)
         on = int(self.body.on.sum())
-        if self.path and on != self._on:
-            with open(self.path, "a", encoding="utf-8") as file:
-                file.write(json.dumps({"at": at, "powered": on}) + "\n")
+        if on != self._on:
+            self.write(at=at, powered=on)
         self._on = on
+        stands = self.body.rests()
+        if stands != self._stood:
+            self.write(at=at, stands=stands)
+        self._stood = stands

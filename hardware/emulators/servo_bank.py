@@ -5,6 +5,7 @@ at most at its speed, with a lag. What bites between packets and table follows t
 e-manual.
 """
 
+from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,6 +15,7 @@ from bns.hardware.emulators.device import Reply
 from bns.hardware.emulators.hexapod_body import HexapodBody
 
 TOP = 6.18 * packets.UNITS  # units/s: 59 rpm without load (e-manual)
+TORQUE_OFF = bytes((packets.TORQUE, 0))
 LAG = 0.05  # s (assumed)
 BYTE = 10 / packets.BAUD  # s
 
@@ -31,7 +33,8 @@ class ServoBank:
         body: what they move; None = each its own horn.
 
     Attributes:
-        goals: times and goals of every sync write, newest last.
+        goals: times of every sync write, newest last.
+        stops: when torque was switched off by broadcast [s], the newest last.
     """
 
     def __init__(
@@ -51,6 +54,8 @@ class ServoBank:
         self.tables = {number: _table(number, voltage) for number in set(numbers)}
         self.place = dict.fromkeys(self.tables, 512.0)
         self.goals: list[float] = []
+        self.stops: deque[float] = deque(maxlen=10_000)
+        self._voltage = voltage
         self._now, self._buffer = at, b""
 
     def advance(self, now: float) -> None:
@@ -73,6 +78,17 @@ class ServoBank:
             gap = (goal - self.place[number]) * (1 - np.exp(-dt / LAG))
             self.place[number] += float(np.clip(gap, -top * dt, top * dt))
 
+    def restart(self, now: float, *, power: bool) -> None:
+        """All tables as after switching on: no torque, as fast as they can."""
+        del power
+        self.advance(now)
+        self._buffer = b""
+        for number in self.tables:
+            self.tables[number] = _table(number, self._voltage)
+            if self.body is not None:
+                self.body.power(number, False)
+                self.body.speed(number, 0.0)
+
     def receive(self, data: bytes, now: float) -> list[Reply]:
         """Take bytes; gives the status packets."""
         self.advance(now)
@@ -84,6 +100,9 @@ class ServoBank:
         if item.code == packets.SYNC_WRITE:
             self._sync(item.parameters, at)
             return []
+        off = item.code == packets.WRITE and item.parameters[:2] == TORQUE_OFF
+        if off and item.servo == packets.BROADCAST:
+            self.stops.append(at)
         replies = []
         for number in self.numbers:
             if item.servo not in (number, packets.BROADCAST):

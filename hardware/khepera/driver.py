@@ -1,15 +1,17 @@
 """The driver of a Khepera III: one command, one answer, and nothing moves unwatched."""
 
+import contextlib
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 from bns.errors import BnsError
 from bns.hardware.clock import Clock
-from bns.hardware.errors import LinkError
+from bns.hardware.errors import LinkError, SafetyStop, Void
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera import protocol
-from bns.hardware.khepera.strangers import stranger
+from bns.hardware.khepera.port_diagnosis import port_error
 from bns.hardware.line import Line
+from bns.hardware.stop_order import insist, khepera3
 from bns.models.khepera3.units import Firmware, firmware
 
 LARGEST = 43_000  # speed units, firmware < 3, regulated (manual 2.2, p. 14)
@@ -17,6 +19,12 @@ NEWEST = 9  # firmware versions beyond it are not known and refused
 TIMEOUT = 0.15  # s for an answer: 7 ms of wire, two Bluetooth latencies; assumed
 RETRIES = 6
 QUIET = 0.02  # s without a byte after which the line counts as silent
+SLICE = 0.03  # s between two looks after the watchdog while an answer is waited for
+SILENT = 0.12  # s without a byte, after which a moving robot is stopped
+UNANSWERED = 0.3  # s without a proper answer, after which a moving robot is stopped
+BABBLE = 256  # bytes that are no answer, after which a moving robot is stopped
+TURNING = 1000  # speed units of a wheel that turned until a moment ago
+STOPPING = 1.0  # s for the robot to acknowledge a stop
 
 
 class Guard(Protocol):
@@ -74,7 +82,8 @@ class Khepera3:
         self.version: tuple[int, int] = (0, 0)
         self.wheels = (1.0, 1.0)
         self.round_trips: list[float] = []
-        self._moving = False
+        self._moving = self._stopping = False
+        self._came = 0  # bytes since the last proper answer
 
     @property
     def patience(self) -> float:
@@ -99,7 +108,7 @@ class Khepera3:
         try:
             answer = self.ask(b"B\n", "b", heard=heard)
         except LinkError as error:
-            raise stranger(b"".join(heard)) from error
+            raise port_error(b"".join(heard)) from error
         self.version = (answer[0], answer[1])
         if not 1 <= self.version[0] <= NEWEST:
             raise BnsError(
@@ -117,7 +126,7 @@ class Khepera3:
         Args:
             command: the line, with its ending.
             letter: of the answer.
-            heard: collects every byte that came, for a look at a stranger.
+            heard: collects every byte that came, for a diagnosis of the port.
 
         Raises:
             LinkError: no proper answer in any of the tries, or the line is dead.
@@ -138,8 +147,7 @@ class Khepera3:
             BnsError: too fast, nobody guards, or the firmware is not known yet.
             LinkError: not acknowledged.
         """
-        if self.units is None:
-            raise BnsError("The firmware is not known yet: call identify() first.")
+        _ = self._known
         if max(abs(left), abs(right)) > self.limit * (1 + 1e-9):
             raise BnsError(
                 f"Speed {max(abs(left), abs(right)):.3g} m/s is above the limit of "
@@ -160,10 +168,26 @@ class Khepera3:
             self.ask(command, "d")
         return Drive(begin + (took + protocol.longer(command)) / 2, pair, took)
 
+    @property
+    def _known(self) -> Firmware:
+        """Units of the firmware.
+
+        Raises:
+            BnsError: it is not known yet.
+        """
+        if self.units is None:
+            raise BnsError("The firmware is not known yet: call identify() first.")
+        return self.units
+
+    def speed(self, units: float) -> float:
+        """Over the floor, with the nominal wheel [m/s], of a speed in device units."""
+        return float(self._known.speed(float(units)))
+
     def _device(self, left: float, right: float) -> tuple[int, int]:
         """Speeds over the floor [m/s] in device units."""
         a, b = self.wheels
-        return round(self.units.units(left / a)), round(self.units.units(right / b))
+        units = self._known.units
+        return round(units(left / a)), round(units(right / b))
 
     def lead(self, *pair: float) -> float:
         """How long before its moment a set point has to be sent [s].
@@ -176,26 +200,71 @@ class Khepera3:
         return (sorted(recent)[len(recent) // 2] + protocol.longer(command)) / 2
 
     def stop(self) -> None:
-        """Stop both wheels and see that they stand.
+        """Order both wheels to stop, then see that they stand.
+
+        The order is written before anything else is done, and nothing that fails
+        keeps it from being written again. A robot that does not confirm it is left to
+        the watchdog, which goes on.
 
         Raises:
             LinkError: the robot does not confirm it.
         """
-        for _ in range(4):
-            self.ask(protocol.STOP, "d")
-            self.ask(protocol.STOP, "d")
-            if self._standing():
-                break
+        self._stopping = True
+        try:
+            for _ in range(3):
+                if self._ordered() and self._standing():
+                    break
+            else:
+                raise LinkError(
+                    "The robot does not confirm that it stands: check the link; the "
+                    "watchdog goes on trying."
+                )
+        finally:
+            self._stopping = False
         self._moving = False
+        self._calm()
+
+    def paused(self) -> bool:
+        """Order a stop and see whether the wheels have turned until then."""
+        self.ask(protocol.STOP, "d")
+        return max(map(abs, self.speeds())) > TURNING
+
+    def _ordered(self) -> bool:
+        """Write the order until the robot acknowledges it; whether it does."""
+        return insist(
+            khepera3()._replace(acknowledged=2),
+            self.line.order,
+            self.line.read,
+            self.clock.now,
+            patience=STOPPING,
+            meanwhile=self._calm,
+        )
+
+    def _calm(self) -> None:
+        """Feed the guard; whatever it says, the robot is being stopped already."""
         if self.guard is not None:
-            self.guard.feed(moving=False)
+            with contextlib.suppress(SafetyStop, Void):
+                self.guard.feed(moving=self._moving)
+
+    def alive(self) -> None:
+        """Feed the guard of a robot that moves; see that the line is its own.
+
+        Raises:
+            SafetyStop, Void: from the guard, or another program has opened the port.
+        """
+        if self._stopping:
+            self._calm()
+        elif self.guard is not None and self._moving:
+            self.guard.feed(moving=True)
+            if self.line.intruder():
+                raise Void("another program has opened the port")
 
     def _standing(self) -> bool:
         """Whether the wheels slow down to a stand within a moment."""
         for _ in range(12):
             if max(map(abs, self.speeds())) < 1500:  # below the smallest regulated
                 return True
-            self.clock.sleep(0.03)
+            self.clock.sleep(SLICE)
         return False
 
     def speeds(self) -> tuple[int, int]:
@@ -238,20 +307,40 @@ class Khepera3:
         return self._repeat(lambda: self._line(command, understood, heard), what)
 
     def _repeat(self, once: Callable, what: str):
+        since, self._came = self.clock.now(), 0
         for _ in range(RETRIES + 1):
-            if self.guard is not None and self._moving:
-                self.guard.feed(moving=True)
+            self.alive()
             begin = self.clock.now()
             answer = once()
             if answer is not None:
                 self.round_trips.append(self.clock.now() - begin)
                 del self.round_trips[:-1000]
                 return answer
+            if self._moving and not self._stopping:
+                self._doubt(since, what)
             self.resynchronise()
         raise LinkError(
             f"No proper answer to {what!r} in {RETRIES + 1} tries: check the link; a "
             "robot that was moving may still be."
         )
+
+    def _doubt(self, since: float, what: str) -> None:
+        """Give up a robot that moves and does not answer.
+
+        Args:
+            since: when it was first asked [s].
+            what: it was asked.
+
+        Raises:
+            Void: it has not answered for too long; the caller stops it.
+        """
+        waited = self.clock.now() - since
+        if not self._came and waited > SILENT:
+            raise Void(f"the robot said nothing to {what!r} for {waited:.2f} s")
+        if self._came > BABBLE:
+            raise Void(f"the line goes on talking ({self._came} bytes to {what!r})")
+        if waited > UNANSWERED:
+            raise Void(f"no proper answer to {what!r} in {waited:.2f} s")
 
     def _line(self, command: bytes, understood: Callable, heard: list[bytes] | None):
         """One try: lines are read until one is the answer or time is up."""
@@ -259,7 +348,11 @@ class Khepera3:
         self.line.write(command)
         until, buffer = self.clock.now() + self.patience, b""
         while (left := until - self.clock.now()) > 0:
-            data = self.line.read(left)
+            data = self.line.read(min(left, SLICE))
+            self.alive()
+            self._came += len(data)
+            if self._came > BABBLE and self._moving:
+                break
             if heard is not None:
                 heard.append(data)
             buffer = (buffer + data)[-4096:]
@@ -281,7 +374,8 @@ class Khepera3:
         until, data = self.clock.now() + self.timeout, b""
         size = protocol.FRAME.size
         while len(data) < size and (left := until - self.clock.now()) > 0:
-            data += self.line.read(left)
+            data += self.line.read(min(left, SLICE))
+            self.alive()
         reading = protocol.frame(data[:size])
         if reading is None:
             self.faults.note("broken frame", b"X", data[:size])
@@ -292,5 +386,7 @@ class Khepera3:
         self.line.write(b"\n")  # empty lines are ignored
         until = self.clock.now() + 0.2
         while self.clock.now() < until and self.line.read(QUIET):
-            pass
+            self.alive()
+            if self._moving and not self._stopping and self._came > BABBLE:
+                break
         self.line.discard()

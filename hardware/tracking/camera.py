@@ -1,18 +1,43 @@
 """A calibrated camera: from the world to pixels and back to a plane."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Literal
 
+import msgspec
 import numpy as np
 
 from bns.errors import FormatError
 from bns.hardware.tracking.opencv import cv2
 from bns.models.arena import CAMERA_HEIGHT, SIZE
+from bns.storage import files, reading, seal
 
 MARGIN = 1.06  # of the board's height that the overhead camera sees
 DOWN = np.diag([1.0, -1.0, -1.0])  # a camera that looks straight down, x to the right
+
+
+Pixels = Annotated[int, msgspec.Meta(ge=16, le=32768)]
+Focal = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
+Metres = Annotated[float, msgspec.Meta(ge=-1000, le=1000)]
+Share = Annotated[float, msgspec.Meta(ge=-1.000001, le=1.000001)]
+Lens = Annotated[float, msgspec.Meta(ge=-1e4, le=1e4)]
+
+
+class Calibration(msgspec.Struct, forbid_unknown_fields=True):
+    """The file of a camera, see `Camera`."""
+
+    format: Literal["bns-camera"]
+    size: tuple[Pixels, Pixels]
+    matrix: tuple[tuple[Focal, Focal, Focal], ...]
+    distortion: tuple[Lens, Lens, Lens, Lens, Lens]
+    rotation: tuple[tuple[Share, Share, Share], ...]
+    position: tuple[Metres, Metres, Metres]
+    latency: Annotated[float, msgspec.Meta(ge=0, le=10)]
+
+    def __post_init__(self) -> None:
+        if len(self.matrix) != 3 or len(self.rotation) != 3:
+            raise ValueError("matrix and rotation need three rows")
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +116,7 @@ class Camera:
             "position": np.asarray(self.position).tolist(),
             "latency": self.latency,
         }
-        Path(path).write_text(json.dumps(held, indent=1) + "\n", encoding="utf-8")
+        files.write_json(path, held)
 
     @classmethod
     def read(cls, path: Path | str) -> "Camera":
@@ -100,24 +125,27 @@ class Camera:
         Raises:
             FormatError: there is none, or it is something else.
         """
-        try:
-            held = json.loads(Path(path).read_text(encoding="utf-8"))
-            if held["format"] != "bns-camera":
-                raise KeyError("format")
-            made = cls(
-                (int(held["size"][0]), int(held["size"][1])),
-                np.array(held["matrix"], float).reshape(3, 3),
-                np.array(held["distortion"], float).reshape(5),
-                np.array(held["rotation"], float).reshape(3, 3),
-                np.array(held["position"], float).reshape(3),
-                float(held["latency"]),
-            )
-        except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
+        todo = "Make one with `bns hardware calibrate`."
+        content = seal.opened(reading.read_json(path), path)
+        held = reading.typed(content, Calibration, path, todo=todo)
+        matrix, rotation = np.array(held.matrix), np.array(held.rotation)
+        bottom = np.array_equal(matrix[2], (0, 0, 1))
+        if not bottom or min(matrix[0, 0], matrix[1, 1]) < 1 or matrix[1, 0]:
             raise FormatError(
-                f"{path} is no camera calibration ({error}): make one with "
-                "`bns hardware calibrate`."
-            ) from error
-        return made
+                f"{path}: matrix needs focal lengths of 1 px at least and the last row "
+                f"0, 0, 1. {todo}"
+            )
+        turned = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6)
+        if not turned or np.linalg.det(rotation) < 0:
+            raise FormatError(f"{path}: rotation is none. {todo}")
+        return cls(
+            held.size,
+            matrix,
+            np.array(held.distortion),
+            rotation,
+            np.array(held.position),
+            held.latency,
+        )
 
 
 def plane_points(pose: Sequence[float], local: np.ndarray, height: float) -> np.ndarray:

@@ -36,11 +36,14 @@ class Sighting(NamedTuple):
         pose: (x, y, yaw) of the robot in the world frame [m, m, rad]; yaw continuous.
         side: of the tag as seen on its plane [m]: larger than printed where the tag
             is higher than it was said to be.
+        repeated: the picture is the one before it to the last bit, which no camera
+            gives twice: it hangs, and the robot may be anywhere.
     """
 
     time: float
     pose: np.ndarray
     side: float
+    repeated: bool = False
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,7 @@ class Tracker:
         self.loss = Loss()
         self._finder = Finder()
         self._last: Sighting | None = None
+        self._image: np.ndarray | None = None
         local = marker.corners()
         self._ahead = local[[0, 1]].mean(0) - local[[2, 3]].mean(0)
         self._middle = local.mean(0)
@@ -81,11 +85,14 @@ class Tracker:
         if corners is None:
             corners = self._finder.anywhere(frame.image).get(self.marker.number)
         sighting = self._posed(frame.time, corners) if corners is not None else None
+        before, self._image = self._image, frame.image
         loss = self.loss
         if sighting is None:
             self.loss = replace(loss, missed=loss.missed + 1)
             return None
         self.loss = replace(loss, seen=loss.seen + 1)
+        if before is not None and np.array_equal(before, frame.image):
+            sighting = sighting._replace(repeated=True)
         self._last = sighting
         return sighting
 

@@ -1,6 +1,6 @@
 """The arena: a white board under an overhead camera, with objectives to show."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 SIZE = (2.7, 1.8)
@@ -22,7 +22,7 @@ _REACH = (0.99, 0.83, 0.35, 1.0)
 _INK = (0.13, 0.15, 0.20, 1.0)
 
 # Letters as strokes in a box from (-1, -1) to (1, 1).
-_STROKES = {
+_STROKES: dict[str, Sequence[Sequence[float]]] = {
     "A": [(-0.8, -1, 0, 1), (0, 1, 0.8, -1), (-0.45, -0.25, 0.45, -0.25)],
     "B": [
         (-0.7, -1, -0.7, 1),

@@ -6,7 +6,7 @@ hips), angles as goals are (`servos`).
 
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,7 +41,7 @@ class Shape(NamedTuple):
 def shape() -> Shape:
     """The model's lengths and zeros (`numbers.toml`)."""
     table = numbers.read(Path(__file__).parent)
-    value = {name: item.value for name, item in table.items()}
+    value: dict[str, Any] = {name: item.value for name, item in table.items()}
     side = np.array([1 if leg.startswith("left") else -1 for leg in LEGS])
     ends = {"front": 1, "rear": -1, "middle": 0}
     ahead = np.array([ends[leg.rpartition("_")[2]] for leg in LEGS])

@@ -1,6 +1,4 @@
-"""What tests of runs share: the fake learner in the place of the real one."""
-
-import sys
+"""What tests of runs share."""
 
 import pytest
 
@@ -12,9 +10,8 @@ def one_commit(monkeypatch):
 
 
 @pytest.fixture
-def fakes(monkeypatch):
-    """The module `fakes`, its learner in the place of the real one."""
+def fakes():
+    """The module `fakes`, whose learner is known by its name."""
     from tests.bns import fakes
 
-    fakes.learner_modules(lambda name, m: monkeypatch.setitem(sys.modules, name, m))
     return fakes

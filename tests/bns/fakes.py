@@ -12,18 +12,20 @@ import os
 import signal
 import sys
 from dataclasses import replace
-from types import ModuleType, SimpleNamespace
 
 import numpy as np
 
 from bns import seeding
 from bns.experiment import versions
 from bns.experiment.config import ControllerConfig, RunConfig, WorldConfig
+from bns.learners import registry
+from bns.learners.base import Learner, Proposal
 from bns.storage import files
 from bns.worlds.trial import Commands, Trial
 
 CONFIG = RunConfig(
     preset="fake",
+    learner="fake",
     controller=ControllerConfig(max_commands=4, initial_min=1, initial_max=4),
     world=WorldConfig(damage=("wheel_gain:wheel=left,factor=0.8@2",)),
     trials=4,
@@ -32,13 +34,17 @@ CONFIG = RunConfig(
 )
 
 
-class FakeLearner:
+class FakeLearner(Learner):
     """Its memory is one number per run, moved by what it sees and by chance."""
 
-    def __init__(self, configs, *, replicates, onsets):
-        self.config, self.replicates = configs[0], list(replicates)
+    def __init__(self, configs, *, replicates, onsets, models=()):
+        super().__init__(configs, replicates=replicates, onsets=onsets, models=models)
         self.onsets = list(onsets)
         self.memory = np.zeros(len(configs))
+
+    @classmethod
+    def compiles(cls, config):
+        return config.compiled == "yes"
 
     def propose(self, trial):
         tried = []
@@ -47,7 +53,7 @@ class FakeLearner:
             count = 1 + run % self.config.controller.max_commands
             values = rng.uniform(-0.1, 0.1, (count, 2)) + 1e-3 * self.memory[run]
             tried.append(Commands(values, np.full(count, 0.5)))
-        return SimpleNamespace(tried=tried, best=None)
+        return Proposal(tried)
 
     def observe(self, trial, tried, best):
         longest = self.config.controller.max_commands
@@ -93,13 +99,7 @@ class FakeWorld:
         )
 
 
-def learner_modules(put):
-    """Let the run loop find the fake learner; `put` sets an entry of `sys.modules`."""
-    learner, inner = ModuleType("bns.learner"), ModuleType("bns.inner")
-    learner.Learner = FakeLearner
-    inner.should_compile = lambda config: config.compiled == "yes"
-    put("bns.learner", learner)
-    put("bns.inner", inner)
+registry.register("fake", FakeLearner)
 
 
 def dies_at(write, moment):
@@ -141,7 +141,6 @@ def longer(trials):
 
 
 if __name__ == "__main__":
-    learner_modules(sys.modules.__setitem__)
     versions.commit = lambda: "test"
     dies_at(int(sys.argv[2]), sys.argv[3])
     train(sys.argv[1], resume=True)

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from bns.adaptation import Adaptations
 from bns.adaptations import registry
 from bns.errors import BnsError, UnknownNameError
 from bns.experiment.config import AdaptationConfig, RunConfig
+from bns.learners.bns.adaptation import Adaptations
 
 
 @pytest.mark.parametrize("name", registry.names())

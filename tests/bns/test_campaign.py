@@ -17,7 +17,7 @@ from bns.campaign.plan import plan
 from bns.campaign.store import CampaignStore
 from bns.campaign.table import table
 from bns.errors import BnsError, FormatError
-from bns.storage import files
+from bns.storage import files, reading
 from tests.bns.campaigns import campaign
 from tests.bns.contents import contents
 
@@ -34,7 +34,9 @@ def held(directory):
 def clean(tmp_path_factory):
     """The store of a campaign that nothing disturbed."""
     out = tmp_path_factory.mktemp("campaign") / "clean"
-    session = drive.run(campaign(), out, InlineEngine())
+    with pytest.MonkeyPatch.context() as patch:  # as `conftest` does in each test
+        patch.setattr("bns.experiment.versions.commit", lambda: "test")
+        session = drive.run(campaign(), out, InlineEngine())
     assert (session.done, session.failed, session.missing) == (2, {}, 0)
     return out
 
@@ -244,7 +246,7 @@ def test_what_does_not_belong_together_is_not_put_together(clean, tmp_path):
         merge(other, [clean])
     with pytest.raises(BnsError, match="given twice"):
         merge(clean, [clean])
-    head = files.read_json(other / "campaign.json")
+    head = reading.read_json(other / "campaign.json")
     head["seed"], head["versions"]["mujoco"] = 0, "1.0"
     files.write_json(other / "campaign.json", head)
     with pytest.raises(BnsError, match="another mujoco"):

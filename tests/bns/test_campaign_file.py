@@ -197,3 +197,20 @@ def test_a_job_is_plain_values():
         assert Job.from_mapping(job.to_mapping()) == job
         for config in job.configs.values():
             assert from_mapping(to_mapping(config)) == config
+
+
+def test_learners_are_compared_in_one_campaign_each_with_its_own_settings(tmp_path):
+    path = tmp_path / "learners.toml"
+    path.write_text(
+        'name = "learners"\npreset = "khepera-simple"\nreplicates = 2\n'
+        "[settings]\ntrials = 4\nevolution.generations = 3\n"
+        '[[list]]\nlabel = "a"\nlearner = "bns"\n'
+        '[[list]]\nlabel = "b"\nlearner = "cma"\nsettings.population = 4\n'
+    )
+    one, other = (member.config for member in file.read(path).members)
+    assert (one.learner, one.evolution.generations) == ("bns", 3)
+    assert (other.learner, other.settings.population) == ("cma", 4)
+    assert identity.identity(one) != identity.identity(other)
+    part_of_it = identity.settings(other)
+    assert "settings.population" in part_of_it
+    assert not any(name.startswith("evolution.") for name in part_of_it)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 
-from bns.adaptation import Adaptations
 from bns.draws import Draws
 from bns.errors import BnsError
 from bns.experiment.batch import Batch
@@ -18,8 +17,10 @@ from bns.experiment.config import (
     TaskConfig,
     WorldConfig,
 )
-from bns.learner import Learner
-from bns.patterns import PatternBuffer, of_trial
+from bns.learners.bns.adaptation import Adaptations
+from bns.learners.bns.learner import Bns
+from bns.learners.bns.memory import PatternBuffer
+from bns.learners.bns.navigation import of_trial
 from bns.units import metres_per_second
 from bns.worlds import registry
 from bns.worlds.trial import Commands, Outcome, Trial
@@ -106,7 +107,7 @@ def test_disagreement_needs_an_ensemble():
 def test_runs_that_cannot_share_a_batch_are_refused():
     other = replace(SMALL, evolution=EvolutionConfig(population=30))
     with pytest.raises(BnsError, match="adaptation"):
-        Learner([SMALL, other], replicates=[0, 0], onsets=[-1, -1])
+        Bns([SMALL, other], replicates=[0, 0], onsets=[-1, -1])
 
 
 def test_window_slides_and_runs_have_their_own():
@@ -167,11 +168,26 @@ def test_simulator_reset_keeps_the_data_and_retrains():
     config = replace(SMALL, adaptation=AdaptationConfig(simulator_reset_every=2))
     made = batch(config)
     play(made, 2)
-    counts = made.learner.buffer.counts
+    counts = made.learner.memories[0].buffer.counts
     before = made.learner.theta.clone()
     made.learner.propose(2)
-    assert made.learner.buffer.counts.tolist() == counts.tolist()
+    assert made.learner.memories[0].buffer.counts.tolist() == counts.tolist()
     assert not torch.equal(made.learner.theta, before)
+
+
+@pytest.mark.parametrize("untrained", [True, False])
+def test_a_reset_simulator_is_trained_at_once_or_after_the_next_trial(untrained):
+    made = schedule(simulator_reset=True, simulator_reset_untrained=untrained)
+    resets = made.resets(11)
+    assert resets.simulator.tolist() == [True, False]
+    assert resets.trained.tolist() == [not untrained, False]
+    told = AdaptationConfig(simulator_reset=True, simulator_reset_untrained=untrained)
+    damaged = replace(SMALL.world, damage=("wheel_gain:wheel=left,factor=0.8@1",))
+    playing = batch(replace(SMALL, adaptation=told, world=damaged))
+    play(playing, 2)
+    fitted = playing.learner.loss.clone()
+    playing.learner.propose(2)
+    assert torch.equal(playing.learner.loss, fitted) == untrained
 
 
 def test_draws_restore():

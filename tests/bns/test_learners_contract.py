@@ -1,4 +1,4 @@
-"""What every learner of bns/learners keeps to; a new one brings no new test."""
+"""What every learner keeps to on every task; a new one brings no new test."""
 
 from dataclasses import replace
 
@@ -6,65 +6,233 @@ import numpy as np
 import pytest
 
 from bns import presets
-from bns.errors import UnknownNameError
-from bns.experiment.config import AdaptationConfig
+from bns.errors import BnsError, UnknownNameError
+from bns.experiment.batch import Batch
+from bns.experiment.config import AdaptationConfig, LearnerSettings
+from bns.experiment.loading import from_mapping, to_mapping, with_learner
 from bns.experiment.run import train
 from bns.learners import registry
+from bns.learners.base import Curves
 from bns.storage import store
+from bns.tasks import registry as tasks
+from bns.worlds import registry as worlds
+from bns.worlds.counted import CountedWorld
+from bns.worlds.world import World
+from tests.bns.light_fakes import FakeLightWorld
+from tests.bns.walkers import Slider
 
-PRESETS = {presets.load(name).learner: name for name in presets.names()}
+LEARNERS = [name for name in registry.names() if name != "fake"]
+PRESETS = {
+    "navigation": "khepera-simple",
+    "light": "khepera-light",
+    "walk": "hexapod-walk",
+}
+GIVEN = {"columns": ("fitness", "fitness_best", "solved", "reached", "commands")}
 
 
-def small(name: str):
-    """A preset of a learner, cut down to a second."""
-    config = presets.load(PRESETS[name])
-    return replace(
-        config,
-        evolution=replace(config.evolution, population=12, generations=2, tournament=3),
-        snn=replace(config.snn, epochs=4),
-        trials=2,
-        replicates=2,
-        record_replicates=1,
-        compiled="no",
-        threads=1,
+def small(learner: str, task: str):
+    """A preset of a task for a learner, cut down to a second."""
+    cut = {"light.cycles": 12, "light.circle_cycles": 5, "light.starts": 2}
+    config = presets.load(PRESETS[task]).with_(cut)
+    config = with_learner(config, learner) if learner != "bns" else config
+    if learner == "bns":
+        sizes = {"population": 12, "generations": 2, "tournament": 3}
+        evolution = {f"evolution.{name}": size for name, size in sizes.items()}
+        config = config.with_({**evolution, "snn.epochs": 4, "compiled": "no"})
+    return replace(config, trials=4, replicates=2, record_replicates=1, threads=1)
+
+
+def world(task: str, **settings) -> World:
+    if task == "navigation":
+        return worlds.make("static-snn", robot="khepera3", **settings)
+    return FakeLightWorld() if task == "light" else Slider()
+
+
+def made(config, task: str, **settings):
+    """A learner of the configuration's runs, with a model where it wants one."""
+    runs = config.replicates
+    models = [CountedWorld(world(task), 60) for _ in range(runs)]
+    return registry.get(config.learner)(
+        [config] * runs,
+        replicates=range(runs),
+        onsets=[-1] * runs,
+        models=models if config.learner == "cma" else (),
+        **settings,
     )
 
 
-@pytest.mark.parametrize("name", registry.names())
-class TestEveryLearner:
-    def test_says_what_it_is(self, name):
-        assert len(registry.describe(name)) > 20
+def advance(learner, task: str, trials: range) -> list[dict[str, np.ndarray]]:
+    """Rows of some trials, all that a batch would ask for asked for."""
+    rows, place = [], world(task)
+    for trial in trials:
+        proposal = learner.propose(trial)
+        run = learner.task.execute
+        both = [
+            run(place, part, trial=trial, seeds=[0, 1]) if part else None
+            for part in (proposal.tried, proposal.best)
+        ]
+        rows.append(learner.observe(trial, *both))
+    return rows
 
-    def test_has_a_preset(self, name):
-        assert name in PRESETS
 
-    def test_same_seed_same_figures_and_all_of_it_is_stored(self, name, tmp_path):
-        first = train(small(name), tmp_path / "run")
-        again = train(small(name))
-        assert first.columns
-        for column in first.columns:
-            np.testing.assert_array_equal(first[column], again[column])
-        read = store.load(tmp_path / "run")
-        assert set(read.extra) == set(first.extra)
-        for array in read.extra:
-            np.testing.assert_array_equal(read.extra[array], first.extra[array])
-
-    def test_what_a_run_resets_moves_no_draw_of_the_others(self, name):
-        config = replace(small(name), evolve_from=0)
-        resets = replace(config, adaptation=AdaptationConfig(restart=True))
-        told = {"replicates": [0, 1], "onsets": [0, 0]}
-        sound, mine = (
-            registry.get(name).make([config, side], **told) for side in (config, resets)
+@pytest.mark.parametrize("task", PRESETS)
+@pytest.mark.parametrize("name", LEARNERS)
+class TestEveryLearnerOnEveryTask:
+    def test_the_same_seed_gives_the_same_and_another_one_another(self, name, task):
+        first, again = (
+            advance(made(small(name, task), task), task, range(2)) for _ in range(2)
         )
-        for trial in range(3):
-            sound.propose(trial)
-            mine.propose(trial)
-        one, other = (made.population.genes.numpy() for made in (sound, mine))
-        half = len(one) // 2
-        np.testing.assert_array_equal(one[:half], other[:half])
-        assert not np.array_equal(one[half:], other[half:])
+        other = replace(small(name, task), seed=1)
+        differing = advance(made(other, task), task, range(2))
+        for column, value in first[-1].items():
+            np.testing.assert_array_equal(value, again[-1][column])
+        assert any(
+            not np.array_equal(value, differing[-1][column])
+            for column, value in first[-1].items()
+        )
+
+    def test_restored_it_goes_on_to_the_same_bytes(self, name, task):
+        whole, cut = made(small(name, task), task), made(small(name, task), task)
+        wanted = advance(whole, task, range(4))[2:]
+        advance(cut, task, range(2))
+        kept = {key: value.copy() for key, value in cut.state().items()}
+        assert all(
+            isinstance(array, np.ndarray) and not array.dtype.hasobject
+            for array in kept.values()
+        )
+        again = made(small(name, task), task)
+        again.restore(kept)
+        for one, other in zip(wanted, advance(again, task, range(2, 4)), strict=True):
+            for column, value in one.items():
+                np.testing.assert_array_equal(value, other[column])
+        for key, array in whole.state().items():
+            assert array.tobytes() == again.state()[key].tobytes(), key
+
+    def test_it_is_told_nothing_of_damage_and_truth(self, name, task, monkeypatch):
+        kind, heard = registry.get(name), []
+        observe = kind.observe
+
+        def listen(self, trial, tried, best):
+            heard.extend([*tried, *(best or ())])
+            return observe(self, trial, tried, best)
+
+        monkeypatch.setattr(kind, "observe", listen)
+        config = small(name, task)
+        batch = Batch([config], [Telling(world(task))])
+        batch.advance(0)
+        batch.advance(1)
+        assert len(heard) >= 4
+        assert not any(trial.conditions or trial.truth for trial in heard)
+
+    def test_columns_and_figures_are_as_declared_and_stored(self, name, task, tmp_path):
+        config, kind = small(name, task), registry.get(name)
+        record = train(config, tmp_path / "run", world=world(task))
+        declared = {*GIVEN["columns"], *kind.columns, *tasks.of(config).columns}
+        assert declared <= set(record.columns)
+        for column in ("fitness", "fitness_best", "solved"):
+            assert np.isfinite(record[column]).all()
+        shown = [f for f in kind.figures if isinstance(f, Curves)]
+        assert {p.column for f in shown for p in f.panels} <= set(record.columns)
+        read = store.load(tmp_path / "run")
+        assert read.config == config
+        for column, values in record.columns.items():
+            np.testing.assert_array_equal(values, read[column])
+
+    def test_a_report_and_a_recording_can_be_made(self, name, task, tmp_path):
+        from bns.viz import recording, report
+
+        record = train(small(name, task), world=world(task))
+        page = report.write(record, tmp_path / "r.html").read_text()
+        assert page.count("<figcaption>") >= 4
+        assert recording.write(record, {}, tmp_path / "r.rrd").stat().st_size > 1000
+
+    def test_its_configuration_is_read_back(self, name, task):
+        config = small(name, task)
+        assert from_mapping(to_mapping(config)) == replace(config, preset=config.preset)
 
 
-def test_unknown_learner_is_refused():
-    with pytest.raises(UnknownNameError, match="learner"):
-        train(replace(small("navigation"), learner="navigaton"))
+class Telling:
+    """A world whose trials say more than a learner may know."""
+
+    def __init__(self, inner):
+        self.inner, self.name, self.robot = inner, inner.name, inner.robot
+
+    def run(self, commands, **settings):
+        return self._told(self.inner.run(commands, **settings))
+
+    def drive(self, policy, **settings):
+        return self._told(self.inner.drive(policy, **settings))
+
+    def _told(self, trials):
+        secret = {"conditions": {"damage": ["x"]}, "truth": {"qpos": np.zeros(3)}}
+        return [trial.replace(**secret) for trial in trials]
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_says_what_it_is_and_what_its_settings_may_be(name):
+    assert len(registry.describe(name)) > 20
+    kind = registry.get(name)
+    assert issubclass(kind.Settings, LearnerSettings)
+    usual = kind.Settings()
+    for setting, (low, high, _) in kind.Settings.bounds.items():
+        assert low <= getattr(usual, setting) <= high
+
+
+@pytest.mark.parametrize("task", PRESETS)
+def test_what_a_run_of_bns_resets_moves_no_draw_of_the_others(task):
+    config = replace(small("bns", task), evolve_from=0)
+    resets = replace(config, adaptation=AdaptationConfig(restart=True))
+    told = {"replicates": [0, 1], "onsets": [0, 0]}
+    sound, mine = (
+        registry.get("bns")([config, side], **told) for side in (config, resets)
+    )
+    for trial in range(3):
+        sound.propose(trial)
+        mine.propose(trial)
+    one, other = (made.population.genes.numpy() for made in (sound, mine))
+    half = len(one) // 2
+    np.testing.assert_array_equal(one[:half], other[:half])
+    assert not np.array_equal(one[half:], other[half:])
+
+
+class TestRefused:
+    def test_an_unknown_learner(self):
+        with pytest.raises(UnknownNameError, match="learner"):
+            train(replace(small("bns", "navigation"), learner="bsn"))
+
+    def test_a_task_in_the_place_of_a_learner(self):
+        with pytest.raises(BnsError, match=r"give --task\.name"):
+            registry.get("simple")
+
+    def test_settings_of_another_learner(self):
+        config = small("random", "navigation")
+        with pytest.raises(BnsError, match="belongs to the learner 'bns'"):
+            config.with_({"snn.epochs": 3})
+        with pytest.raises(UnknownNameError, match=r"settings\.sigma"):
+            config.with_({"settings.sigma": 0.1})
+
+    def test_a_number_out_of_its_bounds(self):
+        with pytest.raises(BnsError, match=r"settings\.sigma"):
+            small("cma", "navigation").with_({"settings.sigma": -1.0})
+
+
+@pytest.mark.parametrize(("task", "name"), [("walk", "walk"), ("light", "light")])
+def test_configurations_of_version_0_1_are_read(task, name):
+    old = to_mapping(presets.load(PRESETS[task]))
+    old["learner"], old["task"]["name"] = name, "simple"
+    assert from_mapping(old) == presets.load(PRESETS[task])
+    assert from_mapping({"learner": "navigation"}).learner == "bns"
+
+
+def test_cma_does_better_than_random_search_where_it_may_think():
+    """Floor and ceiling: with a model of the robot, and without anything."""
+    config = small("cma", "walk").with_({"settings.population": 10})
+    model = CountedWorld(Slider(), 600)
+    told = {"replicates": [0], "onsets": [-1]}
+    one = registry.get("cma")([config], **told, models=[model])
+    tried = one.propose(0).tried
+    ceiling = one.task.fitness(Slider().run(tried))
+    assert model.spent == 600
+    floor = registry.get("random")([small("random", "walk")], **told)
+    seen = [floor.task.fitness(Slider().run(floor.propose(t).tried)) for t in range(99)]
+    assert ceiling[0] < 2 * np.min(seen) < 0  # twice the square of the distance

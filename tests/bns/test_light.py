@@ -9,15 +9,13 @@ import torch
 from bns.draws import Draws
 from bns.errors import BnsError
 from bns.experiment.config_light import LightConfig
-from bns.light import patterns
-from bns.light.controller import Controllers
-from bns.light.policy import GenomePolicy
-from bns.light.scaling import brightness, counts
-from bns.light.simulator import Simulator, Thetas
-from bns.light.task import LightTask, lost
+from bns.learners.bns.light import patterns
+from bns.learners.bns.light.simulator import Simulator, Thetas
+from bns.tasks.light import LampGoal, lost
+from bns.tasks.light_controller import Controllers, GenomePolicy, brightness, counts
 from tests.bns.light_fakes import FakeLightWorld, small
 
-TASK = LightTask.of(LightConfig(goal=0.3, circle_cycles=40))
+TASK = LampGoal.of(LightConfig(goal=0.3, circle_cycles=40))
 
 
 class TestController:
@@ -89,8 +87,8 @@ class TestController:
 class TestTask:
     def test_a_lamp_that_no_robot_can_reach_is_refused(self):
         with pytest.raises(BnsError, match="off the board"):
-            LightTask.of(LightConfig(lamps=("x=1.4,y=0",)))
-        assert LightTask.of(LightConfig(lamps=("x=1.3,y=0", "x=9"))).lamp == (1.3, 0)
+            LampGoal.of(LightConfig(lamps=("x=1.4,y=0",)))
+        assert LampGoal.of(LightConfig(lamps=("x=1.3,y=0", "x=9"))).lamp == (1.3, 0)
 
     def test_cost_of_standing_still_is_the_start_distance_share(self):
         path = np.tile([0.9, 0.0], (11, 1))
@@ -105,9 +103,9 @@ class TestTask:
         path = np.array([[1.0, 0], [0.5, 0], [0.1, 0], [0.1, 0], [0.1, 0]])
         charged = TASK.cost(path, np.array([False, False, True, True]))
         assert charged == pytest.approx(0.2 + 0.2 + 2 * 0.7)
-        stand = LightTask(TASK.lamp, replace(TASK.config, charge_stopped="stand"))
+        stand = LampGoal(TASK.lamp, replace(TASK.config, charge_stopped="stand"))
         assert stand.cost(path) == pytest.approx(0.2 + 0.2 + 2 * 0.2)
-        far = LightTask(TASK.lamp, replace(TASK.config, charge_stopped="far"))
+        far = LampGoal(TASK.lamp, replace(TASK.config, charge_stopped="far"))
         lost = np.array([False, False, True, True])
         assert far.cost(path, lost) == pytest.approx(0.2 + 0.2 + 2 * 1.0)
 
@@ -141,11 +139,11 @@ class TestTask:
     @pytest.mark.parametrize("text", ["x", "x=left", "x=1,y"])
     def test_lamps_that_cannot_be_read(self, text):
         with pytest.raises(BnsError, match="Lamp"):
-            LightTask.of(LightConfig(lamps=(text,)))
+            LampGoal.of(LightConfig(lamps=(text,)))
 
     def test_no_lamp(self):
         with pytest.raises(BnsError, match="lamps is empty"):
-            LightTask.of(LightConfig(lamps=()))
+            LampGoal.of(LightConfig(lamps=()))
 
 
 class TestSimulator:
@@ -261,3 +259,14 @@ class TestPatterns:
         read = np.array([0.0, 1000.0, 4095.0])
         np.testing.assert_allclose(counts(brightness(read)), read, atol=1e-9)
         assert brightness(np.array(0.0)) == 1.0
+
+
+def test_the_net_turn_of_a_trial_goes_on_beyond_half_a_turn():
+    from bns.light.observing import _turned
+    from bns.worlds.trial import Commands, Trial
+
+    yaw = np.array([3.0, 4.0, 5.0, 6.0, 7.0])
+    poses = np.column_stack([yaw * 0, yaw * 0, (yaw + np.pi) % (2 * np.pi) - np.pi])
+    commands = Commands([[0.1, 0.1]] * 4, [1.0] * 4)
+    trial = Trial(commands, np.arange(5.0), poses, np.arange(5))
+    assert _turned(trial) == pytest.approx(4.0)

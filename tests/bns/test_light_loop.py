@@ -7,18 +7,18 @@ import pytest
 import torch
 
 from bns import presets
-from bns.adaptation import Adaptations
-from bns.chromosome import Population
 from bns.draws import Draws
 from bns.errors import BnsError
+from bns.evolution.chromosome import Population
 from bns.evolution.generation import Breeder, Rates
 from bns.experiment.config import RunConfig
 from bns.experiment.config_light import LightConfig
 from bns.experiment.run import train
-from bns.light import islands
-from bns.light.controller import Controllers, Weights
-from bns.light.learner import LightLearner
-from bns.light.policy import Attempt, GenomePolicy
+from bns.learners.bns.adaptation import Adaptations
+from bns.learners.bns.learner import Bns
+from bns.learners.bns.light import islands
+from bns.learners.bns.light.problem import Weights
+from bns.tasks.light_controller import Controllers, GenomePolicy, LightController
 from tests.bns.contents import contents
 from tests.bns.light_fakes import FakeLightWorld, small
 
@@ -66,7 +66,7 @@ class TestEvolution:
 
     def test_reset_keeps_as_many_as_asked_for(self):
         configs = [small(reset_every=1, reset_elitists=n) for n in (0, 3)]
-        learner = LightLearner(configs, replicates=[0, 0], onsets=[-1, -1])
+        learner = Bns(configs, replicates=[0, 0], onsets=[-1, -1])
         before = learner.population.genes.clone()
         learner._reset(1)
         same = (learner.population.genes[:, :, None] == before[:, None]).all(-1).all(-1)
@@ -74,18 +74,19 @@ class TestEvolution:
 
     def test_the_worst_islands_start_anew_and_the_others_do_not(self):
         config = small(islands=4, renewed=3)
-        learner = LightLearner([config] * 2, replicates=[0, 1], onsets=[-1, -1])
+        learner = Bns([config] * 2, replicates=[0, 1], onsets=[-1, -1])
         before = learner.population.genes.clone()
         size = before.shape[1]
         cost = torch.arange(8.0)[:, None].expand(8, size).clone()
         cost[5, 0] = -1.0  # an island counts by its best: of run 1 it is the second
-        learner._settle(1, cost)
-        kept = (learner.population.genes == before).flatten(1).all(1)
+        state = learner.memories, learner.population
+        after, _ = learner.problem.settle(1, *state, cost)
+        kept = (after.genes == before).flatten(1).all(1)
         assert kept.tolist() == [True, *[False] * 4, True, False, False]
 
     def test_weights_stay_within_their_limit(self):
         config = small(weight_limit=12.0)
-        learner = LightLearner([config], replicates=[0], onsets=[-1])
+        learner = Bns([config], replicates=[0], onsets=[-1])
         for trial in (1, 2):
             learner.propose(trial)  # SBX would spread them beyond it
         assert learner.population.genes.abs().max() == 12.0
@@ -119,7 +120,7 @@ class TestLoop:
 
     def test_runs_of_a_batch_keep_their_own_settings(self):
         configs = [small(mirror=True), small(mirror=False, weights=1.0)]
-        learner = LightLearner(configs, replicates=[0, 0], onsets=[-1, -1])
+        learner = Bns(configs, replicates=[0, 0], onsets=[-1, -1])
         reach = learner.population.genes.abs().amax((1, 2, 3))
         assert reach[0] > 9
         assert reach[1] <= 1
@@ -131,7 +132,7 @@ class TestLoop:
         assert row["sensor_patterns"].tolist() == [42, 21]
 
     def test_a_batch_is_drawn_from_all_patterns_of_a_run(self):
-        learner = LightLearner(
+        learner = Bns(
             [small(batch=32, mirror=False), small(batch=32)],
             replicates=[0, 0],
             onsets=[-1, -1],
@@ -139,37 +140,39 @@ class TestLoop:
         policy = GenomePolicy.of(learner.propose(0).tried)
         tried = FakeLightWorld().drive(policy, cycles=20, seeds=[1, 2])
         learner.observe(0, tried, None)
-        drawn = learner.motion._patterns()
+        drawn = learner.memories[0]._patterns()
         assert drawn.weight.sum((1, 2, 3)).tolist() == [20, 32]  # of 20 and of 40
-        kept = {tuple(row) for row in learner.motion.buffer.targets[1].tolist()}
+        kept = {tuple(row) for row in learner.memories[0].buffer.targets[1].tolist()}
         assert {tuple(row) for row in drawn.targets[1].T.tolist()} <= kept
-        whole = learner.motion.buffer.targets[0]
+        whole = learner.memories[0].buffer.targets[0]
         np.testing.assert_array_equal(drawn.targets[0].T[:20].numpy(), whole)
 
     def test_settings_that_cannot_differ(self):
         with pytest.raises(BnsError, match="light following may differ"):
-            LightLearner([small(), small(hidden=7)], replicates=[0, 1], onsets=[-1, -1])
+            Bns([small(), small(hidden=7)], replicates=[0, 1], onsets=[-1, -1])
         with pytest.raises(BnsError, match="multiple"):
-            LightLearner([small(islands=5)], replicates=[0], onsets=[-1])
+            Bns([small(islands=5)], replicates=[0], onsets=[-1])
         with pytest.raises(BnsError, match="nothing would be learned"):
-            LightLearner([small(renewed=1)], replicates=[0], onsets=[-1])
+            Bns([small(renewed=1)], replicates=[0], onsets=[-1])
 
     def test_foreseen_and_measured_agree_where_the_snns_are_right(self):
         """A robot that was seen to stand still is foreseen where it stands."""
         config = small()
         stops = replace(config.controller, speed_low=5000.0)
         config = replace(config, controller=stops)
-        learner = LightLearner([config], replicates=[0], onsets=[-1])
-        learner._chosen = torch.zeros_like(learner._chosen)[:1]
-        learner._chosen[0, -2:] = -3.0  # both wheels below the dead band
-        kind = learner.simulator.controllers
-        attempt = Attempt(kind, learner._chosen[0], 20, 0.4)
+        learner = Bns([config], replicates=[0], onsets=[-1])
+        genes = torch.zeros_like(learner._chosen.genes)
+        genes[0, 0, -2:] = -3.0  # both wheels below the dead band
+        learner._chosen = learner._chosen._replace(genes=genes)
+        kind = learner.problem.simulator.controllers
+        attempt = LightController(kind, genes[0, 0, :, 0], 20, 0.4)
         tried = FakeLightWorld().drive(GenomePolicy.of([attempt]), cycles=20, seeds=[1])
         assert not tried[0].commands.values.any()
         for trial in range(6):
             row = learner.observe(trial, tried, None)
-        np.testing.assert_allclose(row["predicted"], row["poses"], atol=0.05)
-        assert row["fitness_predicted"] == pytest.approx(row["fitness"], rel=0.1)
+        seen = learner.task.measured(tried)
+        np.testing.assert_allclose(row["predicted"], seen["poses"], atol=0.05)
+        assert row["fitness_predicted"] == pytest.approx(seen["fitness"], rel=0.1)
 
 
 def test_windows_and_magnitudes_follow_the_adaptations():
@@ -177,10 +180,10 @@ def test_windows_and_magnitudes_follow_the_adaptations():
         small(),
         adaptation=replace(RunConfig().adaptation, mutation_magnitude_after=0.3),
     )
-    learner = LightLearner([config], replicates=[0], onsets=[1])
+    learner = Bns([config], replicates=[0], onsets=[1])
     assert isinstance(learner.adaptations, Adaptations)
-    assert learner._rates(1).magnitude.tolist() == [[pytest.approx(0.05)]]
-    assert learner._rates(2).magnitude.tolist() == [[pytest.approx(0.3)]]
+    assert learner.problem.rates(1).magnitude.tolist() == [[pytest.approx(0.05)]]
+    assert learner.problem.rates(2).magnitude.tolist() == [[pytest.approx(0.3)]]
 
 
 class TestDisagreement:
@@ -188,19 +191,19 @@ class TestDisagreement:
         config = small(**light)
         config = replace(config, choose="disagreement")
         config = replace(config, snn=replace(config.snn, kind="ensemble", members=4))
-        return LightLearner([config] * 2, replicates=[0, 1], onsets=[-1, -1])
+        return Bns([config] * 2, replicates=[0, 1], onsets=[-1, -1])
 
     def test_is_the_variance_over_members_summed_over_cycles(self):
         learner = self.learner()
         for learned, shape in (
-            (learner.motion, learner.simulator.motion),
-            (learner.sensors, learner.simulator.sensors),
+            (learner.memories[0], learner.problem.simulator.motion),
+            (learner.memories[1], learner.problem.simulator.sensors),
         ):
             learned.theta.zero_()  # every member says its last bias
             learned.theta[1, -shape.outputs] = 0.2  # of the last member of run 1
         genomes = learner.population.genes.reshape(2, 12, -1, 1)
         whole = Population(genomes, torch.zeros(2, 12).long())
-        found = learner.loops.disagreement(learner.snns.thetas, whole)
+        found = learner.problem.disagreement(learner.memories, whole)
         each = 0.2**2 * (1 / 4 - 1 / 16)  # of a member of four that is off by 0.2
         assert found[0].tolist() == [0.0] * 12
         assert found[1].tolist() == pytest.approx([20 * 2 * each] * 12)
@@ -211,6 +214,6 @@ class TestDisagreement:
 
     def test_needs_an_ensemble(self):
         config = replace(small(), choose="disagreement")
-        learner = LightLearner([config], replicates=[0], onsets=[-1])
+        learner = Bns([config], replicates=[0], onsets=[-1])
         with pytest.raises(BnsError, match="needs an ensemble"):
             learner.propose(0)

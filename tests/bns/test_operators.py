@@ -3,10 +3,10 @@
 import pytest
 import torch
 
-from bns.chromosome import Encoding, Population
 from bns.draws import Draws
 from bns.errors import UnknownNameError
 from bns.evolution import crossover, diversity, mutation, selection
+from bns.evolution.chromosome import Encoding, Population
 from bns.evolution.generation import Breeder, Rates
 from bns.experiment.config import ControllerConfig, EvolutionConfig
 

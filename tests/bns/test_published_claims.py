@@ -1,10 +1,18 @@
 """Findings on claims that come with the package, and the page made of them."""
 
+import json
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
-from bns.claims import page, published, report, sides, verdict
-from bns.claims.claim import claims, find
-from bns.stats import Interval
+from bns.claims import page, provenance, published, report, sides, verdict
+from bns.claims.claim import claims, content, find
+from bns.claims.provenance import Made
+from bns.claims.published import Stale
+from bns.errors import FormatError
+from bns.experiment.config import RunConfig
+from bns.experiment.versions import REVISION
 from tests.sources import ROOT
 
 WORLDS = ("mujoco", "static-snn")
@@ -29,35 +37,117 @@ def test_the_page_has_every_claim_and_is_the_committed_one():
     assert "reversed" in text and "{rule}" not in text
 
 
-def test_published_findings_are_of_comparisons_and_settings_that_there_are():
-    found = report.publishable(without_runs(own=False))
-    assert found == list(published.rows().values())
+def test_published_findings_are_of_comparisons_that_there_are():
+    known = {(c.id, cell.text) for c in claims().values() for cell in c.cells}
+    for world, claim, text in published.library().rows:
+        assert world in WORLDS and (claim, text) in known, (claim, text)
 
 
-def test_what_was_published_of_other_settings_does_not_count():
-    claim = find("A15")
-    cell = claim.cells[0]
-    names = [sides.member("A", s, world="mujoco").identity for s in cell.sides]
-    kept = published.finding(claim, cell, names, world="mujoco")
-    assert kept.published and kept.runs == (30, 30) and kept.verdict == "holds"
-    for other in (names[::-1], [names[0], "0" * 12]):
-        assert published.finding(claim, cell, other, world="mujoco") is None
-    assert published.finding(claim, cell, names, world="elsewhere") is None
+CLAIM = find("A15")
+CELL = CLAIM.cells[0]
 
 
-@pytest.mark.parametrize("fewer", [True, False])
-def test_as_many_runs_of_ones_own_replace_what_is_published(monkeypatch, fewer):
-    claim = find("B16")
-    kept = [
-        row["runs"][0] for row in published.rows().values() if row["claim"] == "B16"
-    ]
-    runs = min(kept) - fewer
+def a_library(**changed):
+    """One finding of today's settings, with parts of its row changed."""
+    found = made_finding()
+    row = published.row(CLAIM, found, world="mujoco") | changed
+    known = {
+        sides.digest_of("A", side, "mujoco"): sides.settings_of("A", side, "mujoco")
+        for side in CELL.sides
+    }
+    return published.parse(published.text([row], known), "test")
 
-    def finding(cell, have):
-        return verdict.finding(cell, (runs, runs), 0.01, Interval(0.7, 0.6, 0.8))
 
-    monkeypatch.setattr(report, "_finding", finding)
-    (row,) = report.judged([claim], ROOT / "none", world="mujoco", own=False)
-    assert [found.published for found in row.findings] == [fewer] * 2
-    (row,) = report.judged([claim], ROOT / "none", world="mujoco")
-    assert [found.runs for found in row.findings] == [(runs, runs)] * 2
+def made_finding():
+    """A finding with its provenance."""
+    low = np.arange(10) / 7
+    found = verdict.examine(CELL, low + 9, low, verdict.design(CELL))
+    digests = tuple(sides.digest_of("A", side, "mujoco") for side in CELL.sides)
+    made = Made(
+        sides=digests,
+        revision=REVISION,
+        commits=("abc",),
+        dates=("2026-11-23",),
+        seeds=(1, 2),
+        versions={"torch": "2"},
+        seconds=12.5,
+    )
+    return replace(found, made=made)
+
+
+def test_a_finding_comes_back_whole_and_unrounded():
+    kept = published.finding(CLAIM, CELL, world="mujoco", among=a_library())
+    assert kept == replace(made_finding(), published=True)
+    assert published.finding(CLAIM, CELL, world="elsewhere", among=a_library()) is None
+
+
+def test_a_finding_of_other_code_is_stale():
+    found = a_library(revision=REVISION - 1)
+    kept = published.finding(CLAIM, CELL, world="mujoco", among=found)
+    assert isinstance(kept, Stale) and "revision" in kept.why
+
+
+def test_a_finding_of_before_settings_were_kept_is_stale():
+    row = {"world": "mujoco", "claim": "A15", "cell": CELL.text, "sides": ["a", "b"]}
+    row |= {"runs": [30, 30], "p": 0.01, "share": [0.8, 0.7, 0.9]}
+    old = published.parse(json.dumps([row]), "old")
+    kept = published.finding(CLAIM, CELL, world="mujoco", among=old)
+    assert kept == Stale(CELL.text, (30, 30), 0.8, 0.01, published.NO_SETTINGS)
+    (judged,) = report.judged(
+        [CLAIM], ROOT / "none", world="mujoco", own=False, among=old
+    )
+    assert (judged.verdict, judged.findings) == ("stale", ())
+    assert not judged.complete and judged.note == published.NO_SETTINGS
+
+
+def test_a_changed_default_makes_a_finding_stale_and_is_named(monkeypatch):
+    found = a_library()
+    changed = replace(
+        RunConfig().evolution, generations=RunConfig().evolution.generations + 1
+    )
+    plain = sides.presets.load
+    monkeypatch.setattr(
+        sides.presets, "load", lambda name: replace(plain(name), evolution=changed)
+    )
+    for cached in (sides._whole, sides.settings_of, sides.digest_of):
+        cached.cache_clear()
+    try:
+        kept = published.finding(CLAIM, CELL, world="mujoco", among=found)
+    finally:
+        for cached in (sides._whole, sides.settings_of, sides.digest_of):
+            cached.cache_clear()
+    assert isinstance(kept, Stale)
+    assert kept.why.endswith("evolution.generations was 60, is 61")
+
+
+def test_a_digest_is_of_names_and_values_and_of_nothing_else():
+    settings = sides.settings_of("A", "left-20", "mujoco")
+    shuffled = dict(sorted(settings.items(), reverse=True))
+    assert provenance.of(shuffled) == provenance.of(settings)
+    assert settings["evolution.generations"] == 60 and "seed" not in settings
+    assert not any(key.startswith(("light.", "walk.")) for key in settings)
+    other = {**settings, "adaptation.window": 7}
+    assert provenance.of(other) != provenance.of(settings)
+    for letter in "ABCD":
+        for piece in content(letter)["pieces"].values():
+            assert not set(piece) & set(content(letter)["ignored"])
+
+
+def test_a_newer_file_and_a_damaged_one_are_refused():
+    with pytest.raises(FormatError, match="newer"):
+        published.parse(json.dumps({"schema": 99}), "x.json")
+    for text in ("{", "{}", "[1]"):
+        with pytest.raises(FormatError, match=r"x\.json"):
+            published.parse(text, "x.json")
+
+
+@pytest.mark.parametrize("runs", [(10, True), (50, False), (20, False)])
+def test_runs_of_ones_own_replace_what_is_published_if_they_say_more(monkeypatch, runs):
+    mine, stopped = runs
+    kept = a_library(runs=[30, 30], stopped=False)
+    found = replace(made_finding(), runs=(mine, mine), stopped=stopped)
+    monkeypatch.setattr(report._Judge, "_mine", lambda self, claim, cell: found)
+    (row,) = report.judged(
+        [CLAIM], ROOT / "none", world="mujoco", own=False, among=kept
+    )
+    assert row.findings[0].published == (mine == 20)

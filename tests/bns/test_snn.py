@@ -3,8 +3,8 @@
 import pytest
 import torch
 
-from bns.chromosome import Encoding
 from bns.draws import Draws
+from bns.evolution.chromosome import Encoding
 from bns.experiment.config import ControllerConfig, SnnConfig
 from bns.snn import training
 from bns.snn.network import Shape, forward, predict

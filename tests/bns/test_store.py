@@ -9,7 +9,7 @@ import pytest
 from bns.errors import BnsError, FormatError
 from bns.experiment.config import RunConfig
 from bns.experiment.step import Step
-from bns.storage import files
+from bns.storage import arrays
 from bns.storage.store import load
 from bns.worlds.data import dataset
 from bns.worlds.trial import Commands, Outcome, Trial
@@ -111,7 +111,7 @@ def test_empty_directory_is_used(fakes, tmp_path):
         ("[]", "holds no JSON object"),
         ('{"format": "other", "schema": 1}', "is not a run of bns"),
         ('{"format": "bns-run", "schema": 2}', "schema 2, this version reads up to 1"),
-        ('{"format": "bns-run", "schema": 1}', "cannot be used"),
+        ('{"format": "bns-run", "schema": 1}', "not as it should be"),
     ],
 )
 def test_bad_head_is_refused(fakes, begun, text, match):
@@ -180,7 +180,7 @@ def test_step_comes_back_from_arrays_as_it_was():
 
 def test_arrays_of_objects_are_never_stored(tmp_path):
     with pytest.raises(TypeError, match="cannot be stored: \\['a'\\]"):
-        files.write_npz(tmp_path / "x.npz", {"a": np.array([None])})
+        arrays.write_npz(tmp_path / "x.npz", {"a": np.array([None])})
 
 
 def test_unwritable_place_is_one_message(fakes, tmp_path):

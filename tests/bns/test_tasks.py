@@ -2,20 +2,22 @@
 
 import math
 
+import numpy as np
 import pytest
 import torch
 
 from bns import tasks
-from bns.errors import UnknownNameError
-from bns.experiment.config import TaskConfig
+from bns.errors import BnsError, UnknownNameError
+from bns.experiment.config import RunConfig, TaskConfig
 from bns.path import integrate
-from bns.tasks import NavigationTask
+from bns.tasks import navigation
+from bns.tasks.navigation import Route
 
 GOALS = [(0.3, -0.3), (-0.3, -0.3), (-0.3, 0.3), (0.3, 0.3), (0.3, -0.3)]
 
 
 def score(points, length=None, **settings):
-    task = NavigationTask.of(TaskConfig(**settings))
+    task = Route.of(TaskConfig(**settings))
     x, y = torch.tensor(points, dtype=torch.float64).T
     length = torch.tensor(len(points) if length is None else length)
     cost, reached = task.score(x, y, length)
@@ -60,14 +62,14 @@ def test_reached_only_inside_the_radius():
 
 
 def test_infinity_passes_the_centre_twice():
-    task = NavigationTask.of(TaskConfig(name="infinity"))
+    task = Route.of(TaskConfig(name="infinity"))
     assert task.goals.tolist().count([0.0, 0.0]) == 2
     assert len(task.goals) == 7
 
 
 def test_unknown_task():
     with pytest.raises(UnknownNameError, match="Unknown task 'simpel'"):
-        NavigationTask.of(TaskConfig(name="simpel"))
+        Route.of(TaskConfig(name="simpel"))
 
 
 def test_integration_of_a_square():
@@ -88,14 +90,67 @@ def test_integration_undoes_body_displacements():
     torch.testing.assert_close(torch.stack([x, y, yaw], 1), poses[1:])
 
 
-@pytest.mark.parametrize("name", tasks.names())
-def test_every_task_can_be_done(name):
-    """Contract of a task's file: described, and a path through all costs no penalty."""
+ROUTES = [name for name in tasks.names() if tasks.kind(name) == "navigation"]
+
+
+@pytest.mark.parametrize("name", ROUTES)
+def test_every_route_can_be_driven(name):
+    """Contract of a route's file: a path through all costs no penalty."""
     config = TaskConfig(name=name)
-    places = tasks.objectives(config)
-    assert len(tasks.describe(name)) > 20
-    assert set(tasks.order(name)) <= set(places)
+    places = navigation.objectives(config)
+    letters = navigation.order(name)
+    assert set(letters) <= set(places)
     assert all(abs(x) <= 1.35 and abs(y) <= 0.9 for x, y in places.values())
-    cost, reached = score([places[letter] for letter in tasks.order(name)], name=name)
-    assert reached == len(tasks.order(name))
+    cost, reached = score([places[letter] for letter in letters], name=name)
+    assert reached == len(letters)
     assert cost < config.penalty
+
+
+def configured(name):
+    robot = "phantomx" if tasks.kind(name) == "walk" else "khepera3"
+    changes = {"task.name": name, "world.robot": robot}
+    return RunConfig().with_(changes)
+
+
+@pytest.mark.parametrize("name", tasks.names())
+class TestEveryTask:
+    def test_it_says_what_it_is(self, name):
+        assert len(tasks.describe(name)) > 20
+        shown = tasks.of(configured(name)).picture
+        assert shown.name and shown.solved and shown.discs
+        assert set(shown.order) <= set(shown.objectives)
+
+    def test_its_space_holds_random_controllers_and_decodes_them(self, name):
+        task = tasks.of(configured(name))
+        space, rng = task.space, np.random.default_rng(0)
+        vectors = space.random(7, rng)
+        assert vectors.shape == (7, space.size)
+        assert (vectors >= space.low).all() and (vectors <= space.high).all()
+        assert (space.first_low >= space.low).all()
+        assert (space.first_high <= space.high).all()
+        assert len(space.controllers(vectors)) == 7
+        wide = space.high + np.array([[1.0], [2.0]])
+        assert len(space.controllers(wide)) == 2  # clipped, not refused
+
+    def test_vectors_of_another_length_and_nan_are_refused(self, name):
+        space = tasks.of(configured(name)).space
+        with pytest.raises(BnsError, match="they need"):
+            space.controllers(np.zeros((1, space.size + 1)))
+        with pytest.raises(BnsError, match="NaN"):
+            space.controllers(np.full((1, space.size), np.nan))
+
+
+def test_a_vector_of_navigation_is_its_commands_and_how_many():
+    task = tasks.of(configured("simple"))
+    space = task.space
+    vector = space.low.copy()
+    vector[:6] = 0.1, 0.07, 1.0, 0.01, 0.1, 2.0  # below the dead band: a stop
+    vector[-1] = 2.3
+    (made,) = space.controllers(vector[None])
+    np.testing.assert_allclose(made.values, [[0.1, 0.07], [0.0, 0.1]], rtol=1e-6)
+    np.testing.assert_allclose(made.durations, [1.0, 2.0])
+
+
+def test_a_route_of_another_kind_is_refused():
+    with pytest.raises(UnknownNameError, match="navigation task"):
+        navigation.order("walk")

@@ -8,16 +8,20 @@ import pytest
 import torch
 
 from bns import presets
-from bns.chromosome import Population
 from bns.draws import Draws
 from bns.errors import BnsError
+from bns.evolution.chromosome import Population
+from bns.evolution.goals import TICK, Goals
 from bns.experiment.run import train
+from bns.learners.bns import walking
+from bns.learners.bns.learner import Bns
+from bns.learners.bns.problem import should_compile
+from bns.learners.bns.walking import WalkEvaluator, path, variance
+from bns.snn import adam
 from bns.snn.fitting import Patterns
 from bns.snn.network import Shape, forward
-from bns.walk import fitness, observing, scaling, training
-from bns.walk.evaluation import WalkEvaluator, path, variance
-from bns.walk.goals import TICK, Goals
-from bns.walk.learner import WalkLearner
+from bns.tasks import walk as task
+from bns.tasks.walk import WalkTask
 from bns.worlds.trial import Commands, Outcome, Trial
 from tests.bns.walkers import STRIDE, Slider, small
 
@@ -26,31 +30,31 @@ SHAPE = Shape(groups=3, hidden=8, outputs=3, inputs=36, activation="relu")
 
 def moved(*steps):
     """Scaled outputs ``(1, 1, 3, K)`` of one member and one individual."""
-    scaled = np.array(steps) / np.array(scaling.MOVED)
+    scaled = np.array(steps) / np.array(walking.MOVED)
     return torch.tensor(scaled.T, dtype=torch.float32)[None, None]
 
 
 class TestFitness:
     def test_printed_is_variance_over_distance(self):
-        cost = fitness.printed(torch.tensor([[0.5, 2.0]]), torch.tensor([[1.0, 1.0]]))
+        cost = walking.printed(torch.tensor([[0.5, 2.0]]), torch.tensor([[1.0, 1.0]]))
         assert cost.tolist() == [[2.0, 0.5]]
 
     def test_printed_cannot_tell_far_from_near_where_all_agree(self):
-        cost = fitness.printed(torch.tensor([[0.01, 1.0]]), torch.zeros(1, 2))
+        cost = walking.printed(torch.tensor([[0.01, 1.0]]), torch.zeros(1, 2))
         assert cost.tolist() == [[0.0, 0.0]]
 
     def test_repaired_is_distance_less_the_spread_of_end_points(self):
         x = torch.tensor([[[3.0], [5.0]]])  # two members: mean 4, spread 1
         y = torch.tensor([[[3.0], [3.0]]])
-        assert fitness.repaired(x, y, 2.0).item() == pytest.approx(2 - 5)
+        assert walking.repaired(x, y, 2.0).item() == pytest.approx(2 - 5)
 
     def test_standing_still_is_no_optimum_of_the_repaired_form(self):
-        still = fitness.repaired(torch.zeros(1, 4, 1), torch.zeros(1, 4, 1), 1.0)
+        still = walking.repaired(torch.zeros(1, 4, 1), torch.zeros(1, 4, 1), 1.0)
         x = torch.tensor([[[0.02], [0.03], [0.02], [0.03]]])
-        walking = fitness.repaired(x, torch.zeros(1, 4, 1), 1.0)
-        assert walking.item() < still.item() == 0.0
-        agreed = fitness.printed(torch.tensor([[1e-3]]), torch.tensor([[1e-9]]))
-        assert agreed.item() < fitness.printed(
+        moving = walking.repaired(x, torch.zeros(1, 4, 1), 1.0)
+        assert moving.item() < still.item() == 0.0
+        agreed = walking.printed(torch.tensor([[1e-3]]), torch.tensor([[1e-9]]))
+        assert agreed.item() < walking.printed(
             torch.tensor([[0.025]]), torch.tensor([[1e-3]])
         ), "the printed form prefers not to move"
 
@@ -70,7 +74,7 @@ class TestEvaluator:
         assert found.tolist() == [[3 * 1.0 + 3 * 4.0, 0.0]]
 
     def test_pieces_give_what_the_whole_gives(self, monkeypatch):
-        monkeypatch.setattr("bns.walk.evaluation.CHUNK", 7)
+        monkeypatch.setattr("bns.learners.bns.walking.CHUNK", 7)
         draws = Draws(1)
         theta, seen = SHAPE.random(2, draws), draws.uniform(2, 36, 30)
         evaluator = WalkEvaluator(SHAPE, small().walk)
@@ -80,7 +84,8 @@ class TestEvaluator:
     def test_inputs_are_the_goals_before_and_the_goals(self):
         goals = torch.arange(6.0).view(1, 1, 2, 3)
         wanted = torch.tensor([[0.0, 0, 0, 0, 1, 2], [0, 1, 2, 3, 4, 5]])
-        torch.testing.assert_close(scaling.inputs(goals)[0, 0], wanted / scaling.GOAL)
+        found = walking.goal_inputs(goals)[0, 0]
+        torch.testing.assert_close(found, wanted / walking.GOAL)
 
     def test_each_individual_gets_its_own_path(self):
         config = small()
@@ -103,12 +108,12 @@ class TestTraining:
         theta = draws.uniform(2, 5)
         weight = torch.nn.Parameter(theta.clone())
         optimiser = torch.optim.Adam([weight], lr=0.01)
-        state = training.AdamState.fresh(theta)
+        state = adam.AdamState.fresh(theta)
         for step in range(1, 4):
             grad = draws.uniform(2, 5) - 0.5
             weight.grad = grad.clone()
             optimiser.step()
-            theta, state = training.adam(
+            theta, state = adam.adam(
                 theta, grad, state, torch.tensor(0.01), torch.tensor(float(step))
             )
         torch.testing.assert_close(theta, weight.data)
@@ -123,7 +128,7 @@ class TestTraining:
         theta = SHAPE.random(2, draws)
         patterns = Patterns(inputs, targets, weight)
         config = replace(config, snn=replace(config.snn, epochs=400, dropout=0.0))
-        _, loss = training.fit(SHAPE, config, theta, patterns, draws)
+        _, loss = adam.fit(SHAPE, config, theta, patterns, draws)
         assert (loss < 0.1 * targets[0].square().mean()).all()
 
     def test_slope_of_relu_is_that_of_autograd(self):
@@ -161,17 +166,16 @@ class TestObserving:
     STRAIGHT = ((0, 0, 0), (0.1, 0, 0), (0.2, 0, 0), (0.3, 0.4, 0))
 
     def test_distance_is_from_start_to_end(self):
-        assert observing.of_trials([trial(self.STRAIGHT)]) == pytest.approx([0.5])
+        assert task.of_trials([trial(self.STRAIGHT)]) == pytest.approx([0.5])
 
     def test_a_lost_end_is_where_it_was_seen_last(self):
         lost = trial((*self.STRAIGHT[:3], (np.nan,) * 3))
-        assert observing.of_trials([lost]) == pytest.approx([0.2])
+        assert task.of_trials([lost]) == pytest.approx([0.2])
 
     def test_fitness_is_equation_7_4_in_centimetres_turned_round(self):
-        walk = replace(small().walk, adequate=0.5)
-        row = observing.measured([trial(self.STRAIGHT)], None, walk)
+        config = replace(small(), walk=replace(small().walk, adequate=0.5))
+        row = WalkTask(config).measured([trial(self.STRAIGHT)])
         assert row["fitness"] == pytest.approx([-2500.0])
-        assert row["fitness_best"] == pytest.approx([-2500.0])
         assert row["solved"] == [1.0]
 
     @pytest.mark.parametrize(
@@ -180,13 +184,14 @@ class TestObserving:
     )
     def test_who_fell_or_diverged_has_not_solved(self, flags, solved, way):
         walk = replace(small().walk, adequate=0.4, upright=True)
-        row = observing.measured([trial(self.STRAIGHT, **flags)], None, walk)
+        made = WalkTask(replace(small(), walk=walk))
+        row = made.measured([trial(self.STRAIGHT, **flags)])
         assert row["solved"] == [solved]
         assert row["distance"] == pytest.approx([way])
 
     def test_patterns_are_in_the_body_frame_and_leave_the_lost_out(self):
         turned = trial(((0, 0, math.pi / 2), (0, 0.1, math.pi / 2), (np.nan,) * 3))
-        seen, was = scaling.of_trial(turned)
+        seen, was = walking.of_trial(turned)
         assert seen.shape == (1, 36)
         np.testing.assert_allclose(was, [[0.1, 0, 0]], atol=1e-12)
 
@@ -208,7 +213,7 @@ class TestLearner:
 
     def test_resumed_state_gives_the_same_bytes(self):
         def learner():
-            return WalkLearner([small()] * 2, replicates=[0, 1], onsets=[-1, -1])
+            return Bns([small()] * 2, replicates=[0, 1], onsets=[-1, -1])
 
         def advance(one, number):
             seen = Slider().run(one.propose(number).tried)
@@ -228,8 +233,8 @@ class TestLearner:
         config = replace(
             config, adaptation=replace(config.adaptation, mutation_magnitude_after=40.0)
         )
-        one = WalkLearner([config], replicates=[0], onsets=[3])
-        before, after = one._rates(3).magnitude, one._rates(4).magnitude
+        one = Bns([config], replicates=[0], onsets=[3])
+        before, after = one.problem.rates(3).magnitude, one.problem.rates(4).magnitude
         assert before[0].tolist() == pytest.approx([20 * TICK] * 18)
         assert after[0].tolist() == pytest.approx([40 * TICK] * 18)
 
@@ -237,13 +242,13 @@ class TestLearner:
         config = small()
         wheels = replace(config, world=replace(config.world, robot="khepera3"))
         with pytest.raises(BnsError, match="is wheeled and cannot walk"):
-            WalkLearner([wheels], replicates=[0], onsets=[-1])
+            Bns([wheels], replicates=[0], onsets=[-1])
 
     def test_networks_that_cannot_disagree_are_refused(self):
         config = small()
         three = replace(config, snn=replace(config.snn, kind="three"))
         with pytest.raises(BnsError, match=r"set snn\.kind = 'ensemble'"):
-            WalkLearner([three], replicates=[0], onsets=[-1])
+            Bns([three], replicates=[0], onsets=[-1])
 
     @pytest.mark.parametrize("form", ["printed", "repaired"])
     def test_both_forms_of_fitness_run(self, form):
@@ -254,8 +259,6 @@ class TestLearner:
 
 
 def test_generations_are_not_compiled():
-    """Compiled ones take several times as long: see `bns.walk.loops`."""
-    from bns.inner import should_compile
-
+    """Compiled ones take several times as long: see `WalkProblem`."""
     long = replace(presets.load("hexapod-walk"), trials=10**6, compiled="auto")
-    assert not should_compile(long)
+    assert not should_compile(long, walking.WalkProblem.relative_cost)

@@ -7,8 +7,8 @@ import pytest
 
 from bns.experiment.config_watch import WatchConfig
 from bns.experiment.run import train
-from bns.patterns import PatternBuffer
-from bns.walk import forgetting
+from bns.learners.bns import change_evidence as forgetting
+from bns.learners.bns.memory import PatternBuffer
 from tests.bns.walkers import Slider, small
 
 SIZE = 11

@@ -8,12 +8,12 @@ import pytest
 import torch
 
 from bns import models
-from bns.chromosome import Population
 from bns.draws import Draws
+from bns.evolution import repetition
+from bns.evolution.chromosome import Population
 from bns.evolution.generation import Rates
-from bns.walk import repetition
-from bns.walk.goals import TICK, GoalBreeder, Goals
-from bns.walk.learner import WalkLearner
+from bns.evolution.goals import TICK, GoalBreeder, Goals
+from bns.learners.bns.learner import Bns
 from tests.bns.walkers import small
 
 
@@ -103,9 +103,9 @@ class TestRepetition:
 
     def test_only_once_damage_is_known(self):
         config = small(walk=replace(small().walk, repeat_after=0.2))
-        learner = WalkLearner([config] * 2, replicates=[0, 1], onsets=[3, -1])
-        assert learner._rates(3).repeat is None
-        assert learner._rates(4).repeat.tolist() == pytest.approx([0.2, 0.0])
+        learner = Bns([config] * 2, replicates=[0, 1], onsets=[3, -1])
+        assert learner.problem.rates(3).repeat is None
+        assert learner.problem.rates(4).repeat.tolist() == pytest.approx([0.2, 0.0])
         always = replace(config, walk=replace(config.walk, repeat=0.1))
-        learner = WalkLearner([always] * 2, replicates=[0, 1], onsets=[3, -1])
-        assert learner._rates(4).repeat.tolist() == pytest.approx([0.2, 0.1])
+        learner = Bns([always] * 2, replicates=[0, 1], onsets=[3, -1])
+        assert learner.problem.rates(4).repeat.tolist() == pytest.approx([0.2, 0.1])

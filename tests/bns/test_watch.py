@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bns.detection import Detector, Ground, Misses, innovation
 from bns.experiment.config_watch import WatchConfig
-from bns.forgetting import contradicted
-from bns.light.learner import LightLearner
-from bns.light.policy import GenomePolicy
-from bns.light.watching import CHANNELS
+from bns.learners.bns.change_detection import Detector, Ground, Misses, innovation
+from bns.learners.bns.forgetting import contradicted
+from bns.learners.bns.learner import Bns
+from bns.learners.bns.light.innovations import CHANNELS
+from bns.tasks.light_controller import GenomePolicy
 from tests.bns.light_fakes import FakeLightWorld, small
 
 WATCH = WatchConfig()
@@ -239,8 +239,8 @@ class TestForgetting:
 class TestInTheLearner:
     def drive(self, learner, trial):
         """A trial of a random controller, with readings as noisy as real ones."""
-        genome = learner._random_population().genes[0, :1, :, 0]
-        policy = GenomePolicy(learner.simulator.controllers, genome)
+        genome = learner.problem.random().genes[0, :1, :, 0]
+        policy = GenomePolicy(learner.problem.simulator.controllers, genome)
         (seen,) = FakeLightWorld().drive(policy, cycles=60, seeds=[trial])
         noise = np.zeros_like(seen.observed)
         noise[:, 3:] = np.random.default_rng(trial).normal(0, 100, noise[:, 3:].shape)
@@ -255,7 +255,7 @@ class TestInTheLearner:
         watch = WatchConfig(detect=True, warmup=4, history=6)
         reset = replace(config.adaptation, population_reset=True)
         config = replace(config, watch=watch, adaptation=reset)
-        learner = LightLearner([config], replicates=[0], onsets=[10])
+        learner = Bns([config], replicates=[0], onsets=[10])
         for trial in range(10):
             row = learner.observe(trial, self.drive(learner, trial), None)
             assert not row["detected"].any()
@@ -269,13 +269,15 @@ class TestInTheLearner:
 
     def test_what_is_contradicted_is_dropped_with_its_trial_numbers(self):
         config = replace(small(), watch=WatchConfig(forget=True))
-        learner = LightLearner([config], replicates=[0], onsets=[-1])
+        learner = Bns([config], replicates=[0], onsets=[-1])
         for trial in range(3):
             row = learner.observe(trial, self.drive(learner, trial), None)
-        for part in (learner.motion, learner.sensors):
+        for part in learner.memories:
             assert len(part.trials[0]) == part.buffer.counts[0]
         state = learner.state()
-        other = LightLearner([config], replicates=[0], onsets=[-1])
+        other = Bns([config], replicates=[0], onsets=[-1])
         other.restore(state)
-        assert np.array_equal(other.motion.trials[0], learner.motion.trials[0])
+        assert np.array_equal(
+            other.memories[0].trials[0], learner.memories[0].trials[0]
+        )
         assert "forgotten" in row

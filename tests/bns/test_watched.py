@@ -7,9 +7,8 @@ import pytest
 
 from bns.experiment.config import AdaptationConfig, SnnConfig, WorldConfig
 from bns.experiment.config_watch import WatchConfig
-from bns.learner import Learner
+from bns.learners.bns.navigation import WheeledProblem, ways
 from bns.snn.scaling import AXLE
-from bns.watched import CHANNELS, ways
 from tests.bns.test_learner import SMALL, batch, play
 
 WATCH = WatchConfig(detect=True, forget=True, warmup=4, history=8)
@@ -28,8 +27,9 @@ def broken(wheel, onset=10):
     )
 
 
-def test_a_learner_that_is_not_asked_to_watch_is_the_plain_one():
-    assert type(batch(SMALL).learner) is Learner
+def test_a_learner_that_is_not_asked_to_watch_says_nothing_of_it():
+    (row,) = play(batch(SMALL), 1)
+    assert not {"detected", "suspect", "alarm_score", "forgotten"} & set(row)
 
 
 @pytest.mark.parametrize("wheel", ["left", "right"])
@@ -40,12 +40,12 @@ def test_a_slow_wheel_is_found_named_forgotten_and_reacted_to(wheel):
     last = rows[10]
     assert last["detected"].mean() > 0.5
     named = last["suspect"][last["detected"] > 0].astype(int)
-    assert {CHANNELS[name] for name in named} == {f"{wheel} wheel"}
+    assert {WheeledProblem.channels[name] for name in named} == {f"{wheel} wheel"}
     resets = made.learner.adaptations.resets(11).population
     assert np.array_equal(resets, last["detected"] > 0)
     assert last["forgotten"].sum() > np.mean([row["forgotten"].sum() for row in rows])
-    for run, marks in enumerate(made.learner.marks):
-        assert len(marks) == made.learner.buffer.counts[run]
+    for run, marks in enumerate(made.learner.memories[0].trials):
+        assert len(marks) == made.learner.memories[0].buffer.counts[run]
 
 
 def test_restored_goes_on_to_the_same_bytes():

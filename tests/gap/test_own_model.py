@@ -9,9 +9,10 @@ import pytest
 
 from bns.errors import BnsError, FormatError
 from bns.gap.bench import mjcf_cases
+from bns.gap.candidates import mjcf
 from bns.gap.diagnose import diagnose
 from bns.gap.models.mjcf.config import OwnConfig
-from bns.gap.models.mjcf.effects import CLASSES
+from bns.gap.models.mjcf.effects import CLASSES, OWNERS
 from bns.gap.models.mjcf.model import OwnModel
 from bns.worlds.data import dataset
 
@@ -172,6 +173,33 @@ def test_effects_are_considered_where_none_are_listed(arm):
         "reading_gain[shoulder]",
         "command_delay[all]",
     } < names
+
+
+PARTS = {"joint": "elbow", "body": "forearm", "actuator": "elbow_servo"}
+
+
+@pytest.mark.parametrize("name", sorted(set(CLASSES) - {"geom_friction"}))
+def test_every_effect_can_be_a_candidate(arm, name):
+    channel = "elbow" if name.startswith("reading") else "elbow_goal"
+    part = PARTS.get(OWNERS.get(name, ""), channel)
+    config = replace(OwnConfig.read(ARM), effects={name: (part,)}, bounds={})
+    made = mjcf.candidates(config, arm.compiled(()).model)
+    strengths = [item.name for item in CLASSES[name].parameters if item.scales]
+    assert [item.parameter for item in made] == strengths
+    for item in made:
+        assert item.low <= item.nominal <= item.high and item.excite
+        for magnitude in (item.low, *item.grid, item.high):
+            assert item.make(magnitude)["part"] == part
+
+
+def test_former_names_in_a_description_are_read(arm):
+    config = replace(
+        OwnConfig.read(ARM),
+        effects={"sensor_gain": ("elbow",)},
+        bounds={"sensor_gain[elbow]": {"high": 1.5}},
+    )
+    (made,) = mjcf.candidates(config, arm.compiled(()).model)
+    assert (made.name, made.high) == ("reading_gain[elbow]", 1.5)
 
 
 def test_the_description_in_the_documentation_is_one(tmp_path):

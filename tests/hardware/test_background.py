@@ -1,13 +1,16 @@
-"""Evolution beside a robot that moves."""
+"""Learning beside a robot that moves."""
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from bns import presets
 from bns.errors import BnsError
-from bns.experiment.background import LEAST, Worker, behind
+from bns.experiment.background import behind
+from bns.experiment.loading import with_learner
 from bns.learners import registry as learners
+from bns.learners.bns.learner import LEAST
 from bns.worlds import registry
 
 WORLDS = {"khepera-simple": "mujoco", "hexapod-walk": "hexapod"}
@@ -28,31 +31,53 @@ def small(name):
     )
 
 
+def world(name, task):
+    robot = task.config.world.robot
+    return registry.make(WORLDS[name], robot=robot, **task.surroundings())
+
+
 @pytest.mark.parametrize("name", WORLDS)
 def test_generations_run_during_a_trial_and_after_it_and_are_counted(name):
     config = small(name)
-    worker = Worker([config], replicates=[0], onsets=[-1])
-    kind = learners.get(config.learner)
-    world = registry.make(
-        WORLDS[name], robot=config.world.robot, **kind.surroundings(config)
-    )
+    told = {"replicates": [0], "onsets": [-1]}
+    learner = learners.get("bns")([config], **told)
+    learner.run_in_background()
+    place = world(name, learner.task)
     for trial in range(2):
-        proposal = worker.propose(trial)
-        assert worker.busy
-        before = worker.learner.population
-        while worker.busy:
-            worker.breed()
-        assert worker.generations == 10  # no more than configured
-        assert worker.learner.population is not before
-        tried = kind.execute(world, proposal.tried, trial=trial, seeds=[trial])
-        row = worker.observe(trial, tried, None)
-        assert row["generations"].tolist() == [10 + LEAST] and not worker.busy
-    kept = worker.state()
-    again = Worker([config], replicates=[0], onsets=[-1])
-    again.restore(kept)
-    assert again.learner.buffer.counts.tolist() == worker.learner.buffer.counts.tolist()
+        proposal = learner.propose(trial)
+        before = learner.population
+        while learner.think():
+            pass
+        assert learner.population is not before
+        assert not learner.think()  # no more than configured
+        run = learner.task.execute
+        tried = run(place, proposal.tried, trial=trial, seeds=[trial])
+        row = learner.observe(trial, tried, None)
+        assert row["generations"].tolist() == [10 + LEAST]
+    again = learners.get("bns")([config], **told)
+    again.restore(learner.state())
+    kept, wanted = (one.memories[0].buffer.counts for one in (again, learner))
+    assert kept.tolist() == wanted.tolist()
 
 
-def test_a_learner_that_closes_a_loop_is_refused():
-    with pytest.raises(BnsError, match="cannot go on in the background"):
+@pytest.mark.parametrize("name", ["random", "cma"])
+def test_any_learner_can_be_in_a_process_of_its_own(name):
+    config = with_learner(small("khepera-simple"), name)
+    config = replace(config, replicates=1, threads=1)
+    if name == "cma":
+        prior = {"prior.world": "mujoco", "prior.evaluations": 12}
+        config = config.with_({**prior, "settings.population": 6})
+    learner = behind(config)
+    place = world("khepera-simple", learner.task)
+    for trial in range(2):
+        proposal = learner.propose(trial)
+        tried = learner.task.execute(place, proposal.tried, trial=trial, seeds=[0])
+        row = learner.observe(trial, tried, None)
+    assert np.isfinite(row["best_seen"]).all()
+    assert ("evaluations" in row) == (name == "cma")
+    assert learner.state().keys()
+
+
+def test_a_task_that_closes_a_loop_is_refused():
+    with pytest.raises(BnsError, match="cannot be learned in the background"):
         behind(presets.load("khepera-light"))

@@ -1,6 +1,8 @@
 """The hexapod's bus: ROBOTIS's SDK against emulated servos on a pseudo terminal."""
 
+import os
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from bns.hardware.clock import RealClock
 from bns.hardware.dynamixel import joints, packets
 from bns.hardware.emulators.pty_host import PtyHost
 from bns.hardware.emulators.servo_bank import ServoBank
-from bns.hardware.errors import SafetyStop
+from bns.hardware.errors import LinkError, SafetyStop, Void
 
 pytest.importorskip("dynamixel_sdk")
 pytest.importorskip("serial")
@@ -37,6 +39,7 @@ def served(tmp_path):
         thread = threading.Thread(target=host.serve, args=(done.is_set,))
         thread.start()
         ends.append((done, thread, host))
+        bank.host = host
         return str(tmp_path / "bus"), bank
 
     yield serve
@@ -56,7 +59,7 @@ def test_goals_reach_all_servos_and_states_come_back(served):
     port, bank = served()
     bus = opened(port, guard=Watching())
     bus.identify()
-    bus.torque(True)
+    bus.power()
     bus.write({joint.name: 0.2 for joint in bus.joints})
     RealClock().sleep(0.5)
     for joint in bus.joints:
@@ -124,3 +127,88 @@ def test_a_full_turn_of_the_law_takes_the_motors_time():
     way = bank.place[1] - 512
     assert 0.9 * 511 < way <= 511
     assert np.isclose(packets.UNITS, 1023 / np.deg2rad(300), rtol=1e-5)
+
+
+def standing(served):
+    """A bus whose servos hold, and the servos."""
+    port, bank = served()
+    bus = opened(port, guard=Watching())
+    bus.write({joint.name: 0.0 for joint in bus.joints})
+    bus.power()
+    bus.read(1)
+    return bus, bank
+
+
+def test_a_bus_that_goes_on_talking_is_left_and_the_stop_gets_through(served):
+    bus, bank = standing(served)
+    bank.host.baud, bank.host.flooded = packets.BAUD, True
+    with pytest.raises((Void, LinkError)):
+        for _ in range(200):
+            bus.read(2)
+    bank.host.flooded = False
+    bus.stop()
+    assert not any(table[packets.TORQUE] for table in bank.tables.values())
+    assert bus.guard.fed[-1] is False
+    bus.release()
+
+
+def test_servos_that_were_reset_are_noticed(served):
+    bus, bank = standing(served)
+    bus.powered()
+    bank.restart(RealClock().now(), power=True)
+    with pytest.raises(Void, match="has lost its torque"):
+        bus.powered()
+    bus.close()
+
+
+def test_a_stop_that_no_servo_confirms_is_said_so(served):
+    bus, bank = standing(served)
+    bank.host.deaf_until = float("inf")
+    with pytest.raises(LinkError, match="do not confirm"):
+        bus.stop()
+    assert bus.guard.fed[-1] is True
+    bus.release()
+
+
+def test_somebody_who_opens_the_port_stops_the_robot(served):
+    bus, bank = standing(served)
+    other = os.open(bank.host.link, os.O_RDWR | os.O_NOCTTY)
+    os.close(other)
+    with pytest.raises(Void, match="another program"):
+        bus.write({joint.name: 0.0 for joint in bus.joints})
+    bus.close()
+
+
+def test_a_wall_clock_that_is_set_does_not_matter(served, monkeypatch):
+    bus, _ = standing(served)
+    jumps = iter(range(10**6))
+    real = time.time
+    monkeypatch.setattr(time, "time", lambda: real() + 3600 * (next(jumps) % 3 - 1))
+    for joint in bus.joints:
+        assert bus.read(joint.id).voltage == 11.1
+    assert not len(bus.faults)
+    bus.close()
+
+
+def test_a_servo_that_falls_silent_makes_the_trial_void_where_torque_is_on(served):
+    bus, bank = standing(served)
+    bank.numbers.remove(7)
+    with pytest.raises(Void, match="servo 7 gave no proper answer"):
+        bus.read(7)
+    bus.stop()
+    with pytest.raises(LinkError, match="check its cable"):
+        bus.read(7)
+    bus.close()
+
+
+def test_an_answer_is_not_waited_for_without_end_on_a_line_that_never_rests(served):
+    bus, _ = standing(served)
+    bus.stop()
+    begin = time.monotonic()
+    with open("/dev/zero", "rb", buffering=0) as garbage:
+        line, bus._port.ser = bus._port.ser, garbage
+        bus._port.setPacketTimeout(8)
+        _, result = bus._protocol.rxPacket(bus._port)
+        bus._port.ser = line
+    assert result != 0 and time.monotonic() - begin < 10.0
+    bus.close()

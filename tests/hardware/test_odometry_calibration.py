@@ -42,6 +42,15 @@ def test_a_robot_that_is_none_is_refused(tmp_path):
     Wheels(left=2 * WHEEL_DIAMETER, right=WHEEL_DIAMETER, axle=0.088).write(
         tmp_path / "odd.json"
     )
-    for name, words in (("odd.json", "nominal size"), ("none.json", "calibration of")):
+    for name, words in (("odd.json", "nominal size"), ("none.json", "cannot be read")):
         with pytest.raises(FormatError, match=words):
             Wheels.read(tmp_path / name)
+
+
+@pytest.mark.parametrize("change", ['"axle": 0', '"axle": NaN', '"left": "wide"'])
+def test_wheels_that_cannot_be_are_refused(tmp_path, change):
+    text = '{"format": "bns-wheels", "left": 0.041, "right": 0.041, "axle": 0.0884,'
+    text += f' "error": [0, 0, 0], {change}}}'
+    (tmp_path / "wheels.json").write_text(text)
+    with pytest.raises(FormatError, match=r"wheels\.json"):
+        Wheels.read(tmp_path / "wheels.json")

@@ -1,5 +1,7 @@
 """Tracking on drawn pictures, whose poses are known."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -76,5 +78,26 @@ def test_a_distorted_camera_projects_and_comes_back(tmp_path):
     held = Camera.read(tmp_path / "c.json")
     assert (held.distortion == bent.distortion).all()
     (tmp_path / "d.json").write_text("{}")
-    with pytest.raises(FormatError, match="no camera calibration"):
+    with pytest.raises(FormatError, match="bns hardware calibrate"):
         Camera.read(tmp_path / "d.json")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"size": [1280, 0]},
+        {"latency": -1.0},
+        {"latency": 1e308},
+        {"matrix": np.zeros((3, 3)).tolist()},
+        {"rotation": (2 * np.eye(3)).tolist()},
+        {"matrix": None},
+    ],
+    ids=str,
+)
+def test_a_camera_that_cannot_be_is_refused(tmp_path, change):
+    Camera.overhead(SIZE).write(tmp_path / "c.json")
+    held = json.loads((tmp_path / "c.json").read_text()) | change
+    del held["sha256"]
+    (tmp_path / "c.json").write_text(json.dumps(held))
+    with pytest.raises(FormatError, match=r"c\.json"):
+        Camera.read(tmp_path / "c.json")

@@ -70,5 +70,5 @@ def test_a_directory_is_a_robot(tmp_path):
     made = tmp_path / "beetle"
     made.mkdir()
     (made / "robot.toml").write_text('kind = "wheeled"\n')
-    with pytest.raises(FormatError, match="commands"):
+    with pytest.raises(FormatError, match="missing required field `doc`"):
         robot_model.read(made)

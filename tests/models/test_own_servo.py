@@ -83,9 +83,9 @@ def test_the_check_sees_what_is_wrong(walker, tmp_path):
     place = walker(voltage=12.0)
     file = tmp_path / "0" / "quad" / servo_numbers.LAW
     for text, expected in (
-        ("[voltage]\nvalue = 12.0\n", "not a table of numbers"),
-        (file.read_text().replace("a test", ""), "lacks a basis, source or unit"),
-        (None, "not a table of numbers"),
+        ("[voltage]\nvalue = 12.0\n", "[voltage] in"),
+        (file.read_text().replace("a test", ""), "lacks a source or unit"),
+        (None, "cannot be read"),
     ):
         file.write_text(text) if text else file.unlink()
         servo_numbers._tables.cache_clear()

@@ -57,7 +57,7 @@ def test_every_point_holds(place):
         ("burger.xml", '<key name="home"', '<key name="rest"', "no key called 'home'"),
         ("burger.xml", "6.6667 6.6667", "5 5", "its actuator from -0.165 to 0.165"),
         ("burger.xml", 'mass="0.94474"', 'mass="1.2"', "body_mass: body burger mass"),
-        ("burger.xml", "<worldbody>", "<worldbodies>", "cannot read"),
+        ("burger.xml", "<worldbody>", "<worldbodies>", "cannot be read"),
         ("robot.toml", 'actuator = "left_wheel"\n\n[wheels.right]',
          'actuator = "left"\n\n[wheels.right]', "no actuator called 'left'"),
         ("robot.toml", 'kind = "wheeled"', 'kind = "flying"', "none of wheeled"),

@@ -1,15 +1,18 @@
 """Figures: what is drawn is what was recorded."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
+from bns.learners.bns.learner import DIVERSITY, SNN_ERROR
 from bns.viz import facts, figures
 from bns.viz.figures import bands
 from bns.viz.figures.displacement import SHOWN, groups
 
-OVER_TRIALS = ("fitness", "solved", "diversity", "snn_error", "waits")
+OVER_TRIALS = ("fitness", "solved", "waits")
+OF_BNS = {item.name: item for item in (SNN_ERROR, DIVERSITY)}
 
 
 @pytest.fixture(scope="module")
@@ -18,9 +21,10 @@ def undamaged(record):
     return replace(record, damage_onset=never)
 
 
-@pytest.mark.parametrize("name", OVER_TRIALS)
+@pytest.mark.parametrize("name", [*OVER_TRIALS, *OF_BNS])
 def test_one_run_several_runs_and_no_damage(name, record, undamaged):
-    make = getattr(figures, name)
+    make = getattr(figures, name, None)
+    make = make or partial(figures.curves, shown=OF_BNS[name])
     assert make({"a": record}).axes
     labels = [
         text.get_text()
@@ -80,11 +84,13 @@ def test_displacement_is_thinned_and_stays_in_its_frame(record):
 
 
 def test_the_path_fades_after_the_last_objective(record):
-    from bns.viz import scene
+    from bns.tasks import registry as tasks
+
+    task = tasks.of(record.config)
 
     poses = record.poses[0, 39]
     poses = poses[np.isfinite(poses[:, 0])]
     assert record["solved"][0, 39]
     longer = np.concatenate([poses, poses[-1:] + np.ones(3)])
-    assert scene.finish(record.config, longer) == len(poses) - 1
-    assert scene.finish(record.config, poses[:3]) == 2  # not done: all of it
+    assert task.finish(longer) == len(poses) - 1
+    assert task.finish(poses[:3]) == 2  # not done: all of it

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bns.experiment.run import train
+from bns.tasks import registry as tasks
 from bns.viz import figures, recording, report, scene
 from tests.bns.light_fakes import FakeLightWorld, small
 
@@ -22,9 +23,10 @@ def test_the_report_speaks_of_the_lamp(record, tmp_path):
 
 
 def test_the_lamp_is_the_objective(record):
-    assert scene.objectives(record.config) == {"lamp": (0.0, 0.0)}
-    assert scene.radius(record.config) == record.config.light.goal
-    assert scene.finish(record.config, record.poses[0, 0]) == 20
+    shown = scene.picture(record.config)
+    assert shown.objectives == {"lamp": (0.0, 0.0)}
+    assert shown.radius == record.config.light.goal
+    assert tasks.of(record.config).finish(record.poses[0, 0]) == 20
 
 
 def test_readings_are_drawn_as_they_were_read(record):

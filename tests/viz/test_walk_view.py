@@ -66,9 +66,13 @@ def test_only_walking_robots_report_servos():
 
 @pytest.mark.parametrize("walks", [False, True])
 def test_a_recording_of_walking_shows_distances_and_no_wheels(walks):
-    from bns.viz import blueprint
+    from bns import presets
+    from bns.viz import blueprint, charts, scene
 
-    layout = blueprint.blueprint(1.0, 1.0, walks=walks)
+    config = presets.load("hexapod-walk" if walks else "khepera-simple")
+    shown_task = scene.picture(config)
+    titles = charts.chart_titles({}, shown_task)
+    layout = blueprint.blueprint(shown_task, charts=titles)
     shown = dict(_views(layout.root_container))
     assert ("/wheels" in shown) != walks
     title = shown["charts/fitness"]

@@ -137,7 +137,7 @@ BAD_TRIALS = {
     ),
     "two robots": ([TRIALS[0], trial(1, robot="other")], "Trial 1 has another robot"),
     "boundary outside": ([trial(0, boundaries=[0, 3, 6])], "outside the 6 samples"),
-    "not JSON": ([trial(0, conditions={"a": {1, 2}})], "cannot be written as JSON"),
+    "read as JSON": ([trial(0, conditions={"a": {1, 2}})], "cannot be written as JSON"),
 }
 
 
@@ -150,11 +150,11 @@ def test_bad_trials_are_not_written(case, tmp_path):
 
 
 def header(**changes):
-    """A change of the header; None removes a key."""
+    """A change of the header, as by hand; None removes a key."""
 
     def change(directory):
         file = directory / "dataset.json"
-        new = json.loads(file.read_text()) | changes
+        new = json.loads(file.read_text()) | {"sha256": None} | changes
         kept = {key: value for key, value in new.items() if value is not None}
         file.write_text(json.dumps(kept))
 
@@ -194,7 +194,7 @@ DAMAGED_FILES = {
     "no header": (lambda d: (d / "dataset.json").unlink(), "half-written"),
     "no table": (lambda d: (d / "commands.parquet").unlink(), "is missing"),
     "no directory": (shutil.rmtree, "no dataset"),
-    "half a header": (cut("dataset.json", 40), "not JSON"),
+    "half a header": (cut("dataset.json", 40), "read as JSON"),
     "half a table": (cut("trials.parquet", 300), "cannot be read as Parquet"),
     "foreign": (header(schema="lerobot"), "schema 'lerobot'"),
     "newer": (header(version=2), "version 2; this release reads 1"),

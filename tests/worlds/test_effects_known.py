@@ -6,7 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from bns import models
 from bns.errors import BnsError
+from bns.worlds.damage import Event
 from bns.worlds.effects import bodies, registry
 from bns.worlds.effects.base import ControlSignal, PoseSignal
 
@@ -105,6 +107,11 @@ class TestCommands:
         cut = apply("speed_saturation:limit=0.05", told)[:, 0]
         assert cut.tolist() == [0.01, -0.01, 0.05, -0.05, 0.05, -0.05]
 
+    def test_dead_zone_takes_its_speed_off(self):
+        told = control([0.01, -0.01, 0.05, -0.05, 0.2, -0.2])
+        left = apply("dead_zone:speed=0.03", told)[:, 0]
+        assert left == pytest.approx([0, 0, 0.02, -0.02, 0.17, -0.17])
+
 
 class TestActuators:
     def test_lag_has_done_63_per_cent_at_its_time_constant(self):
@@ -123,6 +130,28 @@ class TestActuators:
         got = apply("battery_sag:per_second=0.05,per_metre=1", told)
         assert got[0, 0] == 0.1
         assert got[-1, 0] == pytest.approx(0.1 * np.exp(-(0.05 * 2 + 1 * 0.2)))
+
+    def test_backlash_loses_its_play_at_each_reversal(self):
+        told = control(np.repeat([0.1, -0.1, 0.1], 200))  # 0.1 m each
+        made = apply("wheel_backlash:play=0.02", told)[:, 0]
+        ways = made.reshape(3, 200).sum(axis=1) * DT
+        assert ways == pytest.approx([0.09, -0.08, 0.08])
+        assert set(np.round(made, 9)) == {0.0, 0.1, -0.1}
+
+    def test_battery_fades_from_trial_to_trial(self):
+        event = Event.parse("battery_fade:per_trial=0.1@5")
+        assert event.at(4) == event.at(5) == ()
+        assert event.first_trial == 6
+        (active,) = event.at(8)
+        assert str(active.effect) == "battery_fade:per_trial=0.1,trials=3"
+        told = control(np.full(10, 0.2))
+        made = apply(str(active.effect), told)
+        assert made == pytest.approx(np.full((10, 2), 0.2 * np.exp(-0.3)))
+
+    def test_battery_is_charged_with_each_period(self):
+        event = Event.parse("battery_fade:per_trial=0.1@0%4/3")
+        trials = [[e.effect["trials"] for e in event.at(t)] for t in range(7)]
+        assert trials == [[], [1], [2], [], [], [1], [2]]
 
 
 class TestTracking:
@@ -165,8 +194,58 @@ class TestTracking:
         assert times - signal.times == pytest.approx(gained, abs=1e-12)
         assert (poses == signal.poses).all()
 
+    def test_a_marker_off_the_centre_goes_round_it(self):
+        turn = np.stack([np.zeros(7), np.zeros(7), np.linspace(0, np.pi, 7)], axis=1)
+        times = np.arange(7.0)
+        _, seen = apply(
+            "marker_mount:dx=0.02,dy=0,yaw=0.1", PoseSignal(times, turn, times, turn)
+        )
+        assert np.hypot(*seen[:, :2].T) == pytest.approx(0.02)
+        assert seen[0] == pytest.approx([0.02, 0, 0.1])
+        assert seen[3] == pytest.approx([0, 0.02, np.pi / 2 + 0.1])
+        assert seen[-1] == pytest.approx([-0.02, 0, np.pi + 0.1])
+
+    def test_a_shifted_camera_shifts_every_pose(self):
+        signal = straight_drive()
+        _, seen = apply("tracker_shift:dx=0.05,dy=-0.03", signal)
+        assert seen - signal.poses == pytest.approx(
+            np.tile([0.05, -0.03, 0], (len(seen), 1))
+        )
+
 
 class TestBodies:
+    def test_an_eccentric_wheel_drives_by_fits_and_starts(self):
+        spec, offset, phase = models.spec("khepera3"), 0.0002, 0.7
+        registry.make("wheel_eccentricity", offset=offset, phase=phase).edit(spec)
+        spec.option.timestep = 0.001  # a light wheel creeps, the less the finer
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+        data.ctrl[:] = 3.0  # [rad/s]
+        wheel, ratios, angles = data.joint("left_wheel"), [], []
+        for step in range(6000):
+            mujoco.mj_step(model, data)
+            if step < 1000:
+                continue
+            pitching = data.qvel[4]  # [rad/s] the base's frame is on the floor
+            axle = data.qvel[0] + RADIUS * pitching
+            ratios.append(axle / (wheel.qvel[0] + pitching))
+            angles.append(wheel.qpos[0] + phase)
+        wave = np.stack([np.ones_like(angles), np.sin(angles), np.cos(angles)], axis=1)
+        mean, rise, other = np.linalg.lstsq(wave, np.array(ratios), rcond=None)[0]
+        assert mean == pytest.approx(RADIUS, rel=1e-3)
+        assert rise == pytest.approx(offset, rel=0.05)
+        assert abs(other) < 0.05 * offset
+
+    def test_a_dragging_caster_costs_its_friction(self):
+        turning = [
+            driven(compiled(*texts)).joint("left_wheel_joint").qvel[0]
+            for texts in ([], ["caster_drag:friction=0.1"])
+        ]
+        load = 0.69 * 9.81 * 0.011 / 0.0449  # [N] on the caster
+        slower = 0.1 * load * RADIUS / (2 * KV)  # [rad/s]
+        assert turning[0] - turning[1] == pytest.approx(slower, rel=0.03)
+
     def test_wheel_diameter_moves_the_axle_with_the_radius(self):
         model = compiled("wheel_diameter:wheel=left,factor=1.1")
         wheel, geom = model.body("left_wheel"), model.geom("left_wheel_geom")

@@ -93,8 +93,8 @@ def test_imported_trials_can_be_written_as_a_dataset(log, column_map, tmp_path):
 
 
 BAD = {
-    "no file": (None, PLAIN, UNITS, FormatError, "cannot be read as CSV"),
-    "empty": ("", PLAIN, UNITS, FormatError, "cannot be read as CSV"),
+    "no file": (None, PLAIN, UNITS, FormatError, "cannot be read"),
+    "empty": ("", PLAIN, UNITS, FormatError, "cannot be read"),
     "no rows": (
         "stamp,px,py,heading\n",
         PLAIN,

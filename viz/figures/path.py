@@ -5,11 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from bns.experiment.record import RunRecord
-from bns.viz import scene, style
+from bns.tasks import registry as tasks
+from bns.tasks.base import BOARD as HALF
+from bns.viz import style
 from bns.viz.choices import Choice, choose, typical
 from bns.viz.paths import arcs, listed
 
-BOARD = np.array(scene.BOARD)
+BOARD = np.array(HALF)
 """m; beyond the board paths are cut"""
 
 _FORESEEN = {"color": style.BLACK, "linewidth": 1.3, "ls": (0, (3, 2))}
@@ -52,9 +54,11 @@ def path(
 def _objectives(axes, record: RunRecord) -> None:
     from matplotlib.patches import Circle
 
-    radius = scene.radius(record.config)
-    for name, (x, y) in scene.objectives(record.config).items():
-        axes.add_patch(Circle((x, y), radius, color=style.YELLOW, alpha=0.55, lw=0))
+    shown = tasks.of(record.config).picture
+    for name, (x, y) in shown.objectives.items():
+        axes.add_patch(
+            Circle((x, y), shown.radius, color=style.YELLOW, alpha=0.55, lw=0)
+        )
         axes.annotate(name, (x, y), ha="center", va="center", fontweight="bold")
 
 
@@ -67,13 +71,13 @@ def _paths(axes, record: RunRecord, at: tuple[int, int], colour: str) -> None:
         poses = listed(poses)
         if len(poses) < 2:
             continue
-        done = scene.finish(record.config, poses)
+        done = tasks.of(record.config).finish(poses)
         axes.plot(*arcs(poses[: done + 1])[:, :2].T, label=label, **line)
         if done + 1 < len(poses):
             axes.plot(*arcs(poses[done:])[:, :2].T, alpha=0.3, **line)
     real = listed(record.poses[at])
     if len(real):
-        end = real[scene.finish(record.config, real), :2]
+        end = real[tasks.of(record.config).finish(real), :2]
         axes.plot(*real[0, :2], "o", color=style.BLACK, markersize=5, label="start")
         axes.plot(*end, "s", color=colour, mec=style.BLACK, markersize=5, label="end")
 
@@ -83,12 +87,12 @@ def _until_done(record: RunRecord, at: tuple[int, int]) -> np.ndarray:
     poses = listed(record.poses[at])
     if len(poses) < 2:
         return np.zeros((1, 3))
-    return arcs(poses[: scene.finish(record.config, poses) + 1])
+    return arcs(poses[: tasks.of(record.config).finish(poses) + 1])
 
 
 def _limits(axes, record: RunRecord, shown) -> None:
     """The objectives and the paths, but nothing beyond the board."""
-    half = np.array(scene.extent(record.config))
+    half = np.array(tasks.of(record.config).picture.extent)
     paths = np.concatenate([_until_done(record, at)[:, :2] for at in shown])
     low = np.minimum(-half, np.maximum(paths.min(axis=0) - 0.05, -BOARD))
     high = np.maximum(half, np.minimum(paths.max(axis=0) + 0.05, BOARD))

@@ -19,7 +19,9 @@ def readings(record: RunRecord, *, replicate: int | None = None):
     replicate = typical(record) if replicate is None else replicate
     chosen = choose(record, replicate)
     real = record.extra["readings"][replicate]
-    foreseen = record.extra["readings_predicted"][replicate]
+    foreseen = np.full_like(real, np.nan)
+    if "readings_predicted" in record.extra:
+        foreseen = record.extra["readings_predicted"][replicate]
     with style.plotting() as figure_class:
         figure = figure_class(figsize=(7.0, 3.6), layout="constrained")
         panels = figure.subplots(

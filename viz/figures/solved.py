@@ -5,11 +5,12 @@ from collections.abc import Mapping
 from bns.experiment.record import RunRecord
 from bns.viz import style
 from bns.viz.figures import bands
+from bns.viz.scene import picture
 
 
 def solved(runs: Mapping[str, RunRecord]):
     """Left: objectives reached (median, middle half). Right: share of runs solving."""
-    from bns.viz.scene import order, walks
+    shown = [picture(record.config) for record in runs.values()]
 
     with style.plotting() as figure_class:
         figure = figure_class(figsize=style.WIDE, layout="constrained")
@@ -18,11 +19,10 @@ def solved(runs: Mapping[str, RunRecord]):
             bands.band(left, record["reached"], colour, label)
             share = 100 * record["solved"].mean(axis=0)
             right.plot(share, color=colour, label=label, drawstyle="steps-mid")
-        goals = max(len(order(record.config)) for record in runs.values())
+        goals = max(len(one.order) for one in shown)
         left.set_ylim(-0.15, goals + 0.15)
         left.set_yticks(range(goals + 1))
-        gait = any(walks(record.config) for record in runs.values())
-        left.set_title("Adequate gait" if gait else "Objectives reached", pad=14)
+        left.set_title(shown[0].reached, pad=14)
         right.set_ylim(-3, 103)
         right.set_ylabel("% of runs")
         right.set_title("Runs whose trial solved the task", pad=14)

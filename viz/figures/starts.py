@@ -3,6 +3,7 @@
 import numpy as np
 
 from bns.experiment.record import RunRecord
+from bns.tasks.base import BOARD
 from bns.viz import scene, style
 from bns.viz.choices import typical
 from bns.viz.paths import listed
@@ -25,9 +26,10 @@ def starts(record: RunRecord, *, replicate: int | None = None):
     with style.plotting() as figure_class:
         figure = figure_class(figsize=(7.0, 4.9), layout="constrained")
         axes = figure.subplots()
-        for x, y in scene.objectives(record.config).values():
+        shown_task = scene.picture(record.config)
+        for x, y in shown_task.objectives.values():
             ring = {"fill": False, "color": style.YELLOW, "linewidth": 3.0}
-            axes.add_patch(Circle((x, y), scene.radius(record.config), **ring))
+            axes.add_patch(Circle((x, y), shown_task.radius, **ring))
             axes.plot(x, y, "*", color=style.YELLOW, markersize=14)
         for number, trial in enumerate(shown):
             poses = listed(record.poses[replicate, trial])
@@ -37,7 +39,7 @@ def starts(record: RunRecord, *, replicate: int | None = None):
             axes.plot(*poses[0, :2], "o", color=style.BLACK, markersize=4)
             if record["lamp_stops"][replicate, trial] > 0:
                 axes.plot(*poses[-1, :2], "x", color=style.BLACK, markersize=7)
-        half = np.array(scene.BOARD)
+        half = np.array(BOARD)
         axes.set_xlim(-half[0], half[0])
         axes.set_ylim(-half[1], half[1])
         axes.set_aspect("equal", "box")

@@ -8,7 +8,7 @@ import numpy as np
 
 from bns.gap.models.base import GapModel
 from bns.gap.records import Diagnosis
-from bns.viz import series, style
+from bns.viz import rrd, series, style
 from bns.viz.blueprint import BACKGROUND, LIVE_TIMELINE
 from bns.viz.gap import scene
 from bns.viz.gap.figures import CORRECTED, NOMINAL
@@ -45,19 +45,17 @@ def write(
     stream.set_log_tick_enabled(False)
     planar = scene.planar(seen)
     length = starts[-1] + _length(seen.trials[chosen[-1]])
-    stream.save(str(path), default_blueprint=_layout(seen, planar, length))
-    stream.send_recording_name(f"gap of {found.model}: {found.verdict.kind}")
-    _styles(stream, seen)
-    if planar:
-        scene.log_static(stream, seen)
-    for number, start in zip(chosen, starts, strict=True):
-        _residuals(stream, seen, number, start)
-        _observed(stream, seen, number, start)
+    with rrd.saved(stream, path, _layout(seen, planar, length)):
+        stream.send_recording_name(f"gap of {found.model}: {found.verdict.kind}")
+        _styles(stream, seen)
         if planar:
-            scene.send(stream, seen, number, start)
-    stream.log("about", _about(found, chosen), static=True)
-    stream.flush()
-    stream.disconnect()
+            scene.log_static(stream, seen)
+        for number, start in zip(chosen, starts, strict=True):
+            _residuals(stream, seen, number, start)
+            _observed(stream, seen, number, start)
+            if planar:
+                scene.send(stream, seen, number, start)
+        stream.log("about", _about(found, chosen), static=True)
     return Path(path)
 
 

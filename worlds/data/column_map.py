@@ -20,7 +20,6 @@ which a diagnosis takes for a gap. Other names become further observed channels;
 their unit.
 """
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,6 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bns.errors import BnsError, FormatError, UnknownNameError
+from bns.storage import reading
 from bns.worlds.data import dataset_checks as checks
 from bns.worlds.trial import POSE, WHEEL_CHANNELS, Channel
 
@@ -102,10 +102,7 @@ class ColumnMap:
             FormatError: no such file, not TOML, or no table `columns`.
             BnsError: as `of`.
         """
-        try:
-            given = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise FormatError(f"Column map {path} cannot be read ({error}).") from None
+        given = reading.read_toml(path)
         for key in given:
             if key not in ("robot", "columns"):
                 raise UnknownNameError("key of a column map", key, ("robot", "columns"))

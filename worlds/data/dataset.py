@@ -14,6 +14,7 @@ A dataset is a directory with three files.
                       "trial", "world", "outcome" (flags and counters), "conditions",
                       "handled" (indices of commands in which somebody moved it)
     provenance        anything that says where the data come from
+    sha256            of all this (`bns.storage.seal`); may be left out
 
 `trials.parquet`, one row per sample, grouped by trial, in order of time:
 
@@ -33,19 +34,24 @@ All units are SI. Poses are (x, y, yaw) in the world frame, yaw continuous. A sa
 that the tracker lost has NaN in all of x, y and yaw; no other NaN is allowed. A robot
 on a stand has no pose, but other channels: there a lost sample is NaN in all. Hidden
 states (`Trial.truth`) are not kept. The same trials give the same bytes.
+
+The tables carry checksums of their pages and, as the key `sha256` of their metadata,
+one of all columns. What has none is read, with a warning. Poses are within 1,000 km and
+1e6 rad, commands within 1e6, and durations agree with the times of the samples.
 """
 
 import json
-import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from bns.errors import BnsError, FormatError
+from bns.storage import files, reading, seal
 from bns.worlds.data import dataset_checks as checks
 from bns.worlds.data import tables
 from bns.worlds.trial import Channel, Outcome, Trial
 
+HEAD = 256 << 20  # [bytes] of the header, which lists every trial
 SCHEMA, VERSION = "bns-dataset", 1
 HEADER, SAMPLES, COMMANDS = "dataset.json", "trials.parquet", "commands.parquet"
 
@@ -105,21 +111,16 @@ def write(
     checks.fit_together(trials, replicates)
     numbers = tables.numbers(replicates)
     header = _header(trials, replicates, numbers, provenance or {})
-    temporary = directory.with_name(f".{directory.name}.part")
-    try:
-        shutil.rmtree(temporary, ignore_errors=True)
+    samples = tables.of_samples(trials, replicates, numbers)
+    commands = tables.of_commands(trials, replicates, numbers)
+
+    def fill(temporary: Path) -> None:
         temporary.mkdir()
-        tables.write(
-            temporary / SAMPLES, tables.of_samples(trials, replicates, numbers)
-        )
-        tables.write(
-            temporary / COMMANDS, tables.of_commands(trials, replicates, numbers)
-        )
-        (temporary / HEADER).write_text(header, encoding="utf-8")
-        temporary.rename(directory)
-    except OSError as error:
-        shutil.rmtree(temporary, ignore_errors=True)
-        raise BnsError(f"{directory} cannot be written: {error.strerror}.") from error
+        tables.write(temporary / SAMPLES, samples)
+        tables.write(temporary / COMMANDS, commands)
+        files.write_text(temporary / HEADER, header)
+
+    files.replace(directory, fill)
     return directory
 
 
@@ -158,7 +159,9 @@ def _header(
         "provenance": dict(provenance),
     }
     try:
-        return json.dumps(header, indent=1, sort_keys=True, allow_nan=False) + "\n"
+        text = json.dumps(header, sort_keys=True, allow_nan=False)
+        sealed = seal.sealed(json.loads(text))
+        return json.dumps(sealed, indent=1, sort_keys=True) + "\n"
     except (TypeError, ValueError) as error:
         raise BnsError(
             f"Conditions or provenance cannot be written as JSON ({error}); give "
@@ -222,15 +225,11 @@ def read(directory: str | Path) -> Dataset:
 
 def _read_header(directory: Path) -> dict:
     path = directory / HEADER
-    if not path.is_file():
+    if not path.exists():
         raise FormatError(
             f"{directory} holds no {HEADER}: it is no dataset, or a half-written one."
         )
-    try:
-        header = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise FormatError(f"{path} is not JSON ({error}).") from None
-    given = header if isinstance(header, dict) else {}
+    given = reading.read_json(path, most=HEAD)
     if given.get("schema") != SCHEMA:
         raise FormatError(
             f"{path} has schema {given.get('schema')!r}, a dataset {SCHEMA!r}; bring "
@@ -244,4 +243,6 @@ def _read_header(directory: Path) -> dict:
         )
     if not isinstance(given.get("robot"), str):
         raise FormatError(f"{path} names no robot.")
-    return given
+    if not isinstance(given.get("provenance", {}), dict):
+        raise FormatError(f"{path}: provenance is no object.")
+    return seal.opened(given, path)

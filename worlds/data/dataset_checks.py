@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,14 @@ from bns.worlds.trial import (
 )
 
 UNITS = {channel.name: channel.unit for channel in (*POSE_CHANNELS, *WHEEL_CHANNELS)}
+FARTHEST = {"m": 1e6, "rad": 1e6}
+"""how far a pose may be from the origin, by unit"""
+
+STRONGEST = 1e6
+"""magnitude of a command, in its unit"""
+
+LONGEST = 1e9  # [s] a trial, 32 years
+APART = 1.0  # [s] by which commands may be longer or shorter than their samples say
 RESERVED = ("replicate", "trial", "time", "first", "last", "duration")
 
 
@@ -57,7 +66,8 @@ def valid(trial: Trial, where: str) -> None:
 
     Raises:
         FormatError: NaN outside lost samples, infinity, time that is not finite or
-            goes backwards, boundaries that are no samples.
+            goes backwards, boundaries that are no samples; poses, times or commands
+            beyond what they can be; commands that are not as long as their samples.
     """
     if not np.isfinite(trial.times).all():
         raise FormatError(f"{where}: a time is NaN or infinite.")
@@ -83,6 +93,41 @@ def valid(trial: Trial, where: str) -> None:
         raise FormatError(
             f"{where}: commands begin or end outside the {len(trial.times)} samples, "
             "or overlap."
+        )
+    plausible(trial, where)
+
+
+def plausible(trial: Trial, where: str) -> None:
+    """Stop at numbers that no robot can have made.
+
+    Raises:
+        FormatError: there is one.
+    """
+    if len(trial.times) and np.abs(trial.times).max() > LONGEST:
+        raise FormatError(f"{where}: a time is beyond {LONGEST:g} s; times are in s.")
+    for column, channel in enumerate(trial.channels):
+        most = FARTHEST.get(channel.unit) if channel.name in POSE else None
+        most = most or np.finfo(np.float32).max
+        seen = np.abs(trial.observed[:, column])
+        if np.nanmax(seen, initial=0.0) > most:
+            raise FormatError(
+                f"{where}: {channel.name} is {np.nanmax(seen):.3g} {channel.unit}, "
+                f"{most:g} is the most that is read; units are SI."
+            )
+    told = np.abs(trial.commands.values)
+    if told.max(initial=0.0) > STRONGEST:
+        raise FormatError(
+            f"{where}: a command is {told.max():.3g}, {STRONGEST:g} is the most that "
+            "is read; units are SI."
+        )
+    held = trial.times[trial.boundaries]
+    late = np.abs(np.diff(held) - trial.commands.durations)
+    longest = APART + 0.5 * trial.commands.durations
+    if (late > longest).any():
+        at = int(np.argmax(late - longest))
+        raise FormatError(
+            f"{where}: command {at} says {trial.commands.durations[at]:.4g} s, its "
+            f"samples {held[at + 1] - held[at]:.4g} s; times and durations are in s."
         )
 
 
@@ -125,7 +170,7 @@ def channels(header: dict, key: str, where: Path) -> tuple[Channel, ...]:
     """
     try:
         found = tuple(
-            Channel(str(item["name"]), str(item["unit"])) for item in header[key]
+            Channel(_text(item["name"]), _text(item["unit"])) for item in header[key]
         )
     except (KeyError, TypeError):
         raise FormatError(
@@ -135,6 +180,12 @@ def channels(header: dict, key: str, where: Path) -> tuple[Channel, ...]:
     if key == "channels":
         missing_pose(found, f"{where}: {key}")
     return found
+
+
+def _text(value: object) -> str:
+    if not isinstance(value, str):
+        raise TypeError("no text")
+    return value
 
 
 def rows(header: dict, samples: int, commands: int, where: Path) -> None:
@@ -157,11 +208,11 @@ def listed_trials(header: dict, where: Path) -> list[dict]:
     Raises:
         FormatError: they are missing or malformed.
     """
-    items = header.get("trials")
+    items: Any = header.get("trials")
     fine = isinstance(items, list) and all(
         isinstance(item, dict)
-        and isinstance(item.get("replicate"), int)
-        and isinstance(item.get("trial"), int)
+        and type(item.get("replicate")) is int
+        and type(item.get("trial")) is int
         and isinstance(item.get("conditions", {}), dict)
         for item in items
     )
@@ -172,7 +223,7 @@ def listed_trials(header: dict, where: Path) -> list[dict]:
     return items
 
 
-def flags(about: dict, where: Path) -> dict[str, bool | int]:
+def flags(about: dict, where: Path) -> dict[str, Any]:
     """Outcome flags and counters of a trial.
 
     Raises:
@@ -182,7 +233,7 @@ def flags(about: dict, where: Path) -> dict[str, bool | int]:
     known = Outcome._fields
     kinds = {name: type(value) for name, value in Outcome._field_defaults.items()}
     if not isinstance(given, dict) or not all(
-        name in known and type(value) is kinds[name] and value >= 0
+        name in known and type(value) is kinds[name] and 0 <= value <= LONGEST
         for name, value in given.items()
     ):
         raise FormatError(

@@ -6,13 +6,14 @@ headings are made continuous, empty or NaN poses are lost samples. What comes ou
 written with `bns.worlds.data.dataset.write`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from bns.errors import FormatError
+from bns.storage import csv_table
 from bns.worlds.data import dataset_checks as checks
 from bns.worlds.data.column_map import SPEEDS, ColumnMap, Source, factor
 from bns.worlds.data.mcap_log import STAMPS
@@ -48,9 +49,8 @@ def from_csv(
         BnsError: an unknown channel or unit.
     """
     found = _map(columns, units, robot)
-    table = _csv_columns(
-        Path(path), [s.column for s in found.columns.values()], delimiter
-    )
+    wanted = [source.column for source in found.columns.values()]
+    table = csv_table.read(path, wanted, delimiter=delimiter)
     named = {name: table[source.column] for name, source in found.columns.items()}
     return trials(named, found, where=str(path))
 
@@ -111,38 +111,6 @@ def _map(
     return ColumnMap.of(columns, units, robot)
 
 
-def _csv_columns(
-    path: Path, wanted: Sequence[str], delimiter: str
-) -> dict[str, np.ndarray]:
-    import pyarrow
-    from pyarrow import csv
-
-    try:
-        table = csv.read_csv(
-            path,
-            parse_options=csv.ParseOptions(delimiter=delimiter),
-            convert_options=csv.ConvertOptions(
-                include_columns=sorted(set(wanted)), include_missing_columns=False
-            ),
-        )
-    except KeyError as error:
-        raise FormatError(f"{path} lacks a column of the map: {error}.") from None
-    except (pyarrow.ArrowException, OSError) as error:
-        raise FormatError(f"{path} cannot be read as CSV ({error}).") from None
-    arrays = {}
-    for name in table.column_names:
-        column = table.column(name)
-        if not (
-            pyarrow.types.is_integer(column.type)
-            or pyarrow.types.is_floating(column.type)
-        ):
-            raise FormatError(
-                f"{path}: column {name!r} is {column.type}, it needs numbers."
-            )
-        arrays[name] = column.cast("float64").fill_null(np.nan).to_numpy()
-    return arrays
-
-
 def trials(
     named: Mapping[str, np.ndarray], columns: ColumnMap, *, where: str
 ) -> list[Trial]:
@@ -172,8 +140,9 @@ def trials(
 
 def _trial(si: Mapping[str, np.ndarray], columns: ColumnMap, where: str) -> Trial:
     times = si["time"] - si["time"][0]
-    if not np.isfinite(times).all() or (np.diff(times) < 0).any():
-        row = int(np.flatnonzero(~(np.diff(times, prepend=-np.inf) >= 0))[0])
+    wrong = ~np.isfinite(times) | (np.diff(times, prepend=times[0]) < 0)
+    if wrong.any():
+        row = int(np.argmax(wrong))
         raise FormatError(
             f"{where}: time is missing or goes backwards at sample {row}; sort the "
             "samples by time."

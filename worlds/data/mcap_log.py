@@ -1,6 +1,5 @@
 """Samples of named fields from an MCAP log."""
 
-import json
 import struct
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -9,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from bns.errors import BnsError, FormatError, MissingDependencyError
+from bns.storage import reading
 
-_BROKEN = (OSError, EOFError, struct.error, json.JSONDecodeError, UnicodeDecodeError)
 STAMPS = ("log_time", "publish_time")  # [ns], of the message itself
 
 
@@ -87,25 +86,54 @@ def _messages(path: Path, topics: set[str]) -> dict[str, list]:
     found: dict[str, list] = {topic: [] for topic in topics}
     decoders: dict[int, Callable[[bytes], Any]] = {}
     try:
-        with path.open("rb") as file:
-            log = make_reader(file).iter_messages(topics=sorted(topics))
+        with reading.regular(path) as file:
+            reader = make_reader(file, validate_crcs=True)
+            _small(reader.get_summary(), path)
+            log = reader.iter_messages(topics=sorted(topics))
             for schema, channel, message in log:
                 if channel.id not in decoders:
                     decoders[channel.id] = _decoder(schema, channel)
                 stamps = (message.log_time, message.publish_time)
                 value = decoders[channel.id](message.data)
                 found[channel.topic].append((stamps, value))
-    except (*_BROKEN, McapError) as error:
-        raise FormatError(f"{path} cannot be read as MCAP ({error}).") from None
+    except BnsError:
+        raise
+    except (*_broken(), McapError) as error:
+        raise FormatError(f"{path} cannot be read as MCAP: {error}.") from error
     for topic, log in found.items():
         if not log:
             raise FormatError(f"{path} has no message on the topic {topic!r}.")
     return found
 
 
+def _broken() -> tuple[type[Exception], ...]:
+    """What damaged records, and chunks in their compressions, raise."""
+    broken = (*reading.UNREADABLE, struct.error)
+    try:
+        from zstandard import ZstdError
+    except ImportError:
+        return broken
+    return (*broken, ZstdError)
+
+
+def _small(summary: Any, path: Path) -> None:
+    """Stop at a log whose chunks claim too much.
+
+    Raises:
+        FormatError: they do.
+    """
+    chunks = summary.chunk_indexes if summary else ()
+    claimed = sum(chunk.uncompressed_size for chunk in chunks)
+    if claimed > reading.DATA:
+        raise FormatError(
+            f"{path} claims {reading.size(claimed)}, {reading.size(reading.DATA)} is "
+            "the most that is unpacked."
+        )
+
+
 def _decoder(schema: Any, channel: Any) -> Callable[[bytes], Any]:
     if channel.message_encoding == "json":
-        return json.loads
+        return lambda data: reading.json(data, f"A message on {channel.topic}")
     try:
         from mcap_ros2.decoder import DecoderFactory
     except ImportError:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from bns.errors import BnsError, FormatError
+from bns.storage import parquet
 from bns.worlds.trial import Channel, Commands, Trial
 
 Table = dict[str, np.ndarray]
@@ -63,15 +64,15 @@ def of_commands(
 
 
 def write(path: Path, table: Table) -> None:
-    """Write columns to a Parquet file, always the same bytes."""
-    import pyarrow
-    from pyarrow import parquet
+    """Write columns to a Parquet file, always the same bytes.
 
+    Raises:
+        StorageError: no space, or no permission.
+    """
     columns = {name: np.ascontiguousarray(column) for name, column in table.items()}
-    parquet.write_table(
-        pyarrow.table(columns),
+    parquet.write(
         path,
-        compression="zstd",
+        columns,
         use_dictionary=False,
         column_encoding={
             name: "BYTE_STREAM_SPLIT"
@@ -91,32 +92,13 @@ def read(path: Path, keys: dict[str, str], channels: Sequence[Channel]) -> Table
         channels: with one column of doubles each.
 
     Raises:
-        FormatError: no such file, not Parquet, a column missing or of another type.
+        FormatError: no such file, not Parquet, damaged, a column missing, twice or of
+            another type.
     """
-    import pyarrow
-    from pyarrow import parquet
-
-    if not path.is_file():
+    if not path.exists():
         raise FormatError(f"{path} is missing; the dataset is half-written.")
-    try:
-        table = parquet.read_table(path)
-    except (pyarrow.ArrowException, OSError) as error:
-        raise FormatError(f"{path} cannot be read as Parquet ({error}).") from None
     wanted = keys | {channel.name: "double" for channel in channels}
-    missing = [name for name in wanted if name not in table.column_names]
-    if missing:
-        raise FormatError(
-            f"{path} lacks the columns {', '.join(missing)}; it has "
-            f"{', '.join(table.column_names)}."
-        )
-    for name, kind in wanted.items():
-        column = table.column(name)
-        if str(column.type) != kind or column.null_count:
-            raise FormatError(
-                f"{path}: column {name!r} is {column.type} with {column.null_count} "
-                f"nulls, it needs {kind} without."
-            )
-    return {name: table.column(name).to_numpy() for name in wanted}
+    return parquet.numbers(parquet.read(path), wanted, path)
 
 
 def split(

@@ -15,7 +15,7 @@ An effect is a class in a file of one of the folders here; `registry` finds it b
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -32,6 +32,7 @@ __all__ = [
     "CommandEffect",
     "ControlSignal",
     "Effect",
+    "ModelEdit",
     "OpticsEffect",
     "Parameter",
     "PoseSignal",
@@ -68,7 +69,8 @@ class Effect(ABC):
 
     def __init__(self, values: Mapping[str, Any] | None = None):
         given = dict(values or {})
-        known = {item.name: item for item in (*self.parameters, *self.choices)}
+        known = [item.name for item in self.parameters]
+        known += [item.name for item in self.choices]
         for name in given:
             if name not in known:
                 raise UnknownNameError(f"parameter of {self.name}", name, known)
@@ -84,7 +86,9 @@ class Effect(ABC):
         return self.values[name]
 
     def __eq__(self, other: object) -> bool:
-        return type(self) is type(other) and self.values == other.values  # type: ignore[attr-defined]
+        if not isinstance(other, Effect) or type(self) is not type(other):
+            return False
+        return self.values == other.values
 
     def __hash__(self) -> int:
         return hash((self.name, tuple(self.values.items())))
@@ -228,6 +232,10 @@ class ServoEffect(Effect):
         for actuator in chosen(spec, self["servo"]):
             law, powered = servo_joint.read(actuator)
             servo_joint.write(spec, actuator, self.change(law), powered)
+
+
+ModelEdit: TypeAlias = BodyEffect | ServoEffect
+"""What is written into a model before compilation."""
 
 
 class OpticsEffect(Effect):

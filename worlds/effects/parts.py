@@ -108,16 +108,18 @@ def in_file(spec: Any, joint: Any, value: float) -> float:
     return float(np.rad2deg(value)) if hinge and spec.compiler.degree else value
 
 
-def loosen(spec: Any, joint: Any, play: float, **soft: float) -> None:
+def loosen(
+    spec: Any, joint: Any, play: float, soft: tuple[float, float] | None = None
+) -> None:
     """Put play behind a joint, as a joint of its own with stops; more if it has some.
 
     Args:
         spec: a `mujoco.MjSpec`.
         joint: of it.
         play: full [rad or m].
-        soft: `armature` and `damping` in the play, so that it can be computed; by
-            default a thousandth of the inertia that the joint moves, and as much
-            damping as stops it within ten milliseconds.
+        soft: inertia and damping in the play, so that it can be computed; by default a
+            thousandth of the inertia that the joint moves, as much damping as stops
+            that within ten milliseconds, and stops as hard as the step allows.
     """
     half = in_file(spec, joint, play / 2)
     name = f"{joint.name}_play"
@@ -127,16 +129,19 @@ def loosen(spec: Any, joint: Any, play: float, **soft: float) -> None:
         return
     model = spec.copy().compile()
     inertia = 1e-3 * float(model.dof_M0[model.joint(joint.name).dofadr[0]])
-    joint.parent.add_joint(
+    armature, damping = soft or (inertia, inertia / 0.01)
+    made = joint.parent.add_joint(
         name=name,
         type=joint.type,
         axis=joint.axis,
         pos=joint.pos,
         range=[-half, half],
         limited=True,
-        armature=soft.get("armature", inertia),
-        damping=[soft.get("damping", inertia / 0.01), 0.0, 0.0],
+        armature=armature,
+        damping=[damping, 0.0, 0.0],
     )
+    if soft is None:
+        made.solref_limit = [2 * spec.option.timestep, 1.0]
     _make_room(spec, model, joint.name)
 
 

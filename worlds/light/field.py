@@ -43,7 +43,7 @@ class Lamp:
     flicker_depth: float = 0.0
     flicker_frequency: float = 100.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for item in fields(self):
             low, high, unit = _BOUNDS[item.name]
             value = bounded(
@@ -73,7 +73,7 @@ class LightField:
     lamps: tuple[Lamp, ...] = field(default_factory=lambda: (Lamp(),))
     ambient: float = 0.02
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         lamps = (self.lamps,) if isinstance(self.lamps, Lamp) else tuple(self.lamps)
         if not lamps or not all(isinstance(lamp, Lamp) for lamp in lamps):
             raise BnsError(

@@ -18,7 +18,7 @@ saturated sensor repeats itself; `noise` scales both noises. `sensitivity` scale
 light on a sensor.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -139,6 +139,6 @@ def _shadow(law: Law, poses: np.ndarray) -> np.ndarray:
     return np.where(inside, law["shadow_transmission"][..., None, None], 1.0)
 
 
-def stacked(laws: list[Law]) -> dict[str, np.ndarray]:
+def stacked(laws: Sequence[Law]) -> dict[str, np.ndarray]:
     """The laws of several robots as one, with a leading robot axis."""
     return {name: np.stack([law[name] for law in laws]) for name in laws[0]}

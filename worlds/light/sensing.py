@@ -171,6 +171,6 @@ class Changes:
         """
         for item, rng, begin in self._effects:
             rng.bit_generator.state = begin
-            effect: SensorEffect = item.effect  # type: ignore[assignment]
+            effect: SensorEffect = item.effect
             readings = effect.apply(times, readings, names, item.active(times), rng)
         return readings[-1]

@@ -9,13 +9,14 @@ for one of the user's they are cast when it is first used.
 import json
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
 from bns import models
-from bns.errors import BnsError
+from bns.errors import BnsError, FormatError
 from bns.models import light_sites
+from bns.storage import files, reading
+from bns.storage.numbers import Finite
 
 FILE = "sight.json"
 ELEVATIONS = np.radians(np.arange(0, 90, 10))
@@ -63,7 +64,8 @@ def kept(robot: str, names: tuple[str, ...]) -> BodySight:
     """
     file = models.path(robot) / FILE
     if file.is_file():
-        known = json.loads(file.read_text(encoding="utf-8"))
+        kind = dict[str, list[tuple[Finite, Finite]]]
+        known = reading.typed(reading.read_json(file), kind, file)
     else:
         known = cast(robot)
     missing = [name for name in names if name not in known]
@@ -72,6 +74,9 @@ def kept(robot: str, names: tuple[str, ...]) -> BodySight:
             f"Robot {robot!r} has no kept sight for {', '.join(missing)}; "
             f"cast it anew (python -m bns.worlds.light.sight) or delete {file}."
         )
+    rows = {name: len(known[name]) for name in names}
+    if set(rows.values()) - {len(ELEVATIONS)}:
+        raise FormatError(f"{file}: sensors need {len(ELEVATIONS)} pairs each.")
     degrees = np.array([known[name] for name in names], dtype=np.float64)
     return BodySight(np.radians(degrees[..., 0]), np.radians(degrees[..., 1]))
 
@@ -154,7 +159,7 @@ def main() -> None:
                 for name, stretches in cast(robot).items()
             )
             text = "{\n" + ",\n".join(rows) + "\n}\n"
-            Path(models.path(robot) / FILE).write_text(text, encoding="utf-8")
+            files.write_text(models.path(robot) / FILE, text)
 
 
 if __name__ == "__main__":

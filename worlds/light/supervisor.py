@@ -58,7 +58,7 @@ class Supervisor:
     at_lamp: str = "stop"
     edge: float = 0.08
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         bounded("safety boundary", self.safety, 0.0, 10.0, "m")
         bounded("edge margin", self.edge, -100.0, 10.0, "m")
         if self.at_lamp not in ("stop", "turn"):
@@ -89,7 +89,7 @@ class Supervisor:
         if not (depth > 0).any():
             return {}
         deeper = (depth[:, 1:] > 0) & (depth[:, 1:] - depth[:, :-1] > DEEPER)
-        robots = deeper.any(axis=(1, 2)).nonzero()[0].tolist()
+        robots = np.flatnonzero(deeper.any(axis=(1, 2))).tolist()
         return {robot: self._first(deeper[robot]) for robot in robots}
 
     def _first(self, deeper: np.ndarray) -> Call:

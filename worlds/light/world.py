@@ -4,12 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import cached_property
 from math import inf
+from typing import Unpack
 
 import numpy as np
 
 from bns import seeding
 from bns.errors import BnsError
-from bns.worlds import given, objects
+from bns.worlds import checks, objects
 from bns.worlds.active import Placed, Stages
 from bns.worlds.damage import Damage
 from bns.worlds.light import sensors as light_sensors
@@ -21,6 +22,7 @@ from bns.worlds.objects import Objects, Post, RayScreen
 from bns.worlds.physics import observe
 from bns.worlds.physics.rollout import Motion
 from bns.worlds.physics.wheeled_world import MujocoWorld, Plan
+from bns.worlds.physics.world import Settings
 from bns.worlds.trial import Trial
 
 
@@ -39,8 +41,8 @@ class LightWorld(MujocoWorld):
         singles: whether trials have each single sensor beside the virtual two.
         supervisor: what happens at the lamp and at the edge, as `Supervisor` or as a
             table with its fields.
-        damage, reality, sample_dt, threads, start, arena, name, truth: those of
-            `MujocoWorld`; `start` is that of `run`.
+        name: of the world in the trials.
+        settings: those of `MujocoWorld`; `start` is that of `run`.
 
     Raises:
         BnsError: no lamp, a robot without light sensors.
@@ -58,35 +60,19 @@ class LightWorld(MujocoWorld):
         sensors: str = "",
         singles: bool = False,
         supervisor: Supervisor | Mapping | None = None,
-        damage: Damage | Sequence = (),
-        reality: Damage | Sequence = (),
-        sample_dt: float = 0.1,
-        threads: int = 2,
-        start: Sequence[float] = (0.0, 0.0, 0.0),
-        arena: Sequence[float] = (2.7, 1.8),
         name: str = "light",
-        truth: bool = False,
+        **settings: Unpack[Settings],
     ):
-        super().__init__(
-            robot,
-            damage=damage,
-            reality=reality,
-            sample_dt=sample_dt,
-            threads=threads,
-            start=start,
-            arena=arena,
-            name=name,
-            truth=truth,
-        )
-        self.field = LightField(given.several(Lamp, "lamp", lights), ambient)
-        self.posts = given.several(Post, "object", posts)
+        super().__init__(robot, name=name, **settings)
+        self.field = LightField(checks.several(Lamp, "lamp", lights), ambient)
+        self.posts = checks.several(Post, "object", posts)
         self.sensors = light_sensors.of(robot, sensors)
         self.radius = self.sensors.radius
         objects.checked(self.posts, self._places, np.zeros((0, 2)), self.radius)
         self._screen = RayScreen(self.posts) if self.posts else None
         self.singles = singles
         told = {} if supervisor is None else supervisor
-        self.supervisor = given.one(Supervisor, "supervisor", told)
+        self.supervisor = checks.one(Supervisor, "supervisor", told)
 
     def _refuse(self, damage: Damage) -> None:
         light_sensors.refuse_absent(damage, self.robot)

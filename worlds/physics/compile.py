@@ -7,8 +7,9 @@ import mujoco
 import numpy as np
 
 from bns import models
+from bns.models import mjcf
 from bns.worlds.active import Placed
-from bns.worlds.effects.base import BodyEffect
+from bns.worlds.effects.base import ModelEdit
 from bns.worlds.physics import control, servo_joint
 from bns.worlds.physics.rollout import STATE, Compiled, Job, Segment, run
 
@@ -20,7 +21,7 @@ SETTLE = 0.5  # [s] at rest before a trial, so that it starts without a bounce; 
 
 
 @lru_cache(maxsize=256)
-def compiled(robot: str, effects: tuple[BodyEffect, ...] = ()) -> Compiled:
+def compiled(robot: str, effects: tuple[ModelEdit, ...] = ()) -> Compiled:
     """The robot's scene with the effects written into it.
 
     Args:
@@ -33,7 +34,7 @@ def compiled(robot: str, effects: tuple[BodyEffect, ...] = ()) -> Compiled:
         effect.edit(spec)
     if spec.memory < 0:  # not said in the model
         spec.memory = ARENA
-    return Compiled(spec.compile())
+    return Compiled(mjcf.compiled(spec, f"the model of {robot}"))
 
 
 @lru_cache(maxsize=256)
@@ -86,7 +87,7 @@ def free_joint(model: mujoco.MjModel) -> slice:
 
 
 def segments(
-    robot: str, effects: tuple[Placed, ...], values: np.ndarray, dt: float
+    robot: str, effects: tuple[Placed[ModelEdit], ...], values: np.ndarray, dt: float
 ) -> tuple[Segment, ...]:
     """The trial cut where a body effect starts or stops.
 
@@ -108,7 +109,9 @@ def segments(
     )
 
 
-def _held(effects: tuple[Placed, ...], step: int, dt: float) -> tuple[BodyEffect, ...]:
+def _held(
+    effects: tuple[Placed[ModelEdit], ...], step: int, dt: float
+) -> tuple[ModelEdit, ...]:
     """The effects that hold from a physics step on."""
     return tuple(
         item.effect

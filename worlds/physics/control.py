@@ -6,15 +6,18 @@ import numpy as np
 
 from bns.errors import BnsError, OutOfBoundsError
 from bns.worlds.active import Placed
-from bns.worlds.effects.base import ControlSignal
-from bns.worlds.trial import Channel, Commands
+from bns.worlds.effects.base import CommandEffect, ControlSignal
+from bns.worlds.trial import Commands
 
 _ROUNDING = 1 + 1e-9  # by which a value may exceed its limit
 LONGEST = 3600.0  # [s] a trial; assumed: longer ones are slips of a unit
 
 
 def check(
-    commands: Commands, channels: Sequence[Channel], limits: np.ndarray, robot: str
+    commands: Commands,
+    channels: Sequence[tuple[str, str]],
+    limits: np.ndarray,
+    robot: str,
 ) -> None:
     """Stop if a robot cannot be told these commands.
 
@@ -46,16 +49,13 @@ def check(
     beyond = np.argwhere((commands.values < low) | (commands.values > high))
     if len(beyond):
         row, column = beyond[0]
-        ends = limits[column] if limits.ndim == 2 else (-limits[column], limits[column])
-        raise OutOfBoundsError(
-            f"command {row}: {channels[column].name}",
-            commands.values[row, column],
-            *ends,
-            channels[column].unit,
-        )
+        name, unit = channels[column]
+        limit, given = limits[column], commands.values[row, column]
+        least, most = limit if limits.ndim == 2 else (-limit, limit)
+        raise OutOfBoundsError(f"command {row}: {name}", given, least, most, unit)
 
 
-def _listed(channels: Sequence[Channel]) -> str:
+def _listed(channels: Sequence[tuple[str, str]]) -> str:
     return ", ".join(f"{name} [{unit}]" for name, unit in channels)
 
 
@@ -83,7 +83,10 @@ def signal(commands: Commands, counts: np.ndarray, dt: float) -> ControlSignal:
 
 
 def disturbed(
-    given: ControlSignal, effects: Sequence[Placed], seed: int, trial: int
+    given: ControlSignal,
+    effects: Sequence[Placed[CommandEffect]],
+    seed: int,
+    trial: int,
 ) -> np.ndarray:
     """The signal's values after the command and actuator effects, ``(S, C)``."""
     for placed in effects:

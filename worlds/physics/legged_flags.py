@@ -1,10 +1,14 @@
 """What happened to a walking robot in a trial, beside where it went."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from bns.models.ax12a import HOTTEST
 from bns.worlds.physics import observe
 from bns.worlds.trial import Outcome
+
+Laws = Mapping[str, np.ndarray]
 
 SATURATED = 0.98  # share of the torque limit that counts as all of it; assumed
 OVERLOAD_TIME = 1.0  # [s] at the limit until the servo gives up; assumed
@@ -70,13 +74,13 @@ def lies(free: np.ndarray, carried: np.ndarray) -> bool:
     return bool((heights < LYING).any())
 
 
-def _duty(goals, angles, laws) -> np.ndarray:
+def _duty(goals: np.ndarray, angles: np.ndarray, laws: Laws) -> np.ndarray:
     """Share of the supply on each motor, shape ``(S, C)``."""
     wanted = laws["gain"] * laws["error_gain"] * (goals - angles)
     return np.clip(wanted, -laws["duty_limit"], laws["duty_limit"]) * laws["powered"]
 
 
-def _heated(duty, speeds, laws, dt: float) -> np.ndarray:
+def _heated(duty: np.ndarray, speeds: np.ndarray, laws: Laws, dt: float) -> np.ndarray:
     """Servos' temperatures at the end if none is given off, shape ``(C,)`` [deg C]."""
     driving = duty * laws["voltage"] - laws["torque_constant"] * speeds * (duty != 0)
     heat = np.nansum(driving**2, axis=0) / laws["resistance"] * dt  # [J]

@@ -173,12 +173,12 @@ def job(
     _refuse_other_sizes(segments)
     laws, before, goals = servos(first).laws, home, []
     home = legged_goals.shaped(home[None], laws, home, dt)[0]
-    for compiled, told in segments:
+    for compiled, stretch in segments:
         laws = servos(compiled).laws
-        goals.append(legged_goals.shaped(told, laws, before, dt))
-        before = told[-1]
+        goals.append(legged_goals.shaped(stretch, laws, before, dt))
+        before = stretch[-1]
     ramps = legged_goals.ramps(np.concatenate(goals), home, speed * dt)
-    cuts = np.cumsum([len(told) for _, told in segments])
+    cuts = np.cumsum([len(stretch) for _, stretch in segments])
     pieces = _pieces(segments, cuts, ramps, counts, limits)
     begin = stand(first, start, (home + 0.0).tobytes())  # -0 stands as 0 does
     return WalkJob(begin, pieces), servos(segments[-1].compiled)
@@ -204,7 +204,13 @@ def _refuse_other_sizes(segments: Sequence[Segment]) -> None:
         )
 
 
-def _pieces(segments, cuts, ramps, counts, limits) -> tuple[Piece, ...]:
+def _pieces(
+    segments: Sequence[Segment],
+    cuts: np.ndarray,
+    ramps: np.ndarray,
+    counts: np.ndarray,
+    limits: np.ndarray,
+) -> tuple[Piece, ...]:
     """The trial cut where commands end and where the model changes."""
     ends = np.cumsum(counts)
     pieces, begun = [], 0

@@ -83,7 +83,13 @@ class _Course:
         self._roller = Rollout()
         self._warm: np.ndarray | None = None
 
-    def go(self, model: mujoco.MjModel, data: mujoco.MjData, control, count) -> None:
+    def go(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        control: np.ndarray,
+        count: int,
+    ) -> None:
         """Roll out a stretch; nothing but NaN once the physics has diverged."""
         at, end = self.steps, self.steps + count
         self.control[at:end] = control
@@ -141,7 +147,7 @@ def walk(job: WalkJob) -> Walk:
     return Walk(
         states=course.states[: steps + 1],
         control=course.control[:steps],
-        touched=course.touched[:steps].any(axis=1),
+        touched=np.asarray(course.touched[:steps].any(axis=1)),
         counts=np.array(counts, np.int64),
         rested=np.array(rested, bool),
         diverged=course.diverged,
@@ -149,7 +155,9 @@ def walk(job: WalkJob) -> Walk:
     )
 
 
-def _waited(course: _Course, model, data, end: int) -> bool:
+def _waited(
+    course: _Course, model: mujoco.MjModel, data: mujoco.MjData, end: int
+) -> bool:
     """Go on with the last goals until the robot rests, or a step; whether it rests."""
     dt, first = model.opt.timestep, 1 + model.nq
     look, more = max(round(LOOK / dt), 1), max(round(PIECE / dt), 1)

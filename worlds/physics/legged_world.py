@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
+from typing import NamedTuple, Unpack
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from bns.worlds.physics import control, legged_flags, legged_plan, observe
 from bns.worlds.physics.legged_goals import in_units
 from bns.worlds.physics.legged_plan import Servos
 from bns.worlds.physics.legged_rollout import Walk, WalkJob, walk
-from bns.worlds.physics.world import PhysicsWorld
+from bns.worlds.physics.world import PhysicsWorld, Settings
 from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Trial
 
 STAGES = ("command", "actuator", "body", "sensor", "tracking")
@@ -48,8 +48,9 @@ class HexapodWorld(PhysicsWorld[Plan]):
     Args:
         robot: name of the robot model, see `bns robots`.
         speed: moving speed of the servos [rad/s].
-        threads: of the physics.
-        damage, reality, sample_dt, start, arena, name, truth: see `PhysicsWorld`.
+        name: of the world in the trials.
+        settings: damage, reality, sample_dt, threads, start, arena, truth, see
+            `Settings`.
 
     Raises:
         UnknownNameError: no such robot or effect.
@@ -64,33 +65,18 @@ class HexapodWorld(PhysicsWorld[Plan]):
         self,
         robot: str = "phantomx",
         *,
-        damage: Damage | Sequence = (),
-        reality: Damage | Sequence = (),
         speed: float = SPEED,
-        sample_dt: float = 0.1,
-        threads: int = 2,
-        start: Sequence[float] = (0.0, 0.0, 0.0),
-        arena: Sequence[float] = (2.7, 1.8),
         name: str = "hexapod",
-        truth: bool = False,
+        **settings: Unpack[Settings],
     ):
-        super().__init__(
-            robot,
-            of_kind("legged", models.robot(robot)),
-            damage=damage,
-            reality=reality,
-            sample_dt=sample_dt,
-            start=start,
-            arena=arena,
-            name=name,
-            truth=truth,
-        )
+        model = of_kind("legged", models.robot(robot))
+        super().__init__(robot, model, name=name, **settings)
         self._ranges = self.model.ranges
         readings = (Channel(f"{c.name}_position", c.unit) for c in self.model.commands)
         self.channels = (*POSE_CHANNELS, *readings)
         self.speed = bounded("speed", speed, 0.01, 100.0, "rad/s")
-        threads = int(bounded("threads", threads, 1, 1024, "1"))
-        self._threads = ThreadPoolExecutor(threads) if threads > 1 else None
+        several = self.threads > 1
+        self._threads = ThreadPoolExecutor(self.threads) if several else None
         legged_plan.refuse_fallen(robot, self.reality, self.start, self._channels)
 
     @property

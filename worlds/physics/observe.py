@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bns.worlds.active import Placed
-from bns.worlds.effects.base import PoseSignal
+from bns.worlds.effects.base import PoseSignal, TrackingEffect
 from bns.worlds.trial import Outcome
 
 FALLEN = np.deg2rad(30.0)  # tilt at which a robot counts as fallen; assumed
@@ -76,7 +76,7 @@ def watched(
     sampled: np.ndarray,
     *,
     dt: float,
-    effects: Sequence[Placed],
+    effects: Sequence[Placed[TrackingEffect]],
     seed: int,
     trial: int,
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -101,7 +101,7 @@ def tracked(
     times: np.ndarray,
     fine_poses: np.ndarray,
     fine_times: np.ndarray,
-    effects: Sequence[Placed],
+    effects: Sequence[Placed[TrackingEffect]],
     seed: int,
     trial: int,
 ) -> tuple[np.ndarray, np.ndarray]:

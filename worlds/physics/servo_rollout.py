@@ -35,7 +35,7 @@ class Drive:
     dt: float = DT
     every: int = 5
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         runs, steps = np.shape(self.goals)
         if np.shape(self.start) != (runs,) or np.shape(self.speed) != (runs,):
             raise BnsError(f"Drive needs a start and a speed for each of {runs} runs.")
@@ -164,7 +164,14 @@ class _State:
             motor, brake = motor * self.on[step], brake * self.on[step]
         return motor, brake
 
-    def _moved(self, speed, motor, brake, load, inertia) -> np.ndarray:
+    def _moved(
+        self,
+        speed: np.ndarray,
+        motor: np.ndarray,
+        brake: np.ndarray,
+        load: np.ndarray,
+        inertia: np.ndarray,
+    ) -> np.ndarray:
         """Speed after a step under motor, load and friction."""
         law, fast = self.law, np.abs(speed)
         budget = law["coulomb"] + law["viscous"] * fast
@@ -179,7 +186,9 @@ class _State:
         limit = self.dt * budget
         return (free - np.clip(free, -limit, limit)) / felt
 
-    def _with_play(self, motor, brake, load) -> None:
+    def _with_play(
+        self, motor: np.ndarray, brake: np.ndarray, load: np.ndarray
+    ) -> None:
         """One step with a gap between gears and lever; they meet without a bounce."""
         half, law, dt = self.law["backlash"] / 2, self.law, self.dt
         rotor = np.maximum(law["armature"], 1e-5)

@@ -15,7 +15,7 @@ from bns.worlds.light.sensing import LEAD, Sensing
 from bns.worlds.light.supervisor import PERIOD, Call, Supervisor
 from bns.worlds.physics import compile, observe
 from bns.worlds.physics.loop_control import LoopControl
-from bns.worlds.physics.rollout import Job, Motion, Pool
+from bns.worlds.physics.rollout import Job, Motion, Pool, Segment
 from bns.worlds.trial import Channel
 
 
@@ -51,7 +51,7 @@ class Setting:
     supervisor: Supervisor | None = None
     lamps: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         bounded("cycle", self.cycle, self.dt, 60.0, "s")
         bounded("cycles", self.cycles, 1, 1e6, "1")
 
@@ -118,12 +118,13 @@ class Session:
         every = max(round(PERIOD / setting.dt), 1)
         self._looks = np.append(np.arange(0, steps, every), steps)
         self._warm: list[np.ndarray | None] = [None] * n
-        self._turning = {}
+        self._turning: dict[int, np.random.Generator] = {}
         self.commands = np.zeros((n, cycles, len(setting.channels)))
         self.handled = np.zeros((n, cycles), bool)
         self.turns, self.stops = np.zeros(n, int), np.zeros(n, int)
         self.stopped, self.diverged = np.zeros(n, bool), np.zeros(n, bool)
-        self.cycle, self.segments = 0, {}
+        self.cycle = 0
+        self.segments: dict[int, tuple[Segment, ...]] = {}
         self.readings = self._read(np.ones(n, bool))
 
     def step(self, commands: object) -> np.ndarray:
@@ -197,7 +198,7 @@ class Session:
         for robot, call in calls.items():
             if not self.stopped[robot]:
                 self._hold(robot, begin + self._looks[call.look])
-                self._handle(robot, call)
+                self._handle(robot, call, setting.supervisor)
                 moved[robot] = not self.stopped[robot]
         return moved
 
@@ -208,10 +209,10 @@ class Session:
         states[:, self._speeds] = 0.0
         self._warm[robot] = None
 
-    def _handle(self, robot: int, call: Call) -> None:
+    def _handle(self, robot: int, call: Call, supervisor: Supervisor) -> None:
         """A robot that was stopped is turned, or left where it stands."""
         self.handled[robot, self.cycle - 1] = True
-        supervisor, lamp = self.setting.supervisor, None
+        lamp = None
         if call.reason == "lamp":
             lamp = self.setting.lamps[call.lamp]
             self.stops[robot] += 1

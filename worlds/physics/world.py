@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypedDict, TypeVar
 
 import mujoco
 
@@ -10,9 +10,34 @@ from bns.models.robot_model import RobotModel
 from bns.worlds import active
 from bns.worlds.checks import bounded, checked_start, shared
 from bns.worlds.damage import Damage
-from bns.worlds.trial import Commands, Trial
+from bns.worlds.trial import Channel, Commands, Trial
 
 PlanT = TypeVar("PlanT")
+
+
+class Settings(TypedDict, total=False):
+    """What all physics worlds can be given, by keyword.
+
+    Attributes:
+        damage: what is wrong with the robots, by trial: one `Damage` (or effects as
+            text or objects) for all, or a sequence of such with one per robot.
+        reality: effects that always hold (unless they have a schedule): how the world
+            departs from the nominal model, which is no damage.
+        sample_dt: time between two samples of the tracker [s]; the end of each command
+            is sampled as well.
+        threads: of the physics.
+        start: pose at the start of each trial in the world frame [m, m, rad].
+        arena: size of the board along x and y [m], its centre the world's origin.
+        truth: whether trials carry hidden states (`qpos`, `qvel` at the samples).
+    """
+
+    damage: Damage | Sequence
+    reality: Damage | Sequence
+    sample_dt: float
+    threads: int
+    start: Sequence[float]
+    arena: Sequence[float]
+    truth: bool
 
 
 class PhysicsWorld(ABC, Generic[PlanT]):
@@ -24,16 +49,8 @@ class PhysicsWorld(ABC, Generic[PlanT]):
     Args:
         robot: name of the robot model, as it was given.
         model: of the robot.
-        damage: what is wrong with the robots, by trial: one `Damage` (or effects as
-            text or objects) for all, or a sequence of such with one per robot.
-        reality: effects that always hold (unless they have a schedule): how this
-            world departs from the nominal model, which is no damage.
-        sample_dt: time between two samples of the tracker [s]; the end of each
-            command is sampled as well.
-        start: pose at the start of each trial in the world frame [m, m, rad].
-        arena: size of the board along x and y [m], its centre the world's origin.
-        name: name of the world in the trials.
-        truth: whether trials carry hidden states (`qpos`, `qvel` at the samples).
+        name: of the world in the trials.
+        damage, reality, sample_dt, threads, start, arena, truth: see `Settings`.
 
     Raises:
         UnknownNameError: no such effect.
@@ -48,15 +65,17 @@ class PhysicsWorld(ABC, Generic[PlanT]):
         robot: str,
         model: RobotModel,
         *,
-        damage: Damage | Sequence,
-        reality: Damage | Sequence,
-        sample_dt: float,
-        start: Sequence[float],
-        arena: Sequence[float],
         name: str,
-        truth: bool,
+        damage: Damage | Sequence = (),
+        reality: Damage | Sequence = (),
+        sample_dt: float = 0.1,
+        threads: int = 2,
+        start: Sequence[float] = (0.0, 0.0, 0.0),
+        arena: Sequence[float] = (2.7, 1.8),
+        truth: bool = False,
     ):
-        self.robot, self.model, self._channels = robot, model, model.channels
+        self.robot, self.model = robot, model
+        self._channels = tuple(Channel(*item) for item in model.channels)
         self.name, self.truth = name, truth
         self.damage = active.per_robot(damage)
         self.reality = active.as_damage(reality)
@@ -67,6 +86,7 @@ class PhysicsWorld(ABC, Generic[PlanT]):
         self.arena = (float(arena[0]), float(arena[1]))
         self.start = checked_start(start, self.arena)
         self.sample_dt = bounded("sample_dt", sample_dt, self.dt, 60.0, "s")
+        self.threads = int(bounded("threads", threads, 1, 1024, "1"))
 
     @property
     @abstractmethod

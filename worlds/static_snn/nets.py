@@ -1,20 +1,30 @@
 """Fixed networks that stand for a world: what each command does, learned once."""
 
 import json
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
+import msgspec
 import numpy as np
 
 from bns import seeding
 from bns.errors import BnsError, FormatError
+from bns.storage import arrays as npz
+from bns.storage import reading
+from bns.storage.numbers import BEYOND
 
 SCHEMA, VERSION = "bns-static-nets", 1
 INPUTS, OUTPUTS = 5, 3
 _ARRAYS = ("w1", "b1", "w2", "b2", "input_scale", "output_scale")
+
+
+class Header(msgspec.Struct):
+    """What a file of networks says of them, beside its schema and version."""
+
+    provenance: dict[str, Any] = {}
+    activation: Literal["sigmoid", "relu"] = "sigmoid"
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +62,7 @@ class StaticNets:
     provenance: Mapping[str, object] = field(default_factory=dict)
     activation: Literal["sigmoid", "relu"] = "sigmoid"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in _ARRAYS:
             array = np.array(getattr(self, name), dtype=np.float64)
             array.setflags(write=False)
@@ -105,15 +115,11 @@ class StaticNets:
         }
         if self.activation != "sigmoid":
             header["activation"] = self.activation
-        text = np.array(json.dumps(header, sort_keys=True))
+        if Path(path).exists():
+            raise BnsError(f"{path} exists and is not overwritten; take another name.")
         arrays = {name: getattr(self, name) for name in _ARRAYS}
-        try:
-            with open(path, "xb") as file:
-                np.savez(file, header=text, **arrays)
-        except FileExistsError:
-            raise BnsError(
-                f"{path} exists and is not overwritten; take another name."
-            ) from None
+        arrays["header"] = np.array(json.dumps(header, sort_keys=True))
+        npz.write_npz(Path(path), arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> "StaticNets":
@@ -122,26 +128,28 @@ class StaticNets:
         Raises:
             FormatError: no such file, or not one of this kind and version.
         """
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                arrays = {name: file[name] for name in file.files}
-            header = json.loads(str(arrays.pop("header")))
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        arrays = npz.read_npz(path, most=reading.TEXT << 4)
+        if "header" not in arrays:
             raise FormatError(
-                f"{path} is no file of static networks ({error}); make one with "
-                "StaticNets.save."
-            ) from None
+                f"{path} is no file of static networks; make one with StaticNets.save."
+            )
+        header = reading.json(str(arrays.pop("header")), path)
         _check_header(header, path)
         if set(arrays) != set(_ARRAYS):
             raise FormatError(
                 f"{path} holds {', '.join(sorted(arrays))}; static networks are "
                 f"{', '.join(_ARRAYS)}."
             )
-        return cls(
-            **arrays,
-            provenance=header.get("provenance", {}),
-            activation=header.get("activation", "sigmoid"),
-        )
+        said = reading.typed(header, Header, path)
+        for name, array in arrays.items():
+            if array.dtype != np.float64:
+                raise FormatError(f"{path}: {name} is {array.dtype}, not float64.")
+            if not (np.abs(array) <= BEYOND).all():
+                raise FormatError(f"{path}: {name} holds NaN or more than {BEYOND:g}.")
+        try:
+            return cls(**arrays, provenance=said.provenance, activation=said.activation)
+        except BnsError as error:
+            raise FormatError(f"{path}: {error}") from error
 
 
 def _check_header(header: object, path: str | Path) -> None:

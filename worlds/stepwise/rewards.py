@@ -48,7 +48,7 @@ class Waypoints:
         goals: where to go, in order [m].
     """
 
-    names = ("goal_x", "goal_y")
+    names: tuple[str, ...] = ("goal_x", "goal_y")
 
     def __init__(self, goals: Sequence[Sequence[float]] = GOALS):
         self.goals = np.array(
@@ -90,7 +90,7 @@ class StayByLight:
         radius: of the circle [m].
     """
 
-    names = ()
+    names: tuple[str, ...] = ()
 
     def __init__(self, lamp: Sequence[float], radius: float = GOAL_RADIUS):
         self.lamp = np.array(lamp, dtype=np.float64)
@@ -120,7 +120,7 @@ class StayByLight:
 class Distance:
     """How far the robot came from where it was [m], as walking is judged."""
 
-    names = ()
+    names: tuple[str, ...] = ()
 
     def __init__(self) -> None:
         self._before = 0.0

@@ -1,12 +1,13 @@
 """The TOML file that describes a model of one's own; see docs/gap_your_robot.md."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from bns.errors import BnsError, FormatError, UnknownNameError
+from bns.storage import reading
+from bns.storage.numbers import BEYOND
 from bns.worlds.data.column_map import FACTORS, Source
 from bns.worlds.trial import Channel
 
@@ -98,20 +99,21 @@ class OwnConfig:
             BnsError: an unknown key, unit or quantity.
         """
         path = Path(path)
-        try:
-            given = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise FormatError(f"Model file {path} cannot be read ({error}).") from None
+        given = reading.read_toml(path)
         _known(given, KEYS, f"key of {path}")
         for key in ("name", "model", "commands", "observed"):
             if not given.get(key):
                 raise FormatError(
                     f"{path} lacks {key!r}; see docs/gap_your_robot.md for an example."
                 )
+        if not isinstance(given["commands"], dict) or not isinstance(
+            given["observed"], dict
+        ):
+            raise FormatError(f"{path}: commands and observed have to be tables.")
         start = _table(given, "start", path)
         _known(start, START, f"key of [start] in {path}")
         bounds = _table(given, "bounds", path)
-        effects = given.get("effects")
+        effects = _table(given, "effects", path) if "effects" in given else None
         return cls(
             name=str(given["name"]),
             model=path.parent / str(given["model"]),
@@ -119,8 +121,8 @@ class OwnConfig:
             seen=tuple(_seen(n, t, path) for n, t in given["observed"].items()),
             keyframe=str(start.get("keyframe", "")),
             recorded=bool(start.get("recorded", False)),
-            settle=float(start.get("settle", 0.0)),
-            window=float(given.get("window", WINDOW)),
+            settle=_number(start.get("settle", 0.0), "settle", path, 0.0, 60.0),
+            window=_number(given.get("window", WINDOW), "window", path, 1e-3, 60.0),
             effects=None
             if effects is None
             else {name: _names(parts) for name, parts in effects.items()},
@@ -143,7 +145,8 @@ def _table(given: Mapping[str, Any], key: str, path: Path) -> Mapping[str, Any]:
 
 
 def _names(parts: Any) -> tuple[str, ...]:
-    return (parts,) if isinstance(parts, str) else tuple(map(str, parts))
+    listed = parts if isinstance(parts, list | tuple) else (parts,)
+    return tuple(map(str, listed))
 
 
 def _told(name: str, table: Any, path: Path) -> Told:
@@ -153,7 +156,7 @@ def _told(name: str, table: Any, path: Path) -> Told:
     for key in ("actuator", "unit", "low", "high"):
         if key not in table:
             raise FormatError(f"{path}: [commands.{name}] lacks {key!r}.")
-    low, high = float(table["low"]), float(table["high"])
+    low, high = (_number(table[key], key, path) for key in ("low", "high"))
     if not low < high:
         raise BnsError(f"{path}: [commands.{name}] needs low < high.")
     channel = Channel(name, str(table["unit"]))
@@ -165,7 +168,8 @@ def _seen(name: str, table: Any, path: Path) -> Seen:
     allowed = (*QUANTITIES, "axis", "unit", "noise", "scatter")
     _known(table, allowed, f"key of [observed.{name}] in {path}")
     what = [key for key in QUANTITIES if key in table]
-    if len(what) != 1 or "unit" not in table or not table.get("noise", 0) > 0:
+    noise = _number(table.get("noise", 0), "noise", path, 0.0)
+    if len(what) != 1 or "unit" not in table or not noise > 0:
         raise FormatError(
             f"{path}: [observed.{name}] needs one of {', '.join(QUANTITIES)}, a unit "
             "and a positive noise (standard deviation of its measurement)."
@@ -173,14 +177,13 @@ def _seen(name: str, table: Any, path: Path) -> Seen:
     axis = str(table.get("axis", "x"))
     if axis not in AXES:
         raise UnknownNameError(f"axis of [observed.{name}]", axis, AXES)
-    noise = float(table["noise"])
     return Seen(
         Channel(name, str(table["unit"])),
         what[0],
         str(table[what[0]]),
         AXES.index(axis),
         noise,
-        float(table.get("scatter", noise)),
+        _number(table.get("scatter", noise), "scatter", path, 0.0),
     )
 
 
@@ -193,7 +196,24 @@ def _mapping(table: Any, where: str, path: Path) -> Mapping[str, Any]:
 def _bounds(name: str, row: Any, path: Path) -> Mapping[str, float]:
     row = _mapping(row, f"bounds of {name}", path)
     _known(row, ("low", "high", "slack"), f"bound of {name} in {path}")
-    return {key: float(value) for key, value in row.items()}
+    return {key: _number(value, key, path) for key, value in row.items()}
+
+
+def _number(
+    value: Any, name: str, path: Path, low: float = -BEYOND, high: float = BEYOND
+) -> float:
+    """A number of the description.
+
+    Raises:
+        FormatError: it is none, or out of bounds.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise FormatError(f"{path}: {name} = {value!r} is no number.")
+    if not low <= value <= high:
+        raise FormatError(
+            f"{path}: {name} = {value!r} is not from {low:g} to {high:g}."
+        )
+    return float(value)
 
 
 def _source(name: str, item: Any, path: Path) -> Source:

@@ -6,6 +6,8 @@ import numpy as np
 
 from bns.errors import FormatError
 from bns.gap.models.mjcf.config import OwnConfig
+from bns.storage import csv_table
+from bns.worlds.data import dataset_checks as checks
 from bns.worlds.data.column_map import FACTORS
 from bns.worlds.trial import Commands, Trial
 
@@ -20,9 +22,9 @@ def read(path: str, config: OwnConfig) -> list[Trial]:
     Raises:
         FormatError: no such file, a column missing, or time going backwards.
     """
-    if not Path(path).is_file():
+    if not Path(path).exists():
         raise FormatError(f"{path} is neither a dataset directory nor a log.")
-    table = _table(path)
+    table = csv_table.read(path)
     needed = [item.channel.name for item in (*config.told, *config.seen)]
     columns = {}
     for name in ("time", *needed):
@@ -41,21 +43,6 @@ def read(path: str, config: OwnConfig) -> list[Trial]:
         _trial({n: v[rows] for n, v in columns.items()}, config, f"{path}, trial {k}")
         for k, rows in enumerate(np.split(np.arange(len(marks)), edges))
     ]
-
-
-def _table(path: str) -> dict[str, np.ndarray]:
-    import pyarrow
-    from pyarrow import csv
-
-    try:
-        table = csv.read_csv(Path(path))
-        return {
-            name: table.column(name).cast("float64").fill_null(np.nan).to_numpy()
-            for name in table.column_names
-        }
-    except (pyarrow.ArrowException, OSError) as error:
-        first = str(error).splitlines()[0]
-        raise FormatError(f"{path} is no CSV table of numbers ({first}).") from None
 
 
 def _factor(unit: str) -> float:
@@ -79,7 +66,7 @@ def _trial(columns: dict[str, np.ndarray], config: OwnConfig, where: str) -> Tri
     begins = begins[np.diff(times[np.append(begins, len(times) - 1)]) > 0]
     bounds = np.append(begins, len(times) - 1)
     channels = tuple(item.channel for item in config.told)
-    return Trial(
+    made = Trial(
         commands=Commands(told[begins], np.diff(times[bounds]), channels),
         times=times,
         observed=seen,
@@ -88,3 +75,5 @@ def _trial(columns: dict[str, np.ndarray], config: OwnConfig, where: str) -> Tri
         robot=config.name,
         world="imported",
     )
+    checks.plausible(made, where)
+    return made

@@ -8,7 +8,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from bns.errors import BnsError, FormatError, UnknownNameError
+from bns.errors import FormatError, UnknownNameError
 from bns.gap.candidates import mjcf, mjcf_rows
 from bns.gap.core import segments
 from bns.gap.decomposition.model import DecomposableModel
@@ -18,6 +18,8 @@ from bns.gap.models.mjcf import effects as own_effects
 from bns.gap.models.mjcf import log, view
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.records import Candidate
+from bns.models import mjcf as mjcf_file
+from bns.storage import files
 from bns.worlds.effects.base import ControlSignal, Effect
 from bns.worlds.physics.rollout import STATE, Compiled, Job, Pool, Segment
 from bns.worlds.trial import Trial
@@ -95,14 +97,10 @@ class OwnModel(DecomposableModel):
         Raises:
             FormatError: the MJCF file is missing or MuJoCo refuses it.
         """
-        if not self.config.model.is_file():
+        if not self.config.model.exists():
             raise FormatError(f"There is no model file {self.config.model}.")
-        try:
-            made = mujoco.MjSpec.from_file(str(self.config.model))
-            made.copy().compile()
-        except ValueError as error:
-            first = str(error).strip().splitlines()[0]
-            raise FormatError(f"{self.config.model}: {first}") from None
+        made = mjcf_file.load(self.config.model)
+        mjcf_file.compiled(made.copy(), self.config.model)
         for effect in effects:
             if effect.stage == "body" and not effect.is_nominal:
                 effect.edit(made)
@@ -330,10 +328,7 @@ class OwnModel(DecomposableModel):
         made = [self.parse(text) for text in effects]
         spec = self.spec(made)
         spec.compile()
-        try:
-            Path(path).write_text(spec.to_xml(), encoding="utf-8")
-        except OSError as error:
-            raise BnsError(f"{path} cannot be written: {error.strerror}.") from error
+        files.write_text(path, spec.to_xml())
         return [str(effect) for effect in made if effect.stage != "body"]
 
 

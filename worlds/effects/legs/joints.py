@@ -117,4 +117,4 @@ class LooseHorn(BodyEffect):
         if self.is_nominal:
             return
         joint = spec.joint(self["joint"])
-        loosen(spec, joint, self["angle"], armature=ARMATURE, damping=DAMPING)
+        loosen(spec, joint, self["angle"], (ARMATURE, DAMPING))

@@ -1,5 +1,7 @@
 """Drive of a servo: goals, gain, limits and motor."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from bns.worlds.effects.base import Parameter, ServoEffect
@@ -134,7 +136,7 @@ class ServoCurrentLimit(ServoEffect):
         ),
     )
 
-    def change(self, law: Law) -> Law:
+    def change(self, law: Mapping[str, np.ndarray]) -> Law:
         value = np.minimum(law["current_limit"], self["current"])
         return {**law, "current_limit": value}
 

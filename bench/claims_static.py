@@ -1,0 +1,14 @@
+"""Claims that have their verdict in the static-SNN world."""
+
+from bench._claims import settled
+from bench.result import Result
+
+DOC = "claims with all comparisons at the runs that their design asks for, static-SNN"
+BAR = ">= 120 of 157"
+LEAST = 120
+
+
+def run(quick: bool) -> Result:
+    """Judge what has been run: `bns claims run --all --world static-snn` runs it."""
+    del quick
+    return settled("static-snn", bar=LEAST)

@@ -1,0 +1,177 @@
+"""What a learner is: it says what to try, is told what came of it, and keeps its state.
+
+A module of `bns.learners` (or a package with a module `learner`) has one subclass of
+`Learner`, `LEARNER`, and its first line says what it is. That is all that a new learner
+needs: batches, resume, campaigns, statistics, reports and hardware work with it.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Generic, TypeVar
+
+import numpy as np
+
+from bns.errors import BnsError
+from bns.experiment.config import LearnerSettings, RunConfig
+from bns.tasks import registry as tasks
+from bns.tasks.base import Task
+from bns.worlds.counted import CountedWorld
+from bns.worlds.trial import Trial
+
+Controller = TypeVar("Controller")  # what the task's `Space` decodes
+
+PER_RUN = ("preset", "adaptation", "world")
+"""settings in which the runs of any batch may differ"""
+
+
+@dataclass(frozen=True)
+class Proposal(Generic[Controller]):
+    """What to run in the world.
+
+    Attributes:
+        tried: the controller each run learns from, R of them.
+        best: what each run would drive with if trials ended now, where that is another
+            one: to be measured, not learned from and not charged; else None.
+    """
+
+    tried: list[Controller]
+    best: list[Controller] | None = None
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A column of the record over trials: its title, and the factor to its unit."""
+
+    column: str
+    title: str
+    factor: float = 1.0
+
+
+@dataclass(frozen=True)
+class Curves:
+    """A figure of a learner's own columns over trials, a panel each.
+
+    Attributes:
+        name: of the figure in a report.
+        title, caption: of the figure; "{band}" in it explains line and band.
+        label: of the vertical axis.
+        panels: what is drawn.
+        log: whether the axis is logarithmic.
+        shared: whether the panels share it.
+        compared: whether it is drawn where several batches are compared, too.
+    """
+
+    name: str
+    title: str
+    caption: str
+    label: str
+    panels: tuple[Panel, ...]
+    log: bool = False
+    shared: bool = False
+    compared: bool = True
+
+
+class Learner(ABC):
+    """R runs of a way to learn, advancing trial by trial in lockstep.
+
+    Args:
+        configs: one per run; they may differ in `PER_RUN` alone.
+        replicates: number of each run, part of its identity.
+        onsets: first damaged trial of each run, -1 = none: for adaptations that are
+            *told* when damage came, and for nothing else.
+        models: a world to think in for each run, its evaluations counted and limited;
+            none where `prior.world` is empty.
+
+    Raises:
+        BnsError: configurations that cannot share a batch, or a setting that the
+            learner or the task cannot be with.
+    """
+
+    Settings: ClassVar[type[LearnerSettings]] = LearnerSettings
+    """the section `settings` of its configurations"""
+    sections: ClassVar[tuple[str, ...]] = ()
+    """other sections and settings of a configuration that are its own"""
+    columns: ClassVar[Mapping[str, str]] = {}
+    """per-trial figures that `observe` gives for every task, with their meaning"""
+    figures: ClassVar[tuple[Curves | str, ...]] = ()
+    """what a report shows of it: own columns, or figures of `bns.viz.figures`"""
+
+    def __init__(
+        self,
+        configs: Sequence[RunConfig],
+        *,
+        replicates: Sequence[int],
+        onsets: Sequence[int],
+        models: Sequence[CountedWorld] = (),
+    ):
+        self.check_alike(configs)
+        self.config, self.configs, self.runs = configs[0], list(configs), len(configs)
+        self.replicates, self.models = list(replicates), list(models)
+        self.task: Task = tasks.of(configs[0])
+        self.begin()
+
+    def begin(self) -> None:  # noqa: B027 (nothing to do is the default)
+        """Make what the first trial needs, once configurations and task are known."""
+
+    def check_alike(self, configs: Sequence[RunConfig]) -> None:
+        """Refuse configurations that cannot share a batch.
+
+        Raises:
+            BnsError: they differ in more than `PER_RUN`.
+        """
+        first = configs[0]
+        free: dict[str, Any] = {name: getattr(first, name) for name in PER_RUN}
+        if any(replace(config, **free) != first for config in configs):
+            raise BnsError(
+                "Runs of one batch may differ in `adaptation` and `world` only; "
+                "train the others as a batch of their own."
+            )
+
+    @classmethod
+    def figures_of(cls, task: Task) -> list[Curves | str]:
+        """What a report shows of runs of a task; see `figures`."""
+        del task
+        return list(cls.figures)
+
+    @classmethod
+    def compiles(cls, config: RunConfig) -> bool:
+        """Whether a run is compiled; the record says so."""
+        del config
+        return False
+
+    @abstractmethod
+    def propose(self, trial: int) -> Proposal[Any]:
+        """What to try in trial number `trial`, as the task's controllers."""
+
+    @abstractmethod
+    def observe(
+        self, trial: int, tried: Sequence[Trial], best: Sequence[Trial] | None
+    ) -> dict[str, np.ndarray]:
+        """Learn from a trial of every run.
+
+        Args:
+            trial: its number.
+            tried: R trials of the proposed controllers, without the damage and the
+                truth.
+            best: R trials of `Proposal.best` where there was one.
+
+        Returns:
+            `columns`, each ``(R,)``, and arrays with the run first; "predicted"
+            ``(R, K + 1, 3)`` are the poses it had foreseen.
+        """
+
+    @abstractmethod
+    def state(self) -> dict[str, np.ndarray]:
+        """All that the next trial depends on, as plain arrays."""
+
+    @abstractmethod
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Go on from `state`."""
+
+    def run_in_background(self) -> None:  # noqa: B027 (nothing to do is the default)
+        """From now on think in `think`, while trials run, and not in `propose`."""
+
+    def think(self) -> bool:
+        """A short piece of thinking while a trial runs; False: there is none left."""
+        return False

@@ -1,0 +1,1 @@
+"""BNS: evolve inside a simulator neural network, try, train, repeat (thesis 2.8)."""

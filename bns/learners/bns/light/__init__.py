@@ -1,0 +1,1 @@
+"""BNS with closed loops (thesis chapters 5 and 6): light following."""

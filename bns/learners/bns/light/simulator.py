@@ -1,0 +1,255 @@
+"""Closed loops inside the SNNs: 100 cycles one after another, all robots at once.
+
+What happens depends on the lamp's place in the robot's frame alone, so that is all
+that is kept of a simulated pose. Arrays have the shape ``(R, S, P)``: runs, starts,
+individuals; the individual is last, so that every step works on contiguous memory.
+
+Motion SNN: previous left and right wheel speed, new left and right wheel speed ->
+forward, left, turn in the body frame. Sensor SNNs: bearing and distance of the lamp ->
+brightness left and right. All are scaled to about -1..1; a cycle has always the same
+duration, so it is no input.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from bns.experiment.config import RunConfig, SnnConfig
+from bns.snn.network import Shape, forward, predict
+from bns.snn.scaling import AXLE
+from bns.tasks.light_controller import Controllers
+
+FAR = 1.0  # [m] distance of the lamp that is scaled to 1; assumed
+MOTION_INPUTS, MOTION_OUTPUTS = 4, 3
+SENSORS = 2
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Scales of the motion SNN.
+
+    Attributes:
+        speed: largest wheel speed [m/s].
+        moved: of forward, left [m] and turn [rad].
+    """
+
+    speed: float
+    moved: tuple[float, float, float]
+
+    @classmethod
+    def of(cls, controllers: Controllers, cycle: float) -> "Scales":
+        """For the speeds of some controllers, held for `cycle` seconds."""
+        speed = max(abs(controllers.slowest), abs(controllers.fastest))
+        way = speed * cycle
+        return cls(speed, (way, way, 2 * way / AXLE))
+
+
+class Thetas(NamedTuple):
+    """Weights of the motion SNN ``(R, D)`` and of the sensor SNNs ``(R, E)``."""
+
+    motion: Tensor
+    sensors: Tensor
+
+
+class Noise(NamedTuple):
+    """What is added to the SNNs' outputs in a cycle, alike for all individuals.
+
+    Attributes:
+        motion: scaled, ``(R, 3, S, 1)``.
+        sensors: scaled, ``(R, 2, S, 1)``.
+    """
+
+    motion: Tensor
+    sensors: Tensor
+
+
+class State(NamedTuple):
+    """Simulated robots at the start of a cycle.
+
+    Attributes:
+        ahead, left: of the lamp in the robot's frame [m], ``(R, S, P)``.
+        before: scaled wheel speeds of the last cycle, ``(R, 2, S, P)``.
+        memory: last outputs, ``(R, 2, S, P)``; kept for recurrent controllers.
+        begun: distance of the lamp at the start [m], ``(R, S, P)``.
+        error: sum of the distances from the goal radius so far [m].
+    """
+
+    ahead: Tensor
+    left: Tensor
+    before: Tensor
+    memory: Tensor
+    begun: Tensor
+    error: Tensor
+
+
+class NetOutputs(NamedTuple):
+    """What a cycle was, for paths and for the record; shapes ``(R, n, S, P)``.
+
+    Attributes:
+        moved: forward, left [m], turn [rad].
+        brightness: that the controllers saw at its start, left and right.
+        speeds: told [m/s], left and right.
+    """
+
+    moved: Tensor
+    brightness: Tensor
+    speeds: Tensor
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """Motion SNN and sensor SNNs as a world for controllers.
+
+    Attributes:
+        controllers: what the controllers have in common.
+        scales: of the motion SNN.
+        motion: networks from four wheel speeds to a displacement.
+        sensors: networks from bearing and distance of the lamp to its brightness.
+        sine: whether the bearing is given as sine and cosine.
+        goal: radius to stay at [m].
+        safety: nearer to the lamp than this a robot is stopped [m].
+        back: whether a stopped robot costs as if it were back at its start.
+        beyond: or that much farther away [m].
+    """
+
+    controllers: Controllers
+    scales: Scales
+    motion: Shape
+    sensors: Shape
+    sine: bool
+    goal: float
+    safety: float
+    back: bool
+    beyond: float = 0.0
+
+    @classmethod
+    def of(cls, config: RunConfig) -> "Simulator":
+        """The SNNs a configuration asks for."""
+        controllers, light = Controllers.of(config), config.light
+        sine = light.bearing == "sine"
+        return cls(
+            controllers=controllers,
+            scales=Scales.of(controllers, light.cycle),
+            motion=_shape(config.snn, MOTION_INPUTS, MOTION_OUTPUTS),
+            sensors=_shape(config.snn, 3 if sine else 2, SENSORS),
+            sine=sine,
+            goal=light.goal,
+            safety=light.safety,
+            back=light.charge_stopped != "stand",
+            beyond=light.goal if light.charge_stopped == "far" else 0.0,
+        )
+
+    def views(self, ahead: Tensor, left: Tensor) -> Tensor:
+        """Inputs of the sensor SNNs for a lamp at some place, ``(..., I, N)``."""
+        distance = (ahead.square() + left.square()).sqrt().clamp(min=1e-3)
+        if self.sine:
+            bearing = [left / distance, ahead / distance]
+        else:
+            bearing = [torch.atan2(left, ahead) / torch.pi]
+        return torch.stack([*bearing, distance / FAR], dim=-2)
+
+    def begin(self, ahead: Tensor, left: Tensor) -> State:
+        """Robots at rest, the lamp at a place in their frames [m], ``(R, S, P)``."""
+        runs, starts, count = ahead.shape
+        still = torch.zeros(runs, 2, starts, count, device=ahead.device)
+        begun = (ahead.square() + left.square()).sqrt()
+        return State(ahead, left, still, still, begun, torch.zeros_like(ahead))
+
+    def step(
+        self,
+        thetas: Thetas,
+        layers: tuple[Tensor, ...],
+        state: State,
+        noise: Noise | None = None,
+    ) -> tuple[State, NetOutputs]:
+        """One cycle of all robots.
+
+        Args:
+            thetas: weights of the SNNs.
+            layers: weights of the controllers, see `Controllers.layers`.
+            state: before.
+            noise: of this cycle; None = what the SNNs say holds.
+        """
+        runs, starts, count = state.ahead.shape
+        bright = self.look(thetas, state, noise)
+        seen = self.controllers.see(bright)
+        inputs = [seen[:, 0], seen[:, 1]]
+        if self.controllers.recurrent:
+            inputs += [state.memory[:, 0], state.memory[:, 1]]
+        outputs = self.controllers.act(layers, inputs)
+        speeds = torch.stack([self.controllers.speed(o) for o in outputs], dim=1)
+        told = speeds / self.scales.speed
+        pair = torch.cat([state.before, told], dim=1).flatten(2)
+        said = predict(self.motion, thetas.motion, pair, fused=True)
+        moved = said.view(runs, MOTION_OUTPUTS, starts, count)
+        if noise is not None:
+            moved = moved + noise.motion
+        near = (state.ahead.square() + state.left.square()).sqrt() < self.safety
+        forward, left, turn = (
+            torch.where(near, 0.0, moved[:, axis] * self.scales.moved[axis])
+            for axis in range(MOTION_OUTPUTS)
+        )
+        cos, sin = turn.cos(), turn.sin()
+        x, y = state.ahead - forward, state.left - left
+        ahead, left_of = cos * x + sin * y, cos * y - sin * x
+        distance = (x.square() + y.square()).sqrt()
+        if self.back:
+            distance = torch.where(near, state.begun + self.beyond, distance)
+        error = state.error + (distance - self.goal).abs()
+        memory = torch.stack(outputs, dim=1)
+        after = State(ahead, left_of, told, memory, state.begun, error)
+        return after, NetOutputs(
+            torch.stack([forward, left, turn], dim=1), bright, speeds
+        )
+
+    def look(self, thetas: Thetas, state: State, noise: Noise | None = None) -> Tensor:
+        """Brightness that the robots see now, ``(R, 2, S, P)``."""
+        runs, starts, count = state.ahead.shape
+        views = self.views(state.ahead.flatten(1), state.left.flatten(1))
+        said = predict(self.sensors, thetas.sensors, views, fused=True)
+        bright = said.view(runs, SENSORS, starts, count)
+        if noise is not None:
+            bright = bright + noise.sensors
+        return bright.clamp(0.0, 1.0)
+
+    def disagreement(self, thetas: Thetas, state: State, after: State) -> Tensor:
+        """How far ensembles disagree on a cycle, ``(R, S, P)``.
+
+        Variance over the members, summed over the scaled outputs of all SNNs; needs
+        SNNs of kind "ensemble".
+
+        Args:
+            thetas: weights of the SNNs.
+            state, after: before and after the cycle.
+        """
+        runs, starts, count = state.ahead.shape
+        told = torch.cat([state.before, after.before], dim=1).flatten(2)
+        views = self.views(state.ahead.flatten(1), state.left.flatten(1))
+        parts = (
+            forward(shape, theta, inputs).var(1, unbiased=False).sum(1)
+            for shape, theta, inputs in (
+                (self.motion, thetas.motion, told),
+                (self.sensors, thetas.sensors, views),
+            )
+        )
+        motion, sensors = parts
+        return (motion + sensors).view(runs, starts, count)
+
+    def advance(
+        self,
+        thetas: Thetas,
+        layers: tuple[Tensor, ...],
+        state: State,
+        noise: Noise | None = None,
+    ) -> State:
+        """`step` without what was seen: the form to compile."""
+        return self.step(thetas, layers, state, noise)[0]
+
+
+def _shape(config: SnnConfig, inputs: int, outputs: int) -> Shape:
+    """A network an output, or an ensemble with all outputs (`SnnConfig.kind`)."""
+    if config.kind == "three":
+        return Shape(outputs, config.hidden, 1, inputs)
+    return Shape(config.members, config.hidden, outputs, inputs)

@@ -1,0 +1,301 @@
+"""BNS for walking (thesis chapter 7): servo goals -> predicted path -> cost.
+
+Inputs of the networks (7.2.5): the servos' present goals and their next ones, at the
+start all half-way. Outputs: forward, left [m] and turn [rad] of the command in the body
+frame at its start.
+
+Inside the SNN lower is better, as everywhere here. The dissertation's fitness (7.1)
+divides the ensemble's variance (7.2) by the distance. A controller whose commands all
+members agree upon scores next to nothing, however short the way, so evolution goes
+where the SNN is sure, not where the robot gets far. The repaired form is a distance:
+the mean end point's, less the members' spread around it. Standing still costs 0 at
+best, and any walk that is longer than its spread beats it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from bns.draws import Draws
+from bns.errors import BnsError
+from bns.evolution.chromosome import Population
+from bns.evolution.generation import Rates
+from bns.evolution.goals import TICK, GoalBreeder, Goals
+from bns.experiment.config import RunConfig
+from bns.experiment.config_walk import WalkConfig
+from bns.learners.bns import change_evidence
+from bns.learners.bns.adaptation import Adaptations
+from bns.learners.bns.memory import Memory
+from bns.learners.bns.navigation import OpenLoopProblem
+from bns.path import integrate
+from bns.snn import adam, fitting
+from bns.snn.network import Shape, forward
+from bns.snn.scaling import OUTPUTS
+from bns.tasks import walk as walking
+from bns.tasks.base import Task
+from bns.worlds.trial import Trial, body_displacements
+
+GOAL = 0.5  # [rad] that is scaled to 1; assumed
+MOVED = (0.05, 0.05, 0.25)  # [m, m, rad] of a command that are scaled to 1; assumed
+SHORTEST = 1e-6  # [m] so that the printed form stays finite
+START = (0.0, 0.0, 0.0)
+CHUNK = 1100  # patterns predicted at once on a CPU: activations stay in its cache
+
+
+@dataclass(frozen=True)
+class WalkEvaluator:
+    """What a population is worth according to an ensemble; as `Evaluator`.
+
+    Attributes:
+        shape: of the ensemble.
+        config: which fitness.
+    """
+
+    shape: Shape
+    config: WalkConfig
+
+    def inputs(self, population: Population) -> Tensor:
+        """Network inputs, ``(R, 2 C, K * P)``, the individual varying fastest."""
+        scaled = goal_inputs(population.genes)
+        return scaled.permute(0, 3, 2, 1).flatten(2).contiguous()
+
+    def members(self, theta: Tensor, seen: Tensor) -> Tensor:
+        """Scaled outputs of every member, ``(R, G, 3, N)``, piece by piece."""
+        if seen.device.type != "cpu":
+            return forward(self.shape, theta, seen)
+        return torch.cat(
+            [
+                torch.cat([forward(self.shape, row, part) for part in parts], dim=3)
+                for row, parts in zip(
+                    theta.split(1), map(_pieces, seen.split(1)), strict=True
+                )
+            ]
+        )
+
+    def judge(
+        self, theta: Tensor, seen: Tensor, lengths: Tensor, *, fused: bool = False
+    ) -> Tensor:
+        """Predicted cost ``(R, P)`` from inputs; `fused` changes nothing here."""
+        del fused
+        return self.worth(self.members(theta, seen), lengths.shape[1])
+
+    def worth(self, outputs: Tensor, count: int) -> Tensor:
+        """Cost ``(R, P)`` of P = `count` individuals from the members' outputs."""
+        if self.config.fitness == "repaired":
+            x, y, _ = path(outputs, count)
+            return repaired(x[:, :, -1], y[:, :, -1], self.config.doubt)
+        x, y, _ = path(outputs.mean(1, keepdim=True), count)
+        distance = (x[:, 0, -1].square() + y[:, 0, -1].square()).sqrt()
+        return printed(distance, variance(outputs, count))
+
+    def cost(self, theta: Tensor, population: Population) -> Tensor:
+        """Predicted cost of a population, ``(R, P)``."""
+        return self.judge(theta, self.inputs(population), population.lengths)
+
+    def poses(self, theta: Tensor, population: Population) -> Tensor:
+        """Pose at the start and after each command as the members' mean foresees it.
+
+        Returns:
+            ``(R, P, K + 1, 3)`` [m, m, rad].
+        """
+        outputs = self.members(theta, self.inputs(population))
+        x, y, yaw = path(outputs.mean(1, keepdim=True), population.lengths.shape[1])
+        after = torch.stack([x[:, 0], y[:, 0], yaw[:, 0]], dim=-1).transpose(1, 2)
+        return torch.nn.functional.pad(after, (0, 0, 1, 0))
+
+    def disagreement(self, theta: Tensor, population: Population) -> Tensor:
+        """V of equation 7.2 for a population, ``(R, P)``."""
+        outputs = self.members(theta, self.inputs(population))
+        return variance(outputs, population.lengths.shape[1])
+
+
+def path(outputs: Tensor, count: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Compose each member's own path.
+
+    Args:
+        outputs: scaled, ``(R, G, 3, K * P)``.
+        count: P.
+
+    Returns:
+        x, y [m] and yaw [rad] after each command, each ``(R, G, K, P)``.
+    """
+    runs, members = outputs.shape[:2]
+    moved = outputs.view(runs, members, 3, -1, count)
+    ahead, left, turn = (moved[:, :, axis] * MOVED[axis] for axis in range(3))
+    return integrate(ahead, left, turn, START, dim=2)
+
+
+def variance(outputs: Tensor, count: int) -> Tensor:
+    """Equation 7.2: the members' variance of the scaled outputs, summed over these
+    and over commands, ``(R, P)``; members along axis 1."""
+    spread = outputs.var(1, unbiased=False).sum(1)
+    return spread.view(len(outputs), -1, count).sum(1)
+
+
+def _pieces(seen: Tensor) -> tuple[Tensor, ...]:
+    return tuple(part.contiguous() for part in seen.split(CHUNK, dim=2))
+
+
+def printed(distance: Tensor, variance: Tensor) -> Tensor:
+    """Equations 7.1 and 7.2, the sign turned.
+
+    Args:
+        distance: from start to end of the predicted path [m].
+        variance: of the members' predictions, summed over outputs and commands.
+    """
+    return variance / distance.clamp(min=SHORTEST)
+
+
+def repaired(x: Tensor, y: Tensor, doubt: float) -> Tensor:
+    """Spread less distance of the members' end points [m].
+
+    Args:
+        x, y: end points from the start, the members along axis 1, ``(R, G, P)`` [m].
+        doubt: weight of the spread.
+
+    Returns:
+        ``(R, P)``.
+    """
+    spread = (x.var(1, unbiased=False) + y.var(1, unbiased=False)).sqrt()
+    return doubt * spread - (x.mean(1).square() + y.mean(1).square()).sqrt()
+
+
+def goal_inputs(goals: Tensor) -> Tensor:
+    """Network inputs of command lists, goals ``(..., K, C)`` [rad].
+
+    Returns:
+        ``(..., K, 2 C)``, scaled.
+    """
+    before = torch.nn.functional.pad(goals, (0, 0, 1, 0))[..., :-1, :]
+    return torch.cat([before, goals], dim=-1) / GOAL
+
+
+def of_trial(trial: Trial) -> tuple[np.ndarray, np.ndarray]:
+    """What the commands of a trial were and did.
+
+    Returns:
+        scaled inputs ``(K, 2 C)`` and displacements ``(K, 3)`` [m, m, rad]; commands
+        whose pose was lost at either end, and diverged trials, are left out.
+    """
+    seen = goal_inputs(torch.from_numpy(trial.commands.values.copy())).numpy()
+    moved = body_displacements(trial.command_poses_world)
+    good = np.isfinite(moved).all(1) & trial.outcome.usable
+    return seen[good], moved[good]
+
+
+class WalkProblem(OpenLoopProblem):
+    """BNS for lists of servo goals (investigation D).
+
+    No generation is compiled. A compiled one took 4.5 times as long as an eager one
+    (30 runs of 400 lists of 198 goals, one thread: 0.38 s against 0.085 s), since the
+    compiler has no vectorised inverse error function, which normal mutations need; what
+    the networks foresee is a matter of large matrix products, as fast without.
+    """
+
+    encoding: Goals
+    stream = "walk-learner"
+    relative_cost = 0.0
+    bucket = 256
+    columns: ClassVar[Mapping[str, str]] = {
+        "distance_predicted": "from start to end as the SNN foresaw it [m]",
+        "disagreement": "of the ensemble on the controller tried (equation 7.2)",
+        "worth_predicted": "what it was worth inside the SNN",
+    }
+
+    def __init__(
+        self,
+        task: Task,
+        configs: Sequence[RunConfig],
+        draws: Draws,
+        adaptations: Adaptations,
+    ):
+        super().__init__(task, configs, draws, adaptations)
+        config = self.config
+        if config.snn.kind != "ensemble":
+            raise BnsError(
+                "task.name = 'walk' weighs how far networks disagree; set "
+                "snn.kind = 'ensemble' (the preset hexapod-walk does)."
+            )
+        self.encoding = Goals.of(config)
+        self.shape = Shape(
+            groups=config.snn.members,
+            hidden=config.snn.hidden,
+            outputs=OUTPUTS,
+            inputs=2 * len(self.encoding.channels),
+            activation=config.walk.activation,
+        )
+        self.output = torch.tensor(MOVED)
+        self.evaluator = WalkEvaluator(self.shape, config.walk)
+        self.breeder = GoalBreeder(config.evolution, self.encoding, True)
+        self._compile()
+
+    def choosing(self, trial: int) -> RunConfig:
+        """Before evolution starts, any: an SNN that has seen next to nothing would
+        choose what it has seen."""
+        if trial < self.config.evolve_from:
+            return replace(self.config, choose="random")
+        return self.config
+
+    def rates(self, trial: int) -> Rates:
+        """See `Problem.rates`."""
+        rate, _ = self.adaptations.mutation(trial)
+        usual = [config.walk.mutation_magnitude for config in self.configs]
+        size = self.adaptations.magnitudes(trial, usual)
+        each = torch.tensor(size, dtype=torch.float32)[:, None] * TICK
+        servos = len(self.encoding.channels)
+        return Rates(
+            torch.from_numpy(rate).to(self.device),
+            each.expand(-1, servos).to(self.device),
+            repeat=self._repeat(trial),
+        )
+
+    def _repeat(self, trial: int) -> Tensor | None:
+        """Chance that a child repeats its commands, of each run; None = of no run."""
+        walk = self.config.walk
+        chance = self.adaptations.since_damage(trial, walk.repeat, walk.repeat_after)
+        if not chance.any():
+            return None
+        return torch.from_numpy(chance.astype(np.float32)).to(self.device)
+
+    def predicted(
+        self, memories: Sequence[Memory], chosen: Population, tried: Sequence[Trial]
+    ) -> dict[str, np.ndarray]:
+        """See `Problem.predicted`; beside, `columns`."""
+        theta = memories[0].theta
+        poses = self.evaluator.poses(theta, chosen)[:, 0].double().cpu().numpy()
+        far = walking.distance(poses)
+        spread = self.evaluator.disagreement(theta, chosen)[:, 0]
+        worth = self.evaluator.cost(theta, chosen)[:, 0]
+        return {
+            "predicted": poses,
+            "distance_predicted": far,
+            "disagreement": spread.double().cpu().numpy(),
+            "worth_predicted": worth.double().cpu().numpy(),
+            "fitness_predicted": walking.cost(far),
+        }
+
+    def inputs_and_motion(self, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
+        """See `OpenLoopProblem.inputs_and_motion`."""
+        return of_trial(trial)
+
+    def forget(self, run: int, memories: Sequence[Memory]) -> int:
+        """See `Problem.forget`; by `change_evidence`."""
+        memory, size = memories[0], self.config.walk.commands
+        inputs, targets = memory.patterns(run)
+        newest = change_evidence.changed(inputs, targets, size)
+        if not newest:
+            return 0
+        memory.keep(run, newest)
+        return (len(inputs) - newest) // size
+
+    def train(
+        self, shape: Shape, theta: Tensor, patterns: fitting.Patterns
+    ) -> tuple[Tensor, Tensor]:
+        """See `Problem.train`; by Adam on parts of the patterns (walk.batch > 0)."""
+        if self.config.walk.batch == 0:
+            return super().train(shape, theta, patterns)
+        return adam.fit(shape, self.config, theta, patterns, self.draws)

@@ -1,0 +1,192 @@
+"""Walking: lists of servo goals that carry a legged robot as far as they can."""
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+import torch
+
+from bns.evolution.chromosome import Population
+from bns.evolution.goals import Goals
+from bns.tasks.base import Arrays, Curve, Picture, Space, Task
+from bns.worlds.trial import Commands, Trial
+
+if TYPE_CHECKING:
+    from bns.experiment.record import RunRecord
+    from bns.learners.bns.problem import Problem
+
+CENTIMETRES = 100.0  # [cm/m] scores are in the dissertation's unit
+FLAGS = ("fell", "collided", "overloaded", "overheated", "unrested")
+"""of the outcome, each a column of 0 and 1"""
+
+
+def distance(poses_world: np.ndarray) -> np.ndarray:
+    """From the first to the last pose that was seen, along axis -2 [m].
+
+    Args:
+        poses_world: ``(..., K + 1, 3)``, NaN where lost; the first is known.
+
+    Returns:
+        ``(...,)``.
+    """
+    places = poses_world[..., :2]
+    seen = np.isfinite(places).all(-1)
+    last = places.shape[-2] - 1 - seen[..., ::-1].argmax(-1)
+    end = np.take_along_axis(places, last[..., None, None], axis=-2)[..., 0, :]
+    found: np.ndarray = np.hypot(*np.moveaxis(end - places[..., 0, :], -1, 0))
+    return found
+
+
+def cost(ways: np.ndarray) -> np.ndarray:
+    """Fitness, lower is better: the square of distances [m], its sign turned [cm2].
+
+    Its sum over the trials after damage is equation 7.4, the sign turned.
+    """
+    return -((CENTIMETRES * ways) ** 2)
+
+
+def of_trials(trials: Sequence[Trial]) -> np.ndarray:
+    """How far N robots got, ``(N,)`` [m]; one whose physics diverged got nowhere."""
+    ways = distance(np.stack([trial.command_poses_world for trial in trials]))
+    good = [trial.outcome.usable for trial in trials]
+    return np.where(good, np.nan_to_num(ways), 0.0)
+
+
+class WalkTask(Task):
+    """Get far from the start; a gait is adequate from `walk.adequate` on.
+
+    Controllers are `walk.commands` commands of a goal a servo; a vector holds them
+    command by command [rad from half-way].
+    """
+
+    sections = ("walk",)
+    columns: ClassVar[Mapping[str, str]] = {
+        "distance": "from start to end [m]",
+        "seconds": "what the trial took [s]",
+        "fell": "1 where belly or hip touched the floor",
+        "collided": "1 where parts of the robot touched each other",
+        "overloaded": "1 where a servo pushed in vain for too long",
+        "overheated": "1 where a servo became too hot",
+        "unrested": "1 where a command ended by its time limit",
+    }
+
+    @cached_property
+    def goals(self) -> Goals:
+        """What the goals may be.
+
+        Raises:
+            BnsError: a robot without legs.
+        """
+        return Goals.of(self.config)
+
+    def surroundings(self) -> dict[str, Any]:
+        """Nothing: the robot starts in the middle of the board, at rest."""
+        return {}
+
+    @property
+    def space(self) -> Space:
+        """See `Task.space`."""
+        goals, count = self.goals, self.goals.max_commands
+        lowest, highest = goals.low.cpu(), goals.high.cpu()
+        first = lowest.clamp(min=-goals.initial), highest.clamp(max=goals.initial)
+        low, high, first_low, first_high = (
+            np.tile(edge.double().numpy(), count) for edge in (lowest, highest, *first)
+        )
+        return Space(low, high, first_low, first_high, self._decode)
+
+    def _decode(self, vectors: np.ndarray) -> list[Commands]:
+        shape = (len(vectors), 1, *self.goals.gene_shape)
+        genes = torch.from_numpy(vectors.reshape(shape))
+        lengths = torch.full(shape[:2], self.goals.max_commands)
+        return self.goals.commands(Population(genes, lengths))
+
+    def fitness(self, trials: Sequence[Trial]) -> np.ndarray:
+        """See `cost`."""
+        return cost(of_trials(trials))
+
+    def measured(self, tried: Sequence[Trial]) -> Arrays:
+        """See `Task.measured`; sent are goals ``(R, K, C)`` [rad]."""
+        ways, walk = of_trials(tried), self.config.walk
+        flags = {
+            name: np.array([float(getattr(trial.outcome, name)) for trial in tried])
+            for name in FLAGS
+        }
+        solved = (ways >= walk.adequate) * (1.0 - flags["fell"] * walk.upright)
+        return {
+            "fitness": cost(ways),
+            "distance": ways,
+            "solved": solved,
+            "reached": solved,
+            "seconds": np.array([float(t.times[-1] - t.times[0]) for t in tried]),
+            "commands": np.array([float(len(trial.commands)) for trial in tried]),
+            **flags,
+            "sent": np.stack([trial.commands.values for trial in tried]),
+            "poses": np.stack([trial.command_poses_world for trial in tried]),
+        }
+
+    def durations(self, record: "RunRecord", at: tuple[Any, Any]) -> np.ndarray:
+        """See `Task.durations`; all commands of a trial count as equally long."""
+        seconds = np.asarray(record["seconds"][at])[..., None]
+        count = record.sent.shape[2]
+        return np.repeat(seconds / max(count, 1), count, axis=-1)
+
+    @property
+    def picture(self) -> Picture:
+        """See `Task.picture`."""
+        enough = self.config.walk.adequate
+        return Picture(
+            name="walking",
+            solved=f"{enough:g} m walked",
+            order=("",),
+            objectives={"": (0.0, 0.0)},
+            radius=enough,
+            discs=(
+                "An adequate gait gets out of the disc. The body is drawn level, its "
+                "legs as the servos reported them."
+            ),
+            curve=Curve(
+                column="distance",
+                label="distance [m] (higher is better)",
+                title="Distance walked in the world",
+                log=False,
+                chart="Distance walked over trials [m] (brown: damaged)",
+                marks=((enough, ""),),
+            ),
+            reached="Adequate gait",
+            wheels=False,
+            titles={"solved": "Adequate gaits"},
+            captions=CAPTIONS,
+        )
+
+    def problem(self) -> "type[Problem]":
+        """See `Task.problem`."""
+        from bns.learners.bns.walking import WalkProblem
+
+        return WalkProblem
+
+
+CAPTIONS = {
+    "path": (
+        "One run, chosen as the typical one. Solid: where the robot went, command by "
+        "command. Dashed: where its simulator network (SNN) had said it would go. An "
+        "adequate gait gets out of the disc."
+    ),
+    "fitness": (
+        "Distance from start to end of the controller tried in each trial, higher is "
+        "better; the dotted line is an adequate gait ({adequate:g} m). The fitness "
+        "stored is its square with the sign turned (equation 7.4). {band}"
+    ),
+    "solved": (
+        "Left: whether the gait was adequate ({adequate:g} m). Right: share of runs "
+        "whose trial was. {band}"
+    ),
+    "waits": (
+        "Share of runs that had found an adequate gait before the damage (left), and, "
+        "counted from the first damaged trial, again (right). A curve that ends below "
+        "100 % tells of runs that never did. The dotted line drops from the median."
+    ),
+}
+"""How to read figures where walking reads otherwise than navigation."""
+
+TASK = WalkTask

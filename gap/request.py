@@ -1,0 +1,73 @@
+"""What a diagnosis was asked for, kept in its directory until it is done.
+
+A process that is killed leaves it there: the same command then goes on, or starts over.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from bns.errors import BnsError
+from bns.gap.report.partial import FILE as PARTIAL
+from bns.gap.store import FILE as DIAGNOSIS
+from bns.storage import files, reading, seal
+
+FILE = "request.json"
+FORMAT = "bns-diagnosis-request"
+
+
+class Request(msgspec.Struct):
+    """The file."""
+
+    format: str
+    asked: dict[str, Any]
+
+
+def begin(out: Path, asked: Mapping[str, Any]) -> None:
+    """Note in a directory, locked by who calls, what is diagnosed there.
+
+    What a killed process left half-written is removed; of another request nothing is.
+
+    Raises:
+        BnsError: it holds a finished diagnosis, one of another request, or something
+            else.
+    """
+    path = out / FILE
+    if path.exists():
+        content = seal.opened(reading.read_json(path), path)
+        if reading.typed(content, Request, path).asked != dict(asked):
+            raise BnsError(
+                f"{out} holds an unfinished diagnosis of something else: repeat its "
+                "command, give another --out, or remove it."
+            )
+    else:
+        _check_free(out)
+    files.remove_temporary(out)
+    files.write_json(path, {"format": FORMAT, "asked": dict(asked)})
+
+
+def _check_free(out: Path) -> None:
+    held = sorted(path.name for path in out.iterdir())
+    held = [name for name in held if not name.startswith(files.TEMPORARY)]
+    if DIAGNOSIS in held:
+        raise BnsError(
+            f"{out} holds a finished diagnosis, which is not overwritten: give another "
+            "--out, or remove it."
+        )
+    if [name for name in held if name != PARTIAL]:
+        raise BnsError(
+            f"{out} holds {held[0]} and is not overwritten; give another --out."
+        )
+
+
+def end(out: Path) -> None:
+    """The diagnosis is whole: nothing is left to do in the directory."""
+    (out / PARTIAL).unlink(missing_ok=True)
+    drop(out)
+
+
+def drop(out: Path) -> None:
+    """Forget the request: what was asked for cannot be had."""
+    (out / FILE).unlink(missing_ok=True)

@@ -1,0 +1,95 @@
+"""Emulated robots have the mishaps that they are told to have."""
+
+import os
+import threading
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip("cv2")
+
+from bns.hardware.emulators.camera import EmulatedCamera
+from bns.hardware.emulators.frames import painter
+from bns.hardware.emulators.mishaps import WORDS
+from bns.hardware.emulators.run import khepera3
+from bns.hardware.tracking.camera import Camera
+
+SLOW = 20.0  # s; a busy machine
+
+
+@pytest.fixture
+def port(tmp_path):
+    done = threading.Event()
+    words = {"stop": done.is_set, "rate": 50.0, "log": str(tmp_path / "log")}
+    thread = threading.Thread(target=khepera3, args=(tmp_path / "port",), kwargs=words)
+    thread.start()
+    path = tmp_path / "port"
+    while not (tmp_path / "port.mishaps").exists():
+        time.sleep(0.01)
+    yield path
+    done.set()
+    thread.join()
+
+
+def tell(port, word):
+    with open(f"{port}.mishaps", "w") as pipe:
+        pipe.write(word + "\n")
+
+
+def waited(good):
+    until = time.monotonic() + SLOW
+    while time.monotonic() < until:
+        if found := good():
+            return found
+        time.sleep(0.01)
+    return None
+
+
+def test_what_a_camera_may_do(port):
+    camera = EmulatedCamera(port, painter("khepera3", Camera.overhead((320, 240))))
+
+    def pair():
+        one, two = camera.read(SLOW), camera.read(SLOW)
+        return two.time - one.time, np.array_equal(one.image, two.image)
+
+    assert pair()[0] > 0 and not pair()[1]
+    tell(port, "frozen")
+    assert waited(lambda: pair()[1])
+    assert pair()[0] > 0  # its time stamps go on
+    tell(port, "frozen")
+    assert waited(lambda: not pair()[1])
+    tell(port, "stale")
+    assert waited(lambda: pair()[0] == 0 and not pair()[1])
+    tell(port, "stale")
+    tell(port, "covered")
+    assert waited(lambda: camera.read(0.3) is None)
+    camera.close()
+
+
+def test_what_a_line_may_do(port):
+    line = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+
+    def heard():
+        try:
+            return os.read(line, 65536)
+        except BlockingIOError:
+            return b""
+
+    def answers():
+        os.write(line, b"B\n")
+        time.sleep(0.1)
+        return b"b,2,5" in heard()
+
+    assert waited(answers)
+    tell(port, "power")
+    assert waited(lambda: not answers())
+    tell(port, "power")
+    assert waited(answers)  # it has booted
+    tell(port, "flood")
+    assert waited(lambda: len(heard()) > 100)
+    tell(port, "nonsense")
+    tell(port, "cable")
+    assert waited(lambda: not os.path.exists(port))
+    os.close(line)
+    assert set(WORDS) >= {"stuck", "reset"}

@@ -1,0 +1,137 @@
+"""A camera that hangs stops the robot; one that drives is not taken to stand."""
+
+import numpy as np
+import pytest
+
+from bns.errors import BnsError
+from bns.hardware.motion_check import AXLE, SLOWEST, MotionCheck
+from bns.hardware.tracking.tracker import Frame, Sighting, Tracker
+from bns.worlds.trial import Commands
+
+pytest.importorskip("cv2")
+
+from bns.hardware.emulators import virtual
+from bns.hardware.errors import Void
+from bns.hardware.world import HardwareWorld
+
+BOTH = np.ones(2)
+ROUND = Commands([[0.04, 0.10]], [4.0])
+STEP = 0.002  # s
+
+
+def driven(rng, lag, delay, seconds=8.0):
+    """A robot on wheels that lag: whether it was ever taken to stand."""
+    check, pose, speed = MotionCheck(), np.zeros(3), np.zeros(2)
+    goal, poses = np.zeros(2), []
+    for step in range(round(seconds / STEP)):
+        at = step * STEP
+        if step % 150 == 0:  # every 0.3 s
+            goal = rng.uniform(-0.15, 0.15, 2) * rng.choice([0.1, 1.0])
+            check.told(at, *goal)
+        speed += (goal - speed) * STEP / lag
+        left, right = speed * STEP
+        turn = (right - left) / AXLE
+        ahead, heading = (left + right) / 2, pose[2] + turn / 2
+        way = np.array([ahead * np.cos(heading), ahead * np.sin(heading), turn])
+        pose = pose + way
+        poses.append(pose)
+        if step % 17 == 0:
+            shown = poses[max(step - round(delay / STEP), 0)]
+            noise = rng.normal(0, [4e-5, 4e-5, 5e-4])
+            if check.stands(Sighting(at, shown + noise, 0.08), BOTH):
+                return True
+    return False
+
+
+@pytest.mark.parametrize("lag", [0.05, 0.13, 0.25])
+@pytest.mark.parametrize("delay", [0.0, 0.08])
+def test_a_robot_that_drives_is_never_taken_to_stand(lag, delay):
+    rng = np.random.default_rng([int(1000 * lag), int(100 * delay)])
+    assert not any(driven(rng, lag, delay) for _ in range(4))
+
+
+@pytest.mark.parametrize("speed, within", [(0.1, 0.08), (0.03, 0.12), (0.016, 0.2)])
+def test_a_pose_that_stays_shows_soon(speed, within):
+    check = MotionCheck()
+    check.told(0.0, speed, speed)
+    frames = np.arange(0.5, 3.0, 1 / 30)
+    stood = []
+    for at in frames:
+        x = speed * (min(at, 2.0) - 0.13)
+        if check.stands(Sighting(at, np.array([x, 0.0, 0.0]), 0.08), BOTH):
+            stood.append(at)
+    assert 2.0 < stood[0] < 2.0 + within
+
+
+def test_what_need_not_move_is_left_alone():
+    for left, right, shares in (
+        (0.9 * SLOWEST, 0.0, BOTH),  # slower than it regulates
+        (0.1, 0.0, np.array([0.0, 1.0])),  # the wheel is known to be dead
+        (0.0, 0.0, BOTH),
+    ):
+        check = MotionCheck()
+        check.told(0.0, left, right)
+        assert not any(
+            check.stands(Sighting(at, np.zeros(3), 0.08), shares)
+            for at in np.arange(0.0, 3.0, 0.1)
+        )
+
+
+def test_a_picture_that_comes_again_is_marked():
+    rig = virtual.rig()
+    image = rig.eyes.source.paint_at(0.1)
+    tracker = Tracker(rig.eyes.tracker.camera, rig.eyes.tracker.marker)
+    first, again = (tracker.see(Frame(at, image, 0)) for at in (0.1, 0.2))
+    other = tracker.see(Frame(0.3, rig.eyes.source.paint_at(0.3), 2))
+    assert [s.repeated for s in (first, again, other)] == [False, True, False]
+
+
+@pytest.mark.parametrize("way", ["frozen", "stuck", "stale", "ahead"])
+def test_a_camera_that_hangs_stops_the_robot_in_time(way, monkeypatch):
+    if way == "frozen":  # a repeated picture is no sighting, whatever it shows
+        monkeypatch.setattr(MotionCheck, "stands", lambda *words: False)
+    rig = virtual.rig(rate=30.0)
+    broken = {"at": 0.0}
+    paint, poll = rig.eyes.source.paint_at, rig.eyes.poll
+
+    def hangs():
+        told = rig.device.log[-1][1:] if rig.device.log else ()
+        driven = told == (5760, 14401) and rig.device.log[-1][0] + 0.5
+        if not broken["at"] and driven and rig.clock.now() > driven:
+            broken["at"] = rig.clock.now()
+            broken["image"] = paint(broken["at"])
+        return broken["at"]
+
+    def painted(at):
+        if hangs() and way == "frozen":
+            return broken["image"]
+        return paint(broken["at"] if hangs() and way == "stuck" else at)
+
+    def polled():
+        seen = poll()
+        if hangs() and way == "stale":
+            return [s._replace(time=min(s.time, broken["at"])) for s in seen]
+        if hangs() and way == "ahead":
+            return [s._replace(time=s.time + 3600) for s in seen]
+        return seen
+
+    rig.eyes.source.paint_at, rig.eyes.poll = painted, polled
+    world = HardwareWorld(rig=rig)
+    with pytest.raises(Void):
+        world._once(rig, ROUND, world._stages(4.0, 0, ())[0], 0, 0)
+    stops = [at for at in rig.device.stops if at > broken["at"] > 0]
+    assert stops[0] - broken["at"] < 0.2
+    assert max(map(abs, rig.body.wheel_speeds())) < 0.02
+    if way in ("frozen", "stale", "ahead"):  # nor does it begin to move again
+        told = len(rig.device.log)
+        with pytest.raises(BnsError, match="not in view"):
+            world.run([ROUND])
+        assert all(row[1:] == (0, 0) for row in list(rig.device.log)[told:])
+
+
+def test_a_robot_that_is_held_is_no_hanging_camera():
+    dead = ["wheel_gain:wheel=left,factor=0", "wheel_gain:wheel=right,factor=0"]
+    rig = virtual.rig(dead)
+    (trial,) = HardwareWorld(rig=rig).run([Commands([[0.1, 0.1]], [1.5])])
+    assert np.ptp(trial.poses_world[:, 0]) < 0.002
+    assert rig.faults.counts["stands"] >= 1
