@@ -60,8 +60,8 @@ def diagnose(
         seed: of what is drawn (null distributions, bootstraps).
         candidates: explanations to consider; None = all of the model's (or those
             that it suspects).
-        calibration: thresholds; None = those of the package.
-        most: largest number of effects at once.
+        calibration: thresholds, None = those of the package; the joint fit has none.
+        most: largest number of effects at once; the joint fit has no limit.
         full: with localisation and closed fractions; False = the verdict alone.
         reference: recordings of the same robot in which nothing was changed; they tell
             how far the nominal model is off anyway (`gap/core/reference.py`).
@@ -77,15 +77,14 @@ def diagnose(
         "most": most,
         "reference": reference,
     }
-    if isinstance(model, DecomposableModel) and not light_model.told_by(
-        model, (*trials, *reference)
-    ):
+    seen_by_light = light_model.told_by(model, (*trials, *reference))
+    if isinstance(model, DecomposableModel) and not (reference or seen_by_light):
         usable, faults = _checked(trials, model)
         names = None if candidates is None else [item.name for item in candidates]
         return decomposed(
             usable, model, seed=seed, faults=faults, full=full, rows=names
         )
-    if light_model.told_by(model, (*trials, *reference)):
+    if seen_by_light:
         from bns.gap.models.light import diagnosis
 
         parts = diagnosis.analyse(trials, model, **given)

@@ -56,7 +56,7 @@ class Diagnose(Check):
     seed: int = 0
     """of what is drawn (null distributions, bootstraps)"""
     most: int = 3
-    """largest number of effects at once"""
+    """largest number of effects at once, of servos, legs and light; else no limit"""
     threads: int = 2
     """threads of the physics"""
 

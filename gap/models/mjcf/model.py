@@ -180,7 +180,8 @@ class OwnModel(DecomposableModel):
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
         """Predicted samples, see `GapModel.simulate`."""
-        made = self._predicted([(t, items) for items in effects for t in trials])
+        pairs = [(trial, items) for items in effects for trial in trials]
+        made = self._predicted(pairs, self._parts())
         count = len(trials)
         return [made[at * count : (at + 1) * count] for at in range(len(effects))]
 
