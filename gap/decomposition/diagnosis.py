@@ -21,6 +21,7 @@ from bns.worlds.trial import Trial
 MOST = 0.5  # share of the gap beyond which what is left is most of it
 FELT = 0.02  # of the floor's variance: a gap below shows in no picture
 LARGE = 2.0  # variances of the floor: more than heavy tails of any camera's noise
+SCATTER = 3.0  # times what differs between repeats
 SINGLES = 8  # explanations whose share alone is reported
 
 
@@ -37,7 +38,8 @@ class Decomposition:
         onset: what sets in; None = nothing.
         floor: what measuring scatters.
         before, after: excess over the floor of the nominal model and of `point`.
-        recurs: whether what `point` leaves recurs.
+        recurs: standard errors by which what `point` leaves recurs.
+        scatter: excess over the floor of what differs between repeats.
         closed: share closed on stretches that were not fitted.
     """
 
@@ -51,6 +53,7 @@ class Decomposition:
     before: float
     after: float
     recurs: float
+    scatter: float
     closed: float
 
     @property
@@ -61,10 +64,10 @@ class Decomposition:
     @property
     def lasting(self) -> bool:
         """Whether the rest is more than scatter: it recurs, or it is far beyond what
-        measuring scatters and there are no repeats that could show it to be scatter."""
+        measuring scatters and what differs between repeats."""
         if self.recurs > rest.SURE:
             return self.after > FELT
-        return self.after > LARGE and not rest.repeats(self.problem)
+        return self.after > max(LARGE, SCATTER * self.scatter)
 
     @property
     def kind(self) -> str:
@@ -118,6 +121,7 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
             point.noise.sd,
             piece=rest.SHORT if point.noise.order else rest.PIECE,
         ),
+        scatter=rest.scattered(problem, plain, known, inside),
         closed=float((none - some) / max(none - min(least, some), 1e-9)),
     )
 
@@ -215,7 +219,7 @@ def recorded(
             "source": "the recording",
             "repeats": len(rest.repeats(problem)),
             "sigma": made.floor.sigma.tolist(),
-            "process": np.asarray(getattr(model, "process", ())).tolist(),
+            "process": np.asarray(model.process).tolist(),
             "channels": [channel.name for channel in model.channels],
         },
         closed=closed,

@@ -39,8 +39,6 @@ def best(problem: Problem, point: Point) -> Level | None:
     ]
     few = problem.sample()
     found = _scored(problem, point, todo, few)
-    if not found:
-        return None
     base = min(_weighed(problem, point, few).cost(s) for s in (point.support, ()))
     near = [item for item in found if item[0] < base + NEAR][:MOST]
     rows = {number for _, (number, _), _ in near}
@@ -49,7 +47,11 @@ def best(problem: Problem, point: Point) -> Level | None:
             near.append(item)
             rows.add(item[1][0])
     if len(few) < len(problem.trials):
-        near = _scored(problem, point, [which for _, which, _ in near], None)
+        # what a first look does not feel may be felt elsewhere: slow commands are rare
+        tried = {which for _, which, _ in found}
+        unfelt = [w for w in todo if w not in tried and not problem.rows[w[0]].smooth]
+        again = [*(which for _, which, _ in near), *unfelt]
+        near = _scored(problem, point, again, None)
     made: list[Level] = []
     count: dict[int, int] = {}
     for _, (number, value), linear in near:

@@ -22,6 +22,8 @@ class DecomposableModel(ABC):
         channels: what is observed, as in `Trial.channels`.
         features: what is compared, C channels.
         least: smallest standard deviation of each feature that is believed, ``(C,)``.
+        process: what a nominal robot scatters by itself in one second of motion, by
+            feature, ``(C,)``; for plans.
         memory: order of the autoregression that residuals may have; 0 = none.
         many: whether fits are also started from all rows at once: where many depart
             at once a tangent at the nominal misleads.
@@ -30,6 +32,7 @@ class DecomposableModel(ABC):
     name: str
     channels: tuple[Channel, ...]
     features: tuple[Channel, ...]
+    process: np.ndarray
     memory: int = 0
     many: bool = False
 

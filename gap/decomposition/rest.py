@@ -113,6 +113,20 @@ def recurrence(
     return max(_errors(np.sum(every, axis=0)), _errors(same), alone)
 
 
+def scattered(problem: Problem, rest: np.ndarray, known: Floor, inside) -> float:
+    """Excess over the floor, per residual, of what differs between repeats: the
+    robot's own scatter; 0 where there are no repeats."""
+    units = np.where(inside, np.nan_to_num(rest) / known.sd, 0.0)
+    total, count = 0.0, 0
+    for one, other in repeats(problem):
+        a, b = (np.flatnonzero(problem.trial == n) for n in (one, other))
+        length = min(len(a), len(b))
+        both = inside[a[:length]] & inside[b[:length]]
+        apart = (units[a[:length]] - units[b[:length]])[both]
+        total, count = total + float((apart**2).sum()) / 2, count + int(both.sum())
+    return max(total / count - 1.0, 0.0) if count else 0.0
+
+
 def _errors(sums: np.ndarray) -> float:
     """A sum of independent values over its standard error."""
     size = np.sqrt((sums**2).sum())
