@@ -65,6 +65,8 @@ class Decomposition:
     def lasting(self) -> bool:
         """Whether the rest is more than scatter: it recurs, or it is far beyond what
         measuring scatters and what differs between repeats."""
+        if self.after <= self.scatter:
+            return False
         if self.recurs > rest.SURE:
             return self.after > FELT
         return self.after > max(LARGE, SCATTER * self.scatter)
