@@ -1,7 +1,7 @@
 # make demo   train BNS against a damaged robot, leave runs/demo/ with a report
 # make test   run the test suite
 # make lint   formatting and lint checks
-# make api    write the reference of all public names to site/api/ (HTML)
+# make docs   build the documentation's site, with the reference, into site/
 # make clean  remove the environment and build leftovers (never runs/)
 #
 # Both first make .venv with everything in it, once; PYTHON=... chooses the Python.
@@ -11,12 +11,11 @@ VENV := .venv
 STAMP := $(VENV)/.installed
 BIN := $(VENV)/bin
 DEMO := runs/demo
-API := site/api
 PYTHON ?=
 
 export RERUN_ANALYTICS ?= 0
 
-.PHONY: help demo test lint api env clean
+.PHONY: help demo test lint docs env clean
 
 help:
 	@sed -n '1,/^$$/s/^# \{0,1\}//p' Makefile
@@ -32,11 +31,10 @@ lint: env
 	$(BIN)/ruff check .
 	$(BIN)/mypy --python-executable $(BIN)/python -p bns.worlds -p bns.models
 
-# importing glfw starts a process, which pdoc forbids unless it is told
-api: env
+docs: env
 	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[docs]'
-	PDOC_ALLOW_EXEC=1 $(BIN)/python -m pdoc --docformat google --no-show-source \
-		--output-directory $(API) bns bns.models bns.worlds bns.gap bns.hardware bns.viz
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@echo "Written: site/index.html"
 
 env: $(STAMP)
 

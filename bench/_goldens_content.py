@@ -19,6 +19,7 @@ DEPTH = 2
 """nested mappings are told apart by key so deep; what lies deeper is one hash"""
 MAY_DIFFER = {"versions", "commit", "cores", "machine", "python", "bns", "mujoco"}
 MAY_DIFFER |= {"numpy", "scipy", "torch", "pyarrow", "rerun-sdk", "ray"}
+MAY_DIFFER |= {"sha256", "revision"}  # of content that has versions in it
 MAY_DIFFER |= {"seconds", "date", "time", "at", "started", "finished", "engine"}
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 _TABLE = re.compile(r"<table.*?</table>", re.DOTALL)

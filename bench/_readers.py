@@ -423,7 +423,11 @@ def run(found: Any) -> str:
 
 def state(found: Mapping[str, np.ndarray]) -> str:
     """Weights that are numbers."""
-    return "" if np.isfinite(found["theta"]).all() else "theta holds NaN"
+    names = [name for name in found if name.rpartition(".")[2] == "theta"]
+    bad = [name for name in names if not np.isfinite(found[name]).all()]
+    if not names:
+        return "no weights"
+    return f"{bad[0]} holds NaN" if bad else ""
 
 
 def trials(found: Any) -> str:

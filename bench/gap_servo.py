@@ -10,8 +10,9 @@ from bench.result import Result
 from bench.servo_cases import KINDS, Case
 
 DOC = "STS3215 recordings, one setting mis-told: share named right, aliases merged"
-BAR = ">= 0.90"
-BAR_VALUE = 0.90
+BAR = ">= 0.95; with 5 % of the runs frozen for 1 s >= 0.93"
+BAR_VALUE, FROZEN_BAR = 0.95, 0.93
+FREEZE = 0.05  # share of all runs that stand still for a second in the second row
 SEED, EACH, QUICK = 2027, 32, 6  # 2026 was used while the tool was made
 FITTED, HELD_OUT = (1, 2), (3,)  # repeats that are diagnosed and that are predicted
 SMOOTH = ("sin_sin", "sin_time_square", "up_and_down")
@@ -35,9 +36,9 @@ def run(quick: bool) -> Result:
     named = np.array([row["named"] == row["truth"] for row in rows])
     details = _details(rows)
     errors = details["median_relative_error"]
-    holds = named.mean() >= BAR_VALUE and all(
-        errors[kind] <= bar for kind, bar in ERROR_BARS.items()
-    )
+    frozen = _frozen(cases, every)
+    held = named.mean() >= BAR_VALUE and frozen["named"] >= FROZEN_BAR
+    holds = held and all(errors[kind] <= bar for kind, bar in ERROR_BARS.items())
     return Result(
         figure=round(float(named.mean()), 4),
         unit="of cases",
@@ -45,12 +46,39 @@ def run(quick: bool) -> Result:
         n=len(rows),
         details={
             **details,
+            "frozen_for_a_second": frozen,
+            "left_out_as_recorded": reference.left_out,
             **({} if quick else _harder(cases, every, law)),
             "candidates": len(reference.candidates),
             "nominal_error_rad": law.error,
             "nominal": {k: round(v, 5) for k, v in law.values.items()},
         },
     )
+
+
+def _frozen(cases: list[Case], every) -> dict[str, object]:
+    """The same cases with frozen runs among all: law, reference and diagnosed ones."""
+    from bns.gap.models.servo import diagnosis, repeats
+
+    rng = np.random.default_rng(SEED)
+    stuck, chosen = servo_cases.frozen(every, FREEZE, rng)
+    law = servo_cases.nominal(repeats.sound(stuck)[0])
+    past = stuck.take(stuck.where(lambda r: r > 0, "repeat"))
+    reference = diagnosis.learn(past, law)
+    rows = [_row(case, stuck, reference, FITTED) for case in cases]
+    found = set(repeats.odd(stuck))
+    return {
+        "named": _share(rows),
+        "frozen": len(chosen),
+        "frozen_left_out": len(found & set(chosen.tolist())),
+        "others_left_out": len(found - set(chosen.tolist())),
+        "false_alarm": float(
+            np.mean([r["named"] != "none" for r in rows if r["truth"] == "none"])
+        ),
+        "confusion": dict(
+            sorted(Counter(f"{r['truth']} -> {r['named']}" for r in rows).items())
+        ),
+    }
 
 
 def _harder(cases: list[Case], every, law) -> dict[str, object]:

@@ -1,7 +1,7 @@
 """Withheld-setting cases from real servo recordings, and their scores."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from bns.gap.models.servo import curves
 from bns.gap.models.servo import nominal as servo_nominal
 from bns.gap.models.servo.curves import features
 from bns.gap.models.servo.nominal import Nominal
-from bns.gap.models.servo.runs import Runs, cells, merged, runs
+from bns.gap.models.servo.runs import SAMPLE, Runs, cells, merged, runs
 from bns.worlds.effects import registry
 
 SET = "kscale_sts3215"
@@ -20,6 +20,9 @@ SECONDS = 5.9  # of each run; all last 6 s
 FITTED = ((0.535, 0.10, 4.0), (0.741, 0.15, 16.0), (0.969, 0.10, 32.0))
 """cells whose first repeats the nominal law is fitted to, beside the next"""
 FITTED_TOO = (1.168, 0.15, 8.0)
+
+
+FROZEN = 1.0  # [s] that a frozen run stands still
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,27 @@ def nominal(every: Runs) -> Nominal:
     here = np.array([tuple(np.round(cell, 2)) in wanted for cell in cells(every)])
     first = every.where(lambda number: number == 0, "repeat")
     return servo_nominal.fit(every.take(here & first))
+
+
+def frozen(
+    every: Runs, share: float, rng: np.random.Generator
+) -> tuple[Runs, np.ndarray]:
+    """The runs, some of whose angles stand still for `FROZEN` seconds.
+
+    Args:
+        every: all runs.
+        share: of the runs that freeze.
+        rng: draws which, and when.
+
+    Returns:
+        The runs, and the indices of the frozen ones.
+    """
+    angles, width = every.angles.copy(), round(FROZEN / SAMPLE)
+    chosen = rng.permutation(len(every))[: round(share * len(every))]
+    for index in chosen:
+        begin = int(rng.integers(angles.shape[1] - width))
+        angles[index, begin : begin + width] = angles[index, begin]
+    return replace(every, angles=angles), chosen
 
 
 def draw(every: Runs, each: int, rng: np.random.Generator) -> Iterator[Case]:

@@ -32,7 +32,7 @@ __all__ = [
     "train_many",
 ]
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _PLACES = {
     "RunConfig": "bns.experiment.config",

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Sequence
 
 from bns.cli import dispatch
+from bns.cli.extras import missing
 from bns.errors import BnsError
 
 WRONG_INPUT = 2
@@ -24,6 +25,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         return dispatch(list(sys.argv[1:] if argv is None else argv))
     except BnsError as error:
         print(f"bns: {' '.join(str(error).split())}", file=sys.stderr)
+        return WRONG_INPUT
+    except ModuleNotFoundError as error:
+        what = missing(error)
+        if not what:
+            raise
+        print(f"bns: {what}", file=sys.stderr)
         return WRONG_INPUT
     except KeyboardInterrupt:
         print("bns: interrupted.", file=sys.stderr)

@@ -12,18 +12,34 @@ from bns.experiment import versions
 
 State = Literal["ok", "missing", "bad", "note"]
 
-REQUIRED = (
-    "mujoco", "numpy", "scipy", "torch", "rerun-sdk", "pyarrow", "tyro", "rich",
-    "matplotlib", "jinja2",
-)  # fmt: skip
-OPTIONAL = {
-    "dm-control": "dm_env worlds",
-    "gymnasium": "Gymnasium worlds",
-    "pyserial": "a Khepera on a serial port",
-    "opencv-python-headless": "overhead tracking",
-    "dynamixel-sdk": "a hexapod on its bus",
-}
-"""package -> what needs it"""
+REQUIRED = ("mujoco", "numpy", "scipy", "pyarrow", "rich", "jinja2")
+
+
+class Optional(NamedTuple):
+    """A package that a part of the testbed needs.
+
+    Attributes:
+        name: of the package.
+        extra: of bns-testbed that brings it.
+        needed_by: what needs it.
+    """
+
+    name: str
+    extra: str
+    needed_by: str
+
+
+OPTIONAL = (
+    Optional("torch", "learn", "learners"),
+    Optional("matplotlib", "report", "figures and reports"),
+    Optional("rerun-sdk", "view", "recordings in 3D"),
+    Optional("imageio-ffmpeg", "video", "videos as MP4"),
+    Optional("gymnasium", "gym", "Gymnasium worlds"),
+    Optional("dm-control", "dm", "dm_env worlds"),
+    Optional("pyserial", "hardware", "a Khepera on a serial port"),
+    Optional("opencv-python-headless", "hardware", "overhead tracking"),
+    Optional("dynamixel-sdk", "hardware", "a hexapod on its bus"),
+)
 
 
 class Finding(NamedTuple):
@@ -71,12 +87,12 @@ def _packages() -> list[Finding]:
 
 def _optional() -> list[Finding]:
     found = []
-    for name, needed_by in OPTIONAL.items():
+    for name, extra, needed_by in OPTIONAL:
         version = versions.package(name)
         if version:
             found.append(Finding(name, "ok", version))
         else:
-            remedy = f"for {needed_by}: pip install {name}"
+            remedy = f"for {needed_by}: pip install 'bns-testbed[{extra}]'"
             found.append(Finding(name, "note", "not installed", remedy))
     return found
 

@@ -29,21 +29,24 @@ def one_line(text: str, longest: int = LONGEST) -> str:
 
 
 class UnknownNameError(BnsError):
-    """A name that no registry holds.
+    """A name that no registry holds: the one that was meant, or else all there are.
 
     Args:
         kind: what was looked up, in singular ("effect", "preset", "world").
         given: the name that was given.
         known: the names that exist.
-        also: a sentence on what else may be given.
+        also: a sentence on what else may be given, where nothing is alike.
     """
 
     def __init__(self, kind: str, given: str, known: Iterable[str], also: str = ""):
         self.kind, self.given, self.known = kind, given, sorted(known)
         close = get_close_matches(given, self.known, n=1, cutoff=0.5)
-        hint = f" Did you mean {close[0]!r}?" if close else ""
         end = f" {also}" if also else ""
-        said = f"Unknown {kind} {one_line(given, 60)!r}.{hint} Available: "
+        said = f"Unknown {kind} {one_line(given, 60)!r}."
+        if close:
+            super().__init__(f"{said} Did you mean {close[0]!r}?")
+            return
+        said += " Available: "
         room = LONGEST - len(said) - len(end) - len(", ... (10000 in all).")
         listed, left = ", ".join(self.known), len(self.known)
         if len(listed) > room:

@@ -1,6 +1,7 @@
 """Where robots lie: here, in installed packages, and in directories of the user's."""
 
 import os
+import tomllib
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -59,4 +60,14 @@ def find(robot: str) -> Path:
 
 def known(robot: str) -> bool:
     """Whether a robot is called so, or that is the directory of one."""
-    return robot in names() or (Path(robot) / FACTS).is_file()
+    return robot in names() or _robot(Path(robot) / FACTS)
+
+
+def _robot(file: Path) -> bool:
+    """Whether a file describes a robot; what cannot be read counts, to be told of."""
+    if not file.is_file():
+        return False
+    try:
+        return "kind" in tomllib.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return True

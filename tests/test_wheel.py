@@ -4,7 +4,6 @@ import os
 import shutil
 import subprocess
 import sys
-import sysconfig
 import zipfile
 from importlib.util import find_spec
 from pathlib import Path
@@ -97,8 +96,7 @@ def _lend_dependencies(environment: Path) -> None:
     Plain paths: the hook of an editable install is in a `.pth` file, which Python
     reads in its own site directory alone.
     """
-    ours = Path(sysconfig.get_path("purelib"))
-    paths = [path for path in sys.path if Path(path).is_relative_to(ours)]
+    paths = [path for path in sys.path if Path(path).name == "site-packages"]
     (site,) = environment.glob("lib/python*/site-packages")
     (site / "dependencies.pth").write_text("\n".join(paths) + "\n")
 

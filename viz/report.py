@@ -14,7 +14,7 @@ from bns.storage import files
 from bns.tasks import registry as tasks
 from bns.viz import comparison, facts, figures, scene
 from bns.viz.captions import BAND, CAPTIONS, TITLES
-from bns.viz.page import picture, render
+from bns.viz.page import picture, portrait, render
 
 SHARED = ("fitness", "solved", "waits")
 """Figures of all tasks and learners; several batches can be laid over one another."""
@@ -115,6 +115,8 @@ def _batch(label: str, record: RunRecord) -> dict:
             (key, comparison.text(value)) for key, value in record.conditions.items()
         ),
         "directory": Path(record.directory).name,
+        "robot": record.config.world.robot,
+        "portrait": portrait(record.config.world.robot),
         "seed": record.config.seed,
     }
 

@@ -4,7 +4,9 @@ Colours are those of Okabe and Ito (2008), which stay apart for the three common
 kinds of colour blindness; lightness differs too, so that they survive grey print.
 """
 
+import io
 from contextlib import contextmanager
+from functools import cache
 from typing import NamedTuple
 
 BLACK = "#222222"
@@ -72,10 +74,23 @@ def plotting():
     alive and threads do not meet.
     """
     import matplotlib
-    from matplotlib.figure import Figure
 
     with matplotlib.rc_context(_RC):
-        yield Figure
+        yield _figure_class()
+
+
+@cache
+def _figure_class():
+    """Matplotlib's figure, which a notebook shows where it is a cell's last value."""
+    from matplotlib.figure import Figure
+
+    class Shown(Figure):
+        def _repr_png_(self) -> bytes:
+            buffer = io.BytesIO()
+            self.savefig(buffer, format="png")
+            return buffer.getvalue()
+
+    return Shown
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

@@ -22,12 +22,14 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from bns.errors import BnsError
+from bns.errors import BnsError, FormatError
 from bns.storage import files as writing
 from bns.storage import reading
 from bns.storage.lock import Lock
 
 FILE, VARIABLE = "worlds.toml", "BNS_WORLDS"
+NEAR = 2
+"""directories above this one that are looked at for worlds kept there"""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 TABLES = "A world has base, robot, note (text) and reality (a list of effects)."
 
@@ -87,6 +89,22 @@ def known() -> dict[str, Corrected]:
     for path in reversed(files()):
         found |= _read(path)
     return dict(sorted(found.items()))
+
+
+def elsewhere(name: str) -> Path | None:
+    """The file near this directory that keeps a world called `name`, if there is one.
+
+    Looks in the directories above this one and in those beside and below them.
+    """
+    here = Path.cwd()
+    for above in (here, *list(here.parents)[:NEAR]):
+        for path in (above / FILE, *sorted(above.glob(f"*/{FILE}"))):
+            try:
+                if name in _read(path):
+                    return path
+            except FormatError:
+                continue
+    return None
 
 
 def keep(world: Corrected, *, user: bool = False, replace: bool = False) -> Path:

@@ -70,7 +70,14 @@ def get(name: str) -> Callable[..., World]:
     kept = corrected.known()
     if name in kept:
         return corrected.factory(kept[name], make)
-    raise UnknownNameError("world", name, names())
+    if path := corrected.elsewhere(name):
+        raise BnsError(
+            f"World {name!r} is kept in {path}, which is read in {path.parent} alone: "
+            "run there, name the file in $BNS_WORLDS, or keep it for all directories "
+            "with `bns gap apply ... --user`."
+        )
+    also = "Worlds of `bns gap apply` are read where they are kept; --user: everywhere."
+    raise UnknownNameError("world", name, names(), also)
 
 
 def describe() -> dict[str, str]:

@@ -1,15 +1,11 @@
 """Progress over a whole campaign, with an estimate of what is left."""
 
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
 
 from bns.campaign.plan import Job
-
-QUIET_SECONDS = 30.0
-"""time between two lines where there is no terminal"""
+from bns.progress import Bar, duration
 
 
 class Progress:
@@ -32,19 +28,17 @@ class Progress:
         self.before, self.total = done, done + sum(job.work for job in jobs)
         self.share = dict.fromkeys(self.jobs, 0.0)
         self.ended = self.failed = 0
-        self.began = self.spoke = time.monotonic()
-        self.bar: Any = None
+        self.began = time.monotonic()
+        self.bar: Bar | None = None
 
     @contextmanager
     def start(self) -> Iterator[None]:
         """Show progress inside the block."""
-        if self.enabled and sys.stderr.isatty():
-            self._start_bar()
-        try:
+        if not self.enabled:
             yield
-        finally:
-            if self.bar:
-                self.bar.stop()
+            return
+        with Bar(self.name, self.total, done=self.before, counted=False) as self.bar:
+            yield
 
     def beat(self, key: str, trials: int) -> None:
         """A batch has done so many trials."""
@@ -80,38 +74,8 @@ class Progress:
         return f"{said}, {duration(self.left())} left"
 
     def _show(self) -> None:
-        if not self.enabled:
+        if not self.bar:
             return
-        now = time.monotonic()
-        if self.bar:
-            self.bar.update(
-                self.task, completed=self.before + self.here, description=self.text()
-            )
-        elif now - self.spoke >= QUIET_SECONDS:
-            self.spoke = now
-            print(f"{self.name}: {self.text()}", file=sys.stderr, flush=True)
-
-    def _start_bar(self) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-        self.bar = Progress(
-            TextColumn(self.name),
-            BarColumn(),
-            TimeElapsedColumn(),
-            TextColumn("{task.description}"),
-            console=Console(stderr=True),
-        )
-        self.task = self.bar.add_task("", total=self.total, completed=self.before)
-        self.bar.start()
-
-
-def duration(seconds: float) -> str:
-    """A time in words: ``about 2 h 10 min``."""
-    if seconds == float("inf"):
-        return "an unknown time"
-    minutes = round(seconds / 60)
-    if minutes < 2:
-        return f"about {seconds:.0f} s"
-    hours, minutes = divmod(minutes, 60)
-    return f"about {hours} h {minutes} min" if hours else f"about {minutes} min"
+        failed = f", {self.failed} failed" if self.failed else ""
+        brief = f"{self.ended} of {len(self.jobs)} batches{failed}"
+        self.bar.update(self.before + self.here, brief, line=self.text())

@@ -30,6 +30,7 @@ from bns.claims.verdict import Finding
 from bns.experiment.config import RunConfig
 from bns.stats.equivalence import of_share
 from bns.stats.measures import a12_error
+from bns.tasks import registry as tasks
 
 FILE = "price.toml"
 UNKNOWN = 0.75  # share expected where nothing is known
@@ -55,14 +56,14 @@ class Price:
 
 @cache
 def rates() -> Mapping[str, Mapping[str, float]]:
-    """What was measured, by learner [s of a processor]."""
+    """What was measured, by kind of task [s of a processor]."""
     path = files("bns.claims.data") / FILE
     return tomllib.loads(path.read_text(encoding="utf-8"))
 
 
 def seconds(config: RunConfig, first: int, last: int) -> float:
     """Processor time of a run's trials from `first` up to `last` [s]."""
-    rate = rates()[config.learner]
+    rate = rates()[tasks.kind(config.task.name)]
     size = config.snn.hidden / rate["hidden"]
     work = config.evolution.population * config.evolution.generations * size
     each = rate["trial"] * size + rate["evolution"] * work

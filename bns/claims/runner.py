@@ -96,12 +96,12 @@ def run(
     out = directory(world, quick=quick, root=root)
     last = runs or (QUICK_RUNS if quick else 0)
     check_device("cpu")
-    store = drive.opened(_campaign((), world), out, resume=True)
-    if not mix:
-        store.check_versions()
-    store.lock()
     session = Session()
-    try:
+    with Lock(out) as lock:
+        store = drive.opened(_campaign((), world), out, resume=True, lock=lock)
+        if not mix:
+            store.check_versions()
+        store.tidy()
         if retry:
             store.forgive()
         while not session.stopped:
@@ -115,8 +115,6 @@ def run(
                 print(price.left(rows, world=world))
             _work(todo, store, engine, session, stop, progress, world, found)
         store.compact()
-    finally:
-        store.close()
     return session
 
 

@@ -1,6 +1,6 @@
 """The command line: one module per family of verbs, imported when it is called."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib import import_module
 
 from bns import __version__
@@ -18,11 +18,23 @@ VERBS = {
     "robots": ("lists", "list the robot models"),
     "models": ("models", "make, check, open or draw a robot model"),
     "effects": ("lists", "list the effects with parameters, units and ranges"),
+    "examples": ("examples", "list, print or copy the examples"),
+    "schema": ("schema", "JSON Schema of the TOML files, for editors"),
     "gap": ("gap", "diagnose the gap between recordings and a model (experimental)"),
     "hardware": ("hardware", "real robots: rehearse, check, calibrate, record"),
     "doctor": ("doctor", "check this machine and say what to install"),
+    "completion": ("completion", "print the completion script of bash, zsh or fish"),
 }
 """verb -> module of this package, and what it does in one line"""
+
+GROUPS = {
+    "Learn": ("run", "report", "compare", "view"),
+    "Many runs": ("campaign", "claims"),
+    "What there is": ("presets", "worlds", "robots", "effects", "models", "examples"),
+    "Real robots": ("gap", "hardware"),
+    "This machine": ("doctor", "completion", "schema"),
+}
+"""title in the manual -> verbs"""
 
 GOODBYE = "`bns VERB --help` is the manual of a verb."
 
@@ -40,9 +52,21 @@ def dispatch(argv: Sequence[str]) -> int:
     if verb in ("-V", "--version"):
         print(f"bns {__version__}")
         return 0
+    if verb == "--complete":
+        from bns.cli.completion import candidates
+
+        print("\n".join(candidates(rest)))
+        return 0
     if verb not in VERBS:
         raise UnknownNameError("command", verb, VERBS)
     return import_module(f"bns.cli.{VERBS[verb][0]}").main(verb, rest)
+
+
+def _groups() -> Iterator[str]:
+    for title, verbs in GROUPS.items():
+        yield f"{title}:"
+        yield from (f"  {verb:<10} {VERBS[verb][1]}" for verb in verbs)
+        yield ""
 
 
 def _manual() -> str:
@@ -51,8 +75,7 @@ def _manual() -> str:
         "",
         "Robots that learn their own simulator, in a physics world.",
         "",
-        *(f"  {verb:<9} {doc}" for verb, (_, doc) in VERBS.items()),
-        "",
+        *_groups(),
         "  --version  print the version",
         "",
         GOODBYE,

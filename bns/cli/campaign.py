@@ -4,8 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-import tyro
-
+from bns.cli.fields import Positional
 from bns.cli.parse import dispatch
 from bns.cli.tables import show
 from bns.errors import BnsError
@@ -33,7 +32,7 @@ class Run:
     done, twice at once; --resume goes on and loses nothing that was done.
     """
 
-    file: tyro.conf.Positional[str]
+    file: Positional[str]
     """the campaign file (TOML), or a campaign's directory to go on with"""
     out: str = ""
     """directory for the results (default: runs/NAME)"""
@@ -59,9 +58,9 @@ class Merge:
     other machines, or of parts of it. The others are not changed.
     """
 
-    directory: tyro.conf.Positional[str]
+    directory: Positional[str]
     """a campaign's directory"""
-    others: tyro.conf.Positional[tuple[str, ...]]
+    others: Positional[tuple[str, ...]]
     """directories to take from"""
     mix: bool = False
     """take results of other package versions as well"""
@@ -71,7 +70,7 @@ class Merge:
 class Status:
     """Say how far a campaign is and which batches failed; it may be running."""
 
-    directory: tyro.conf.Positional[str]
+    directory: Positional[str]
     """a campaign's directory"""
     json: bool = False
     """print JSON instead of a table"""
@@ -94,7 +93,7 @@ class Plot:
     depends on each setting that is varied.
     """
 
-    directory: tyro.conf.Positional[str]
+    directory: Positional[str]
     """a campaign's directory"""
     out: str = field(default="")
     """folder for curves.png and sensitivity.png (default: the directory)"""

@@ -5,15 +5,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-import tyro
-
+from bns.cli.fields import Positional
 from bns.cli.parse import dispatch
 from bns.cli.tables import show
 from bns.errors import BnsError
 
 MANUAL = """usage: bns claims {list,plan,run,take,table} [...]
 
-  list           all 157 claims: where, what is compared, what the dissertation says
+  list           all 157 claims: where, what is compared, what was said
   plan           what all of it costs: sides, runs, processor hours
   run ID ...     run what a claim needs and is missing, then say what it says
   run C ...      the same for all claims of an investigation
@@ -33,7 +32,7 @@ KEEP_EVERY = 300.0  # s
 class List:
     """List the claims: id, place, kind, what the dissertation says, comparisons."""
 
-    ids: tyro.conf.Positional[tuple[str, ...]] = ()
+    ids: Positional[tuple[str, ...]] = ()
     """claims to show with all their comparisons; none lists all"""
     json: bool = False
     """print JSON instead of a table"""
@@ -43,7 +42,7 @@ class List:
 class Plan:
     """Plan the processor hours of claims, as if none of them had run."""
 
-    ids: tyro.conf.Positional[tuple[str, ...]] = ()
+    ids: Positional[tuple[str, ...]] = ()
     """claims or investigations, as in `A15 C`; none means all"""
     world: Literal["mujoco", "static-snn"] = "mujoco"
     """where robots run"""
@@ -58,7 +57,7 @@ class Run:
     is published of today's settings is not run again, unless --own.
     """
 
-    ids: tyro.conf.Positional[tuple[str, ...]] = ()
+    ids: Positional[tuple[str, ...]] = ()
     """claims, as in `bns claims run A15 C22`, or investigations: A, B, C, D"""
     all: bool = False
     """every claim"""
@@ -93,7 +92,7 @@ class Take:
     side's, and of which there are none yet.
     """
 
-    folders: tyro.conf.Positional[tuple[str, ...]]
+    folders: Positional[tuple[str, ...]]
     """folders of run directories"""
     world: Literal["mujoco", "static-snn"] = "mujoco"
     """whose runs"""
@@ -107,7 +106,7 @@ class Table:
     the package where those rest on more runs of the same settings.
     """
 
-    ids: tyro.conf.Positional[tuple[str, ...]] = ()
+    ids: Positional[tuple[str, ...]] = ()
     """claims or investigations, as in `A15 C`; none means all"""
     world: Literal["mujoco", "static-snn"] = "mujoco"
     """which runs"""

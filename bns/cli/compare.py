@@ -3,8 +3,7 @@
 import json
 from dataclasses import dataclass
 
-import tyro
-
+from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.cli.tables import show
 
@@ -16,7 +15,7 @@ class Arguments:
     over the pairs of a measure, and A12 with its 95 % interval.
     """
 
-    directories: tyro.conf.Positional[tuple[str, ...]]
+    directories: Positional[tuple[str, ...]]
     """two or more run directories"""
     json: bool = False
     """print JSON instead of tables"""

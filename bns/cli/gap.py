@@ -2,9 +2,11 @@
 
 from importlib import import_module
 
+from bns.cli.parse import HELP, HELP_ALL
 from bns.errors import UnknownNameError
 
 VERBS = {
+    "describe": ("gap_describe", "write the description of a robot of your own"),
     "check": ("gap_diagnose", "is the recording sound? repairs and faults, one a line"),
     "diagnose": ("gap_diagnose", "is there a gap, where, which effect, how far closed"),
     "plan": ("gap_after", "the next command, which separates what is still tied"),
@@ -18,7 +20,7 @@ VERBS = {
 def main(verb: str, argv: list[str]) -> int:
     """Run a verb of the gap diagnosis; gives the exit code."""
     del verb
-    if not argv or argv[0] in ("-h", "--help"):
+    if not argv or argv[0] in (*HELP, HELP_ALL):
         print(_manual())
         raise SystemExit(0)
     if argv[0] not in VERBS:

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import tyro
-
+from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.errors import BnsError, UnknownNameError
+from bns.progress import working
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,7 +16,7 @@ class Planned:
     tied, and write it to a file. Record it, then diagnose both recordings together.
     """
 
-    directory: tyro.conf.Positional[str]
+    directory: Positional[str]
     """a directory that `bns gap diagnose` wrote"""
     to: str = ""
     """file for the commands, CSV (default: DIRECTORY/next_command.csv)"""
@@ -32,7 +32,7 @@ class Edit:
     was not there: a model with the right physics stays right.
     """
 
-    directory: tyro.conf.Positional[str]
+    directory: Positional[str]
     """a directory that `bns gap diagnose` wrote"""
     remove: str
     """name of the effect, wheel_gain[left] or wheel_gain; * = all"""
@@ -50,7 +50,7 @@ class Apply:
     it, `bns worlds` lists it. For a model of your own: write the corrected MJCF.
     """
 
-    directory: tyro.conf.Positional[str]
+    directory: Positional[str]
     """a directory that `bns gap diagnose` wrote"""
     world: str = ""
     """name for the world"""
@@ -98,7 +98,8 @@ def _plan(given: Planned) -> int:
     else:
         model = _model(found)
         _plannable(found, model)
-        made = plan.plan(found, model, arena=given.arena, seed=given.seed)
+        with working("planning"):
+            made = plan.plan(found, model, arena=given.arena, seed=given.seed)
     print(made.sentence)
     if not made.options or not made.repeats:
         return 0
@@ -134,7 +135,8 @@ def _edit(given: Edit) -> int:
     model = _model(found)
     trials = load_recordings.trials(given.predict, model, columns=given.columns)
     load_recordings.tellable(trials, model)
-    made = edit.edit(found, trials, model, remove=given.remove, effect=given.effect)
+    with working("predicting"):
+        made = edit.edit(found, trials, model, remove=given.remove, effect=given.effect)
     print(made.sentence)
     for name, loss in made.losses.items():
         errors = ", ".join(

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import tyro
-
-from bns.cli.parse import parse
+from bns.cli.fields import Positional
+from bns.cli.parse import dispatch
 from bns.errors import BnsError, FormatError, UnknownNameError
+from bns.progress import working
 
-VERBS = ("make", "run", "score")
 MANUAL = """usage: bns gap bench {make,run,score} [...]
 
   make   write recordings with hidden effects, their answers in another place
@@ -25,7 +24,7 @@ dataset directory each, and an answers file as `make` writes it."""
 class Make:
     """Write blind cases: a dataset directory each, the answers in a file elsewhere."""
 
-    cases: tyro.conf.Positional[str]
+    cases: Positional[str]
     """directory for the cases"""
     answers: str
     """file for the answers, JSON; may not lie in the directory of the cases"""
@@ -44,7 +43,7 @@ class Make:
 class Run:
     """Diagnose the cases of a directory; those already in the file are left out."""
 
-    cases: tyro.conf.Positional[str]
+    cases: Positional[str]
     """directory of the cases"""
     said: str
     """file for what is said, a JSON line per case; appended to"""
@@ -58,24 +57,17 @@ class Run:
 class Score:
     """Compare what was said with the answers."""
 
-    said: tyro.conf.Positional[str]
+    said: Positional[str]
     """file that `run` wrote"""
-    answers: tyro.conf.Positional[str]
+    answers: Positional[str]
     """file that `make` wrote"""
 
 
 def main(verb: str, argv: list[str]) -> int:
     """Run the verb; gives the exit code."""
     del verb
-    if not argv or argv[0] in ("-h", "--help"):
-        print(MANUAL)
-        raise SystemExit(0)
-    kinds: dict[str, Any] = {"make": (Make, _make), "run": (Run, _run)}
-    kinds["score"] = (Score, _score)
-    if argv[0] not in kinds:
-        raise UnknownNameError("verb of `bns gap bench`", argv[0], VERBS)
-    kind, do = kinds[argv[0]]
-    return do(parse(kind, argv[1:], prog=f"bns gap bench {argv[0]}"))
+    does = {"make": (Make, _make), "run": (Run, _run), "score": (Score, _score)}
+    return dispatch("gap bench", argv, does, MANUAL)
 
 
 def _make(given: Make) -> int:
@@ -122,7 +114,8 @@ def _run(given: Run) -> int:
     if not Path(given.cases).is_dir():
         raise FormatError(f"There is no directory {given.cases} of cases.")
     model = load_recordings.model(given.model, threads=given.threads)
-    count = benchmark_io.run(Path(given.cases), model, Path(given.said))
+    with working("diagnosing the cases"):
+        count = benchmark_io.run(Path(given.cases), model, Path(given.said))
     print(f"{count} cases diagnosed: {given.said}")
     return 0
 

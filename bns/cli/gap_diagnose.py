@@ -6,10 +6,11 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import tyro
-
+from bns.cli.extras import attempt
+from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.errors import BnsError, FormatError
+from bns.progress import working
 
 LISTED = 8  # faults that are printed at most
 
@@ -21,7 +22,7 @@ class Check:
     repaired stops it.
     """
 
-    data: tyro.conf.Positional[tuple[str, ...]]
+    data: Positional[tuple[str, ...]]
     """dataset directories, or those of runs; or CSV or MCAP logs, with --columns"""
     model: str = ""
     """nominal robot (see `bns robots`), or the TOML file of a model of your own
@@ -159,7 +160,8 @@ def _diagnosed(given: Diagnose, out: Path | None) -> int:
     else:
         model = nominal(given, given.threads)
         trials = _some(recorded(given, model))
-        found = _before(out) or _general(given, model, trials, out)
+        with working(f"diagnosing {len(trials)} trials"):
+            found = _before(out) or _general(given, model, trials, out)
     found = replace(
         found, provenance={**found.provenance, **_provenance(given, model, trials)}
     )
@@ -308,14 +310,28 @@ def _closed(found: Any) -> Sequence[str]:
 
 
 def _draw(given: Diagnose, found: Any, trials: Any, model: Any, out: Path) -> None:
-    made = {"data": out / "diagnosis.json"}
-    if given.report:
-        from bns.viz.gap import report as gap_report
-
-        made["report"] = gap_report.write(found, trials, model, out / "report.html")
-    if given.rerun and model is not None:
-        from bns.viz.gap import recording
-
-        made["recording"] = recording.write(found, trials, model, out / "recording.rrd")
+    with working("drawing"):
+        made = _drawn(given, found, trials, model, out)
     for name, path in made.items():
         print(f"{name + ':':<11}{path}")
+
+
+def _drawn(
+    given: Diagnose, found: Any, trials: Any, model: Any, out: Path
+) -> dict[str, Path]:
+    def report() -> Path:
+        from bns.viz.gap import report as gap_report
+
+        return gap_report.write(found, trials, model, out / "report.html")
+
+    def recording() -> Path:
+        from bns.viz.gap import recording as gap_recording
+
+        return gap_recording.write(found, trials, model, out / "recording.rrd")
+
+    made = {"data": out / "diagnosis.json"}
+    if given.report:
+        made |= attempt("report", report)
+    if given.rerun and model is not None:
+        made |= attempt("recording", recording)
+    return made

@@ -1,23 +1,22 @@
 """`bns hardware`: rehearse with an emulated robot, check, calibrate, record."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-import tyro
-
-from bns.cli.parse import parse
-from bns.errors import BnsError, UnknownNameError
+from bns.cli.fields import Positional
+from bns.cli.parse import dispatch
+from bns.errors import BnsError
 
 if TYPE_CHECKING:
     from bns.worlds.light.field import Lamp
 
-VERBS = ("emulate", "check", "calibrate", "record")
 MANUAL = """usage: bns hardware {emulate,check,calibrate,record} [...]
 
   emulate    a virtual robot on a serial port, with a camera above it
-  check      battery, firmware, sensors, link, camera, tag: nothing moves without --move
-  calibrate  camera (lens, place, height of the robot's tag), wheels, servo zeros
+  check      battery, firmware, sensors, link, camera, tag; moves with --move
+  calibrate  camera (lens, place, height of the tag), wheels, servo zeros
   record     drive safe commands and write a dataset for `bns gap`
 
 `bns run PRESET --world hardware --port DEVICE --camera N` learns on the robot.
@@ -32,7 +31,7 @@ class Emulate:
     cable, USR2 covers and uncovers the camera.
     """
 
-    robot: tyro.conf.Positional[Robot] = "khepera3"
+    robot: Positional[Robot] = "khepera3"
     """which one"""
     port: str = "bns-robot"
     """path of a link to the port; give it as --port elsewhere"""
@@ -136,22 +135,15 @@ class Record(Connection):
 
 def main(verb: str, argv: list[str]) -> int:
     """Run a verb of the hardware mode; gives the exit code."""
-    del verb
-    if not argv or argv[0] in ("-h", "--help"):
-        print(MANUAL)
-        raise SystemExit(0)
-    if argv[0] not in VERBS:
-        raise UnknownNameError("verb of `bns hardware`", argv[0], VERBS)
-    prog = f"bns hardware {argv[0]}"
-    if argv[0] == "emulate":
-        return _emulate(parse(Emulate, argv[1:], prog=prog))
     from bns.cli import hardware_session as session
 
-    if argv[0] == "check":
-        return session.check(parse(Check, argv[1:], prog=prog))
-    if argv[0] == "calibrate":
-        return session.calibrate(parse(Calibrate, argv[1:], prog=prog))
-    return session.record(parse(Record, argv[1:], prog=prog))
+    does: dict[str, tuple[type, Callable[[Any], int]]] = {
+        "emulate": (Emulate, _emulate),
+        "check": (Check, session.check),
+        "calibrate": (Calibrate, session.calibrate),
+        "record": (Record, session.record),
+    }
+    return dispatch(verb, argv, does, MANUAL)
 
 
 def _emulate(given: Emulate) -> int:

@@ -1,12 +1,16 @@
-"""`bns presets`, `worlds`, `robots`, `effects`: what exists, one line each."""
+"""`bns presets`, `worlds`, `robots`, `effects`: what exists."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Literal
 
+from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.cli.tables import show
+from bns.errors import UnknownNameError
 
 FEW = 4  # commands of a robot that a list shows
+Stage = Literal["", "command", "actuator", "body", "optics", "sensor", "tracking"]
 Rows = tuple[list[str], list[list[str]]]
 
 
@@ -18,8 +22,26 @@ class Arguments:
     """print JSON instead of a table"""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Effects:
+    """List the effects: one line each, or those that FILTER finds with parameters,
+    units and ranges.
+    """
+
+    filter: Positional[str] = ""
+    """part of a name or of a meaning, such as wheel or friction"""
+    stage: Literal[
+        "", "command", "actuator", "body", "optics", "sensor", "tracking"
+    ] = ""
+    """only effects that act there"""
+    json: bool = False
+    """print JSON instead of a table, parameters included"""
+
+
 def main(verb: str, argv: list[str]) -> int:
     """Print the list that `verb` names."""
+    if verb == "effects":
+        return _effects(parse(Effects, argv, prog="bns effects"))
     given = parse(Arguments, argv, prog=f"bns {verb}")
     head, rows = LISTS[verb]()
     show(head, rows, json=given.json)
@@ -62,14 +84,56 @@ def robots() -> Rows:
     return ["robot", "kind", "commands", "what it is"], rows
 
 
-def effects() -> Rows:
-    """Every effect, a line for each of its parameters and choices."""
+def _effects(given: Effects) -> int:
+    found = _chosen(given.filter.lower(), given.stage)
+    if given.json:
+        show(*_parameters(found), json=True)
+        return 0
+    if given.filter:
+        _print_parameters(found)
+        return 0
+    show(
+        ["effect", "stage", "what it is"],
+        [[effect.name, effect.stage, effect.doc] for effect in found],
+        json=False,
+    )
+    print("Parameters, units and ranges: bns effects NAME, or a part of one.")
+    return 0
+
+
+def _chosen(filter: str, stage: str) -> list[Any]:
+    """The effects that are asked for: by name, else by what they mean."""
     from bns.worlds.effects import registry
 
+    known = [registry.get(name) for name in registry.names()]
+    there = [effect for effect in known if stage in ("", effect.stage)]
+    found = [e for e in there if filter == e.name] or [
+        e for e in there if filter in f"{e.name} {e.doc}".lower()
+    ]
+    if not found:
+        raise UnknownNameError("effect", filter, [effect.name for effect in there])
+    return found
+
+
+def _print_parameters(found: list[Any]) -> None:
+    """Effects with their parameters, in three columns that fit a terminal."""
+    rows: list[list[str]] = []
+    for effect in found:
+        rows += [[effect.name, f"({effect.stage})", effect.doc]]
+        for p in effect.parameters:
+            unit = "" if p.unit == "1" else f" {p.unit}"
+            span = f"{p.low:g} to {p.high:g}{unit}, nominal {p.nominal:g}"
+            rows.append([f"  {p.name}", span, p.doc])
+        for c in effect.choices:
+            rows.append([f"  {c.name}", f"{c.shown} (default {c.default})", c.doc])
+    show(["effect", "range", "meaning"], rows, json=False)
+
+
+def _parameters(found: list[Any]) -> Rows:
+    """Effects, a line for each of their parameters and choices."""
     rows = []
-    for name in registry.names():
-        effect = registry.get(name)
-        rows.append([name, effect.stage, "", "", "", effect.doc])
+    for effect in found:
+        rows.append([effect.name, effect.stage, "", "", "", effect.doc])
         for p in effect.parameters:
             span = f"{p.low:g} to {p.high:g}"
             rows.append(
@@ -84,5 +148,4 @@ LISTS: dict[str, Callable[[], Rows]] = {
     "presets": presets,
     "worlds": worlds,
     "robots": robots,
-    "effects": effects,
 }

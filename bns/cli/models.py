@@ -5,8 +5,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-import tyro
-
+from bns.cli.fields import Flat, Positional
 from bns.cli.parse import dispatch
 from bns.errors import BnsError
 from bns.models import legged_files
@@ -19,8 +18,8 @@ MANUAL = """usage: bns models view ROBOT [--png FILE]
        bns models new-legged DIRECTORY --legs 4 --mass KG --body-length M ...
 
   view        open a robot model in MuJoCo's viewer, or draw it to a file
-  check       see whether a robot's directory is what the worlds and the learner need
-  new         make the directory of a robot with two driven wheels from its numbers
+  check       see whether a robot's directory is what worlds and learner need
+  new         make the directory of a robot with two wheels from its numbers
   new-legged  make the directory of a robot that walks on four or six legs
 
 ROBOT is a name that `bns robots` lists, or a directory of your own that holds a
@@ -31,7 +30,7 @@ robot.toml (docs/your_robot.md). `bns models VERB --help` is the manual of each.
 class View:
     """Open a robot model in MuJoCo's viewer, or draw it to a file."""
 
-    robot: tyro.conf.Positional[str]
+    robot: Positional[str]
     """name of the robot, see `bns robots`, or its directory"""
     png: str = ""
     """write a picture to this file instead; needs no display"""
@@ -45,7 +44,7 @@ class View:
 class Check:
     """See whether a robot's directory is what worlds and learner need."""
 
-    robot: tyro.conf.Positional[str]
+    robot: Positional[str]
     """name of the robot, see `bns robots`, or its directory"""
 
 
@@ -56,9 +55,9 @@ class New:
     diagnosed at once. numbers.toml lists what was assumed.
     """
 
-    directory: tyro.conf.Positional[str]
+    directory: Positional[str]
     """to be made; its name is the robot's"""
-    robot: tyro.conf.OmitArgPrefixes[Wheeled]
+    robot: Flat[Wheeled]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,9 +67,9 @@ class NewLegged:
     and is diagnosed at once. numbers.toml lists what was assumed.
     """
 
-    directory: tyro.conf.Positional[str]
+    directory: Positional[str]
     """to be made; its name is the robot's"""
-    robot: tyro.conf.OmitArgPrefixes[Legged]
+    robot: Flat[Legged]
 
 
 def main(verb: str, argv: list[str]) -> int:

@@ -4,13 +4,15 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from bns import stats
-from bns.errors import BnsError
+from bns.cli.extras import attempt
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
+from bns.progress import working
 
 RECORDING = "recording.rrd"
 REPORT = "report.html"
@@ -34,9 +36,13 @@ def write(
     """Write recording and report, then say where everything is."""
     made = {"data": out}
     if report:
-        made |= _try("report", lambda: write_report([out], out / REPORT))
+        with working("drawing the report"):
+            made |= attempt("report", lambda: write_report([out], out / REPORT))
     if recording:
-        made |= _try("recording", lambda: write_recording(record, out / RECORDING))
+        with working("writing the recording"):
+            made |= attempt(
+                "recording", lambda: write_recording(record, out / RECORDING)
+            )
     print(summary(record))
     for name, path in made.items():
         print(f"{name + ':':<11}{path}")
@@ -52,19 +58,28 @@ def write_report(directories: list[Path], path: Path) -> Path:
 
 def write_recording(record: RunRecord, path: Path) -> Path:
     """The recording of the most typical replicate whose samples were kept."""
-    from bns.viz import choices, recording
-    from bns.worlds.data import dataset
+    from bns.viz import recording
 
     os.environ.setdefault("RERUN_ANALYTICS", "0")
-    kept = min(record.config.record_replicates, record.replicates)
-    replicate = choices.typical(record if not kept else _first(record, kept))
-    dense = {}
-    if kept:
-        found = dataset.read(Path(record.directory) / "dataset")
-        known = zip(found.replicates, found.numbers, found.trials, strict=True)
-        dense = {number: trial for run, number, trial in known if run == replicate}
+    replicate, dense = shown(record)
     recording.write(record, dense, path, replicate=replicate)
     return path
+
+
+def shown(record: RunRecord) -> tuple[int, dict[int, Any]]:
+    """The most typical replicate whose samples were kept, and its trials by number."""
+    from bns.viz import choices
+    from bns.worlds.data import dataset
+
+    kept = min(record.config.record_replicates, record.replicates)
+    replicate = choices.typical(record if not kept else _first(record, kept))
+    if not kept:
+        return replicate, {}
+    found = dataset.read(Path(record.directory) / "dataset")
+    known = zip(found.replicates, found.numbers, found.trials, strict=True)
+    return replicate, {
+        number: trial for run, number, trial in known if run == replicate
+    }
 
 
 def summary(record: RunRecord) -> str:
@@ -116,14 +131,3 @@ def _first(record: RunRecord, runs: int) -> RunRecord:
         predicted=record.predicted[:runs],
         damage_onset=record.damage_onset[:runs],
     )
-
-
-def _try(name: str, make: Callable[[], Path]) -> dict[str, Path]:
-    """A picture that fails must not take the data with it."""
-    import sys
-
-    try:
-        return {name: make()}
-    except (BnsError, OSError) as error:
-        print(f"bns: no {name}: {error}", file=sys.stderr)
-        return {}

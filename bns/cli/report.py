@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import tyro
-
+from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.errors import BnsError
+from bns.progress import working
 
 TITLE = b" - BNS report</title>"  # of every page that `bns report` makes
 MARK = 4096  # [bytes] from the beginning, within which a page has its title
@@ -16,7 +16,7 @@ MARK = 4096  # [bytes] from the beginning, within which a page has its title
 class Arguments:
     """Write a report on runs: one HTML file that opens offline."""
 
-    directories: tyro.conf.Positional[tuple[str, ...]]
+    directories: Positional[tuple[str, ...]]
     """run directories, finished or not"""
     out: str = ""
     """file to write; without it report.html in the first directory"""
@@ -42,7 +42,9 @@ def main(verb: str, argv: list[str]) -> int:
             f"{path} was not made by `bns report`: add --force to replace it, or give "
             "another --out."
         )
-    print(write_report(directories, path))
+    with working("drawing the report"):
+        write_report(directories, path)
+    print(path)
     return 0
 
 

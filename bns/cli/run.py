@@ -5,11 +5,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
-import tyro
-
-from bns.cli.parse import parse
+from bns.cli.fields import Flat, Positional, Rare
+from bns.cli.parse import HELP, HELP_ALL, parse
 from bns.errors import BnsError, FormatError, UnknownNameError
 from bns.experiment.config import RunConfig
 
@@ -31,7 +30,7 @@ class Arguments:
     --resume goes on from there.
     """
 
-    source: tyro.conf.Positional[str]
+    source: Positional[str]
     """a preset (see `bns presets`), a TOML file, or a run directory"""
     out: str = ""
     """directory for the results (default: runs/NAME)"""
@@ -41,19 +40,17 @@ class Arguments:
     """save: write recording.rrd; live: stream to a viewer as well; off: neither"""
     report: bool = True
     """write report.html at the end"""
-    port: str = ""
+    port: Rare[str] = ""
     """device of a real or emulated robot, for --world hardware"""
-    camera: str = "emulated"
+    camera: Rare[str] = "emulated"
     """number of the camera above it, or emulated; for --world hardware"""
-    calibration: str = ""
+    calibration: Rare[str] = ""
     """of that camera, see `bns hardware calibrate`"""
-    wheels: str = ""
+    wheels: Rare[str] = ""
     """a Khepera's file of wheels, see `bns hardware calibrate`"""
-    servos: str = ""
+    servos: Rare[str] = ""
     """a hexapod's file of servos, see `bns hardware calibrate`"""
-    config: Annotated[RunConfig, tyro.conf.arg(name="")] = field(
-        default_factory=RunConfig
-    )
+    config: Flat[RunConfig] = field(default_factory=RunConfig)
 
 
 def main(verb: str, argv: list[str]) -> int:
@@ -65,7 +62,7 @@ def main(verb: str, argv: list[str]) -> int:
             f"Nothing to run: give a preset ({', '.join(presets.names())}), a TOML "
             "file or a run directory. See bns run --help."
         )
-    if argv[0] in ("-h", "--help"):
+    if argv[0] in (*HELP, HELP_ALL):
         parse(Arguments, argv, prog="bns run")
     if argv[0].startswith("-"):
         raise BnsError(

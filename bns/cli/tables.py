@@ -1,12 +1,18 @@
 """Tables on the standard output: for a reader, or as JSON."""
 
 import json as jsonlib
+import os
 import sys
 from collections.abc import Sequence
 
+PIPED = 160
+"""width where there is neither a terminal nor `COLUMNS`"""
+
 
 def show(head: Sequence[str], rows: Sequence[Sequence[str]], *, json: bool) -> None:
-    """Print rows under their heads; as JSON one object per row."""
+    """Print rows under their heads, as wide as the terminal or as `COLUMNS` says; as
+    JSON one object per row.
+    """
     if json:
         found = [dict(zip(head, row, strict=True)) for row in rows]
         print(jsonlib.dumps(found, indent=2, ensure_ascii=False))
@@ -18,5 +24,6 @@ def show(head: Sequence[str], rows: Sequence[Sequence[str]], *, json: bool) -> N
     table = Table(*head, box=box.SIMPLE, pad_edge=False, header_style="bold")
     for row in rows:
         table.add_row(*row)
-    width = None if sys.stdout.isatty() else 160
+    known = sys.stdout.isatty() or "COLUMNS" in os.environ
+    width = None if known else PIPED
     Console(width=width, markup=False, highlight=False).print(table)

@@ -5,10 +5,9 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-import tyro
-
+from bns.cli.fields import Positional
 from bns.cli.parse import parse
-from bns.errors import BnsError, MissingDependencyError
+from bns.errors import BnsError, MissingDependencyError, OutOfBoundsError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,10 +15,20 @@ class Arguments:
     """Open the recording of a run or a gap diagnosis in the Rerun viewer, or draw it to
     a file."""
 
-    directory: tyro.conf.Positional[str]
+    directory: Positional[str]
     """directory of a run or of a gap diagnosis, or a recording (.rrd)"""
     png: str = ""
     """write a picture to this file instead; needs no display"""
+    gif: str = ""
+    """write a film of a run to this file instead; needs no display"""
+    mp4: str = ""
+    """the same as MP4"""
+    trials: tuple[int, ...] = ()
+    """trials of the film; by default before, just after and recovered from damage"""
+    speed: float = 8.0
+    """of the film, times real time"""
+    web: bool = False
+    """open it in a browser instead of the viewer's own window"""
     bind: str = "127.0.0.1"
     """address that the viewer listens on; 0.0.0.0 lets other machines send to it"""
 
@@ -28,6 +37,11 @@ def main(verb: str, argv: list[str]) -> int:
     """Run the verb; gives the exit code."""
     given = parse(Arguments, argv, prog="bns view")
     os.environ.setdefault("RERUN_ANALYTICS", "0")
+    if sum(map(bool, (given.png, given.gif, given.mp4, given.web))) > 1:
+        raise BnsError("Give one of --png, --gif, --mp4 and --web.")
+    if given.gif or given.mp4:
+        print(film(given))
+        return 0
     recording = find(Path(given.directory))
     if given.png:
         from bns.viz import picture
@@ -36,7 +50,45 @@ def main(verb: str, argv: list[str]) -> int:
             print(f"bns: the viewer says: {report}", file=sys.stderr)
         print(given.png)
         return 0
-    return show(recording, given.bind)
+    return show(recording, given.bind, web=given.web)
+
+
+def film(given: Arguments) -> Path:
+    """Write the film of a run's trials.
+
+    Raises:
+        BnsError: no run, or a run without such a trial; a file that cannot be.
+        MissingDependencyError: this machine cannot render.
+    """
+    from bns.cli.outputs import shown
+    from bns.storage.store import load
+    from bns.viz import choices, film, style
+
+    path = Path(given.gif or given.mp4)
+    if path.suffix != (".gif" if given.gif else ".mp4"):
+        raise BnsError(f"{path} does not end in {'.gif' if given.gif else '.mp4'}.")
+    record = load(Path(given.directory))
+    if record.trials == 0:
+        raise BnsError(f"{given.directory} has no trial yet: let it run for a while.")
+    for trial in given.trials:
+        if not 0 <= trial < record.trials:
+            raise OutOfBoundsError("--trials", trial, 0, record.trials - 1, "")
+    replicate, dense = shown(record)
+    onset = int(record.damage_onset[replicate])
+    chosen = [
+        choices.Choice(
+            trial, "damaged" if 0 <= onset <= trial else "as it is", style.BLUE
+        )
+        for trial in given.trials
+    ]
+    return film.write(
+        record,
+        dense,
+        path,
+        replicate=replicate,
+        choices=chosen or None,
+        speed=given.speed,
+    )
 
 
 def find(path: Path) -> Path:
@@ -70,8 +122,13 @@ def find(path: Path) -> Path:
     return write_recording(record, recording)
 
 
-def show(recording: Path, bind: str) -> int:
+def show(recording: Path, bind: str, *, web: bool = False) -> int:
     """Open the viewer, which listens on an address, and leave it open.
+
+    Args:
+        recording: what to show.
+        bind: the address.
+        web: serve it to a browser on this machine, until Ctrl-C.
 
     Raises:
         BnsError: there is no display.
@@ -81,14 +138,19 @@ def show(recording: Path, bind: str) -> int:
 
     from bns.viz import picture
 
-    if sys.platform == "linux" and not any(
-        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    if (
+        not web
+        and sys.platform == "linux"
+        and not any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
     ):
         raise BnsError(
-            f"No display to open {recording} on: make a picture with --png FILE, or "
-            "copy the file to a machine that has one."
+            f"No display to open {recording} on: make a picture with --png FILE, "
+            "serve it to a browser with --web, or copy it to a machine that has one."
         )
     viewer = picture.executable()
     if viewer is None:
-        raise MissingDependencyError("bns view", "rerun-sdk", "pip install rerun-sdk")
-    return subprocess.call([viewer, "--bind", bind, str(recording)])
+        raise MissingDependencyError(
+            "bns view", "rerun-sdk", "pip install 'bns-testbed[view]'"
+        )
+    words = ["--bind", bind, *(["--web-viewer"] if web else [])]
+    return subprocess.call([viewer, *words, str(recording)])

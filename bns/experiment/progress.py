@@ -1,20 +1,16 @@
-"""Progress of a run: a bar with an estimate, or a line now and then."""
+"""Progress of a run: what the bar says."""
 
-import sys
 import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 import numpy as np
 
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
 from bns.experiment.step import Step
-
-QUIET_SECONDS = 30.0
-"""time between two lines where there is no terminal"""
+from bns.progress import Bar
 
 RECENT = 8
 """trials whose median time gives the estimate; the first ones compile"""
@@ -33,46 +29,20 @@ class Progress:
         self.name = config.preset or config.task.name
         self.enabled = enabled
         self.solved = np.zeros(config.replicates, dtype=bool)
-        self.bar: Any = None
-        self.before = self.spoke = time.monotonic()
+        self.bar: Bar | None = None
+        self.before = time.monotonic()
         self.seconds: deque[float] = deque(maxlen=RECENT)
 
     @contextmanager
     def start(self, done: int = 0) -> Iterator[None]:
         """Show progress inside the block; `done` trials lie behind already."""
         self.first = done
-        self.before = self.spoke = time.monotonic()
-        if self.enabled and sys.stderr.isatty():
-            self._start_bar()
-        try:
+        self.before = time.monotonic()
+        if not self.enabled:
             yield
-        finally:
-            if self.bar:
-                self.bar.stop()
-
-    def _start_bar(self) -> None:
-        from rich.console import Console
-        from rich.progress import (
-            BarColumn,
-            MofNCompleteColumn,
-            Progress,
-            TextColumn,
-            TimeElapsedColumn,
-            TimeRemainingColumn,
-        )
-
-        self.bar = Progress(
-            TextColumn(self.name),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-            TextColumn("{task.description}"),
-            console=Console(stderr=True),
-        )
-        self.task = self.bar.add_task("", total=self.total, completed=self.first)
-        self.bar.start()
+            return
+        with Bar(self.name, self.total, done=done) as self.bar:
+            yield
 
     def recall(self, record: RunRecord) -> None:
         """Take note of what a run that is resumed has solved already."""
@@ -80,7 +50,7 @@ class Progress:
 
     def update(self, trial: int, step: Step) -> None:
         """Show that a trial is done."""
-        if not self.enabled:
+        if not self.bar:
             return
         now = time.monotonic()
         self.seconds.append(now - self.before)
@@ -88,18 +58,17 @@ class Progress:
         self.solved[: len(step.columns["solved"])] |= (
             step.columns["solved"][: len(self.solved)] > 0
         )
-        text = self.describe(step)
-        if self.bar:
-            self.bar.update(self.task, completed=trial + 1, description=text)
-        elif now - self.spoke >= QUIET_SECONDS:
-            self.spoke = now
-            left = float(np.median(self.seconds)) * (self.total - trial - 1)
-            print(
-                f"{self.name}: trial {trial + 1} of {self.total}, "
-                f"about {left:.0f} s left, {text}",
-                file=sys.stderr,
-                flush=True,
-            )
+        left = float(np.median(self.seconds)) * (self.total - trial - 1)
+        line = f"trial {trial + 1} of {self.total}, about {left:.0f} s left, "
+        self.bar.update(
+            trial + 1, self.brief(step), line=f"{line}{self.describe(step)}"
+        )
+
+    def brief(self, step: Step) -> str:
+        """The runs' state in very few words, for a bar."""
+        damaged = "damaged, " if step.columns["damaged"].any() else ""
+        now = int(np.sum(step.columns["solved"] > 0))
+        return f"{damaged}{now} of {len(self.solved)} solve"
 
     def describe(self, step: Step) -> str:
         """The runs' state in a few words."""

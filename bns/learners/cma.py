@@ -48,7 +48,7 @@ class Search:
         self, settings: CmaSettings, start: np.ndarray, rng: np.random.Generator
     ):
         try:
-            import cma  # type: ignore[import-untyped]
+            import cma
         except ImportError:
             raise MissingDependencyError(
                 "learner = 'cma'", "cma", "pip install 'bns-testbed[cma]'"

@@ -8,6 +8,7 @@ import numpy as np
 
 from bns import models
 from bns.errors import BnsError, FormatError, OutOfBoundsError, UnknownNameError
+from bns.gap.importers import tables
 from bns.gap.models.base import GapModel
 from bns.gap.recordings import trial_labels, trial_selection
 from bns.worlds.trial import Commands, Trial
@@ -126,7 +127,8 @@ def _read(
     """Trials of a recording with their run, where there are several, and number."""
     from bns.worlds.data import dataset
 
-    if Path(path).is_dir() and not importer:
+    own = hasattr(model, "read_log") and tables.reader(path) is not None
+    if Path(path).is_dir() and not importer and not own:
         inside = Path(path) / RUN
         found = dataset.read(inside if inside.is_dir() else path)
         several = len(set(found.replicates)) > 1
@@ -197,14 +199,14 @@ def _sighted(trial: Trial, model: GapModel) -> bool:
 
 
 def thinned(trial: Trial, most: int = SAMPLES) -> Trial:
-    """A trial with every k-th sample, and those at the ends of commands."""
-    every = -(-len(trial.times) // most)
-    if every == 1:
+    """A trial with every k-th sample that was seen, and those at ends of commands."""
+    seen = np.flatnonzero(np.isfinite(trial.observed).all(axis=1))
+    every = -(-len(seen) // most)
+    if every <= 1:
         return trial
-    kept = np.union1d(np.arange(0, len(trial.times), every), trial.boundaries)
+    kept = np.union1d(seen[::every], trial.boundaries)
     if len(kept) > 2 * most:  # more commands than samples wanted
-        kept = np.arange(0, len(trial.times), every)
-        kept = np.union1d(kept, trial.boundaries[[0, -1]])
+        kept = np.union1d(seen[::every], trial.boundaries[[0, -1]])
     return trial.replace(
         times=trial.times[kept],
         observed=trial.observed[kept],

@@ -112,16 +112,17 @@ def dies_at(write, moment):
     def replacing(path, make):
         nonlocal count
         count += 1
+        number = count  # a directory is one write around those of its files
 
         def making(temporary):
             make(temporary)
-            if count == write and moment == "beside":
+            if number == write and moment == "beside":
                 die()
 
-        if count == write and moment == "before":
+        if number == write and moment == "before":
             die()
         whole(path, making)
-        if count == write and moment == "after":
+        if number == write and moment == "after":
             die()
 
     files.replace = replacing

@@ -269,7 +269,8 @@ def test_the_table_compares_members_that_differ_in_one_setting(clean):
 
 
 def test_progress_counts_what_runs_and_estimates_the_rest():
-    from bns.campaign.progress import Progress, duration
+    from bns.campaign.progress import Progress
+    from bns.progress import duration
 
     jobs = plan(campaign(), {})
     shown = Progress("x", jobs, 0, enabled=False)

@@ -2,8 +2,11 @@
 
 import json
 import os
+import re
 import signal
 import sys
+import tomllib
+from functools import reduce
 
 import numpy as np
 import pytest
@@ -11,9 +14,10 @@ import pytest
 from bns import presets
 from bns.__main__ import INTERRUPTED, SPINS, WRONG_INPUT, main
 from bns.cli import VERBS
+from bns.cli.extras import EXTRAS
 from bns.cli.outputs import sentence
 from bns.cli.run import STOPPED, until_interrupted
-from bns.doctor import pins
+from bns.doctor import OPTIONAL, pins
 from bns.storage.store import load
 
 TINY = [
@@ -52,7 +56,33 @@ def test_help_lists_every_verb(capsys, argv):
 
 
 def test_version(capsys):
-    assert said(capsys, "--version") == "bns 0.1.0\n"
+    assert said(capsys, "--version") == "bns 0.2.0\n"
+
+
+@pytest.mark.parametrize("name", EXTRAS)
+def test_a_package_that_is_missing_is_named_with_its_extra(capsys, monkeypatch, name):
+    def missing(argv):
+        raise ModuleNotFoundError(f"No module named {name!r}", name=f"{name}.part")
+
+    monkeypatch.setattr("bns.__main__.dispatch", missing)
+    text = said(capsys, "doctor", code=WRONG_INPUT)
+    assert text.count("\n") == 1
+    assert f"pip install 'bns-testbed[{EXTRAS[name]}]'" in text
+
+
+def test_the_extras_exist(root):
+    known = tomllib.loads((root / "pyproject.toml").read_text())["project"]
+    assert set(EXTRAS.values()) <= set(known["optional-dependencies"])
+    assert {entry.extra for entry in OPTIONAL} <= set(known["optional-dependencies"])
+
+
+def test_a_module_of_ours_that_is_missing_is_a_fault_of_ours(monkeypatch):
+    def missing(argv):
+        raise ModuleNotFoundError("No module named 'bns.nothing'", name="bns.nothing")
+
+    monkeypatch.setattr("bns.__main__.dispatch", missing)
+    with pytest.raises(ModuleNotFoundError):
+        main(["doctor"])
 
 
 def test_threads_that_wait_leave_the_cores_to_others(capsys, monkeypatch):
@@ -69,7 +99,59 @@ def test_help_of_a_preset_shows_its_values(capsys):
         main(["run", "demo", "--help"])
     text = " ".join(capsys.readouterr().out.split())
     assert f"(default: {presets.load('demo').replicates})" in text
+    with pytest.raises(SystemExit):
+        main(["run", "demo", "--help-all"])
+    text = " ".join(capsys.readouterr().out.split())
     assert "an objective is reached within this distance [m]" in text
+
+
+def test_the_manual_of_run_fits_a_page(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit):
+        main(["run", "--help"])
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) <= 60 and max(map(len, lines)) <= 80
+    with pytest.raises(SystemExit):
+        main(["run", "--help-all"])
+    every = capsys.readouterr().out
+    assert "--walk.limit" in every and "--servos" in every
+
+
+@pytest.mark.parametrize("width", [40, 60, 120])
+@pytest.mark.parametrize("verb", VERBS)
+def test_a_manual_is_as_wide_as_the_terminal(capsys, monkeypatch, verb, width):
+    monkeypatch.setenv("COLUMNS", str(width))
+    with pytest.raises(SystemExit):
+        main([verb, "--help-all"])
+    text = capsys.readouterr().out
+    if "[options]" not in text:  # written by hand, for 80 columns or more
+        width = 80
+    unbroken = re.compile(r"usage:|  -")
+    long = [line for line in text.splitlines() if len(line) > width]
+    assert [line for line in long if not unbroken.match(line)] == []
+
+
+@pytest.mark.parametrize(
+    ("words", "values"),
+    [
+        (["--seed=3"], {"seed": 3}),
+        (["--task.start_yaw", "-1e-3"], {"task.start_yaw": -1e-3}),
+        (["--task.start-yaw", "-90"], {"task.start_yaw": -90.0}),
+        (["--task.squared"], {"task.squared": True}),
+        (["--task.no-squared"], {"task.squared": False}),
+        (["--world.damage", "a@1", "b@2"], {"world.damage": ("a@1", "b@2")}),
+        (["--damage"], {"world.damage": ()}),
+        (["--adaptation.window", "7", "--world", "x"], {"world.name": "x"}),
+    ],
+)
+def test_a_setting_is_read_as_it_is_written(monkeypatch, words, values):
+    given = []
+    monkeypatch.setattr("bns.cli.run.execute", lambda g: given.append(g.config) or 0)
+    assert main(["run", "demo", *words]) == 0
+    for name, value in values.items():
+        found = reduce(getattr, name.split("."), given[0])
+        assert found == value and type(found) is type(value)
+    assert given[0].preset == "demo"
 
 
 @pytest.mark.parametrize("verb", ["presets", "worlds", "robots", "effects"])
@@ -93,8 +175,22 @@ def test_effects_have_units_and_ranges(capsys):
     assert row["unit"] == "1" and "nominal 1" in row["range"]
 
 
+def test_effects_are_found_by_a_part_of_their_name_and_by_stage(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    brief = said(capsys, "effects", "--stage", "tracking")
+    assert "tracker_noise" in brief and "wheel_gain" not in brief
+    assert "nominal" not in brief
+    full = said(capsys, "effects", "wheel_gain")
+    assert "0 to " in full and "nominal 1" in full and "wheel_diameter" not in full
+    assert max(map(len, full.splitlines())) <= 80
+    rows = json.loads(said(capsys, "effects", "friction", "--json"))
+    assert {"floor_friction", "servo_load_friction"} <= {row["effect"] for row in rows}
+
+
 WRONG = {
-    "no such verb": (["rum"], "Unknown command 'rum'. Did you mean 'run'? Available"),
+    "no such effect": (["effects", "wheel_gian"], "Did you mean 'wheel_gain'?\n"),
+    "no such stage": (["effects", "--stage", "wheel"], "value of --stage 'wheel'."),
+    "no such verb": (["rum"], "Unknown command 'rum'. Did you mean 'run'?\n"),
     "nothing to run": (["run"], "Nothing to run: give a preset (demo, "),
     "device": (
         ["run", "demo", "--device", "warp"],
@@ -105,11 +201,14 @@ WRONG = {
     "file": (["run", "no.toml"], "There is no file no.toml"),
     "option": (
         ["run", "demo", "--evolution.populatoin", "3"],
-        "Unrecognized options: --evolution.populatoin, 3. Did you mean --evolution.",
+        "Unknown option --evolution.populatoin. Did you mean --evolution.population?\n",
     ),
-    "flag": (["run", "demo", "--resum"], "--resum. Did you mean --resume? See"),
-    "choice": (["run", "demo", "--evolution.selection", "x"], "('tournament',"),
-    "type": (["run", "demo", "--trials", "abc"], "Error parsing --trials"),
+    "flag": (["run", "demo", "--resum"], "--resum. Did you mean --resume?\n"),
+    "choice": (
+        ["run", "demo", "--evolution.selection", "x"],
+        "Unknown value of --evolution.selection 'x'. Available: best, random, roulette",
+    ),
+    "type": (["run", "demo", "--trials", "abc"], "--trials abc: give a whole number."),
     "bound": (
         ["run", "demo", "--task.radius", "5"],
         "task.radius = 5.0 m is not allowed: give a number from 0.005 to 0.5 m",
@@ -148,8 +247,8 @@ WRONG = {
     "one to compare": (["compare", "run"], "1 run was given: give two or more"),
     "none to compare": (["compare"], "0 runs were given"),
     "no recording": (["view", "no.rrd"], "There is no recording no.rrd"),
-    "nothing to view": (["view"], "Missing from bns view"),
-    "an argument too many": (["worlds", "mujoco"], "Unrecognized options: mujoco"),
+    "nothing to view": (["view"], "Missing: DIRECTORY. See `bns view --help`."),
+    "an argument too many": (["worlds", "mujoco"], "'mujoco' is one argument too many"),
 }
 
 
@@ -171,8 +270,8 @@ def test_a_bad_option_is_one_line_on_any_terminal(run_python, encoding):
     words = ["-m", "bns", "run", "demo", "--evolution.populatoin", "3"]
     text = run_python(*words, code=WRONG_INPUT, PYTHONIOENCODING=encoding)
     assert text == (
-        "bns: Unrecognized options: --evolution.populatoin, 3. Did you mean "
-        "--evolution.population? See bns run --help.\n"
+        "bns: Unknown option --evolution.populatoin. Did you mean "
+        "--evolution.population?\n"
     )
 
 
@@ -276,7 +375,7 @@ def test_known_bad_pins(installed, bad):
 
 
 def test_progress_without_a_terminal_is_a_line_now_and_then(capsys, fakes, monkeypatch):
-    monkeypatch.setattr("bns.experiment.progress.QUIET_SECONDS", 0.0)
+    monkeypatch.setattr("bns.progress.QUIET_SECONDS", 0.0)
     fakes.train(None, progress=True)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 4

@@ -76,7 +76,7 @@ def test_scores_are_of_what_was_said(made, capsys):
         (["make", "c", "--answers", "c/a.json"], "see the answers"),
         (["make", "c", "--answers", "a", "--kinds", "sngle"], "Did you mean 'single'"),
         (["run", "nowhere", "--said", "s"], "no directory nowhere"),
-        (["score", "nowhere", "nothing"], "holds no answers"),
+        (["score", "nowhere", "nothing"], "nothing cannot be read"),
         (["scor"], "Did you mean 'score'"),
     ],
 )

@@ -42,7 +42,7 @@ def test_a_robot_is_checked(capsys, tmp_path):
     "words, expected",
     [
         (["check", "."], "./ holds no robot.toml"),
-        (["check", "khepera"], "Or give a directory that holds a robot.toml"),
+        (["check", "nowhere"], "Or give a directory that holds a robot.toml"),
         (["view", "phantom", "--png", "x.png"], "Did you mean 'phantomx'"),
         (["view", "phantomx", "--png", "x.jpg"], "ends in .png"),
         (["view", "phantomx", "--png", "nowhere/x.png"], "no directory nowhere"),

@@ -185,9 +185,10 @@ def test_a_reset_simulator_is_trained_at_once_or_after_the_next_trial(untrained)
     damaged = replace(SMALL.world, damage=("wheel_gain:wheel=left,factor=0.8@1",))
     playing = batch(replace(SMALL, adaptation=told, world=damaged))
     play(playing, 2)
-    fitted = playing.learner.loss.clone()
+    (memory,) = playing.learner.memories
+    fitted = memory.loss.clone()
     playing.learner.propose(2)
-    assert torch.equal(playing.learner.loss, fitted) == untrained
+    assert torch.equal(memory.loss, fitted) == untrained
 
 
 def test_draws_restore():

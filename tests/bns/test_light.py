@@ -262,7 +262,7 @@ class TestPatterns:
 
 
 def test_the_net_turn_of_a_trial_goes_on_beyond_half_a_turn():
-    from bns.light.observing import _turned
+    from bns.tasks.light import _turned
     from bns.worlds.trial import Commands, Trial
 
     yaw = np.array([3.0, 4.0, 5.0, 6.0, 7.0])

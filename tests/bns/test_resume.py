@@ -32,12 +32,13 @@ def clean(fakes, tmp_path):
     return contents(tmp_path / "clean")
 
 
-# Writes of the fake run: config.toml, run.json, four times step and state, arrays,
-# record.
+# Writes of the fake run: config.toml, run.json, four times step and state, arrays, the
+# dataset and its three files, record.
 @pytest.mark.parametrize(
     ("write", "moment"),
     [(2, "before"), (2, "beside"), (3, "beside"), (4, "before"), (4, "after"),
-     (10, "after"), (12, "beside"), (12, "after")],
+     (10, "after"), (12, "beside"), (12, "after"), (14, "beside"), (16, "beside"),
+     (16, "after")],
 )  # fmt: skip
 def test_killed_run_resumes_to_the_same_bytes(
     fakes, clean, run_python, tmp_path, write, moment

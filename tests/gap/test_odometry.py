@@ -6,8 +6,15 @@ import pytest
 from bns.errors import BnsError
 from bns.gap.importers.khepera3_odometry import chained
 from bns.gap.models.odometry import diagnosis
-from bns.gap.models.odometry import fit as odometry
-from bns.gap.models.odometry.fit import Motions, Noise, changed, fit
+from bns.gap.models.odometry.fit import TERMS, problem
+from bns.gap.models.odometry.motions import (
+    NUMBERS,
+    TURN,
+    Motions,
+    changed,
+    start,
+    wrapped,
+)
 from bns.worlds.trial import Channel, Commands, Trial
 
 AXLE, INTERVAL = 0.0884, 0.8
@@ -20,8 +27,10 @@ def motions(magnitudes, *, speed=0.01, count=1200, bias=0.0, seed=0) -> Motions:
     kinds = np.array([(1, 1), (-1, -1), (-1, 1), (1, -1)])[rng.integers(0, 4, count)]
     ways = kinds * speed * INTERVAL * rng.uniform(0.95, 1.0, (count, 2))
     clean = Motions(ways[:, 0], ways[:, 1], np.zeros((count, 3)), AXLE)
-    seen = clean.predict(changed(magnitudes)) + rng.normal(0, SCATTER, (count, 3))
-    seen[:, 0] += bias * np.sign(ways.sum(axis=1)) * (kinds.sum(axis=1) != 0)
+    truth = changed({"length_bias": bias})
+    for name, value in magnitudes.items():
+        truth += changed(dict.fromkeys(TERMS[name].numbers, value))
+    seen = clean.predict(truth) + rng.normal(0, SCATTER, (count, 3))
     seen[rng.integers(0, count, 5)] += 0.1
     return Motions(ways[:, 0], ways[:, 1], seen, AXLE)
 
@@ -32,7 +41,7 @@ class TestKinematics:
         left = np.array([0.2, -AXLE / 2 * quarter, 0.0])
         right = np.array([0.2, AXLE / 2 * quarter, AXLE * quarter])
         still = Motions(left, right, np.zeros((3, 3)), AXLE)
-        straight, spin, arc = still.predict(odometry.NOMINAL)
+        straight, spin, arc = still.predict(changed({}))
         np.testing.assert_allclose(straight, [0.2, 0, 0], atol=1e-15)
         np.testing.assert_allclose(spin, [0, 0, quarter], atol=1e-15)
         np.testing.assert_allclose(arc, [AXLE / 2, AXLE / 2, quarter], atol=1e-15)
@@ -57,28 +66,83 @@ class TestKinematics:
             Motions.of(trial.replace(commands=goal), axle=AXLE)
 
 
+def test_a_bias_of_lengths_lies_along_the_travel():
+    ways = np.array([0.02, -0.02, 0.02]), np.array([0.02, -0.02, -0.02])
+    drive = Motions(*ways, None, AXLE)
+    turned = changed({"mount_angle": 2.0, "length_bias": 1e-3})
+    added = drive.predict(turned) - drive.predict(changed({"mount_angle": 2.0}))
+    ahead = 1e-3 * np.array([np.cos(2.0), -np.sin(2.0), 0])
+    np.testing.assert_allclose(added, [ahead, -ahead, 0 * ahead], atol=1e-15)
+
+
+@pytest.mark.parametrize("angle", [-3.1, -1.7, 0.0, 0.9, 2.4])
+def test_a_start_is_right_at_any_heading(angle):
+    truth = {"left_diameter": 0.03, "mount_x": 0.03, "mount_y": -0.05}
+    data = motions({**truth, "mount_angle": angle}, speed=0.05)
+    found = start(data)
+    assert abs(wrapped(found[TURN] - angle)) < 5e-3
+    for name, value in truth.items():
+        assert found[NUMBERS.index(name)] == pytest.approx(value, abs=2e-3)
+
+
 def test_numbers_come_back_within_their_deviations():
-    truth = {"axle": -0.01, "left_diameter": 0.02, "mount_x": -0.006, "mount_y": 0.002}
-    data = motions(truth, speed=0.1, count=4000)
-    noise = odometry.noise_of(data, length_bias=0.0)
-    np.testing.assert_allclose(noise.deviation, SCATTER, rtol=0.1)
-    found = fit(data, tuple(truth), noise)
+    truth = {
+        "axle": -0.01,
+        "left_diameter": 0.02,
+        "mount_x": -0.006,
+        "mount_y": 0.002,
+        "mount_angle": -2.9,
+    }
+    made = problem(motions(truth, speed=0.1, count=4000), length_bias=0.0)
+    np.testing.assert_allclose(made.noise.deviation, SCATTER, rtol=0.1)
+    found = made.fit(tuple(truth), slack=0.0)
     for name, value in truth.items():
         assert abs(found.magnitudes[name] - value) < 4 * found.deviations[name]
         assert found.deviations[name] < 1e-3
 
 
-def test_whitening_takes_a_common_bias_of_lengths_out():
-    data = motions({}, bias=2e-4)
-    biased = fit(data, ("both_diameters",), Noise(SCATTER, 0.0))
-    taken = fit(data, ("both_diameters",), Noise(SCATTER, 2e-4))
-    strength = [f.magnitudes["both_diameters"] for f in (biased, taken)]
-    off = [
-        f.magnitudes["both_diameters"] / f.deviations["both_diameters"]
-        for f in (biased, taken)
-    ]
-    assert strength[0] != strength[1]
-    assert abs(off[1]) < 3
+def test_a_bias_of_lengths_makes_diameters_uncertain():
+    data, names = motions({}, bias=2e-4), ("axle", "both_diameters")
+    sure, unsure = (
+        problem(data, length_bias=bias).fit(names, slack=0.0) for bias in (0.0, 2e-4)
+    )
+    name = "both_diameters"
+    assert unsure.deviations[name] > 2 * sure.deviations[name]
+    assert abs(sure.magnitudes[name]) > 5 * sure.deviations[name]
+    assert abs(unsure.magnitudes[name]) < 3 * unsure.deviations[name]
+
+
+def test_five_departures_come_out_together():
+    truth = {
+        "axle": 0.03,
+        "left_diameter": -0.02,
+        "mount_x": 0.04,
+        "mount_y": -0.02,
+        "mount_angle": 1.9,
+    }
+    found = diagnosis.diagnose(motions(truth, speed=0.1, count=2400))
+    fits = [found.fits[s] for s in found.verdict.named if set(s) == set(truth)]
+    assert len(fits) == 1
+    for name, value in truth.items():
+        assert abs(fits[0].magnitudes[name] - value) < 4 * fits[0].deviations[name]
+    last = found.shares["mount_angle"][1]
+    assert last > 0.1 and last > found.shares["left_diameter"][1] > 0
+
+
+def test_spins_alone_leave_the_heading_open():
+    rng = np.random.default_rng(0)
+    way = rng.choice([-1.0, 1.0], 1200) * rng.uniform(0.02, 0.03, 1200)
+    clean = Motions(-way, way, np.zeros((1200, 3)), AXLE)
+    truth = {"mount_x": 0.03, "mount_y": 0.01, "mount_angle": 2.5}
+    seen = clean.predict(changed(truth)) + rng.normal(0, SCATTER, (1200, 3))
+    found = diagnosis.diagnose(Motions(-way, way, seen, AXLE))
+    assert found.unseen == ("mount_angle",)
+    assert found.verdict.named == (("mount_x", "mount_y"),)
+    fit = found.fits["mount_x", "mount_y"]
+    assert np.hypot(*fit.magnitudes.values()) == pytest.approx(0.0316, abs=2e-3)
+    for name in fit.names:
+        assert abs(fit.magnitudes[name] - truth[name]) < 3 * fit.deviations[name]
+    assert "mount_angle these drives say nothing" in found.verdict.sentence
 
 
 def test_slow_drives_tie_axle_and_diameters_and_ask_for_a_long_one():
@@ -103,7 +167,9 @@ def test_fast_drives_settle_it():
     found = diagnosis.diagnose(data)
     assert found.verdict.kind == "effect"
     assert found.verdict.named == (("both_diameters",),)
-    assert "both_diameters +2.0" in found.verdict.sentence
+    magnitude = found.fits["both_diameters",].magnitudes["both_diameters"]
+    assert magnitude == pytest.approx(0.02, abs=5e-4)
+    assert f"both_diameters {100 * magnitude:+.2f} %" in found.verdict.sentence
     assert found.plan == ()
 
 

@@ -6,7 +6,7 @@ import pytest
 from bench import real_data, servo_cases
 from bns.gap.importers import khepera3_odometry, mrclam6, xl330
 from bns.gap.models.odometry.diagnosis import diagnose
-from bns.gap.models.odometry.fit import Motions
+from bns.gap.models.odometry.motions import Motions
 from bns.gap.models.servo import diagnosis
 from bns.gap.models.servo.candidates import candidates
 from bns.gap.models.servo.nominal import Nominal
@@ -40,8 +40,9 @@ def test_khepera_wheels_or_axle_and_the_mount():
     assert found.verdict.kind == "either" and len(supports) == 2
     assert {"axle"} < set(supports[0]) ^ set(supports[1]) == {"axle", "both_diameters"}
     for support in supports:
-        away = found.fits[support].magnitudes["mount_x"] - published.values["l_x"]
-        assert abs(away) < 3 * published.deviations["l_x"]
+        for name, theirs in (("mount_x", "l_x"), ("mount_angle", "l_theta")):
+            away = found.fits[support].magnitudes[name] - published.values[theirs]
+            assert abs(away) < 3 * published.deviations[theirs]
     assert found.plan[0][0].startswith("long straight drive")
 
 

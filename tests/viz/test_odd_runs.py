@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from bns.viz import recording, report
+from bns.viz.page import Picture
 
 
 def first(record, replicates, trials):
@@ -60,7 +61,11 @@ def test_it_is_drawn_without_a_warning(case, record, tmp_path):
 
 
 def test_none_recovered_is_said(record, tmp_path, monkeypatch):
-    monkeypatch.setattr(report, "picture", lambda figure: "data:image/svg+xml,")
+    monkeypatch.setattr(
+        report,
+        "picture",
+        lambda figure: Picture("data:image/svg+xml,", "data:image/svg+xml,"),
+    )
     text = report.write(never(record), tmp_path / "a.html").read_text("utf-8")
     assert "None solved the task before the damage." in text
     assert "None recovered within the 20 trials that were left." in text

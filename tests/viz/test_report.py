@@ -1,5 +1,6 @@
 """Reports: one file, true in words, complete."""
 
+import base64
 import re
 from dataclasses import replace
 
@@ -9,6 +10,7 @@ import pytest
 from bns.errors import BnsError, FormatError
 from bns.stats import Interval
 from bns.viz import comparison, facts, figures, report
+from bns.viz.page import Picture
 
 
 @pytest.fixture(scope="module")
@@ -20,13 +22,32 @@ def page(record, tmp_path_factory):
 @pytest.fixture
 def unpictured(monkeypatch):
     """Reports without drawing, for tests of their text."""
-    monkeypatch.setattr(report, "picture", lambda figure: "data:image/svg+xml,")
+    monkeypatch.setattr(
+        report,
+        "picture",
+        lambda figure: Picture("data:image/svg+xml,", "data:image/svg+xml,"),
+    )
 
 
 def test_it_needs_nothing_else(page):
     sources = re.findall(r'(?:src|href)="([^"]{0,30})', page)
-    assert sources and all(source.startswith("data:image/svg") for source in sources)
+    assert sources and all(source.startswith("data:image/") for source in sources)
     assert "<script" not in page and "@import" not in page
+
+
+def test_a_telephone_gets_panels_below_each_other(record):
+    drawn = report.picture(figures.solved({"a": record}))
+    wide, narrow = (size(address) for address in drawn)
+    assert wide[0] > wide[1], "two panels beside each other"
+    assert narrow[0] < 300 < 1.5 * narrow[0] < narrow[1], "below each other [pt]"
+
+
+def size(address):
+    """Width and height of an SVG [pt]."""
+    svg = base64.b64decode(address.partition(",")[2]).decode()
+    return tuple(
+        float(x) for x in re.findall(r'(?:width|height)="([\d.]+)pt"', svg)[:2]
+    )
 
 
 def test_it_says_what_happened(page, record):
@@ -38,8 +59,9 @@ def test_it_says_what_happened(page, record):
 
 
 def test_every_figure_has_a_caption_and_a_text_for_who_cannot_see_it(page):
-    assert page.count("<figcaption>") == page.count("<img") == 7
-    assert page.count('alt="') == 7
+    assert page.count("<figcaption>") == page.count("<picture>") == 7
+    assert page.count('alt="') == page.count("<img") == 1 + 7, "the robot, and figures"
+    assert "data:image/png;base64," in page and 'alt="The robot khepera3."' in page
 
 
 def test_it_can_be_reproduced(page):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bns.cli.run import expanded
-from bns.errors import BnsError, FormatError
+from bns.errors import BnsError, FormatError, UnknownNameError
 from bns.experiment.config import RunConfig, WorldConfig
 from bns.worlds import corrected, registry
 from bns.worlds.corrected import Corrected
@@ -52,6 +52,26 @@ def test_wrong_use_is_refused(kept, tmp_path):
     (tmp_path / "worlds.toml").write_text("[worlds.a]\nreality = 3\n")
     with pytest.raises(FormatError, match="a list of effects"):
         registry.names()
+
+
+def test_one_that_is_kept_elsewhere_is_pointed_to(tmp_path, monkeypatch):
+    monkeypatch.delenv(corrected.VARIABLE, raising=False)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
+    near = tmp_path / "above" / "near"
+    there, here = near / "there", near / "here"
+    for place in (there, here):
+        place.mkdir(parents=True)
+    monkeypatch.chdir(there)
+    corrected.keep(Corrected("kitchen", "mujoco", "khepera3", (GAIN,)))
+    monkeypatch.chdir(here)
+    with pytest.raises(BnsError, match="--user") as caught:
+        registry.make("kitchen")
+    assert str(there / "worlds.toml") in str(caught.value)
+    with pytest.raises(UnknownNameError, match="--user: everywhere"):
+        registry.make("cellar")
+    (there / "worlds.toml").write_text("broken")
+    with pytest.raises(UnknownNameError):
+        registry.make("kitchen")
 
 
 def test_the_nearer_file_wins(tmp_path, monkeypatch):

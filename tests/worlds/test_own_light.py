@@ -94,7 +94,11 @@ def test_effects_take_the_sensors_that_are_there(braitenberg):
     [
         ('"ir_left_45",', '"tracker",', "'tracker' is none of"),
         ('    "ir_left_45",\n', "", "sensor 'ir_right_45' has no twin 'ir_left_45'"),
-        ("full_light = 0.86", "full_light = -1", "full_light = -1 is no number above"),
+        (
+            "full_light = 0.86",
+            "full_light = -1",
+            "full_light = -1.0 is no number above",
+        ),
         ("exponent = 4.0", "exponents = 4.0", "exponents is none of exponent"),
         ("[light]", '[light]\nheadings = "thesis"', "headings"),
     ],

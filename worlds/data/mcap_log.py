@@ -170,3 +170,38 @@ def _field(message: Any, names: tuple[str, ...], path: Path) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise FormatError(f"{path}: field {'.'.join(names)!r} holds {value!r}.")
     return float(value)
+
+
+def topics(path: Path) -> dict[str, str]:
+    """The topics of a log, each with the name of its schema.
+
+    Raises:
+        MissingDependencyError: the package `mcap`.
+        FormatError: no such file, or no MCAP.
+    """
+    try:
+        from mcap.exceptions import McapError
+        from mcap.reader import make_reader
+    except ImportError:
+        raise MissingDependencyError(
+            "Reading MCAP logs", "the package mcap", "pip install mcap"
+        ) from None
+    try:
+        with path.open("rb") as file:
+            found = make_reader(file).get_summary()
+    except (*reading.UNREADABLE, struct.error, McapError) as error:
+        raise FormatError(f"{path} cannot be read as MCAP ({error}).") from None
+    if found is None:
+        raise FormatError(f"{path} has no summary: mend it with `mcap recover`.")
+    names = {number: schema.name for number, schema in found.schemas.items()}
+    return {c.topic: names.get(c.schema_id, "") for c in found.channels.values()}
+
+
+def messages(path: Path, wanted: set[str]) -> dict[str, list]:
+    """Per topic, in order of log time: ((log time, publish time) [ns], message).
+
+    Raises:
+        MissingDependencyError: the package `mcap`, or what decodes its messages.
+        FormatError: no such file, no MCAP, or a topic without messages.
+    """
+    return _messages(path, wanted)

@@ -1,5 +1,10 @@
 """All effects by name: classes in the folders here, by stage; no list to edit.
 
+Other packages add theirs by the entry point `bns.effects`, in their `pyproject.toml`:
+
+    [project.entry-points."bns.effects"]
+    loose_wheel = "my_package.effects:LooseWheel"
+
 An effect is written in text as ``wheel_gain:wheel=left,factor=0.8`` and in TOML as a
 table ``{effect = "wheel_gain", wheel = "left", factor = 0.8}``.
 """
@@ -9,6 +14,7 @@ import pkgutil
 from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
 from types import ModuleType
 from typing import Any
 
@@ -16,6 +22,8 @@ from bns.errors import BnsError, UnknownNameError
 from bns.worlds import effects as package
 from bns.worlds.effects.base import Effect
 
+GROUP = "bns.effects"
+"""entry points of other packages"""
 EXAMPLE = "wheel_gain:wheel=left,factor=0.8"
 FORMER = {
     "sensor_gain": "reading_gain",
@@ -39,7 +47,37 @@ def _classes() -> dict[str, type[Effect]]:
                 if item.name in found:
                     raise BnsError(f"Two effects are called {item.name!r}; rename one.")
                 found[item.name] = item
+    for entry in entry_points(group=GROUP):
+        found |= _installed(entry, found)
     return dict(sorted(found.items()))
+
+
+def _installed(
+    entry: EntryPoint, known: Mapping[str, type[Effect]]
+) -> dict[str, type[Effect]]:
+    """The effect that another package adds.
+
+    Raises:
+        BnsError: it is no effect, cannot be imported, or its name is taken.
+    """
+    try:
+        item = entry.load()
+    except (ImportError, AttributeError) as error:
+        raise BnsError(
+            f"Effect {entry.name!r} of another package cannot be imported from "
+            f"{entry.value} ({error}); mend or uninstall that package."
+        ) from error
+    if not (inspect.isclass(item) and issubclass(item, Effect)):
+        raise BnsError(
+            f"{entry.value}, registered as effect {entry.name!r}, is not a subclass of "
+            "bns.worlds.effects.base.Effect."
+        )
+    if item.name != entry.name or item.name in known:
+        raise BnsError(
+            f"{entry.value} is called {item.name!r}: it has to be {entry.name!r}, as "
+            "it is registered, and no other effect's name."
+        )
+    return {item.name: item}
 
 
 def _modules() -> Iterator[ModuleType]:

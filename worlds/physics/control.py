@@ -36,8 +36,8 @@ def check(
         channels
     ):
         raise BnsError(
-            f"Commands have the channels {_listed(commands.channels)}; robot "
-            f"{robot!r} is told {_listed(channels)}."
+            f"Robot {robot!r} is told {_listed(channels)}; these commands have "
+            f"{_listed(commands.channels)}."
         )
     if not len(commands):
         raise BnsError("A list of commands is empty; give one command at least.")

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from bns.errors import BnsError, FormatError, UnknownNameError
 from bns.storage import reading
 from bns.storage.numbers import BEYOND
@@ -22,7 +24,10 @@ KEYS = (
     "bounds",
     "log",
 )
-START = ("keyframe", "recorded", "settle")
+START = ("keyframe", "recorded", "settle", "cut")
+LOOP = ("kp", "kd", "torque")
+"""of a position loop that the MJCF file lacks"""
+
 QUANTITIES = ("joint", "speed", "site", "body")
 """what an observed channel can be: position or speed of a joint, place of a site or
 body"""
@@ -32,12 +37,24 @@ WINDOW = 0.1  # [s] between two samples that are compared
 
 @dataclass(frozen=True)
 class Told:
-    """A command channel: the actuator it goes to and its limits."""
+    """A command channel.
+
+    Attributes:
+        channel: name and unit.
+        actuator: of the model; one without a name goes by that of its joint.
+        low, high: limits of the command.
+        kp, kd: gains of a position loop around the actuator [N m/rad, N m s/rad, or
+            N/m, N s/m]; kp = 0: the command is the actuator's own control.
+        torque: largest torque or force of that loop [N m or N]; infinity = any.
+    """
 
     channel: Channel
     actuator: str
     low: float
     high: float
+    kp: float = 0.0
+    kd: float = 0.0
+    torque: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -72,6 +89,7 @@ class OwnConfig:
         keyframe: pose at the start of each trial; "" = the model's own.
         recorded: whether observed joints start where they were recorded.
         settle: how long the robot stands at rest before a trial [s].
+        cut: length of the pieces that long recordings are cut into [s]; 0 = none.
         window: see `WINDOW`.
         effects: parts by effect; None = all that make sense.
         bounds: by candidate: low, high, slack.
@@ -85,6 +103,7 @@ class OwnConfig:
     keyframe: str = ""
     recorded: bool = False
     settle: float = 0.0
+    cut: float = 0.0
     window: float = WINDOW
     effects: Mapping[str, tuple[str, ...]] | None = None
     bounds: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -122,6 +141,7 @@ class OwnConfig:
             keyframe=str(start.get("keyframe", "")),
             recorded=bool(start.get("recorded", False)),
             settle=_number(start.get("settle", 0.0), "settle", path, 0.0, 60.0),
+            cut=_cut(start, path),
             window=_number(given.get("window", WINDOW), "window", path, 1e-3, 60.0),
             effects=None
             if effects is None
@@ -152,7 +172,7 @@ def _names(parts: Any) -> tuple[str, ...]:
 def _told(name: str, table: Any, path: Path) -> Told:
     kind = f"key of [commands.{name}] in {path}"
     table = _mapping(table, f"[commands.{name}]", path)
-    _known(table, ("actuator", "unit", "low", "high"), kind)
+    _known(table, ("actuator", "unit", "low", "high", *LOOP), kind)
     for key in ("actuator", "unit", "low", "high"):
         if key not in table:
             raise FormatError(f"{path}: [commands.{name}] lacks {key!r}.")
@@ -160,7 +180,23 @@ def _told(name: str, table: Any, path: Path) -> Told:
     if not low < high:
         raise BnsError(f"{path}: [commands.{name}] needs low < high.")
     channel = Channel(name, str(table["unit"]))
-    return Told(channel, str(table["actuator"]), low, high)
+    loop = {key: _number(table[key], key, path) for key in LOOP if key in table}
+    if loop and not (loop.get("kp", 0) > 0 and min(loop.values()) >= 0):
+        raise BnsError(
+            f"{path}: the loop of [commands.{name}] needs a positive kp, and kd and "
+            "torque not below 0."
+        )
+    return Told(channel, str(table["actuator"]), low, high, **loop)
+
+
+def _cut(start: Mapping[str, Any], path: Path) -> float:
+    cut = _number(start.get("cut", 0.0), "cut", path)
+    if cut < 0 or (cut and not start.get("recorded")):
+        raise BnsError(
+            f"{path}: [start] cut is a positive length in seconds, and needs "
+            "recorded = true: pieces begin where the robot was."
+        )
+    return cut
 
 
 def _seen(name: str, table: Any, path: Path) -> Seen:

@@ -1,48 +1,71 @@
-"""CSV logs of a user's own robot: columns of commands and observations by channel."""
+"""Logs of a user's own robot: columns of commands and observations by channel."""
 
-from pathlib import Path
+from collections.abc import Mapping
 
 import numpy as np
 
 from bns.errors import FormatError
+from bns.gap.importers import tables
+from bns.gap.importers.tables import SENT, TIME, TRIAL, Column, Table
+from bns.gap.models.mjcf import cuts
 from bns.gap.models.mjcf.config import OwnConfig
-from bns.storage import csv_table
 from bns.worlds.data import dataset_checks as checks
 from bns.worlds.data.column_map import FACTORS
 from bns.worlds.trial import Commands, Trial
 
 
 def read(path: str, config: OwnConfig) -> list[Trial]:
-    """Trials of a table of samples, one row each, with a line of column names.
+    """Trials of a log that `bns.gap.importers.tables` knows.
 
-    Columns are named like the channels, beside `time` [s] and, if there is one,
-    `trial`; [log] in the description names others. A stretch of equal commands
-    becomes one command. Empty cells are lost samples.
+    Columns are named like the channels, beside `time` [s] and, if there are,
+    `trial` and `command_time` [s]; [log] in the description names others. A stretch of
+    equal commands becomes one command, which begins with its first row, or at its
+    `command_time`. Empty cells are lost samples. With `cut` in [start] each trial
+    becomes several.
 
     Raises:
         FormatError: no such file, a column missing, or time going backwards.
     """
-    if not Path(path).exists():
-        raise FormatError(f"{path} is neither a dataset directory nor a log.")
-    table = csv_table.read(path)
-    needed = [item.channel.name for item in (*config.told, *config.seen)]
-    columns = {}
-    for name in ("time", *needed):
+    table = tables.read(path)
+    columns = channels(table, config, path)
+    return [
+        piece
+        for number, rows in enumerate(split(columns[TRIAL]))
+        for piece in _trials(
+            {n: v[rows] for n, v in columns.items()}, config, f"{path}, trial {number}"
+        )
+    ]
+
+
+def channels(table: Table, config: OwnConfig, path: str) -> dict[str, np.ndarray]:
+    """Columns of a log by channel, in SI units, and `time`, `trial`, `command_time`.
+
+    Raises:
+        FormatError: a column is missing.
+    """
+    found = {}
+    for name in (TIME, *(i.channel.name for i in (*config.told, *config.seen))):
         source = config.log.get(name)
         column = source.column if source else name
         if column not in table:
             raise FormatError(
                 f"{path} has no column {column!r} for {name!r}; it has "
-                f"{', '.join(table)}. Name it in [log]."
+                f"{', '.join(table.names)}. Name it in [log]."
             )
-        columns[name] = table[column] * _factor(source.unit if source else "")
-    label = config.log["trial"].column if "trial" in config.log else "trial"
-    marks = table.get(label, np.zeros(len(columns["time"])))
+        found[name] = table[column] * _factor(source.unit if source else "")
+    for name in (TRIAL, SENT):
+        source = config.log.get(name)
+        column = source.column if source else name
+        if column in table:
+            found[name] = table[column] * _factor(source.unit if source else "")
+    found.setdefault(TRIAL, np.zeros(len(found[TIME])))
+    return found
+
+
+def split(marks: np.ndarray) -> list[np.ndarray]:
+    """Rows of each trial: a new mark begins a new one."""
     edges = np.flatnonzero(np.diff(marks) != 0) + 1
-    return [
-        _trial({n: v[rows] for n, v in columns.items()}, config, f"{path}, trial {k}")
-        for k, rows in enumerate(np.split(np.arange(len(marks)), edges))
-    ]
+    return np.split(np.arange(len(marks)), edges)
 
 
 def _factor(unit: str) -> float:
@@ -52,8 +75,16 @@ def _factor(unit: str) -> float:
     return 1.0
 
 
-def _trial(columns: dict[str, np.ndarray], config: OwnConfig, where: str) -> Trial:
-    times = columns["time"] - columns["time"][:1]
+def _trials(
+    columns: Mapping[str, np.ndarray], config: OwnConfig, where: str
+) -> list[Trial]:
+    trial = _trial(columns, config, where)
+    return cuts.pieces(trial, config) if config.cut else [trial]
+
+
+def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> Trial:
+    columns = _exact(columns, config, where)
+    times = columns[TIME] - columns[TIME][:1]
     if len(times) < 2 or not (np.diff(times) >= 0).all():
         raise FormatError(f"{where}: fewer than two samples, or time goes backwards.")
     told = np.stack([columns[item.channel.name] for item in config.told], axis=1)
@@ -65,9 +96,9 @@ def _trial(columns: dict[str, np.ndarray], config: OwnConfig, where: str) -> Tri
     begins = np.concatenate([[0], np.flatnonzero(change) + 1])
     begins = begins[np.diff(times[np.append(begins, len(times) - 1)]) > 0]
     bounds = np.append(begins, len(times) - 1)
-    channels = tuple(item.channel for item in config.told)
+    kinds = tuple(item.channel for item in config.told)
     made = Trial(
-        commands=Commands(told[begins], np.diff(times[bounds]), channels),
+        commands=Commands(told[begins], np.diff(times[bounds]), kinds),
         times=times,
         observed=seen,
         boundaries=bounds,
@@ -77,3 +108,36 @@ def _trial(columns: dict[str, np.ndarray], config: OwnConfig, where: str) -> Tri
     )
     checks.plausible(made, where)
     return made
+
+
+def _exact(
+    columns: Mapping[str, np.ndarray], config: OwnConfig, where: str
+) -> Mapping[str, np.ndarray]:
+    """The columns with commands at the time they were sent, if that is known.
+
+    Raises:
+        FormatError: a command sent after its first row, or before the one before.
+    """
+    if SENT not in columns:
+        return columns
+    names = [item.channel.name for item in config.told]
+    told = np.stack([columns[name] for name in names], axis=1)
+    times, sent = columns[TIME], columns[SENT]
+    rows = np.append(0, np.flatnonzero((np.diff(told, axis=0) != 0).any(axis=1)) + 1)
+    moments = np.append(times[0], sent[rows[1:]])
+    wrong = (moments > times[rows] + tables.SAME) | (
+        np.diff(moments, prepend=-np.inf) < 0
+    )
+    if wrong.any() or not np.isfinite(moments).all():
+        row = int(rows[np.argmax(wrong | ~np.isfinite(moments))])
+        raise FormatError(
+            f"{where}: command_time is {sent[row]:.6g} s in row {row}, the first with "
+            f"its command, of {times[row]:.6g} s; a command is sent before its row and "
+            "after the command before it."
+        )
+    seen = [
+        Column(item.channel.name, columns[item.channel.name]) for item in config.seen
+    ]
+    given = [Column(name, columns[name][rows]) for name in names]
+    joint, made = tables.joined(times, seen, moments, given)
+    return {TIME: joint, **{column.name: column.values for column in made}}

@@ -15,7 +15,7 @@ from bns.gap.decomposition.model import DecomposableModel
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import Windows
 from bns.gap.models.mjcf import effects as own_effects
-from bns.gap.models.mjcf import log, view
+from bns.gap.models.mjcf import log, prepared, start, view
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.records import Candidate
 from bns.models import mjcf as mjcf_file
@@ -99,7 +99,7 @@ class OwnModel(DecomposableModel):
         """
         if not self.config.model.exists():
             raise FormatError(f"There is no model file {self.config.model}.")
-        made = mjcf_file.load(self.config.model)
+        made = prepared.spec(self.config)
         mjcf_file.compiled(made.copy(), self.config.model)
         for effect in effects:
             if effect.stage == "body" and not effect.is_nominal:
@@ -236,7 +236,7 @@ class OwnModel(DecomposableModel):
         lead, extra = self._lead(dt), round(LEAD / dt)
         rest = self._rest(self.compiled(()).model)[self.actuators]
         values = np.repeat(trial.commands.values, counts, axis=0)
-        before = np.tile(rest, (lead + extra, 1))
+        before = start.before(trial, rest, lead + extra, self.config, dt)
         values = np.concatenate([before, values])
         signal = ControlSignal(
             times=np.arange(len(values)) * dt,
@@ -260,8 +260,7 @@ class OwnModel(DecomposableModel):
             key = _index(model, "key", self.config.keyframe)
             mujoco.mj_resetDataKeyframe(model, data, key)
         if self.config.recorded:
-            seen = trial.observed[np.isfinite(trial.observed).all(axis=1)]
-            self.view.place(data, seen[0])
+            start.place(data, trial, self.view)
         state = np.empty(mujoco.mj_stateSize(model, STATE))
         data.time = 0.0
         mujoco.mj_getState(model, data, state, STATE)
@@ -348,6 +347,7 @@ def _key(trial: Trial, effects: Sequence[Effect]) -> tuple:
         told.durations.tobytes(),
         trial.times.tobytes(),
         trial.observed[:1].tobytes(),
+        str(trial.conditions.get(start.STATE)),
         tuple(str(effect) for effect in effects),
     )
 

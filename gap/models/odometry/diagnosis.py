@@ -1,18 +1,22 @@
 """Diagnosis of odometry: what is wrong, what is tied, and which drive would tell."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 import numpy as np
 
 from bns.errors import BnsError
 from bns.gap.models.odometry import fit
-from bns.gap.models.odometry.fit import CANDIDATES, Motions, Noise, OdometryFit
+from bns.gap.models.odometry.fit import BLOCK, FULL, TERMS, Noise, OdometryFit, Problem
+from bns.gap.models.odometry.motions import TURN, Motions
 from bns.gap.records import Verdict
 
-LARGEST = 3  # candidates together at most
-TIE = 9.0  # difference of costs up to which two supports are tied: three deviations
-BLOCK = 50  # intervals held out together
+TIE = 3.0  # difference of evidence up to which two supports are tied; assumed
+UNSEEN = 0.5  # of a plausible size: known no better, a mount's number is not seen
+REACH, MOST = 6.0, 12  # evidence behind the best, and how many, are fitted in full
+MOUNT = ("mount_x", "mount_y", "mount_angle")
+TURNED = 0.2  # [rad] no sensor is turned as far by accident; assumed
 SENSOR = np.array([0.005, 0.005, 0.01])
 """deviation of a pose measured before and after a whole drive [m, m, rad]; assumed"""
 
@@ -31,9 +35,13 @@ class OdometryDiagnosis:
     """What is wrong with odometry.
 
     Attributes:
-        verdict: supports of candidates, tied ones together.
+        verdict: supports of terms, tied ones together.
         fits: of every support that the verdict names, and of nothing, by support.
-        gain: how much the best support lowers the held-out cost, and its standard
+        full: the fit of all terms together.
+        shares: of the loss that the best support closes: what each of its terms closes
+            alone, and what it closes last in.
+        unseen: terms of the mount of which these drives say nothing.
+        gain: how much the best support lowers the held-out loss, and its standard
             error over blocks.
         noise: of the motions.
         plan: drives by how well they would tell the first two tied supports apart, in
@@ -42,6 +50,9 @@ class OdometryDiagnosis:
 
     verdict: Verdict
     fits: Mapping[tuple[str, ...], OdometryFit]
+    full: OdometryFit
+    shares: Mapping[str, tuple[float, float]]
+    unseen: tuple[str, ...]
     gain: tuple[float, float]
     noise: Noise
     plan: tuple[tuple[str, float], ...]
@@ -50,7 +61,7 @@ class OdometryDiagnosis:
 def diagnose(
     motions: Motions, *, length_bias: float = fit.LENGTH_BIAS
 ) -> OdometryDiagnosis:
-    """Forward selection on held-out blocks, then exchanges that leave it as good.
+    """All terms together, then those dropped that the evidence does not need.
 
     Args:
         motions: many short intervals.
@@ -64,74 +75,132 @@ def diagnose(
             f"{len(motions)} intervals are too few to hold some out; {4 * BLOCK} are "
             "needed."
         )
-    noise = fit.noise_of(motions, length_bias=length_bias)
-    chosen, gain = _select(motions, noise)
-    tied = _tied(motions, noise, chosen) if chosen else [()]
-    fits = {names: fit.fit(motions, names, noise) for names in {(), *tied}}
+    problem = fit.problem(motions, length_bias=length_bias)
+    full = problem.fit(FULL)
+    place = problem.fit(MOUNT[:2])  # on its own: an open heading leaves it on a circle
+    known = {**full.deviations, **place.deviations}
+    unseen = tuple(n for n in MOUNT if known[n] > UNSEEN * TERMS[n].size)
+    turned = abs(full.values[TURN]) > TURNED
+    search = Search(problem, tuple(_allowed(unseen, turned)))
+    best = search.best()
+    tied = search.tied(best)
+    honest = replace(problem, unseen=unseen)
+    fits = {names: honest.fit(names) for names in {(), *tied}}
+    gain = held_out(problem, best)
     plan = _plan(motions, fits[tied[0]], fits[tied[1]]) if len(tied) > 1 else ()
-    verdict = _verdict(tied, fits, gain, plan)
-    return OdometryDiagnosis(verdict, fits, gain, noise, plan)
+    verdict = _verdict(tied, fits, gain, plan, unseen)
+    shares = _shares(problem, best)
+    return OdometryDiagnosis(
+        verdict, fits, full, shares, unseen, gain, problem.noise, plan
+    )
 
 
-def _select(motions: Motions, noise: Noise) -> tuple[tuple[str, ...], tuple]:
-    """Candidates that lower the held-out cost by more than two standard errors."""
-    chosen: tuple[str, ...] = ()
-    nothing = before = _held_out(motions, chosen, noise)
-    for _ in range(LARGEST):
-        tries = {
-            name: _held_out(motions, (*chosen, name), noise) for name in _free(chosen)
-        }
-        if not tries:
-            break
-        best = min(tries, key=lambda name: tries[name].sum())
-        better, error = _sum(before - tries[best])
-        if better < max(2 * error, TIE):
-            break
-        chosen, before = (*chosen, best), tries[best]
-    return chosen, _sum(nothing - before)
+def _allowed(unseen: Sequence[str], turned: bool) -> Iterator[tuple[str, ...]]:
+    """All sets of terms that are seen, in which no two change the same number.
+
+    Args:
+        unseen: terms that no drive shows.
+        turned: whether the sensor was turned on purpose. Its place is then two numbers
+            or none: a heading known a little only could turn either of them to zero.
+    """
+    seen = [name for name in TERMS if name not in unseen]
+    for count in range(len(seen) + 1):
+        for names in combinations(seen, count):
+            numbers = [number for name in names for number in TERMS[name].numbers]
+            alone = ("mount_x" in names) != ("mount_y" in names)
+            if len(set(numbers)) == len(numbers) and not (turned and alone):
+                yield names
 
 
-def _free(chosen: Sequence[str]) -> list[str]:
-    """Candidates that move a number which no chosen one moves."""
-    moved = {number for name in chosen for number in CANDIDATES[name]}
-    return [
-        name
-        for name, numbers in CANDIDATES.items()
-        if name not in chosen and not set(numbers) <= moved
-    ]
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Supports by their evidence.
+
+    All are ranked by predictions taken as linear about the best fit so far; those that
+    come out near the best are fitted in full.
+
+    Attributes:
+        problem: the motions.
+        supports: that are considered.
+        known: fits so far, by support.
+    """
+
+    problem: Problem
+    supports: tuple[tuple[str, ...], ...]
+    known: dict[tuple[str, ...], OdometryFit] = field(default_factory=dict)
+
+    def fit(self, names: tuple[str, ...]) -> OdometryFit:
+        """A support's fit, made once."""
+        if names not in self.known:
+            self.known[names] = self.problem.fit(names)
+        return self.known[names]
+
+    def best(self) -> tuple[str, ...]:
+        """The support of the highest evidence, ranked about everything at first."""
+        best, about = None, self.problem.fit(FULL).values
+        while True:
+            self._fit_near(self.supports, about)
+            better = min(self.known, key=self._cost)
+            if better == best:
+                return best
+            best, about = better, self.fit(better).values
+
+    def tied(self, best: tuple[str, ...]) -> list[tuple[str, ...]]:
+        """The support and those with one term exchanged that explain as well."""
+        swaps = [
+            names
+            for names in self.supports
+            if len(names) == len(best) and len(set(names) - set(best)) == 1
+        ]
+        self._fit_near([best, *swaps], self.fit(best).values)
+        found = [names for names in (best, *swaps) if names in self.known]
+        least = self._cost(best) + TIE
+        return sorted((n for n in found if self._cost(n) <= least), key=self._cost)
+
+    def _cost(self, names: tuple[str, ...]) -> float:
+        return self.fit(names).cost
+
+    def _fit_near(
+        self, supports: Sequence[tuple[str, ...]], values: np.ndarray
+    ) -> None:
+        """Fit the supports that come within reach of the best of them."""
+        costs = self.problem.costs(supports, values)
+        for at in np.argsort(costs)[:MOST]:
+            if costs[at] <= costs.min() + REACH:
+                self.fit(supports[at])
 
 
-def _held_out(motions: Motions, names: Sequence[str], noise: Noise) -> np.ndarray:
-    """Cost of each block under a fit to the blocks of the other parity."""
-    block = np.arange(len(motions)) // BLOCK
-    costs = np.zeros(block[-1] + 1)
+def held_out(problem: Problem, names: tuple[str, ...]) -> tuple[float, float]:
+    """By how much a support lowers the loss of blocks that it was not fitted to.
+
+    Returns:
+        The sum over blocks, and its standard error.
+    """
+    block = np.arange(len(problem.motions)) // BLOCK
+    gains = np.zeros(block[-1] + 1)
     for parity in (0, 1):
-        fitted = fit.fit(motions.take(block % 2 != parity), names, noise)
-        for number in range(parity, len(costs), 2):
-            part = motions.take(block == number)
-            costs[number] = fit.cost(part, fitted.magnitudes, noise)
-    return costs
-
-
-def _sum(gains: np.ndarray) -> tuple[float, float]:
+        part = problem.take(block % 2 != parity)
+        fits = [part.fit(item, slack=0.0) for item in ((), names)]
+        for number in range(parity, len(gains), 2):
+            part = problem.take(block == number)
+            nothing, explained = (part.loss(item.values) for item in fits)
+            gains[number] = nothing - explained
     return float(gains.sum()), float(gains.std(ddof=1) * np.sqrt(len(gains)))
 
 
-def _tied(
-    motions: Motions, noise: Noise, chosen: tuple[str, ...]
-) -> list[tuple[str, ...]]:
-    """The support and those with one candidate exchanged that cost no more, by cost."""
-    supports = {tuple(sorted(item)) for item in (chosen, *_exchanges(chosen))}
-    costs = {item: fit.fit(motions, item, noise).cost for item in supports}
-    ranked = sorted(costs, key=costs.__getitem__)
-    return [item for item in ranked if costs[item] <= costs[ranked[0]] + TIE]
+def _shares(problem: Problem, names: tuple[str, ...]) -> dict[str, tuple[float, float]]:
+    """What each term closes alone and last in; those not named held at nominal."""
 
+    def loss(support: tuple[str, ...]) -> float:
+        return problem.fit(support, slack=0.0).loss
 
-def _exchanges(chosen: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-    for at in range(len(chosen)):
-        rest = chosen[:at] + chosen[at + 1 :]
-        for name in _free(rest):
-            yield (*rest, name)
+    nothing, whole = loss(()), loss(names)
+    made = {}
+    for name in names:
+        without = tuple(other for other in names if other != name)
+        shares = (nothing - loss((name,)), loss(without) - whole)
+        made[name] = tuple(share / (nothing - whole) for share in shares)
+    return made
 
 
 def _plan(
@@ -143,13 +212,12 @@ def _plan(
         whole = Motions(
             np.array([left]), np.array([right]), np.zeros((1, 3)), motions.axle
         )
-        first = whole.predict(fit.changed(one.magnitudes))[0]
-        second = whole.predict(fit.changed(other.magnitudes))[0]
+        first, second = whole.predict(one.values)[0], whole.predict(other.values)[0]
         separations[name] = float(np.linalg.norm((first - second) / SENSOR))
     return tuple(sorted(separations.items(), key=lambda item: -item[1]))
 
 
-def _verdict(tied, fits, gain, plan) -> Verdict:
+def _verdict(tied, fits, gain, plan, unseen) -> Verdict:
     best = tied[0]
     kind = (
         "no gap"
@@ -169,6 +237,8 @@ def _verdict(tied, fits, gain, plan) -> Verdict:
         "together": f"{said} explain the motions together.",
         "either": f"{said}; but {' or '.join(differing)}: these drives can not tell.",
     }[kind]
+    if unseen:
+        text += f" Of {' and '.join(unseen)} these drives say nothing."
     from scipy.stats import norm
 
     return Verdict(
@@ -191,20 +261,20 @@ def _differing(tied: Sequence[tuple[str, ...]]) -> list[str]:
 
 
 def _text(name: str, magnitude: float) -> str:
-    if name in ("axle", "both_diameters", "left_diameter", "right_diameter"):
+    unit = TERMS[name].unit
+    if unit == "1":
         return f"{name} {100 * magnitude:+.2f} %"
-    if name == "mount_angle":
-        return f"{name} {1e3 * magnitude:+.1f} mrad"
+    if unit == "rad":
+        return f"{name} {1e3 * magnitude:+.1f} mrad ({np.degrees(magnitude):+.1f} deg)"
     return f"{name} {1e3 * magnitude:+.2f} mm"
 
 
 def _angle(one: OdometryFit, other: OdometryFit) -> float:
-    """Between what two fits that differ in one candidate add to the others [deg]."""
-    names, others = list(one.magnitudes), list(other.magnitudes)
-    common = [name for name in names if name in others]
-    rows = [one.signatures[names.index(name)] for name in common]
-    a = one.signatures[next(names.index(n) for n in names if n not in common)]
-    b = other.signatures[next(others.index(n) for n in others if n not in common)]
+    """Between what two fits that differ in one term add to the others [deg]."""
+    common = [name for name in one.names if name in other.names]
+    rows = [one.signatures[one.names.index(name)] for name in common]
+    a = one.signatures[next(i for i, n in enumerate(one.names) if n not in common)]
+    b = other.signatures[next(i for i, n in enumerate(other.names) if n not in common)]
     if rows:
         base = np.linalg.qr(np.array(rows).T)[0]
         a, b = a - base @ (base.T @ a), b - base @ (base.T @ b)

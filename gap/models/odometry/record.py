@@ -4,7 +4,8 @@ import numpy as np
 from scipy.stats import norm
 
 from bns.gap.models.odometry.diagnosis import DRIVES, OdometryDiagnosis, diagnose
-from bns.gap.models.odometry.fit import Motions
+from bns.gap.models.odometry.fit import TERMS
+from bns.gap.models.odometry.motions import Motions
 from bns.gap.planning.excitation import Excitation
 from bns.gap.planning.plan import Option, Plan, repeats
 from bns.gap.records import Diagnosis, Fit
@@ -13,7 +14,6 @@ from bns.worlds.trial import Commands, Trial
 MODEL = "odometry"
 LEVEL = 1.6449  # 90 % interval
 SPEED = 0.1  # [m/s] of the faster wheel in a planned drive
-UNITS = {"mount_x": "m", "mount_y": "m", "mount_angle": "rad"}
 LEFT_OUT = "motions over single intervals have neither horizons nor a path"
 
 
@@ -21,23 +21,14 @@ def record(trials: list[Trial], *, axle: float) -> Diagnosis:
     """Diagnose wheel speeds against a sensor's motion, interval by interval.
 
     Args:
-        trials: one or more recordings; the first is used alone if there is one only.
+        trials: one or more recordings of one robot.
         axle: nominal distance of the wheels [m].
 
     Raises:
         BnsError: commands that are no wheel speeds, or too few intervals.
     """
-    motions = [Motions.of(trial, axle=axle) for trial in trials]
-    if len(motions) > 1:
-        pooled = Motions(
-            np.concatenate([item.left for item in motions]),
-            np.concatenate([item.right for item in motions]),
-            np.concatenate([item.seen for item in motions]),
-            axle,
-        )
-    else:
-        pooled = motions[0]
-    return of(diagnose(pooled), len(trials))
+    motions = Motions.joined([Motions.of(trial, axle=axle) for trial in trials])
+    return of(diagnose(motions), len(trials))
 
 
 def of(found: OdometryDiagnosis, trials: int) -> Diagnosis:
@@ -48,14 +39,18 @@ def of(found: OdometryDiagnosis, trials: int) -> Diagnosis:
         trials=trials,
         faults=(),
         verdict=found.verdict,
-        fits=tuple(sorted(fits, key=lambda fit: fit.loss)),
+        fits=tuple(sorted(fits, key=lambda fit: fit.evidence)),
         where={},
-        signatures={"plan": [list(row) for row in found.plan]},
+        signatures={
+            "plan": [list(row) for row in found.plan],
+            "shares": {name: list(pair) for name, pair in found.shares.items()},
+        },
         floor={
             "source": "the fit's own residuals",
             "sigma": [float(value) for value in found.noise.deviation],
             "channels": ["forward", "left", "turn"],
             "length_bias": found.noise.length_bias,
+            "inflation": found.noise.inflation,
         },
         closed={},
         warnings=(
@@ -100,9 +95,9 @@ def _fit(names: tuple[str, ...], fit) -> Fit:
         effects=tuple(f"{n}:{v:+.5g}" for n, v in zip(names, values, strict=True)),
         magnitudes=tuple(values),
         intervals=tuple((v - h, v + h) for v, h in zip(values, half, strict=True)),
-        units=tuple(UNITS.get(name, "1") for name in names),
-        loss=fit.cost,
-        held_out=fit.cost,
+        units=tuple(TERMS[name].unit for name in names),
+        loss=fit.loss,
+        held_out=fit.loss,
         held_out_se=0.0,
-        evidence=float("nan"),
+        evidence=fit.cost,
     )

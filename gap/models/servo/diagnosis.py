@@ -6,7 +6,7 @@ threshold of a verdict is a quantile of the latter; none is set by hand.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from bns.gap.models.servo import score
 from bns.gap.models.servo.candidates import candidates as all_candidates
 from bns.gap.models.servo.discrepancy import Discrepancy
 from bns.gap.models.servo.nominal import Nominal
+from bns.gap.models.servo.repeats import sound
 from bns.gap.models.servo.runs import Runs, cells, merged
 from bns.gap.models.servo.score import Scores
 from bns.gap.models.servo.verdict import Null, verdict
@@ -32,12 +33,14 @@ class Reference:
         discrepancy: how it errs.
         null: what candidates reach where nothing has changed.
         candidates: by name.
+        left_out: a line for each run that is not as its repeats, see `odd`.
     """
 
     nominal: Nominal
     discrepancy: Discrepancy
     null: Null
     candidates: Mapping[str, Candidate]
+    left_out: tuple[str, ...] = ()
 
 
 def learn(
@@ -47,6 +50,7 @@ def learn(
 
     Args:
         runs: of several settings, truly told; repeats and trajectories as they come.
+            Runs that are not as their repeats are left out.
         nominal: the law.
         candidates: explanations to consider; None = all servo effects.
 
@@ -54,6 +58,7 @@ def learn(
         BnsError: fewer than five settings.
     """
     chosen = tuple(all_candidates() if candidates is None else candidates)
+    runs, left_out = sound(runs)
     runs = merged(runs)
     names, kinds = cells(runs), runs.labels["trajectory"]
     if len(set(names)) < 5:
@@ -77,7 +82,8 @@ def learn(
         ]
         scores[cell] = score.score(residuals[mine], own, matrices)
     null = Null.of(scores)
-    return Reference(nominal, discrepancy, null, {c.name: c for c in chosen})
+    named = {c.name: c for c in chosen}
+    return Reference(nominal, discrepancy, null, named, left_out)
 
 
 def diagnose(
@@ -87,7 +93,8 @@ def diagnose(
 
     Args:
         runs: of one setting, told as the nominal model believes it; repeats and
-            trajectories as they come.
+            trajectories as they come; runs that are not as their repeats are left
+            out, and named in the sentence.
         reference: what runs without a change taught.
         without: cells of the reference to leave out, for tests in which the runs
             belong to one of them.
@@ -98,6 +105,7 @@ def diagnose(
     Raises:
         BnsError: runs of several settings, or a trajectory that the reference lacks.
     """
+    runs, left_out = sound(runs)
     runs = merged(runs)
     if len(set(cells(runs))) != 1:
         raise BnsError(
@@ -112,4 +120,8 @@ def diagnose(
     scores = score.refined(runs, nominal, scores, chosen, matrices)
     gain = cells(runs)[0][-1]
     null = reference.null.without(without)
-    return verdict(scores, null, chosen, gain), scores
+    found = verdict(scores, null, chosen, gain)
+    if left_out:
+        said = f"{found.sentence} Left out: {' '.join(left_out)}"
+        found = replace(found, sentence=said)
+    return found, scores

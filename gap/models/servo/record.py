@@ -9,6 +9,7 @@ from bns.gap.models.servo import diagnosis
 from bns.gap.models.servo import nominal as servo_nominal
 from bns.gap.models.servo.model import ServoModel, seen
 from bns.gap.models.servo.nominal import Nominal
+from bns.gap.models.servo.repeats import sound
 from bns.gap.models.servo.runs import Runs, cells, runs
 from bns.gap.models.servo.score import Scores
 from bns.gap.records import Candidate, Diagnosis, Fit
@@ -46,6 +47,8 @@ def record(
     seconds = np.floor(min(trial.times[-1] for trial in every) * 10) / 10
     mine = runs(every[: len(trials)], seconds=seconds)
     others = runs(every[len(trials) :], seconds=seconds)
+    others, without_repeat = sound(others)
+    faults = (*sound(mine)[1], *without_repeat)
     law = nominal or servo_nominal.fit(others.take(_spread(others)))
     known = diagnosis.learn(others, law)
     own = cells(mine)[0]
@@ -55,7 +58,7 @@ def record(
     return Diagnosis(
         model=ServoModel.name,
         trials=len(trials),
-        faults=(),
+        faults=tuple(f"Left out: {line}" for line in faults),
         verdict=verdict,
         fits=_fits(scores, known.candidates, slack),
         where={},

@@ -9,7 +9,8 @@ from scipy.stats import t as student
 from bns.gap.models.servo.score import Scores
 from bns.gap.records import Candidate, Verdict
 
-LEVEL = 0.02  # chance of a false alarm that is accepted
+LEVEL = 0.05  # chance of a false alarm that is accepted
+MANY = round(1 / LEVEL) - 1  # settings whose own statistics reach to that chance
 # Natural logarithm of the ratio of gains whose statistics count fully: of 0.2 to 100
 # about the likeliest to have predicted each of 48 settings from the others.
 WIDTH = 0.5
@@ -54,21 +55,37 @@ class Null:
     def chance(self, statistic: float, gain: float) -> float:
         """Probability of so large a statistic where nothing changed.
 
-        Statistics are positive and skewed: their logarithms are taken as normal, of a
-        mean and variance that are known from a few settings only (Student's t). Soft
-        control scatters more than stiff: settings near in gain count more.
+        Soft control scatters more than stiff: logarithms are set against the mean and
+        scatter of the settings near in gain. Where there are `MANY` settings, the
+        chance is the share of them that stand out as far among the others (a conformal
+        p-value; no shape is assumed). Of fewer, and beyond all, they are taken as
+        normal, of a mean and variance known from a few settings only (Student's t).
 
         Args:
             statistic: see `Scores.statistic`.
             gain: that the runs were told to have.
         """
+        away, count = self._away(statistic, gain)
+        assumed = float(student.sf(away, count - 1))
+        if len(self.cells) < MANY:
+            return assumed
+        others = [
+            self.without([cell])._away(value, cell[-1])[0]
+            for cell, value in zip(self.cells, self.statistics, strict=True)
+        ]
+        above = sum(value >= away for value in others)
+        share = (1 + above) / (1 + len(others))
+        return share if above else min(share, assumed)
+
+    def _away(self, statistic: float, gain: float) -> tuple[float, float]:
+        """Deviations above settings near in gain, and how many of them count."""
         logs = np.log(np.maximum(self.statistics, LEAST))
         weight, count = self._near(gain)
         mean = float(weight @ logs)
         square = float(weight @ (logs - mean) ** 2) * count / (count - 1)
         spread = np.sqrt(square * (1 + 1 / count))
         away = np.log(max(statistic, LEAST)) - mean
-        return float(student.sf(away / max(spread, LEAST), count - 1))
+        return float(away / max(spread, LEAST)), count
 
     def _near(self, gain: float) -> tuple[np.ndarray, float]:
         """Weights of the settings by gain, and how many count."""

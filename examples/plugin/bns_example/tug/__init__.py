@@ -1,0 +1,1 @@
+"""A robot on two wheels, made with `bns models new`."""

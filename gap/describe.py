@@ -1,0 +1,208 @@
+"""The description of a robot from its MJCF and a log: what is what is found out.
+
+`describe` gives the TOML file of docs/gap_your_robot.md, what was guessed, and what it
+is unsure about; `bns gap describe` prints the same.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bns.errors import BnsError, FormatError
+from bns.gap.importers import tables
+from bns.gap.importers.tables import Column
+from bns.gap.models.mjcf import guesses, matching
+from bns.gap.models.mjcf.channels import Work, commands, compiled, factor, observed
+from bns.gap.models.mjcf.log import split
+from bns.gap.models.mjcf.toml_text import toml
+from bns.worlds.data.column_map import FACTORS
+
+
+@dataclass(frozen=True)
+class Description:
+    """What `describe` found.
+
+    Attributes:
+        toml: text of the description.
+        guessed: what was guessed, one line each.
+        unsure: what had better be looked at, one line each.
+    """
+
+    toml: str
+    guessed: tuple[str, ...]
+    unsure: tuple[str, ...]
+
+    def write(self, path: str | Path) -> Path:
+        """Write the description; gives the file.
+
+        Raises:
+            BnsError: there is one already, or the file can not be written.
+        """
+        path = Path(path)
+        try:
+            with path.open("x", encoding="utf-8") as file:
+                file.write(self.toml)
+        except FileExistsError:
+            raise BnsError(f"{path} exists and is not overwritten.") from None
+        except OSError as error:
+            raise BnsError(f"{path} cannot be written: {error.strerror}.") from None
+        return path
+
+
+def describe(
+    model: str | Path,
+    log: str | Path,
+    *,
+    out: str | Path = "",
+    kp: float = 0.0,
+    kd: float = 0.0,
+    torque: float = np.inf,
+) -> Description:
+    """Describe a robot.
+
+    Args:
+        model: its MJCF file.
+        log: of a kind that `bns.gap.importers.tables` knows.
+        out: where the description will lie; the model is named from there. Empty: in
+            the working directory, under the model's name.
+        kp, kd: gains of a position loop that the robot has and its MJCF has not.
+        torque: largest torque or force of that loop.
+
+    Raises:
+        FormatError: a file that cannot be read, or without times or commands.
+        BnsError: no column can be told, or a loop is needed.
+    """
+    loop = {"kp": kp, "kd": kd, "torque": torque} if kp else {}
+    work = Work(
+        Path(model), str(log), tables.read(log), loop, compiled(Path(model), ())
+    )
+    _clock(work)
+    told, seen = _columns(work)
+    commands(work, told, seen)
+    observed(work, seen)
+    _begin(work)
+    return Description(
+        toml(work, place(model, out)), tuple(work.guessed), tuple(work.unsure)
+    )
+
+
+def place(model: str | Path, out: str | Path = "") -> Path:
+    """Where a description lies: `out`, or the model's name in the working directory."""
+    return Path(out) if str(out) else Path(f"{Path(model).stem}.toml")
+
+
+def _clock(work: Work) -> None:
+    """Columns of time, trial and command_time."""
+    names = work.table.names
+    clock = matching.clock(names)
+    if not clock:
+        rising = [c.name for c in work.table.columns if _rises(c.values)]
+        if not rising:
+            raise FormatError(
+                f"{work.log} has no column of times that grow; it has "
+                f"{', '.join(names)}. Call one time."
+            )
+        clock = rising[0]
+        work.unsure.append(f"time: column {clock!r}, for it grows")
+    trial = matching.one_of(names, matching.TRIALS)
+    marks = work.table[trial] if trial else np.zeros(len(work.table[clock]))
+    work.rows = split(marks)
+    longest = max(work.rows, key=len)
+    unit = matching.unit(clock)
+    unit = (
+        unit if unit in FACTORS["s"] else guesses.time_unit(work.table[clock][longest])
+    )
+    work.times = work.table[clock] * FACTORS["s"][unit]
+    steps = np.diff(work.times[longest])
+    rate = 1 / max(float(np.median(steps[steps > 0])), 1e-9) if (steps > 0).any() else 0
+    if rate <= 0 or (steps < 0).any():
+        raise FormatError(
+            f"{work.log}: time stands still or goes backwards in {clock!r}."
+        )
+    work.guessed.append(f"time: {clock!r} in {unit}, {rate:.4g} samples a second")
+    work.sources[tables.TIME] = (clock, unit)
+    if trial:
+        work.sources[tables.TRIAL] = (trial, "")
+    work.guessed.append(f"trials: {len(work.rows)}" + (f", by {trial!r}" * bool(trial)))
+    sent = matching.one_of(names, matching.SENT)
+    if sent:
+        work.sources[tables.SENT] = (sent, unit)
+        work.guessed.append(f"commands were sent at {sent!r}, in {unit}")
+
+
+def _rises(values: np.ndarray) -> bool:
+    return (
+        len(values) > 1
+        and bool((np.diff(values) >= 0).mean() > 0.99)
+        and bool(np.ptp(values) > 0)
+    )
+
+
+def _columns(work: Work) -> tuple[list[Column], list[Column]]:
+    """Columns that are told and seen, times and counters left out."""
+    used = {column for column, _ in work.sources.values()}
+    rest = [
+        column
+        for column in work.table.columns
+        if column.name not in used and column.name.lower() not in matching.COUNTS
+    ]
+    model = work.model
+    actuators = [model.actuator(a).name for a in range(model.nu)]
+    joints = [model.joint(j).name for j in range(model.njnt)]
+    told, seen = matching.roles(rest, actuators, joints)
+    if not told and model.nu:  # noise has no steps: what stays to the bit is told
+        held = [column for column in seen if _held(column.values)]
+        if len(held) == model.nu:
+            told, seen = held, [column for column in seen if column not in held]
+            listed = ", ".join(column.name for column in told)
+            work.unsure.append(f"commands: {listed}, for they change in steps")
+    if not told:
+        raise BnsError(
+            f"No column of {work.log} is a command; it has "
+            f"{', '.join(work.table.names)}. Call commands as the actuator, or "
+            "JOINT_goal."
+        )
+    return told, seen
+
+
+def _held(values: np.ndarray) -> bool:
+    return bool(np.isfinite(values).all() and (np.diff(values) == 0).mean() > 0.8)
+
+
+def _begin(work: Work) -> None:
+    """How trials begin: at rest in a pose, or where they were; cut or not."""
+    told = np.stack([c.values for c, _, _ in work.told], axis=1)
+    longest = max(work.rows, key=len)
+    span = float(np.ptp(work.times[longest]))
+    first, tolerance = {}, {}
+    for column, part, unit in work.seen:
+        if part.quantity == "joint":
+            pieces = [column.values[rows] * factor(unit) for rows in work.rows]
+            heads = [p[np.isfinite(p)][:1] for p in pieces]
+            first[part.name] = float(np.median(np.concatenate(heads)))
+            wide = guesses.NEAR * float(
+                np.nanmax(column.values) - np.nanmin(column.values)
+            )
+            tolerance[part.name] = max(
+                guesses.SIGMAS * guesses.noise(pieces), wide * factor(unit)
+            )
+    pose, settle = guesses.rests(work.model, first, tolerance)
+    if span > guesses.LONG and guesses.curved(told[longest]):
+        work.start = {"recorded": True, "cut": guesses.CUT}
+        work.start |= {"keyframe": pose} if pose else {}
+        work.guessed.append(
+            f"start: one long recording, cut into pieces of {guesses.CUT:g} s that "
+            "begin with the positions and speeds of the data"
+        )
+    elif pose is None:
+        work.start = {"recorded": True}
+        work.unsure.append(
+            "start: trials begin in no pose of the model at rest, so each begins where "
+            "its joints were recorded; give a keyframe for the rest"
+        )
+    else:
+        work.start = {"keyframe": pose} if pose else {}
+        work.start |= {"settle": settle} if settle else {}
+        what = f"keyframe {pose!r}" if pose else "the model's own pose"
+        work.guessed.append(f"start: at rest in {what}, settling for {settle:g} s")

@@ -1,0 +1,212 @@
+"""Logs as people have them, each read into one table: stamps and columns of numbers.
+
+CSV, PACE (`.pt`), SAGE, LeRobotDataset and MCAP. What a format says of its columns
+(told or seen, which joint, which quantity) is kept; units are left as they are.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+
+from bns.errors import FormatError
+
+TIME, TRIAL, SENT = "time", "trial", "command_time"
+"""columns that a log may have under these names, beside its channels"""
+
+TOLD, SEEN = "told", "seen"
+"""what a column may hold: a command, or a measurement"""
+
+POSITION, SPEED, EFFORT = "position", "speed", "effort"
+SAME = 1e-6  # [s] moments that are nearer are one
+
+ENDS = ([".csv"], [".tsv"], [".txt"])
+PACKED = ".gz"
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """One column of a log.
+
+    Attributes:
+        name: by which a description's [log] finds it.
+        values: its samples, shape ``(T,)``, NaN where there is none.
+        role: `TOLD`, `SEEN` or "" (the format does not say).
+        part: name of the joint, if the format says.
+        quantity: `POSITION`, `SPEED`, `EFFORT` or "" (the format does not say).
+    """
+
+    name: str
+    values: np.ndarray
+    role: str = ""
+    part: str = ""
+    quantity: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A log.
+
+    Attributes:
+        columns: all of the same length, in the order of the file.
+        kind: of the file, in words.
+    """
+
+    columns: tuple[Column, ...]
+    kind: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all columns."""
+        return tuple(column.name for column in self.columns)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Samples of a column.
+
+        Raises:
+            FormatError: there is none of that name.
+        """
+        for column in self.columns:
+            if column.name == name:
+                return column.values
+        raise FormatError(
+            f"the {self.kind} has no column {name!r}; it has {', '.join(self.names)}."
+        )
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.names
+
+
+def reader(path: str | Path) -> Callable[[Path], Table] | None:
+    """What reads a log; None if it is of no known kind."""
+    path = Path(path)
+    suffixes = [suffix.lower() for suffix in path.suffixes]
+    name = ""
+    if path.is_dir():
+        if (path / "meta" / "info.json").is_file():
+            name = "lerobot"
+        elif (path / "control.csv").is_file() and (path / "state_motor.csv").is_file():
+            name = "sage"
+    elif suffixes[-1:] in ([".pt"], [".pth"]):
+        name = "pace"
+    elif suffixes[-1:] == [".mcap"]:
+        name = "ros2_mcap"
+    elif [end for end in suffixes if end != PACKED][-1:] in ENDS:
+        return _csv
+    return import_module(f"bns.gap.importers.{name}").read if name else None
+
+
+def read(path: str | Path) -> Table:
+    """The table in a log.
+
+    Raises:
+        FormatError: no such file, of no known kind, or not to be read.
+        MissingDependencyError: a package that this kind needs.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise FormatError(f"There is no log {path}.")
+    found = reader(path)
+    if found is None:
+        raise FormatError(
+            f"{path} is no log that is known: give a CSV table (.csv, .tsv, .csv.gz), "
+            "a PACE file (.pt), an MCAP log (.mcap), or the directory of a SAGE motion "
+            "(control.csv, state_motor.csv) or of a LeRobotDataset (meta/info.json)."
+        )
+    return found(path)
+
+
+def joined(
+    times: np.ndarray,
+    seen: Sequence[Column],
+    sent: np.ndarray,
+    told: Sequence[Column],
+) -> tuple[np.ndarray, tuple[Column, ...]]:
+    """Measurements and commands that have stamps of their own, in one table.
+
+    A moment at which only a command was sent has no measurement (NaN); each command
+    holds until the next. What was before the first command is left out.
+
+    Args:
+        times: of the measurements [s], shape ``(T,)``, increasing.
+        seen: their columns, each ``(T,)``.
+        sent: when the commands were sent [s], shape ``(M,)``, increasing.
+        told: their columns, each ``(M,)``.
+
+    Returns:
+        the moments [s], increasing, from the first with a command on; told and seen
+        columns.
+    """
+    near = np.searchsorted(times, sent - SAME)
+    own = np.ones(len(sent), bool)
+    inside = near < len(times)
+    own[inside] = np.abs(times[near[inside]] - sent[inside]) > SAME
+    moments = np.sort(np.concatenate([times, sent[own]]), kind="stable")
+    last = np.searchsorted(sent, moments + SAME, side="right") - 1
+    kept = last >= 0
+    at = np.searchsorted(moments, times)
+    made = [_replaced(column, column.values[last[kept]]) for column in told]
+    for column in seen:
+        values = np.full(len(moments), np.nan)
+        values[at] = column.values
+        made.append(_replaced(column, values[kept]))
+    return moments[kept], tuple(made)
+
+
+def _replaced(column: Column, values: np.ndarray) -> Column:
+    return Column(column.name, values, column.role, column.part, column.quantity)
+
+
+def stamped(
+    times: np.ndarray, columns: Sequence[Column], kind: str, trial: np.ndarray | None
+) -> Table:
+    """A table of a format that has names for nothing but joints.
+
+    Args:
+        times: of the samples [s].
+        columns: of commands and measurements.
+        kind: of the file, in words.
+        trial: number of the trial of each sample; None = one.
+    """
+    first = [Column(TIME, np.asarray(times, float))]
+    if trial is not None:
+        first.append(Column(TRIAL, np.asarray(trial, float)))
+    return Table((*first, *columns), kind)
+
+
+def _csv(path: Path) -> Table:
+    """Columns of numbers; others are left out."""
+    import pyarrow
+    from pyarrow import csv, types
+
+    plain = path.with_suffix("") if path.suffix.lower() == PACKED else path
+    tabbed = plain.suffix.lower() == ".tsv"
+    options = csv.ParseOptions(delimiter="\t" if tabbed else ",")
+    try:
+        table = csv.read_csv(path, parse_options=options)
+    except (pyarrow.ArrowException, OSError) as error:
+        first = str(error).splitlines()[0]
+        raise FormatError(f"{path} is no CSV table of numbers ({first}).") from None
+    found: dict[str, np.ndarray] = {}
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        kind = column.type
+        if types.is_boolean(kind):
+            column = column.cast("int8")
+        elif not (
+            types.is_integer(kind) or types.is_floating(kind) or types.is_null(kind)
+        ):
+            continue
+        found[name] = column.cast("float64").fill_null(np.nan).to_numpy()
+    if not found or not table.num_rows:
+        raise FormatError(f"{path} is no CSV table of numbers with a line of names.")
+    return Table(tuple(Column(n, v) for n, v in found.items()), "CSV table")
+
+
+def named(names: Sequence[str], count: int) -> list[str]:
+    """Names of a format's entries, or their numbers where it gives none."""
+    listed = list(names)
+    if len(listed) == count:
+        return [str(name) for name in listed]
+    return [str(number) for number in range(count)]

@@ -1,0 +1,117 @@
+"""One long recording as trials of a few seconds, each begun in the state it was in.
+
+The state is taken from the data: a parabola through the samples around the start gives
+each observed joint's position and speed. What was told in the second before goes along,
+so that what comes late has something before it.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from bns.gap.models.mjcf import start
+from bns.gap.models.mjcf.config import OwnConfig
+from bns.worlds.trial import Commands, Trial
+
+HALF = 0.03  # [s] on each side of a start, of the samples that tell its state
+LEAST = 4  # samples on each side at least
+BEFORE = 0.5  # [s] of commands before a piece
+GRID = 0.005  # [s] between them
+
+
+def pieces(trial: Trial, config: OwnConfig) -> list[Trial]:
+    """A trial in pieces of about `config.cut` seconds; itself if it is not longer.
+
+    Args:
+        trial: recorded; each change of its commands is a command.
+        config: of the robot; joints among its channels get a state.
+    """
+    span = float(trial.times[-1] - trial.times[0])
+    count = round(span / config.cut)
+    if count < 2:
+        return [_begun(trial, trial, 0, config)]
+    seen = np.flatnonzero(np.isfinite(trial.observed).all(axis=1))
+    wanted = trial.times[0] + np.arange(count + 1) * span / count
+    rows = seen[np.clip(np.searchsorted(trial.times[seen], wanted), 0, len(seen) - 1)]
+    rows = np.unique(np.append(rows[:-1], len(trial.times) - 1))
+    return [
+        _begun(_piece(trial, first, last), trial, first, config)
+        for first, last in pairwise(rows)
+    ]
+
+
+def _piece(trial: Trial, first: int, last: int) -> Trial:
+    """Samples first to last, and the commands between them."""
+    bounds = trial.boundaries
+    inner = bounds[(bounds > first) & (bounds < last)]
+    marks = np.concatenate([[first], inner, [last]])
+    index = np.clip(
+        np.searchsorted(bounds, marks[:-1], side="right") - 1, 0, len(bounds) - 2
+    )
+    lasting = np.diff(trial.times[marks])
+    told = Commands(trial.commands.values[index], lasting, trial.commands.channels)
+    return trial.replace(
+        commands=told,
+        times=trial.times[first : last + 1] - trial.times[first],
+        observed=trial.observed[first : last + 1],
+        boundaries=marks - first,
+        handled=np.zeros(0, bool),
+    )
+
+
+def _begun(piece: Trial, whole: Trial, first: int, config: OwnConfig) -> Trial:
+    conditions = {**piece.conditions, start.STATE: state(whole, first, config)}
+    past = commands_before(whole, first)
+    if past:
+        conditions |= {start.BEFORE: past, start.STEP: GRID}
+    return piece.replace(conditions=conditions)
+
+
+def commands_before(trial: Trial, row: int) -> list[list[float]]:
+    """What was told in the last `BEFORE` seconds before a sample, every `GRID`."""
+    begin = trial.times[row]
+    past = min(BEFORE, begin - trial.times[0])
+    moments = begin - np.arange(int(past / GRID + 1e-9), 0, -1) * GRID
+    at = np.searchsorted(trial.times[trial.boundaries], moments + 1e-9, side="right")
+    rows = np.clip(at - 1, 0, len(trial.commands) - 1)
+    return trial.commands.values[rows].tolist()
+
+
+def state(trial: Trial, row: int, config: OwnConfig) -> dict[str, list[float]]:
+    """Position and speed of each observed joint at a sample.
+
+    A speed that is observed itself is taken as the mean around the sample.
+    """
+    found: dict[str, list[float]] = {}
+    near = around(trial.times, np.isfinite(trial.observed).all(axis=1), row)
+    at = trial.times[near] - trial.times[row]
+    for column, item in enumerate(config.seen):
+        if item.quantity == "joint":
+            position, speed = parabola(at, trial.observed[near, column])
+            found[item.part] = [position, found.get(item.part, [0.0, speed])[1]]
+    for column, item in enumerate(config.seen):
+        if item.quantity == "speed":
+            mean = float(parabola(at, trial.observed[near, column])[0])
+            if item.part in found:
+                found[item.part][1] = mean
+    return found
+
+
+def around(times: np.ndarray, seen: np.ndarray, row: int) -> np.ndarray:
+    """Samples near a row: within `HALF` of it, `LEAST` on each side where there are."""
+    rows = np.flatnonzero(seen)
+    place = int(np.searchsorted(rows, row))
+    inside = np.abs(times[rows] - times[row]) <= HALF
+    inside[max(place - LEAST, 0) : place + LEAST + 1] = True
+    return rows[inside]
+
+
+def parabola(at: np.ndarray, values: Sequence[float]) -> tuple[float, float]:
+    """Value and slope at 0 of the parabola nearest to samples (a line through few)."""
+    degree = min(2, len(at) - 1)
+    if degree < 1:
+        return float(values[0]), 0.0
+    basis = np.vander(at, degree + 1, increasing=True)
+    found = np.linalg.lstsq(basis, np.asarray(values, float), rcond=None)[0]
+    return float(found[0]), float(found[1])

@@ -1,0 +1,99 @@
+"""Numbers of a description that the data tell: units of time, noise, limits, start."""
+
+from collections.abc import Mapping, Sequence
+
+import mujoco
+import numpy as np
+
+from bns.gap.core.floor import NORMAL, THIRD
+from bns.worlds.data.column_map import FACTORS
+
+RATES = (4.0, 5000.0)  # [Hz] of logs
+USUAL = 0.01  # [s] between samples; the unit that comes nearest is taken
+LONG = 8.0  # [s] a trial that is longer, and told anew all the time, is cut
+CUT = 3.0  # [s]
+ANEW = 0.2  # share of samples with a new command from which on it is a curve
+SETTLE = 0.5  # [s]
+NEAR = 0.05  # of a joint's range, by which a start may be off
+SIGMAS = 6.0  # times the noise, the same
+PAD = 0.02  # of the range of commands, by which limits are wider
+
+
+def time_unit(times: np.ndarray) -> str:
+    """The unit of stamps: the one that makes their rate that of a log."""
+    steps = np.diff(times)
+    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else USUAL
+    rated = {
+        name: abs(np.log(step * factor / USUAL))
+        for name, factor in FACTORS["s"].items()
+        if 1 / RATES[1] <= step * factor <= 1 / RATES[0]
+    }
+    return min(rated, key=rated.__getitem__) if rated else "s"
+
+
+def noise(pieces: Sequence[np.ndarray]) -> float:
+    """Standard deviation of a channel's measurement, by third differences.
+
+    At least that of rounding to the smallest step between its samples.
+
+    Args:
+        pieces: samples of each trial, ``(T,)``, NaN where there is none.
+    """
+    kept = [piece[np.isfinite(piece)] for piece in pieces]
+    third = np.concatenate([np.abs(np.diff(piece, n=3)) for piece in kept])
+    steps = np.concatenate([np.abs(np.diff(piece)) for piece in kept])
+    steps = steps[steps > 0]
+    span = max((float(np.ptp(piece)) for piece in kept if len(piece)), default=1.0)
+    found = float(np.median(third)) / NORMAL / THIRD if len(third) else 0.0
+    rounding = float(steps.min()) / np.sqrt(12.0) if len(steps) else 0.0
+    return max(found, rounding, 1e-5 * span, 1e-9)
+
+
+def limits(told: np.ndarray, allowed: tuple[float, float]) -> tuple[float, float]:
+    """Lowest and highest command: what was told and a little more, within bounds."""
+    low, high = float(told.min()), float(told.max())
+    pad = PAD * max(high - low, 1e-3 * max(abs(low), abs(high)), 1e-6)
+    return max(low - pad, min(allowed[0], low)), min(high + pad, max(allowed[1], high))
+
+
+def curved(told: np.ndarray) -> bool:
+    """Whether commands, ``(T, C)``, change all the time."""
+    return bool((np.diff(told, axis=0) != 0).any(axis=1).mean() > ANEW)
+
+
+def rests(
+    model: mujoco.MjModel, first: Mapping[str, float], tolerance: Mapping[str, float]
+) -> tuple[str | None, float]:
+    """The pose in which trials begin: a keyframe's name or "" and how long it settles.
+
+    Args:
+        model: that is recorded.
+        first: where each joint is at the start of a trial.
+        tolerance: by how much that may be off.
+
+    Returns:
+        the keyframe ("" = the model's own pose), None = none fits; settling time [s].
+    """
+    names = ["", *(model.key(k).name for k in range(model.nkey) if model.key(k).name)]
+    for settle in (0.0, SETTLE):
+        for name in reversed(names):  # keyframes before the model's own pose
+            data = mujoco.MjData(model)
+            if name:
+                mujoco.mj_resetDataKeyframe(model, data, model.key(name).id)
+            for _ in range(round(settle / model.opt.timestep)):
+                mujoco.mj_step(model, data)
+            off = [
+                abs(float(data.joint(joint).qpos[0]) - at) <= tolerance[joint]
+                for joint, at in first.items()
+            ]
+            if off and all(off):
+                return name, SETTLE if settle or _sinks(model, data) else 0.0
+    return None, 0.0
+
+
+def _sinks(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
+    """Whether the model moves by itself in that pose."""
+    before = data.qpos.copy()
+    for _ in range(round(SETTLE / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+    return bool(np.abs(data.qpos - before).max() > 1e-5)

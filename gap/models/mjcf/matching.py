@@ -1,0 +1,193 @@
+"""What a column of a log is, by its name: told or seen, which part, which unit."""
+
+import re
+from collections.abc import Mapping, Sequence
+
+from bns.gap.importers import tables
+from bns.gap.importers.tables import Column
+
+
+def _set(words: str) -> frozenset[str]:
+    return frozenset(words.split())
+
+
+TOLD = _set(
+    "goal cmd command commanded commands des desired target ref reference "
+    "setpoint sp action ctrl control told u"
+)
+SEEN = _set(
+    "meas measured actual state obs observed observation fb feedback enc encoder real"
+)
+SPEED = _set("vel velocity velocities speed dq qd qvel omega")
+EFFORT = _set("torque torques tau current effort load force voltage temp")
+POSITION = _set("pos position positions angle q qpos joint jnt dof")
+DRIVE = _set("motor servo act actuator drive")
+UNITS = {
+    "rad": "rad",
+    "radian": "rad",
+    "radians": "rad",
+    "deg": "deg",
+    "degree": "deg",
+    "degrees": "deg",
+    "m": "m",
+    "cm": "cm",
+    "mm": "mm",
+    "s": "s",
+    "sec": "s",
+    "seconds": "s",
+    "ms": "ms",
+    "us": "us",
+    "ns": "ns",
+}
+TIMES = _set("time t stamp timestamp timestamps secs clock elapsed")
+TRIALS = _set("trial run episode episode_index rep repetition")
+SENT = _set("command_time sent cmd_time sent_time t_sent t_cmd time_sent")
+COUNTS = _set("frame index frame_index seq sequence task_index step row")
+AXES = ("x", "y", "z")
+
+
+def words(name: str) -> list[str]:
+    """The words and numbers in a name, in lower case."""
+    split = re.sub(r"([a-z])([A-Z])", r"\1 \2", name)
+    return re.findall(r"[a-z]+|\d+", split.lower())
+
+
+def unit(name: str) -> str:
+    """The unit at the end of a name; "" = none there."""
+    found = words(name)
+    return UNITS.get(found[-1], "") if len(found) > 1 else ""
+
+
+def core(name: str) -> str:
+    """What is left of a name without words for what and in which unit it is."""
+    said = words(name)
+    if unit(name):
+        said = said[:-1]
+    dropped = TOLD | SEEN | SPEED | EFFORT | POSITION | DRIVE
+    return "".join(word for word in said if word not in dropped)
+
+
+def quantity(column: Column) -> str:
+    """Position, speed or effort, as `bns.gap.importers.tables` calls them."""
+    if column.quantity:
+        return column.quantity
+    said = set(words(column.name))
+    if said & EFFORT:
+        return tables.EFFORT
+    return tables.SPEED if said & SPEED else tables.POSITION
+
+
+def clock(names: Sequence[str]) -> str:
+    """The column of times; "" if none is called so."""
+    if tables.TIME in names:
+        return tables.TIME
+    for name in names:
+        said = words(name)
+        if name.lower() not in SENT and said and said[0] in TIMES:
+            return name
+    return ""
+
+
+def one_of(names: Sequence[str], known: frozenset[str]) -> str:
+    """The first name that is one of the known ones; "" if none is."""
+    return next((name for name in names if name.lower() in known), "")
+
+
+def roles(
+    columns: Sequence[Column], actuators: Sequence[str], joints: Sequence[str]
+) -> tuple[list[Column], list[Column]]:
+    """Columns that are told, and those that are seen.
+
+    By the format; by words in the name; an actuator's own name, where a joint has
+    another one or is seen in another column.
+    """
+    told, seen = [], []
+    own = set(actuators) - set(joints)
+    for column in columns:
+        said = set(words(column.name))
+        measured = bool(said & (SEEN | SPEED | EFFORT))
+        if column.role:
+            (told if column.role == tables.TOLD else seen).append(column)
+        elif not measured and (said & TOLD or column.name in own):
+            told.append(column)
+        else:
+            seen.append(column)
+    if not told:  # each joint twice: by its name, and as measured
+        again = {core(c.name) for c in seen if set(words(c.name)) & SEEN}
+        told = [c for c in seen if c.name in actuators and core(c.name) in again]
+        seen = [column for column in seen if column not in told]
+    return told, seen
+
+
+def match(
+    columns: Sequence[Column], parts: Sequence[str]
+) -> tuple[dict[str, str], dict[str, str]]:
+    """Which part each column is of, and how that was found.
+
+    By the same name; by the same name without words for what it is; by one name that
+    ends with the other; by order, if as many columns as parts are left.
+
+    Args:
+        columns: of one quantity.
+        parts: names of joints or actuators, in the order of the model.
+
+    Returns:
+        part by column, and the reason by column; columns without one are left out.
+    """
+    found: dict[str, str] = {}
+    why: dict[str, str] = {}
+    rules = (
+        ("by its name", lambda c, p: (c.part or c.name) == p),
+        ("by its name", lambda c, p: _alike(core(c.part or c.name), core(p))),
+        ("by the end of its name", lambda c, p: _ends(core(c.part or c.name), core(p))),
+    )
+    for reason, fits in rules:
+        _unique(columns, parts, fits, found, why, reason)
+    left = [column for column in columns if column.name not in found]
+    free = [part for part in parts if part not in found.values()]
+    if left and len(left) == len(free):
+        for column, part in zip(left, free, strict=True):
+            found[column.name], why[column.name] = part, "by order"
+    return found, why
+
+
+def _unique(columns, parts, fits, found, why, reason) -> None:
+    for column in columns:
+        free = [part for part in parts if part not in found.values()]
+        hits = [part for part in free if fits(column, part)]
+        if column.name in found or len(hits) != 1:
+            continue
+        others = [c for c in columns if c.name not in found and fits(c, hits[0])]
+        if len(others) == 1:
+            found[column.name], why[column.name] = hits[0], reason
+
+
+def _alike(one: str, other: str) -> bool:
+    return bool(one) and one == other
+
+
+def _ends(one: str, other: str) -> bool:
+    short, long = sorted((one, other), key=len)
+    return len(short) > 2 and not short.isdigit() and long.endswith(short)
+
+
+def by_place(columns: Sequence[Column], table: Mapping[str, Sequence[str]]):
+    """Columns that are called as a site or body, with an axis in the name or not.
+
+    Args:
+        columns: that are no joints.
+        table: names of parts by kind, "site" and "body".
+
+    Returns:
+        by column: kind, part, axis ("" = not said).
+    """
+    found = {}
+    for column in columns:
+        name, axis = column.name, ""
+        stem, _, last = name.rpartition("_")
+        for kind, parts in table.items():
+            if name in parts:
+                found.setdefault(column.name, (kind, name, axis))
+            elif last in AXES and stem in parts:
+                found.setdefault(column.name, (kind, stem, last))
+    return found

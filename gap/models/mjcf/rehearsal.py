@@ -1,0 +1,135 @@
+"""How every part of a model moves under recorded commands, to tell columns by it."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+ANGLE = {"rad": 1.0, "deg": 180 / np.pi, "turn": 0.5 / np.pi}
+LENGTH = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
+JOINT, SITE, BODY, SPEED = "joint", "site", "body", "speed"
+OWN = 0.03  # by which a joint is preferred to a place that moves alike
+STILL = 1e-6  # [m or rad] less is no motion
+
+
+class Part(NamedTuple):
+    """What a column may be of: a joint's position or speed, a place along an axis."""
+
+    quantity: str
+    name: str
+    axis: str = ""
+
+
+class Fit(NamedTuple):
+    """How well a column agrees with a part's motion.
+
+    Attributes:
+        score: 1 = in all; correlation, less what unit and place do not explain.
+        unit: of the column, "rad", "deg", "mm", ...
+        correlation: of the column with the motion.
+    """
+
+    score: float
+    unit: str
+    correlation: float
+
+
+def hinged(model: mujoco.MjModel, joint: int) -> bool:
+    """Whether a joint has one coordinate."""
+    kinds = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+    return int(model.jnt_type[joint]) in map(int, kinds)
+
+
+def motions(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    actuators: list[int],
+    times: np.ndarray,
+    told: np.ndarray,
+) -> dict[Part, np.ndarray]:
+    """Positions of all joints, named sites and bodies at some times, each ``(T,)``.
+
+    Args:
+        model: that moves.
+        data: its state at the first time; is changed.
+        actuators: numbers of those that are told.
+        times: of the samples [s], increasing.
+        told: command from each sample on, ``(T, len(actuators))``.
+    """
+    count = int(np.ceil((times[-1] - times[0]) / model.opt.timestep)) + 1
+    at = times[0] + np.arange(count) * model.opt.timestep
+    which = np.searchsorted(times, at + 1e-9, side="right") - 1
+    due = np.searchsorted(at, times - 1e-9)
+    rows = []
+    for step in range(count):
+        data.ctrl[actuators] = told[which[step]]
+        mujoco.mj_forward(model, data) if step == 0 else None
+        rows.append(
+            np.concatenate(
+                [data.qpos, data.qvel, data.site_xpos.ravel(), data.xpos.ravel()]
+            )
+        )
+        mujoco.mj_step(model, data)
+    table = np.array(rows)[np.minimum(due, count - 1)]
+    return _by_part(model, table)
+
+
+def _by_part(model: mujoco.MjModel, table: np.ndarray) -> dict[Part, np.ndarray]:
+    found = {}
+    for number in range(model.njnt):
+        joint = model.joint(number)
+        if hinged(model, number) and joint.name:
+            found[Part(JOINT, joint.name)] = table[:, joint.qposadr[0]]
+            found[Part(SPEED, joint.name)] = table[:, model.nq + joint.dofadr[0]]
+    base = model.nq + model.nv
+    for kind, count, first in (
+        (SITE, model.nsite, base),
+        (BODY, model.nbody, base + 3 * model.nsite),
+    ):
+        for number in range(count):
+            name = getattr(model, kind)(number).name
+            if name and name != "world":
+                for axis, letter in enumerate("xyz"):
+                    part = Part(kind, name, letter)
+                    found[part] = table[:, first + 3 * number + axis]
+    return found
+
+
+def factors(model: mujoco.MjModel, part: Part) -> Mapping[str, float]:
+    """What a part may be measured in, and how much of it makes one SI unit."""
+    if part.quantity == SPEED:
+        return {"rad/s" if _turns(model, part.name) else "m/s": 1.0}
+    if part.quantity == JOINT and _turns(model, part.name):
+        return ANGLE
+    return LENGTH
+
+
+def _turns(model: mujoco.MjModel, joint: str) -> bool:
+    return int(model.joint(joint).type[0]) == int(mujoco.mjtJoint.mjJNT_HINGE)
+
+
+def fit(
+    values: np.ndarray, moved: np.ndarray, units: Mapping[str, float], *, joint: bool
+) -> Fit:
+    """How well samples agree with a motion, in the unit in which they do best.
+
+    Args:
+        values: samples, ``(T,)``; NaN where there is none.
+        moved: the motion in SI units, ``(T,)``.
+        units: that the samples may be in.
+        joint: whether it is a joint's; these are preferred.
+    """
+    good = np.isfinite(values) & np.isfinite(moved)
+    best = Fit(-np.inf, next(iter(units)), 0.0)
+    if good.sum() < 5 or np.ptp(moved[good]) < STILL or not np.ptp(values[good]):
+        return best
+    seen, made = values[good], moved[good]
+    correlation = float(np.corrcoef(seen, made)[0, 1])
+    for name, factor in units.items():
+        ratio = abs(np.log(seen.std() / factor / made.std()))
+        away = abs(seen.mean() / factor - made.mean()) / made.std()
+        score = abs(correlation) - 0.3 * ratio - 0.1 * min(away, 3.0) + OWN * joint
+        if score > best.score:
+            best = Fit(float(score), name, correlation)
+    return best

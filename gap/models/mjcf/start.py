@@ -1,0 +1,48 @@
+"""Where a recorded trial begins: the state of the joints, and what was told before."""
+
+import mujoco
+import numpy as np
+
+from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.models.mjcf.view import View
+from bns.worlds.trial import Trial
+
+STATE = "start"
+"""condition of a trial that begins in motion: by joint its position and speed"""
+
+BEFORE, STEP = "told_before", "told_before_step"
+"""conditions: commands before it, a row each, and the time between two [s]"""
+
+
+def place(data: mujoco.MjData, trial: Trial, view: View) -> None:
+    """Set the joints to where they were at the start of a trial.
+
+    Joints whose state the trial's conditions hold get it, with their speeds; else those
+    that were observed start at their first sample, at rest.
+    """
+    state = trial.conditions.get(STATE)
+    if not isinstance(state, dict):
+        seen = trial.observed[np.isfinite(trial.observed).all(axis=1)]
+        view.place(data, seen[0])
+        return
+    for joint, (position, speed) in state.items():
+        data.joint(joint).qpos[0] = position
+        data.joint(joint).qvel[0] = speed
+
+
+def before(
+    trial: Trial, rest: np.ndarray, count: int, config: OwnConfig, dt: float
+) -> np.ndarray:
+    """Commands at the physics steps before a trial, ``(count, C)``.
+
+    Those that were recorded, and before them the first of these; at rest if none were.
+    A trial that starts where it was recorded was told its first command before.
+    """
+    rows = trial.conditions.get(BEFORE)
+    if not isinstance(rows, list) or not rows:
+        first = trial.commands.values[0] if config.recorded else rest
+        return np.tile(first, (count, 1))
+    step = float(str(trial.conditions[STEP]))
+    past = (np.arange(count, 0, -1)) * dt  # [s] before the start
+    at = len(rows) - np.ceil(past / step - 1e-9).astype(int)
+    return np.array(rows, dtype=float)[np.clip(at, 0, None)]

@@ -1,0 +1,168 @@
+"""A description from an MJCF and a log: channels, units, start; and what follows."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from bns.__main__ import main
+from bns.errors import BnsError, FormatError
+from bns.gap.describe import describe
+from bns.gap.models.mjcf import cuts, start
+from bns.gap.models.mjcf.model import OwnModel
+from bns.gap.recordings import load_recordings
+
+ARM = """
+<mujoco model="arm"><compiler angle="radian"/>
+  <option timestep="0.005" integrator="implicitfast"/>
+  <default><joint damping="0.6" armature="0.01"/></default>
+  <worldbody><body name="upper">
+    <joint name="FL_hip_joint" axis="1 0 0" range="-1.5 1.5" limited="true"/>
+    <geom type="capsule" fromto="0 0 0 0 0 -0.2" size="0.02" mass="1"/>
+    <body name="lower" pos="0 0 -0.2">
+      <joint name="FL_calf_joint" axis="0 1 0" range="-2 2" limited="true"/>
+      <geom type="capsule" fromto="0 0 0 0 0 -0.2" size="0.02" mass="0.3"/>
+      <site name="toe" pos="0 0 -0.2"/>
+    </body></body></worldbody>
+  <actuator>ACTUATORS</actuator></mujoco>"""
+MOTORS = "".join(
+    f'<motor joint="FL_{name}_joint" ctrlrange="-20 20"/>' for name in ("hip", "calf")
+)
+SERVOS = "".join(
+    f'<position joint="FL_{name}_joint" kp="20" kv="1.5"/>' for name in ("hip", "calf")
+)
+
+
+def goals(times):
+    return np.column_stack([0.5 * np.sin(3 * times), 0.3 + 0.4 * np.sin(2 * times)])
+
+
+def recorded(path, *, seconds=12.0, unit=1.0, names="hip_goal,calf_goal,hip,calf"):
+    """A log of the arm with servos at 100 Hz: two goals, two joints, the toe."""
+    model = mujoco.MjModel.from_xml_string(ARM.replace("ACTUATORS", SERVOS))
+    data, rng = mujoco.MjData(model), np.random.default_rng(1)
+    times = np.arange(0, seconds, 0.01)
+    rows = []
+    for time in times:
+        data.ctrl[:] = goals(time)
+        mujoco.mj_forward(model, data)
+        seen = data.qpos + rng.normal(0, 1e-3, 2)
+        rows.append([*data.ctrl / unit, *seen / unit, 1e3 * data.site_xpos[0, 0]])
+        mujoco.mj_step(model, data, 2)
+    head = f"stamp,{names},toe"
+    table = np.column_stack([1e6 + 1e3 * times, np.round(rows, 6)])
+    np.savetxt(path, table, delimiter=",", header=head, comments="", fmt="%.6f")
+    return path
+
+
+@pytest.fixture
+def arm(tmp_path):
+    (tmp_path / "arm.xml").write_text(ARM.replace("ACTUATORS", MOTORS))
+    recorded(tmp_path / "log.csv", unit=np.pi / 180)
+    found = describe(
+        tmp_path / "arm.xml",
+        tmp_path / "log.csv",
+        out=tmp_path / "own.toml",
+        kp=20,
+        kd=1.5,
+    )
+    found.write(tmp_path / "own.toml")
+    return found, OwnModel.read(tmp_path / "own.toml", threads=1), tmp_path / "log.csv"
+
+
+def test_channels_are_told_by_name_and_units_by_motion(arm):
+    found, model, _ = arm
+    config = model.config
+    assert [t.actuator for t in config.told] == ["FL_hip_joint", "FL_calf_joint"]
+    assert [(s.quantity, s.part) for s in config.seen] == [
+        ("joint", "FL_hip_joint"),
+        ("joint", "FL_calf_joint"),
+        ("site", "toe"),
+    ]
+    assert config.seen[2].axis == 0
+    units = {name: source.unit for name, source in config.log.items()}
+    assert units["time"] == "ms"
+    assert {units["hip"], units["calf"], units["hip_goal"]} == {"deg"}
+    assert units["toe"] == "mm"
+    assert config.seen[0].noise == pytest.approx(1e-3, rel=0.3)
+    assert config.recorded and config.cut == 3.0
+    assert any("'stamp' in ms, 100 samples" in line for line in found.guessed)
+
+
+def test_pieces_start_in_motion_and_the_loop_follows(arm):
+    _, model, path = arm
+    trials = load_recordings.trials([str(path)], model)
+    assert len(trials) == 4
+    state = trials[1].conditions[start.STATE]
+    assert abs(state["FL_hip_joint"][1]) > 0.5  # [rad/s], it swings
+    ((*made,),) = model.simulate(trials, [()])
+    for trial, predicted in zip(trials, made, strict=True):
+        rest = (trial.observed - predicted)[:, :2]
+        assert np.nanstd(rest) < 3e-3  # 1e-3 is noise
+
+
+def test_a_command_that_is_late_is_late_in_every_piece(arm):
+    _, model, path = arm
+    trials = load_recordings.trials([str(path)], model)[1:2]
+    late = model.parse("command_delay:part=all,delay=0.05")
+    ((plain,), (after,)) = model.simulate(trials, [(), (late,)])
+    first = slice(0, 20)  # without the commands before, it would not differ smoothly
+    assert 1e-3 < np.abs(plain - after)[first, :2].max() < 0.1
+
+
+def test_goals_told_to_motors_need_a_loop(arm, tmp_path):
+    with pytest.raises(BnsError, match="--kp and --kd"):
+        describe(tmp_path / "arm.xml", tmp_path / "log.csv")
+
+
+def test_names_that_say_nothing_go_by_order(tmp_path):
+    (tmp_path / "arm.xml").write_text(ARM.replace("ACTUATORS", SERVOS))
+    recorded(tmp_path / "log.csv", seconds=4, names="u0,u1,a,b")
+    found = describe(tmp_path / "arm.xml", tmp_path / "log.csv")
+    assert sum("by order" in line for line in found.unsure) == 4
+    assert "cut" not in found.toml
+
+
+def test_the_command_line_writes_what_python_gives(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "arm.xml").write_text(ARM.replace("ACTUATORS", SERVOS))
+    recorded(tmp_path / "log.csv", seconds=4)
+    assert main(["gap", "describe", "arm.xml", "log.csv"]) == 0
+    found = describe("arm.xml", "log.csv")
+    assert (tmp_path / "arm.toml").read_text() == found.toml
+    said = capsys.readouterr().out
+    assert all(line in said for line in (*found.guessed, *found.unsure))
+    assert main(["gap", "describe", "arm.xml", "log.csv"]) == 2
+    assert "exists and is not overwritten" in capsys.readouterr().err
+
+
+def test_a_log_without_times_or_commands_is_said(tmp_path):
+    (tmp_path / "arm.xml").write_text(ARM.replace("ACTUATORS", SERVOS))
+    (tmp_path / "a.csv").write_text("time,hip,calf\n0,0,0.1\n0.1,1,0.2\n0.2,0,0.5\n")
+    with pytest.raises(BnsError, match="No column"):
+        describe(tmp_path / "arm.xml", tmp_path / "a.csv")
+    (tmp_path / "b.csv").write_text("hip,calf\n0,0.1\n-1,0.2\n0,0.0\n")
+    with pytest.raises(FormatError, match="no column of times"):
+        describe(tmp_path / "arm.xml", tmp_path / "b.csv")
+
+
+def test_a_parabola_gives_value_and_slope():
+    at = np.linspace(-1, 1, 7)
+    assert cuts.parabola(at, 2 + 3 * at - at**2) == pytest.approx((2, 3))
+
+
+def test_command_time_dates_a_command_between_samples(tmp_path):
+    (tmp_path / "arm.xml").write_text(ARM.replace("ACTUATORS", SERVOS))
+    times = np.arange(0, 2, 0.1)
+    told = np.where(times < 0.55, 0.0, 0.4)
+    sent = np.where(times < 0.55, 0.0, 0.53)
+    table = np.column_stack([times, told, told, sent, 0 * times, 0 * times])
+    head = "time,hip_goal,calf_goal,command_time,hip,calf"
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header=head, comments="")
+    described = describe(
+        tmp_path / "arm.xml", tmp_path / "a.csv", out=tmp_path / "arm.toml"
+    )
+    described.write(tmp_path / "arm.toml")
+    model = OwnModel.read(tmp_path / "arm.toml", threads=1)
+    (trial,) = model.read_log(str(tmp_path / "a.csv"))
+    assert trial.commands.durations[0] == pytest.approx(0.53)
+    assert np.isnan(trial.observed[trial.boundaries[1]]).all()
