@@ -16,6 +16,8 @@ from bns.gap.core.reference import Reference
 from bns.gap.core.select import Search
 from bns.gap.core.signatures import Curves
 from bns.gap.core.uncertainty import intervals
+from bns.gap.decomposition.diagnosis import diagnose as decomposed
+from bns.gap.decomposition.model import BLOCK, FEW, DecomposableModel
 from bns.gap.models.base import GapModel
 from bns.gap.models.light import model as light_model
 from bns.gap.recordings import check
@@ -58,8 +60,8 @@ def diagnose(
         seed: of what is drawn (null distributions, bootstraps).
         candidates: explanations to consider; None = all of the model's (or those
             that it suspects).
-        calibration: thresholds; None = those of the package.
-        most: largest number of effects at once.
+        calibration: thresholds, None = those of the package; the joint fit has none.
+        most: largest number of effects at once; the joint fit has no limit.
         full: with localisation and closed fractions; False = the verdict alone.
         reference: recordings of the same robot in which nothing was changed; they tell
             how far the nominal model is off anyway (`gap/core/reference.py`).
@@ -75,7 +77,14 @@ def diagnose(
         "most": most,
         "reference": reference,
     }
-    if light_model.told_by(model, (*trials, *reference)):
+    seen_by_light = light_model.told_by(model, (*trials, *reference))
+    if isinstance(model, DecomposableModel) and not (reference or seen_by_light):
+        usable, faults = _checked(trials, model)
+        names = None if candidates is None else [item.name for item in candidates]
+        return decomposed(
+            usable, model, seed=seed, faults=faults, full=full, rows=names
+        )
+    if seen_by_light:
         from bns.gap.models.light import diagnosis
 
         parts = diagnosis.analyse(trials, model, **given)
@@ -209,7 +218,9 @@ def _checked(
     trials: Sequence[Trial], model: GapModel
 ) -> tuple[tuple[Trial, ...], tuple[str, ...]]:
     trials, faults = check.check(trials, model)
-    if len(trials) < LEAST:
+    seconds = sum(trial.commands.duration for trial in trials)
+    enough = isinstance(model, DecomposableModel) and seconds >= FEW * BLOCK
+    if len(trials) < LEAST and not enough:
         raise BnsError(
             f"{len(trials)} usable trial: a diagnosis needs {LEAST} at least, to fit "
             "on some and test on others; record more."

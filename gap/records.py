@@ -219,6 +219,9 @@ class Diagnosis:
         seconds: wall time by stage.
         partial: stages that were left out, with the reason.
         provenance: which model and recordings, versions, and the like.
+        decomposition: of a joint fit: the parts of the gap with their shares, the three
+            statements on size, explanation and rest, and what sets in when; empty in
+            diagnoses that were made otherwise.
     """
 
     model: str
@@ -235,6 +238,7 @@ class Diagnosis:
     seconds: Mapping[str, float] = field(default_factory=dict)
     partial: Mapping[str, str] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    decomposition: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def change(self) -> Mapping[str, Any]:

@@ -57,7 +57,7 @@ class Diagnose(Check):
     seed: int = 0
     """of what is drawn (null distributions, bootstraps)"""
     most: int = 3
-    """largest number of effects at once"""
+    """largest number of effects at once, of servos, legs and light; else no limit"""
     threads: int = 2
     """threads of the physics"""
 
@@ -259,23 +259,43 @@ def shared(trials: list[Any]) -> dict[str, float]:
 
 def _say(found: Any) -> None:
     """The verdict in words, then the best fits."""
-    print(found.verdict.sentence)
+    for line in found.decomposition.get("statements") or (found.verdict.sentence,):
+        print(line)
     if found.verdict.change:
         print(found.verdict.change)
-    for line in _closed(found):
+    for line in _shares(found) if found.decomposition else _ranked(found):
         print(line)
-    nothing = [fit for fit in found.fits if not fit.names]
-    ranked = sorted(found.fits, key=lambda fit: fit.held_out)
-    for fit in [*[fit for fit in ranked if fit.names][:5], *nothing]:
-        print(
-            f"  held-out loss {fit.held_out:.5g}  {' + '.join(fit.names) or 'nothing'}"
-        )
     faults = list(found.faults)
     if len(faults) > LISTED:
         more = len(faults) - LISTED
         faults = [*faults[:LISTED], f"{more} more faults of the data (`bns gap check`)"]
     for line in (*found.warnings, *faults):
         print(f"note: {line}")
+
+
+def _shares(found: Any) -> Sequence[str]:
+    """What each explanation closes, one line each."""
+    parts = found.decomposition["parts"]
+    width = max((len(part["name"]) for part in parts), default=0)
+    return [
+        f"  {part['name']:<{width}}  {100 * part['alone']:5.1f} % of the gap alone, "
+        f"{100 * part['last']:5.1f} % added last"
+        for part in parts
+    ]
+
+
+def _ranked(found: Any) -> Sequence[str]:
+    """The share closed, then the fits with the least held-out loss."""
+    nothing = [fit for fit in found.fits if not fit.names]
+    ranked = sorted(found.fits, key=lambda fit: fit.held_out)
+    best = [*[fit for fit in ranked if fit.names][:5], *nothing]
+    return [
+        *_closed(found),
+        *(
+            f"  held-out loss {fit.held_out:.5g}  {' + '.join(fit.names) or 'nothing'}"
+            for fit in best
+        ),
+    ]
 
 
 def _closed(found: Any) -> Sequence[str]:

@@ -102,18 +102,24 @@ def candidates(config: OwnConfig, model: mujoco.MjModel) -> tuple[OwnCandidate, 
     )
     made = []
     for name, parts in wanted.items():
-        name = effects.current(name)
+        given, name = name, effects.current(name)
         if name not in effects.CLASSES:
             raise UnknownNameError("effect in [effects]", name, effects.CLASSES)
         for part in parts or (ALL,):
-            made += _candidates(name, part, config, model)
-    known = [item.name for item in made]
+            found = _candidates(name, part, config, model)
+            made += [_called(item, given) for item in found]
+    known = [effects.current(item.name) for item in made]
     for name in config.bounds:
         if name not in known:
             raise UnknownNameError("effect in [bounds]", name, known)
     if not made:
         raise BnsError("[effects] names no effect; leave it out to consider the usual.")
     return tuple(made)
+
+
+def _called(item: OwnCandidate, given: str) -> OwnCandidate:
+    """A candidate under the name that the user gave its effect."""
+    return replace(item, name=given + item.name.removeprefix(item.effect))
 
 
 def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]]:

@@ -127,6 +127,22 @@ def windows(trial: Trial, length: float) -> Windows:
     return Windows(first, last, (begin + end) / 2, end - begin)
 
 
+def overlapping(trial: Trial, length: float) -> Windows:
+    """Windows of a length [s] between seen samples, each begun half a length after
+    the one before."""
+    seen = np.flatnonzero(np.isfinite(trial.observed).all(axis=1))
+    seen = seen[seen >= trial.boundaries[0]]
+    if not len(seen):
+        return Windows(seen, seen, np.zeros(0), np.zeros(0))
+    times = trial.times[seen]
+    first = np.searchsorted(times, np.arange(times[0], times[-1] - length, length / 2))
+    last = np.searchsorted(times, times[first] + length - 1e-6)
+    inside = last < len(times)
+    first, last = seen[first[inside]], seen[last[inside]]
+    begin, end = trial.times[first], trial.times[last]
+    return Windows(first, last, (begin + end) / 2, end - begin)
+
+
 def thinned(poses: np.ndarray) -> np.ndarray:
     """Every `EVERY`-th pose; the last interval is made whole by going on straight."""
     missing = -(len(poses) - 1) % EVERY

@@ -9,10 +9,12 @@ import numpy as np
 
 from bns import models
 from bns.errors import BnsError
-from bns.gap.candidates import wheeled
+from bns.gap.candidates import wheeled, wheeled_rows
 from bns.gap.core import segments as pieces
 from bns.gap.core.segments import WHOLE, Piece, moved, pieces_of, stitched, windows
-from bns.gap.models import planar_rollout
+from bns.gap.decomposition.model import DecomposableModel
+from bns.gap.decomposition.row import Row
+from bns.gap.models import planar_rollout, wheeled_drives
 from bns.gap.models.base import Windows
 from bns.gap.models.planar_rollout import EVERY
 from bns.gap.models.surrogate import STEEPEST, Reduced, between, reduced
@@ -31,12 +33,14 @@ from bns.worlds.trial import (
 
 KEPT = 40_000  # simulated drives kept in memory, about 24 kB each
 WINDOW = 0.1  # [s] shortest piece of motion that is compared
+HORIZON = 0.4  # [s] over which motion is compared in the joint fit, half overlapping
+LEAST = (2e-4, 2e-4, 1e-3)  # [m, m, rad] smallest believed deviations over it; assumed
 ABSOLUTE = ("floor_slope",)  # effects that tell one heading in the world from another
 FAR = np.inf
 AT_ONCE = 600  # drives that are computed together
 
 
-class WheeledModel:
+class WheeledModel(DecomposableModel):
     """A differential-drive robot in MuJoCo, seen by an overhead tracker.
 
     Args:
@@ -69,6 +73,7 @@ class WheeledModel:
         self.process = np.array(process, dtype=float)
         self.resolution = np.array(resolution, dtype=float)
         self._pool = Pool(threads)
+        self._drives = wheeled_drives.Drives(robot, self._pool)
         self._cache: OrderedDict[tuple, np.ndarray] = OrderedDict()
         self._given: WeakKeyDictionary[Commands, ControlSignal] = WeakKeyDictionary()
 
@@ -80,6 +85,37 @@ class WheeledModel:
     def candidates(self) -> tuple[Candidate, ...]:
         """All candidates of a wheeled robot."""
         return wheeled.candidates()
+
+    @property
+    def least(self) -> np.ndarray:
+        """Smallest believed standard deviation of each feature [m, m, rad]."""
+        return np.array(LEAST)
+
+    def rows(self, trials: Sequence[Trial]) -> tuple[Row, ...]:
+        """All numbers of a wheeled robot that may be off."""
+        return wheeled_rows.rows(trials)
+
+    def paths(
+        self,
+        trials: Sequence[Trial],
+        sets: Sequence[Sequence[Mapping[str, float]]],
+        *,
+        fine: bool = True,
+    ) -> list[list[np.ndarray]]:
+        """Predicted poses, see `DecomposableModel.paths`."""
+        return self._drives.paths(trials, sets, fine=fine)
+
+    def joint_windows(self, trial: Trial) -> Windows:
+        """Windows of `HORIZON` between seen samples, half overlapping."""
+        return pieces.overlapping(trial, HORIZON)
+
+    def motion(self, features: np.ndarray) -> np.ndarray:
+        """Speed of each feature over a window."""
+        return np.abs(features) / HORIZON
+
+    def effect(self, term: str, values: Mapping[str, float]) -> Effect:
+        """The effect of an explanation."""
+        return wheeled_drives.effect(term, values)
 
     @staticmethod
     def steps(candidate: Candidate, trials: Sequence[Trial]) -> tuple[float, ...]:

@@ -199,7 +199,8 @@ def test_former_names_in_a_description_are_read(arm):
         bounds={"sensor_gain[elbow]": {"high": 1.5}},
     )
     (made,) = mjcf.candidates(config, arm.compiled(()).model)
-    assert (made.name, made.high) == ("reading_gain[elbow]", 1.5)
+    assert (made.name, made.high) == ("sensor_gain[elbow]", 1.5)  # as it was written
+    assert str(made.make(1.2)) == "reading_gain:part=elbow,factor=1.2"
 
 
 def test_the_description_in_the_documentation_is_one(tmp_path):

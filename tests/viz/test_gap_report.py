@@ -51,12 +51,15 @@ def test_the_report_answers_the_questions_in_one_file(home):
         "One effect: wheel_gain[left]",
         "Where is it?",
         "of it in left wheel",
-        "How far does it close?",
+        "How large is it?",
+        "What explains it?",
+        "What is left?",
+        "What the gap is made of",
         "What to do next",
         "bns gap diagnose",
     ):
         assert said in page, said
-    assert page.count("data:image/svg+xml;base64,") == 2 * 4  # wide and narrow
+    assert page.count("data:image/svg+xml;base64,") == 2 * 5  # wide and narrow
     assert not re.findall(r'(?:src|href)="(?!data:)', page)
 
 

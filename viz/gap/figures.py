@@ -14,6 +14,28 @@ ROUND = {"m": ("mm", 1e3), "rad": ("mrad", 1e3)}
 SIDE = 4  # features that fit side by side
 
 
+def shares(found: Diagnosis):
+    """What the gap is made of: the share that each explanation closes, alone and when
+    it is added last, and what is left."""
+    parts = found.decomposition["parts"][:LISTED]
+    names = [part["name"] for part in parts] + ["what is left"]
+    last = [100 * part["last"] for part in parts] + [100 * found.decomposition["left"]]
+    alone = [100 * part["alone"] for part in parts] + [0.0]
+    place = np.arange(len(names))
+    with style.plotting() as figure_class:
+        figure = figure_class(figsize=(7.0, 1.2 + 0.42 * len(names)), layout="tight")
+        axes = figure.subplots()
+        axes.barh(place - 0.18, alone, height=0.34, color=style.GREY, label="alone")
+        axes.barh(place + 0.18, last, height=0.34, color=CORRECTED, label="added last")
+        axes.set_yticks(place, names)
+        axes.set_ylim(len(names) - 0.4, -0.6)
+        axes.set_xlim(left=min(0.0, *last, *alone))
+        axes.grid(axis="y", visible=False)
+        axes.set_xlabel("share of the gap that goes [%]")
+        axes.legend(loc="best")
+    return figure
+
+
 def closing(found: Diagnosis):
     """How far the gap shrinks: nominal, each effect alone, the chosen set, floor."""
     closed = found.closed

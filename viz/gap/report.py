@@ -12,6 +12,11 @@ from bns.viz.page import picture, render
 from bns.worlds.trial import Trial
 
 CAPTIONS = {
+    "shares": (
+        "What the gap is made of",
+        "The share of the gap that each explanation closes: by itself, and when it is "
+        "added to the others. What is left is beyond what measuring scatters.",
+    ),
     "motion": (
         "The robot and its models",
         "The trial with the largest gap: what was recorded, and what the nominal and "
@@ -87,15 +92,11 @@ def _command(found: Diagnosis) -> str:
 def _figures(
     found: Diagnosis, trials: Sequence[Trial], model: GapModel | None
 ) -> list[dict]:
-    if model is None or not found.where:
-        return []
-    seen = view.view(found, trials, model)
-    made = {
-        "motion": figures.motion(seen),
-        "horizons": figures.horizons(found, seen),
-        "closing": figures.closing(found),
-        "over_time": figures.over_time(seen),
-    }
+    made = {}
+    if found.decomposition.get("parts"):
+        made["shares"] = figures.shares(found)
+    if model is not None and found.where:
+        made |= _drawn(found, trials, model)
     return [
         {
             "name": name,
@@ -105,3 +106,14 @@ def _figures(
         }
         for name, figure in made.items()
     ]
+
+
+def _drawn(found: Diagnosis, trials: Sequence[Trial], model: GapModel) -> dict:
+    """Figures that need the simulation."""
+    seen = view.view(found, trials, model)
+    return {
+        "motion": figures.motion(seen),
+        "horizons": figures.horizons(found, seen),
+        "closing": figures.closing(found),
+        "over_time": figures.over_time(seen),
+    }

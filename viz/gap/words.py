@@ -24,7 +24,13 @@ def title(found: Diagnosis) -> str:
 
 
 def answers(found: Diagnosis) -> list[tuple[str, str]]:
-    """The three questions, each with its answer in a sentence or two."""
+    """The three questions, each with its answer in a sentence or two; of a joint fit
+    the three statements come first."""
+    said = list(found.decomposition.get("statements", ()))
+    asked = ("How large is it?", "What explains it?", "What is left?")
+    first = list(zip(asked, said, strict=True)) if len(said) == len(asked) else []
+    if first:
+        return [*first, ("Where is it?", where(found))]
     return [
         ("Where is it?", where(found)),
         ("Which effect?", which(found)),
@@ -71,7 +77,7 @@ def which(found: Diagnosis) -> str:
     """The verdict and what comes next after it."""
     verdict = found.verdict
     if verdict.kind == "no gap":
-        return f"None: there is no gap (p = {verdict.p_gap:.2g})."
+        return "None: there is no gap."
     if verdict.kind == "none of the library":
         best = " + ".join(found.signatures.get("best", ())) or "nothing"
         return f"None of the library. The best attempt is {best}."

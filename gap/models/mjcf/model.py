@@ -1,5 +1,6 @@
 """Any MJCF model, with a TOML file that maps its channels, as a nominal model."""
 
+import math
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -8,8 +9,10 @@ import mujoco
 import numpy as np
 
 from bns.errors import FormatError, UnknownNameError
-from bns.gap.candidates import mjcf
+from bns.gap.candidates import mjcf, mjcf_rows
 from bns.gap.core import segments
+from bns.gap.decomposition.model import DecomposableModel
+from bns.gap.decomposition.row import Row
 from bns.gap.models.base import Windows
 from bns.gap.models.mjcf import effects as own_effects
 from bns.gap.models.mjcf import log, prepared, start, view
@@ -18,18 +21,21 @@ from bns.gap.records import Candidate
 from bns.models import mjcf as mjcf_file
 from bns.storage import files
 from bns.worlds.effects.base import ControlSignal, Effect
-from bns.worlds.physics import control
 from bns.worlds.physics.rollout import STATE, Compiled, Job, Pool, Segment
 from bns.worlds.trial import Trial
 
 LEAD = 1.0  # [s] of rest before a trial, so that what is late has something before it
 KEPT, MODELS = 20_000, 2000  # simulated trials and compiled models kept in memory
 FINE = 0.005  # [s] between kept states; the step if that is longer
-RESOLUTION = 1e-9
+FINEST = 0.0025  # [s] steps beyond which a simulation lags visibly; assumed
+LEAST = 0.3  # of the noise that is told: the smallest that is believed
 
 
-class OwnModel:
+class OwnModel(DecomposableModel):
     """A model of the user's own; see `gap/models/base.py` for the attributes.
+
+    Several numbers of such a robot are off at once, so fits are also started from all
+    of them; residuals of joints are random walks, so an autoregression is tried.
 
     Args:
         config: the description.
@@ -39,6 +45,9 @@ class OwnModel:
         FormatError: the MJCF file is missing or MuJoCo refuses it.
         BnsError: a part that the model lacks.
     """
+
+    memory = 2
+    many = True
 
     def __init__(self, config: OwnConfig, *, threads: int = 2):
         self.config, self.name = config, config.name
@@ -59,6 +68,10 @@ class OwnModel:
             _index(model, "key", config.keyframe)  # there, before anything runs
         self.view = view.View.of(config, model)
         self._candidates = mjcf.candidates(config, model)
+        self._terms = {
+            item.name: item
+            for item in (*self._candidates, *mjcf_rows.grouped(self._candidates))
+        }
 
     @classmethod
     def read(cls, path: str | Path, *, threads: int = 2) -> "OwnModel":
@@ -93,32 +106,102 @@ class OwnModel:
                 effect.edit(made)
         return made
 
-    def compiled(self, effects: Sequence[Effect]) -> Compiled:
-        """The compiled model with the effects on its parts."""
+    def compiled(self, effects: Sequence[Effect], parts: int = 1) -> Compiled:
+        """The compiled model with the effects on its parts.
+
+        Args:
+            effects: of any stage.
+            parts: into how many its step is cut.
+        """
         body = tuple(str(e) for e in effects if e.stage == "body" and not e.is_nominal)
-        if body not in self._compiled:
-            self._compiled[body] = Compiled(self.spec(effects).compile())
+        key = (parts, *body)
+        if key not in self._compiled:
+            made = self.spec(effects).compile()
+            made.opt.timestep /= parts
+            self._compiled[key] = Compiled(made)
             while len(self._compiled) > MODELS:
                 self._compiled.popitem(last=False)
-        return self._compiled[body]
+        return self._compiled[key]
+
+    def _parts(self) -> int:
+        """Into how many parts the step is cut where a simulation has to be fine."""
+        model = self.compiled(()).model
+        if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+            return 1
+        return math.ceil(model.opt.timestep / FINEST - 1e-9)
+
+    @property
+    def least(self) -> np.ndarray:
+        """Smallest believed standard deviation of each feature."""
+        return LEAST * self.resolution
+
+    def rows(self, trials: Sequence[Trial]) -> tuple[Row, ...]:
+        """All numbers that may be off, those of all joints alike included."""
+        return mjcf_rows.rows(tuple(self._terms.values()), trials, self.dt)
+
+    def effect(self, term: str, values: Mapping[str, float]) -> Effect | None:
+        """The effect of an explanation; None for the shift in time."""
+        if term == mjcf_rows.LEAD:
+            return None
+        return self._terms[term].make(values[term])
+
+    def paths(
+        self,
+        trials: Sequence[Trial],
+        sets: Sequence[Sequence[Mapping[str, float]]],
+        *,
+        fine: bool = True,
+    ) -> list[list[np.ndarray]]:
+        """Predicted samples, see `DecomposableModel.paths`; the coarse step is that of
+        the model."""
+        pairs, leads = [], []
+        for row in sets:
+            for trial, values in zip(trials, row, strict=True):
+                made = [self.effect(name, values) for name in values]
+                pairs.append((trial, tuple(e for e in made if e is not None)))
+                leads.append(values.get(mjcf_rows.LEAD, 0.0))
+        seen = self._predicted(pairs, self._parts() if fine else 1)
+        moved = [
+            _led(trial, path, lead)
+            for (trial, _), path, lead in zip(pairs, seen, leads, strict=True)
+        ]
+        count = len(trials)
+        return [moved[at * count : (at + 1) * count] for at in range(len(sets))]
+
+    def joint_windows(self, trial: Trial) -> Windows:
+        """Windows between samples that were seen."""
+        return self.windows(trial)
+
+    def motion(self, features: np.ndarray) -> np.ndarray:
+        """Change of each feature from window to window."""
+        return np.abs(np.gradient(np.nan_to_num(features), axis=0))
 
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
         """Predicted samples, see `GapModel.simulate`."""
-        keys = [[_key(trial, items) for trial in trials] for items in effects]
-        wanted = {}
-        for items, row in zip(effects, keys, strict=True):
-            for trial, key in zip(trials, row, strict=True):
-                if key not in self._cache:
-                    wanted.setdefault(key, (trial, items))
-        jobs = [self._job(trial, items) for trial, items in wanted.values()]
+        pairs = [(trial, items) for items in effects for trial in trials]
+        made = self._predicted(pairs, self._parts())
+        count = len(trials)
+        return [made[at * count : (at + 1) * count] for at in range(len(effects))]
+
+    def _predicted(
+        self, pairs: Sequence[tuple[Trial, Sequence[Effect]]], parts: int = 1
+    ) -> list[np.ndarray]:
+        """Predicted samples of trials, each under effects of its own."""
+        keys = [(parts, *_key(trial, items)) for trial, items in pairs]
+        wanted = {
+            key: pair
+            for key, pair in zip(keys, pairs, strict=True)
+            if key not in self._cache
+        }
+        jobs = [self._job(trial, items, parts) for trial, items in wanted.values()]
         motions = self._pool.map(jobs) if jobs else []
         fresh = {}
         for (key, (trial, items)), motion in zip(wanted.items(), motions, strict=True):
-            states = motion.states[self._lead() :]
-            fresh[key] = self._samples(trial, items, states)
-        made = [[fresh.get(key, self._cache.get(key)) for key in row] for row in keys]
+            states = motion.states[self._lead(self.dt / parts) :]
+            fresh[key] = self._samples(trial, items, states, self.dt / parts)
+        made = [fresh[key] if key in fresh else self._cache[key] for key in keys]
         self._cache.update(fresh)
         while len(self._cache) > KEPT:
             self._cache.popitem(last=False)
@@ -129,12 +212,12 @@ class OwnModel:
         """Physics step [s]."""
         return float(self.compiled(()).model.opt.timestep)
 
-    def _lead(self) -> int:
-        return round(self.config.settle / self.dt)
+    def _lead(self, dt: float) -> int:
+        return round(self.config.settle / dt)
 
-    def _job(self, trial: Trial, effects: Sequence[Effect]) -> Job:
-        scene = self.compiled(effects)
-        told = self._told(trial, effects)
+    def _job(self, trial: Trial, effects: Sequence[Effect], parts: int) -> Job:
+        scene = self.compiled(effects, parts)
+        told = self._told(trial, effects, self.dt / parts)
         begin = self._start(trial, scene.model)
         ctrl = np.tile(self._rest(scene.model), (len(told), 1))
         ctrl[:, self.actuators] = told
@@ -146,11 +229,11 @@ class OwnModel:
             return np.array(model.key_ctrl[key])
         return np.zeros(model.nu)
 
-    def _told(self, trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
+    def _told(self, trial: Trial, effects: Sequence[Effect], dt: float) -> np.ndarray:
         """Commands at each physics step after the effects, settling included."""
-        dt = self.dt
-        counts = control.steps(trial.commands.durations, dt)
-        lead, extra = self._lead(), round(LEAD / dt)
+        ends = np.rint(np.cumsum(trial.commands.durations) / dt).astype(int)
+        counts = np.diff(ends, prepend=0)  # steps add up to the whole trial
+        lead, extra = self._lead(dt), round(LEAD / dt)
         rest = self._rest(self.compiled(()).model)[self.actuators]
         values = np.repeat(trial.commands.values, counts, axis=0)
         before = start.before(trial, rest, lead + extra, self.config, dt)
@@ -184,11 +267,15 @@ class OwnModel:
         return state
 
     def _samples(
-        self, trial: Trial, effects: Sequence[Effect], states: np.ndarray
+        self,
+        trial: Trial,
+        effects: Sequence[Effect],
+        states: np.ndarray,
+        dt: float,
     ) -> np.ndarray:
-        every = max(1, int(FINE / self.dt + 1e-9))
+        every = max(1, int(FINE / dt + 1e-9))
         grid = np.arange(0, len(states), every)
-        times = grid * self.dt
+        times = grid * dt
         scene = self.compiled(effects)
         read = self.view.read(scene.model, states[grid])
         names = tuple(channel.name for channel in self.channels)
@@ -243,6 +330,14 @@ class OwnModel:
         spec.compile()
         files.write_text(path, spec.to_xml())
         return [str(effect) for effect in made if effect.stage != "body"]
+
+
+def _led(trial: Trial, path: np.ndarray, lead: float) -> np.ndarray:
+    """A path so many seconds ahead of itself."""
+    if lead == 0.0:
+        return path
+    at = trial.times - trial.times[trial.boundaries[0]]
+    return np.stack([np.interp(at + lead, at, column) for column in path.T], axis=1)
 
 
 def _key(trial: Trial, effects: Sequence[Effect]) -> tuple:

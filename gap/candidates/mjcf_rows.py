@@ -1,0 +1,132 @@
+"""Numbers of a model of the user's own that may be off, and how far they may be."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bns.gap.candidates.mjcf import EXCITE, OwnCandidate
+from bns.gap.decomposition.row import Row
+from bns.worlds.effects.parts import ALL
+from bns.worlds.trial import Trial
+
+LEAD = "step_lead"
+"""shift of the simulation in time that no effect is"""
+GROUPED = ("joint_damping", "joint_friction", "joint_armature")
+"""effects that may be on all joints alike"""
+LATE = ("command_delay", "command_lag", "reading_delay")
+TOLD = (0.05, 0.12, 0.2, 0.3, 0.4, 0.55)  # quantiles of what was told, for dead zones
+EIGHTH = 0.125  # of the largest value: the plausible one
+MASS = 0.1  # of a body's mass
+OFFSET = 0.0625  # of the span of an offset
+
+# plausible departure and slack of what has no scale of its own (assumed): a gain of a
+# motor is known to 10 %, of a sensor to 3 %, a delay to 40 ms
+PLAUSIBLE = {
+    "actuator_gain": (0.1, 0.003),
+    "actuator_kp": (0.05, 0.003),
+    "actuator_kd": (0.15, 0.01),
+    "command_gain": (0.1, 0.003),
+    "reading_gain": (0.03, 0.001),
+    "geom_friction": (0.3, 0.0),
+    "command_delay": (0.04, 0.0),
+    "command_lag": (0.04, 0.0),
+    "reading_delay": (0.04, 0.0),
+    "body_length": (0.03, 0.001),
+    "encoder_offset": (0.01, 0.0),
+}
+SHARE = 0.02  # slack of a number over its plausible departure
+
+
+def rows(
+    candidates: Sequence[OwnCandidate], trials: Sequence[Trial], dt: float
+) -> tuple[Row, ...]:
+    """All numbers that may be off, with those of all joints alike.
+
+    Args:
+        candidates: of the model.
+        trials: a recording; levels of dead zones lie between what it was told.
+        dt: physics step [s].
+    """
+    made = [row for item in candidates for row in _of(item, trials)]
+    lead = max(0.002, 0.5 * dt)
+    made.append(Row(LEAD, 0.0, lead, -0.02, 0.02, unit="s", nuisance=True, step=0.001))
+    return tuple(made)
+
+
+def grouped(candidates: Sequence[OwnCandidate]) -> list[OwnCandidate]:
+    """Further candidates: an effect alike on all joints that are considered singly."""
+    made = []
+    for name in GROUPED:
+        parts = [item for item in candidates if item.effect == name]
+        if len(parts) > 1 and all(item.fixed["part"] != ALL for item in parts):
+            low = max(item.low for item in parts)
+            high = max(item.high for item in parts)
+            grid = tuple(value for value in parts[0].grid if low <= value <= high)
+            made.append(
+                replace(
+                    parts[0],
+                    name=f"{name}[{ALL}]",
+                    low=low,
+                    high=high,
+                    grid=grid or (high,),
+                    fixed={"part": ALL},
+                    slack=0.0,
+                )
+            )
+    return made
+
+
+def _of(item: OwnCandidate, trials: Sequence[Trial]) -> Iterable[Row]:
+    excite = EXCITE.get(item.effect, "any command")
+    edges = {"low": item.low, "high": item.high, "unit": item.unit, "excite": excite}
+    third = (item.high - item.low) / 3
+    if item.effect == "command_dead_zone":
+        if levels := _levels(item, trials):
+            yield Row(item.name, 0.0, third, smooth=False, stepped=True,
+                      levels=levels, **edges)  # fmt: skip
+        return
+    if item.effect == "command_limit":
+        levels = tuple(v for v in item.grid if item.low < v < item.high)
+        yield Row(item.name, item.nominal, third, smooth=False, levels=levels, **edges)
+        return
+    sd, slack = _plausible(item)
+    late = item.effect in LATE
+    yield Row(
+        item.name,
+        item.nominal,
+        sd,
+        slack=item.slack or slack,
+        levels=(0.15, 0.3) if late else (),
+        step=0.01 if late else 0.0,
+        **edges,
+    )
+
+
+def _plausible(item: OwnCandidate) -> tuple[float, float]:
+    """Plausible departure of a number, and how well it is known."""
+    sd, slack = PLAUSIBLE.get(item.effect, (0.0, 0.0))
+    if item.effect.startswith("joint_"):
+        sd, slack = EIGHTH * item.high, SHARE * EIGHTH * item.high
+    elif item.effect == "body_mass":  # the largest value is twice the mass
+        sd, slack = MASS * item.high / 2, SHARE * MASS * item.high
+    elif item.effect.endswith("_offset") and not sd:
+        sd = OFFSET * (item.high - item.low)
+    if item.fixed["part"] == ALL and item.effect in GROUPED:
+        slack = 0.0
+    return sd or EIGHTH * (item.high - item.low), slack
+
+
+def _levels(item: OwnCandidate, trials: Sequence[Trial]) -> tuple[float, ...]:
+    """Sizes of a dead zone between the magnitudes that were told."""
+    names = [channel.name for channel in trials[0].commands.channels]
+    part = item.fixed["part"]
+    chosen = slice(None) if part == ALL else [names.index(part)]
+    told = np.concatenate([trial.commands.values[:, chosen] for trial in trials])
+    sizes = np.unique(np.abs(told).round(9))
+    sizes = sizes[sizes > 0]
+    if not len(sizes):
+        return ()
+    between = (sizes[:-1] + sizes[1:]) / 2 if len(sizes) > 1 else sizes
+    found = np.minimum(np.quantile(between, TOLD), item.high)
+    return tuple(np.unique(found).tolist())

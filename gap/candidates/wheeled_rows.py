@@ -1,0 +1,164 @@
+"""Numbers of a wheeled robot that may be off, and how far they plausibly are."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from bns.gap.candidates.wheeled import EXCITE, SIDES
+from bns.gap.decomposition.row import Row
+from bns.worlds.effects import registry
+from bns.worlds.effects.common import TOP_SPEED
+from bns.worlds.trial import Trial
+
+LEAD = "step_lead"
+"""shift of the simulation in time that no effect is: its own steps lead or lag"""
+BANDS = 10  # widths of a dead band that are tried
+WAYS = ("forward", "backward", "commanded")
+
+# name, plausible departure (standard deviation), low, high, per wheel?, settings. The
+# departures are what published figures and repairs of such robots show; slack is how
+# well a nominal model is known: 0.3 to 0.4 % of a length, 1 ms, 10 g, 0.5 mm of a
+# centre of mass, 0.2 mm and 1 mrad of a marker (all assumed).
+_SMOOTH = (
+    ("wheel_gain", 0.06, 0, 2, True, {"slack": 0.003, "levels": (0.0, 0.5, 0.85)}),
+    ("wheel_diameter", 0.04, 0.7, 1.3, True, {"levels": (0.93, 0.96, 1.04, 1.07)}),
+    ("axle_length", 0.04, 0.7, 1.3, False, {"slack": 0.004}),
+    ("motor_lag", 0.06, 0, 2, True, {"levels": (0.1, 0.25, 0.6), "step": 0.01}),
+    ("command_latency", 0.05, 0, 1, False, {"levels": (0.1, 0.2, 0.4), "step": 0.01}),
+    ("tracker_latency", 0.05, 0, 1, False, {"step": 0.005}),
+    ("rolling_drag.torque", 0.004, 0, 0.03, True,
+     {"step": 5e-4, "levels": (0.004, 0.01)}),
+    ("rolling_drag.viscous", 2e-4, 0, 0.01, True, {"step": 2e-5}),
+    ("centre_of_mass.dx", 0.008, -0.02, 0.03, False, {"slack": 7e-4}),
+    ("centre_of_mass.dy", 0.008, -0.03, 0.03, False, {"slack": 5e-4}),
+    ("payload", 0.4, 0, 2, False, {"slack": 0.01, "levels": (0.3, 0.8)}),
+    ("tracker_scale", 0.02, 0.8, 1.25, False, {}),
+    ("clock_drift", 0.02, -0.1, 0.1, False, {}),
+    ("marker_mount.dx", 0.008, -0.06, 0.06, False, {"slack": 2e-4}),
+    ("marker_mount.dy", 0.008, -0.06, 0.06, False, {"slack": 2e-4}),
+    ("marker_mount.yaw", 0.04, -0.5, 0.5, False, {"slack": 1e-3}),
+    ("battery_sag.per_second", 0.015, 0, 0.2, False, {}),
+    ("battery_sag.per_metre", 0.08, 0, 2, False, {}),
+    ("battery_fade", 0.01, 0, 0.2, False, {"per_trial": True}),
+    ("dead_zone", 0.015, 0, 0.1, True, {}),
+    ("caster_drag", 0.2, 0, 1, False, {"step": 0.05}),
+    ("wheel_backlash", 0.004, 0, 0.03, True, {"step": 1e-3, "levels": (0.005,)}),
+)  # fmt: skip
+_PLANES = (("floor_slope", 0.03, 0.3, False), ("wheel_eccentricity", 1e-3, 4e-3, True))
+"""explanations with a size and a direction: two rows each, along x and y"""
+
+
+def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
+    """All numbers of a wheeled robot that may be off, in a fixed order.
+
+    Args:
+        trials: a recording; levels of dead bands and limits lie between its speeds.
+    """
+    made = [row for entry in _SMOOTH for row in _smooth(*entry)]
+    made.append(Row(LEAD, 0.0, 0.003, -0.02, 0.02, unit="s", nuisance=True, step=0.001))
+    for name, sd, high, sided in _PLANES:
+        for side in SIDES[:2] if sided else ("",):
+            term = f"{name}[{side}]" if side else name
+            made += [
+                Row(
+                    f"{term}.{axis}",
+                    0.0,
+                    sd,
+                    -high,
+                    high,
+                    group=term,
+                    unit=_unit(name),
+                    excite=EXCITE.get(name, "any drive"),
+                )
+                for axis in "xy"
+            ]
+    for side in SIDES:
+        made += _rough(side, trials)
+    made.append(
+        Row("floor_friction", 1.0, 0.3, 0.01, 3.0, smooth=False,
+            levels=(0.02, 0.05, 0.1, 0.25), excite=EXCITE["floor_friction"])
+    )  # fmt: skip
+    return tuple(made)
+
+
+def _smooth(
+    name: str, sd: float, low: float, high: float, sided: bool, more: dict
+) -> Iterable[Row]:
+    stem = name.partition(".")[0]
+    about = parameter(name)
+    for side in SIDES if sided else ("",):
+        given = dict(more)
+        if name == "motor_lag" and side == "both":
+            given["slack"] = 1e-3
+        yield Row(
+            f"{name}[{side}]" if side else name,
+            float(about.nominal),
+            sd,
+            low,
+            high,
+            unit=about.unit,
+            excite=EXCITE.get(stem, "any drive"),
+            **given,
+        )
+
+
+def parameter(name: str):
+    """The parameter that a row's name, without its wheel, stands for."""
+    stem, _, wanted = name.partition(".")
+    every = registry.get(stem).parameters
+    return next(p for p in every if not wanted or p.name == wanted)
+
+
+def _unit(effect: str) -> str:
+    return registry.get(effect).parameters[0].unit
+
+
+def _rough(side: str, trials: Sequence[Trial]) -> list[Row]:
+    """What has no slope at the nominal, of one wheel or both."""
+    columns = {"left": [0], "right": [1]}.get(side, [0, 1])
+    told = np.concatenate([trial.commands.values[:, columns] for trial in trials])
+    speeds = np.unique(np.abs(told).round(6))
+    speeds = speeds[speeds > 0]
+    made = [
+        Row(f"torque_limit[{side}]", 1.0, 0.05, 0.0, 1.0, smooth=False,
+            levels=(0.05, 0.09, 0.13, 0.2), excite=EXCITE["torque_limit"]),
+        Row(f"wheel_intermittent[{side}]", 0.0, 1.0, 0.0, 12.0, smooth=False,
+            stepped=True, levels=(2.0, 3.0, 4.0, 5.0, 6.0, 8.0), excite="any drive"),
+    ]  # fmt: skip
+    if bands := _bands(speeds):
+        made.append(
+            Row(f"dead_band[{side}]", 0.0, 0.05, 0.0, 0.2, unit="m/s", smooth=False,
+                stepped=True, levels=bands, excite=EXCITE["dead_band"])
+        )  # fmt: skip
+    if limits := _limits(speeds):
+        made.append(
+            Row(f"speed_saturation[{side}]", TOP_SPEED, 0.05, 0.0, TOP_SPEED,
+                unit="m/s", smooth=False, levels=limits,
+                excite=EXCITE["speed_saturation"])
+        )  # fmt: skip
+    for kind in ("wheel_stuck_max", "wheel_stuck_min"):
+        made += [
+            Row(f"{kind}[{side}]@{way}", 0.0, 1.0, 0.0, 1.0, smooth=False,
+                levels=(0.3, 1.0), group=f"{kind}[{side}]", excite="any drive")
+            for way in WAYS
+        ]  # fmt: skip
+    return made
+
+
+def _bands(speeds: np.ndarray) -> tuple[float, ...]:
+    """Widths between the speeds told: between two of them a width does not matter."""
+    between = (speeds + np.append(speeds[1:], speeds[-1:] * 1.2)) / 2
+    between = between[between < 0.2]
+    if len(between) > BANDS:
+        at = np.unique(np.linspace(0, len(between) - 1, BANDS).astype(int))
+        between = between[at]
+    return tuple(between.tolist())
+
+
+def _limits(speeds: np.ndarray) -> tuple[float, ...]:
+    """Limits that cut a part of the speeds told."""
+    if not len(speeds):
+        return ()
+    share = np.array([0.15, 0.3, 0.45, 0.6, 0.75, 0.9])
+    found = np.quantile(speeds, share) if len(speeds) > 5 else speeds
+    return tuple(np.unique(found * 0.98).tolist())

@@ -1,0 +1,1 @@
+"""The gap of a recording taken apart: all candidates in one fit under priors."""

@@ -1,0 +1,156 @@
+"""From a start to a set of explanations that stays when the problem is made linear
+around it; and which of several is the best."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from bns.gap.decomposition import fit, levels
+from bns.gap.decomposition.fit import Noise, Point, linearised, newton, placed
+from bns.gap.decomposition.linear import Linear
+from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.shares import HeldOut
+
+TURNS = 4  # of fitting and searching
+SINGLES = 4  # explanations that are tried alone
+ROUNDS = 2  # of levels
+MARGIN = 1.02  # of the held-out error that an autoregression may cost
+WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
+
+
+def nothing(problem: Problem) -> Point:
+    """The nominal model."""
+    values = problem.nominal.copy()
+    rest, made = problem.residual(values)
+    first = fit.first_noise(problem, rest, made)
+    linear, known, slopes = linearised(problem, values, rest, first)
+    plain = Point(values, frozenset(), rest, linear, slopes, known)
+    if not problem.model.memory:
+        return plain
+    linear, known, slopes = linearised(
+        problem, values, rest, first, slopes, problem.model.memory
+    )
+    remembering = Point(values, frozenset(), rest, linear, slopes, known)
+    worse = _held_out(problem, remembering) > MARGIN * _held_out(problem, plain)
+    return plain if worse else remembering
+
+
+def _held_out(problem: Problem, point: Point) -> float:
+    """Plain held-out error of the set of highest evidence: whether an autoregression
+    helps is for this to say. It does where errors are random walks, not where they are
+    the model's."""
+    _, support = point.linear.search()
+    return float(HeldOut.of(problem, point).error(support).sum())
+
+
+def descend(
+    problem: Problem, values: np.ndarray, support: Iterable[str], known: Noise
+) -> Point:
+    """Fit a set, make the problem linear there, search again, until the set stays."""
+    support, slopes, at = frozenset(support), None, None
+    for _ in range(TURNS):
+        values, rest = newton(problem, values, _fitted(problem, support), known)
+        values, rest = levels.zoomed(problem, values, rest, support, known)
+        near = at is not None and np.abs((values - at) / problem.sd).max() <= fit.FAR
+        slopes, at = (slopes, at) if near else (None, values.copy())
+        linear, known, slopes = linearised(problem, values, rest, known, slopes)
+        found = linear.search(start=support)[1]
+        point = Point(values, found, rest, linear, slopes, known)
+        if found == support:
+            return point
+        support = found
+        values = placed(problem, linear, support, values)
+    values, rest = newton(problem, values, _fitted(problem, support), known, turns=2)
+    return Point(values, support, rest, linear, slopes, known)
+
+
+def _fitted(problem: Problem, support: Iterable[str]) -> set[str]:
+    return set(support) | fit.nuisances(problem)
+
+
+def better(problem: Problem, points: Sequence[Point]) -> Point:
+    """The point of highest evidence."""
+    return points[int(np.argmin(costs(problem, points)))]
+
+
+def costs(problem: Problem, points: Sequence[Point]) -> list[float]:
+    """Costs of points, all under the noise of the one that leaves least."""
+    least = min(points, key=lambda p: float(np.log(p.noise.sd).mean()))
+    lam = min(point.noise.lam for point in points)
+    known = Noise(least.noise.sd, least.noise.memory, lam)
+    return [relinearised(problem, p, known).cost(p.support) for p in points]
+
+
+def relinearised(problem: Problem, point: Point, known: Noise) -> Linear:
+    """A point's linear model under another noise."""
+    whole = fit.target(problem, point.values, point.rest, point.slopes)
+    linear = Linear.of(
+        problem,
+        {k: known.memory(slope) for k, slope in point.slopes.items()},
+        fit.units(problem, point.values),
+        known.memory(whole),
+        known.weights(point.rest, problem.seen),
+    )
+    return linear.correlated(known.lam)
+
+
+def decompose(problem: Problem, start: Point | None = None) -> Point:
+    """The explanations of a recording.
+
+    Started from a tangent at the nominal model, from the best single explanation (a
+    strong one looks like several through a tangent), from all at once where several
+    are strong, and from levels of what has no slope at the nominal.
+
+    Args:
+        problem: the recording.
+        start: the nominal model, None = made here.
+    """
+    start = start or nothing(problem)
+    found = start.linear.search()[1]
+    best = start
+    if found:
+        values = placed(problem, start.linear, found, start.values)
+        best = descend(problem, values, found, start.noise)
+        if len(best.support) > 1:
+            best = better(problem, [best, *_others(problem, start, best)])
+    for _ in range(ROUNDS):
+        tried = levels.best(problem, best)
+        if tried is None or tried.cost > best.cost - WORTH:
+            break
+        other = descend(problem, tried.values, tried.support, best.noise)
+        chosen = better(problem, [best, other])
+        if chosen is best:
+            break
+        best = chosen
+    return best
+
+
+def _others(problem: Problem, start: Point, first: Point) -> list[Point]:
+    """Points from the best single explanation and from all at once."""
+    linear = start.linear
+    order = sorted(linear.free, key=lambda name: linear.cost({name}))[:SINGLES]
+    few = problem.sample(fit.ROUGH)
+    few = None if len(few) == len(problem.trials) else few
+    tried = []
+    for name in order:
+        values = placed(problem, linear, {name}, start.values)
+        fitted = _fitted(problem, {name})
+        values, rest = newton(problem, values, fitted, start.noise, turns=4, only=few)
+        tried.append((first.noise.loss(rest), name, values))
+    _, name, values = min(tried, key=lambda item: item[0])
+    made = [descend(problem, values, {name}, first.noise)]
+    if problem.model.many:
+        made.append(_from_all(problem, start))
+    return made
+
+
+def _from_all(problem: Problem, start: Point) -> Point:
+    """From everything at once, fitted until it stays."""
+    linear, known, values = start.linear, start.noise, start.values
+    everything = set(linear.free) | fit.nuisances(problem)
+    for _ in range(3):
+        values, rest = newton(problem, values, everything, known)
+        linear, known, _ = linearised(problem, values, rest, known)
+    found = linear.search()[1]
+    values = placed(problem, linear, found, values)
+    return descend(problem, values, found, known)

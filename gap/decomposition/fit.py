@@ -1,0 +1,318 @@
+"""The nonlinear fit: damped Gauss-Newton, linear models around it, and its starts."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bns.gap.decomposition import noise
+from bns.gap.decomposition.linear import Linear, Support, inflation
+from bns.gap.decomposition.noise import Memory
+from bns.gap.decomposition.problem import Problem
+
+DAMPING = (0.0, 2.0, 20.0, 200.0)  # added to the curvature, in units of the prior
+LONGEST = 4.0  # prior standard deviations of one step
+STILL = 0.02  # prior standard deviations below which a fit has converged
+FAR = 0.3  # prior standard deviations beyond which slopes are taken anew
+INEXACT = 0.01  # of what effects change: how well they are simulated (assumed); another
+# integrator or way to model an effect is no second effect
+MEASURED = 4  # times that noise is measured from what it leaves
+TURNS = 4  # of fitting and searching
+SINGLES = 4  # explanations that are tried alone
+ROUGH = 20.0  # [s] of recording for comparing these
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """What the residuals scatter: `sd` ``(N, C)``, their memory, and how many count as
+    one (`lam`)."""
+
+    sd: np.ndarray
+    memory: Memory
+    lam: float
+
+    @property
+    def order(self) -> int:
+        """Order of the autoregression."""
+        return self.memory.factors.shape[1]
+
+    def loss(self, rest: np.ndarray) -> float:
+        """Pseudo-Huber loss of residuals."""
+        return noise.loss(self.memory(np.nan_to_num(rest)), self.sd)
+
+    def weights(self, rest: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        """Weights of the squares, ``(N, C)``."""
+        return noise.weights(self.memory(np.nan_to_num(rest)), self.sd, seen)
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A fitted set of explanations.
+
+    Attributes:
+        values: of all rows, ``(R,)``.
+        support: explanations that are in.
+        rest: recorded minus predicted features, ``(N, C)``.
+        linear: the problem made linear there.
+        slopes: derivatives by row, ``(N, C)`` each.
+        noise: what it leaves.
+    """
+
+    values: np.ndarray
+    support: Support
+    rest: np.ndarray
+    linear: Linear
+    slopes: Mapping[int, np.ndarray]
+    noise: Noise
+
+    @property
+    def cost(self) -> float:
+        """Minus the log evidence of its support."""
+        return self.linear.cost(self.support)
+
+
+def smooth(problem: Problem, values: np.ndarray) -> list[int]:
+    """Rows that have a column: those with a slope, and those set to a level."""
+    return [
+        number
+        for number, row in enumerate(problem.rows)
+        if row.smooth or values[number] != row.nominal
+    ]
+
+
+def columns(problem: Problem, values: np.ndarray) -> dict[int, np.ndarray]:
+    """Columns of the linear model; that of a row set to a level is the whole change
+    from nominal, over its size."""
+    wanted = smooth(problem, values)
+    made = problem.slopes(values, [k for k in wanted if problem.rows[k].smooth])
+    for number in wanted:
+        if not problem.rows[number].smooth:
+            made[number] = secant(problem, values, number)
+    return made
+
+
+def secant(problem: Problem, values: np.ndarray, number: int) -> np.ndarray:
+    """Change of the features from nominal to a row's value, over that of the row."""
+    without = values.copy()
+    without[number] = problem.nominal[number]
+    here, there = problem.predict([values, without], fine=False)
+    return np.nan_to_num((here - there) / (values[number] - without[number]))
+
+
+def units(problem: Problem, values: np.ndarray) -> dict[int, float]:
+    """Standard deviation of each row's prior. That of a row set to a level is the size
+    of its departure: what it may be is told by its levels."""
+    return {
+        number: row.sd if row.smooth else abs(values[number] - row.nominal) or row.sd
+        for number, row in enumerate(problem.rows)
+    }
+
+
+def target(
+    problem: Problem, values: np.ndarray, rest: np.ndarray, slopes: Mapping
+) -> np.ndarray:
+    """Residuals of the nominal model by the linear one, ``(N, C)``."""
+    made = np.nan_to_num(rest)
+    for number, slope in slopes.items():
+        made = made + slope * (values[number] - problem.nominal[number])
+    return made
+
+
+def first_noise(problem: Problem, rest: np.ndarray, motion: np.ndarray) -> Noise:
+    """A guess before any fit."""
+    memory = Memory.none(problem.trial, rest.shape[1])
+    sd = noise.scale(rest, problem.model.motion(motion), problem.model.least)
+    return Noise(sd, memory, 2.0)
+
+
+def linearised(
+    problem: Problem,
+    values: np.ndarray,
+    rest: np.ndarray,
+    known: Noise,
+    slopes: Mapping[int, np.ndarray] | None = None,
+    order: int | None = None,
+) -> tuple[Linear, Noise, Mapping[int, np.ndarray]]:
+    """The linear model around values, with the noise that all rows together leave.
+
+    Args:
+        problem: the recording.
+        values: of all rows.
+        rest: residuals there.
+        known: noise to start from.
+        slopes: derivatives from before, None = taken anew.
+        order: of the autoregression, None = as in the noise.
+    """
+    order = known.order if order is None else order
+    wanted = smooth(problem, values)
+    if slopes is None or any(k not in slopes for k in wanted):
+        slopes = columns(problem, values)
+    whole = target(problem, values, rest, slopes)
+    predicted = np.where(problem.seen, problem.recorded, 0.0) - np.nan_to_num(rest)
+    motion = problem.model.motion(predicted)
+    moved = np.nan_to_num(problem.gap - rest)
+    left = rest
+    for turn in range(MEASURED):
+        made = _linear(problem, values, slopes, whole, known, left)
+        found = made.solve(made.free)
+        left = whole - _summed(problem, values, slopes, made, found)
+        memory = known.memory
+        if order and turn < MEASURED - 1:
+            memory = Memory.of(left, problem.trial, order)
+        seen = np.where(problem.seen, memory(left), np.nan)
+        sd = noise.scale(seen, motion, problem.model.least)
+        known = Noise(np.hypot(sd, INEXACT * np.abs(memory(moved))), memory, 1.0)
+    made = _linear(problem, values, slopes, whole, known, left)
+    found = made.solve(made.free)
+    whitened = np.sqrt(made.weight) * made.rest(found)
+    lam = max(noise.correlated(whitened, problem.trial), inflation(made, found))
+    return made.correlated(lam), replace(known, lam=lam), slopes
+
+
+def _linear(problem, values, slopes, whole, known: Noise, left) -> Linear:
+    design = {number: known.memory(slope) for number, slope in slopes.items()}
+    weight = known.weights(left, problem.seen)
+    return Linear.of(
+        problem, design, units(problem, values), known.memory(whole), weight
+    )
+
+
+def _summed(problem, values, slopes, made: Linear, found: np.ndarray) -> np.ndarray:
+    sizes = units(problem, values)
+    total = np.zeros_like(problem.recorded)
+    for number, value in zip(made.columns, found, strict=True):
+        total += slopes[number] * sizes[number] * value
+    return total
+
+
+def newton(
+    problem: Problem,
+    values: np.ndarray,
+    support: Iterable[str],
+    known: Noise,
+    *,
+    turns: int = 3,
+    only: list[int] | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Most probable values of the rows of a set, the others as they are.
+
+    Gauss-Newton on the pseudo-Huber loss with the priors, with Levenberg's damping in
+    their units, within bounds.
+
+    Args:
+        problem: the recording.
+        values: to start from, ``(R,)``.
+        support: explanations that are fitted (nuisances are not, beside these).
+        known: noise.
+        turns: steps at most.
+        only: trials that count, None = all; the others' residuals are left out.
+
+    Returns:
+        values, and residuals there ``(N, C)``.
+    """
+    part = problem if only is None else replace(problem, recorded=_kept(problem, only))
+    names = [k for name in sorted(support) for k in problem.terms[name]]
+    rest = _rest(part, values, only)
+    for _ in range(turns):
+        which = [
+            k
+            for k in names
+            if (part.rows[k].smooth or values[k] != part.nominal[k])
+            and not part.rows[k].stepped
+        ]
+        if not which:
+            break
+        moved = _step(part, values, rest, which, known, only)
+        if moved is None:
+            break
+        change = np.abs((moved[0] - values)[which] / part.sd[which]).max()
+        values, rest = moved
+        if change < STILL:
+            break
+    return values, rest
+
+
+def _kept(problem: Problem, only: list[int]) -> np.ndarray:
+    inside = np.isin(problem.trial, only)
+    return np.where(inside[:, None], problem.recorded, np.nan)
+
+
+def _rest(problem: Problem, values: np.ndarray, only) -> np.ndarray:
+    if only is None:
+        return problem.residual(values)[0]
+    (made,) = problem.predict([values], only=only)
+    return np.where(problem.seen, problem.recorded - np.nan_to_num(made, nan=1e3), 0.0)
+
+
+def _step(problem, values, rest, which, known: Noise, only):
+    """One damped step that lowers the loss; None if there is none."""
+    which = np.array(which)
+    slopes = _slopes(problem, values, which, only)
+    weight = known.weights(rest, problem.seen).ravel()
+    design = np.stack([known.memory(slopes[k]).ravel() for k in which], axis=-1)
+    design = design * problem.sd[which]
+    # what was found by its level has a flat prior
+    flat = np.array([1.0 if problem.rows[k].smooth else 0.2 for k in which])
+
+    def departure(at: np.ndarray) -> np.ndarray:
+        return (at[which] - problem.nominal[which]) / problem.sd[which]
+
+    def height(at: np.ndarray, left: np.ndarray) -> float:
+        prior = (flat**2 * departure(at) ** 2).sum()
+        return known.loss(left) / known.lam + float(prior)
+
+    heavy = design * weight[:, None]
+    curvature = heavy.T @ design / known.lam + np.diag(flat**2)
+    pull = heavy.T @ known.memory(np.nan_to_num(rest)).ravel() / known.lam
+    pull -= flat**2 * departure(values)
+    now = height(values, rest)
+    low, high = problem.bounds
+    for damping in DAMPING:
+        step = np.linalg.solve(curvature + damping * np.eye(len(which)), pull)
+        step *= min(1.0, LONGEST / (np.abs(step).max() + 1e-30))
+        there = values.copy()
+        there[which] += step * problem.sd[which]
+        there = np.clip(there, low, high)
+        left = _rest(problem, there, only)
+        if height(there, left) <= now + 1e-6:
+            return there, left
+    return None
+
+
+def _slopes(problem: Problem, values, which, only) -> dict[int, np.ndarray]:
+    if only is None:
+        return problem.slopes(values, which)
+    sets, steps = [values], []
+    for number in which:
+        moved = values.copy()
+        step = problem.rows[number].difference
+        step = step if values[number] + step <= problem.bounds[1][number] else -step
+        moved[number] += step
+        sets.append(moved)
+        steps.append(step)
+    base, *made = problem.predict(sets, fine=False, only=only)
+    return {
+        number: np.nan_to_num((path - base) / step)
+        for number, path, step in zip(which, made, steps, strict=True)
+    }
+
+
+def placed(
+    problem: Problem, linear: Linear, support: Iterable[str], values: np.ndarray
+) -> np.ndarray:
+    """Values of a set by the linear model, ``(R,)``; rows set to a level keep it."""
+    support = frozenset(support)
+    found = linear.solve(support)
+    made = problem.nominal.copy()
+    for at, number in enumerate(linear.columns):
+        row = problem.rows[number]
+        if row.smooth and (row.term in support or row.nuisance):
+            made[number] += found[at] * row.sd
+        elif not row.smooth and row.term in support:
+            made[number] = values[number]
+    return np.clip(made, *problem.bounds)
+
+
+def nuisances(problem: Problem) -> set[str]:
+    """Names of what is always fitted."""
+    return {row.term for row in problem.rows if row.nuisance}

@@ -1,0 +1,164 @@
+"""Starts over the whole range of what has no slope at the nominal: dead bands, limits,
+lags that are long, wheels that stop."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bns.gap.decomposition.fit import Noise, Point
+from bns.gap.decomposition.linear import KAPPA, Linear, Support, stretches
+from bns.gap.decomposition.problem import Problem
+
+FELT = 4.0  # weighted square of a change below which a level is not felt
+NEAR = 15.0  # nats beyond the present cost within which levels are tried in full
+MOST = 14  # levels that are tried in full on account of their cost
+KINDS = 6  # further ones, the best level of other rows
+SEARCHED = 6  # levels whose sets are searched
+EACH = 2  # levels of one row among these
+PARTS = 6  # between two levels in a search for the best value
+GAIN = 0.5  # of the loss that a new value has to bring
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A row set to a value on top of a fit, with what evidence says goes with it."""
+
+    cost: float
+    values: np.ndarray
+    support: Support
+
+
+def best(problem: Problem, point: Point) -> Level | None:
+    """The level of highest evidence, everything else free; None if none is felt."""
+    todo = [
+        (number, value)
+        for number, row in enumerate(problem.rows)
+        for value in row.levels
+        if (row.smooth or point.values[number] == row.nominal)
+        and value != point.values[number]
+    ]
+    few = problem.sample()
+    found = _scored(problem, point, todo, few)
+    base = min(_weighed(problem, point, few).cost(s) for s in (point.support, ()))
+    near = [item for item in found if item[0] < base + NEAR][:MOST]
+    rows = {number for _, (number, _), _ in near}
+    for item in found:
+        if item[1][0] not in rows and len(near) < MOST + KINDS:
+            near.append(item)
+            rows.add(item[1][0])
+    if len(few) < len(problem.trials):
+        # what a first look does not feel may be felt elsewhere: slow commands are rare
+        tried = {which for _, which, _ in found}
+        unfelt = [w for w in todo if w not in tried and not problem.rows[w[0]].smooth]
+        again = [*(which for _, which, _ in near), *unfelt]
+        near = _scored(problem, point, again, None)
+    made: list[Level] = []
+    count: dict[int, int] = {}
+    for _, (number, value), linear in near:
+        count[number] = count.get(number, 0) + 1
+        if count[number] <= EACH and len(made) < SEARCHED:
+            made.append(_level(problem, point, number, value, linear))
+    return min(made, key=lambda level: level.cost) if made else None
+
+
+def _level(problem, point: Point, number: int, value: float, linear: Linear) -> Level:
+    known = min((point.support, frozenset()), key=lambda s: linear.cost(_in(linear, s)))
+    cost, support = linear.search(start=known, quick=True)
+    row = problem.rows[number]
+    values = problem.nominal.copy()
+    found = linear.solve(support)
+    for at, column in enumerate(linear.columns):
+        other = problem.rows[column]
+        if not other.smooth and other.term in support:
+            values[column] = point.values[column]
+        elif other.smooth and (other.term in support or other.nuisance):
+            values[column] += found[at] * other.sd
+    values = np.clip(values, *problem.bounds)
+    values[number] = value
+    paid = cost + KAPPA + np.log(len(row.levels)) + 0.5
+    return Level(float(paid), values, support | {row.term})
+
+
+def _in(linear: Linear, support: Support) -> Support:
+    return support & frozenset(linear.free)
+
+
+def _weighed(problem: Problem, point: Point, only: list[int] | None) -> Linear:
+    """The linear model of some trials."""
+    if only is None or len(only) == len(problem.trials):
+        return point.linear
+    inside = np.unique(problem.block[np.isin(problem.trial, only)])
+    return point.linear.of_blocks(stretches(len(point.linear.square), inside))
+
+
+def _scored(problem: Problem, point: Point, todo, only: list[int] | None):
+    """Cost of each level with the present explanations or none, best first, with the
+    linear model in which it is set."""
+    if not todo:
+        return []
+    sets = [point.values]
+    for number, value in todo:
+        moved = point.values.copy()
+        moved[number] = value
+        sets.append(moved)
+    base, *made = problem.predict(sets, fine=False, only=only)
+    inside = None
+    if only is not None and len(only) < len(problem.trials):
+        blocks = np.unique(problem.block[np.isin(problem.trial, only)])
+        inside = stretches(len(point.linear.square), blocks)
+    found = []
+    for which, path in zip(todo, made, strict=True):
+        if not np.isfinite(path[problem.seen]).all():
+            continue
+        change = np.nan_to_num(path - base)
+        number, _ = which
+        if problem.rows[number].smooth:  # what it did before is in the target
+            off = point.values[number] - problem.nominal[number]
+            change = change + point.slopes[number] * off
+        change = point.noise.memory(change)
+        if (point.linear.weight * change**2).sum() < FELT:
+            continue
+        term = problem.rows[number].term
+        linear = point.linear.moved(change, drop=term)
+        linear = linear if inside is None else linear.of_blocks(inside)
+        costs = [linear.cost(_in(linear, s)) for s in (point.support, frozenset())]
+        found.append((min(costs), which, linear))
+    return sorted(found, key=lambda item: (item[0], item[1]))
+
+
+def zoomed(
+    problem: Problem, values: np.ndarray, rest: np.ndarray, support, known: Noise
+) -> tuple[np.ndarray, np.ndarray]:
+    """The best values of rows set to levels, between the levels beside.
+
+    Returns:
+        values and residuals.
+    """
+    for number, row in enumerate(problem.rows):
+        inside = row.term in support and values[number] != row.nominal
+        if inside and not row.smooth and len(row.levels) > 1:
+            values, rest = _zoom(problem, values, rest, number, known)
+    return values, rest
+
+
+def _zoom(problem: Problem, values, rest, number: int, known: Noise):
+    row = problem.rows[number]
+    marks = np.unique([*row.levels, row.low, row.high])
+    low = marks[marks < values[number]].max(initial=row.low)
+    high = marks[marks > values[number]].min(initial=row.high)
+    for _ in range(2):
+        sets = []
+        for value in np.linspace(low, high, PARTS)[1:-1]:
+            moved = values.copy()
+            moved[number] = value
+            sets.append(moved)
+        base, *made = problem.predict([values, *sets], fine=False)
+        losses = [known.loss(rest - (path - base)) for path in made]
+        at = int(np.argmin(losses))
+        if losses[at] < known.loss(rest) - GAIN:
+            values = sets[at]
+            rest, _ = problem.residual(values)
+        width = (high - low) / (PARTS - 1)
+        low, high = max(values[number] - width, row.low), values[number] + width
+        high = min(high, row.high)
+    return values, rest

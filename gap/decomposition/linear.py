@@ -1,0 +1,394 @@
+"""The fit as a linear Gaussian model: evidence of each set of explanations.
+
+Every row has a normal prior: as wide as a plausible departure if its explanation is in
+(the slab), as wide as its slack if it is out (the spike; 0 = exactly nominal). With the
+residuals linear in the rows the evidence of a set is known in closed form (Bishop,
+Pattern Recognition and Machine Learning, 2006, 3.5; spike and slab: George and
+McCulloch, JASA 88, 1993). All that it needs is one small matrix per stretch of the
+recording, so that thousands of sets, stretches left out and moments at which a row
+sets in cost no simulation.
+"""
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from bns.gap.decomposition.problem import Problem
+
+KAPPA = 3.0
+"""what an explanation costs: the log odds against it; e^3 = 20, the number of
+explanations of a usual model, so that about one in all is expected"""
+MERGED = 5  # explanations up to which two are tried against one
+
+Support = frozenset[str]
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """Residuals linear in K rows, in units of their priors, by stretch.
+
+    Attributes:
+        columns: numbers of the rows, ``(K,)``.
+        terms: columns of each explanation.
+        free: explanations that may be in or out; nuisances are always in.
+        normal: ``J' W J`` of each of B stretches, ``(B, K, K)``.
+        slope: ``J' W z`` of each, ``(B, K)``.
+        square: ``z' W z`` of each, ``(B,)``.
+        slack: of each row in units of its prior, ``(K,)``.
+        always: rows that are in, whatever is, ``(K,)``.
+        low, high: bounds in units of the prior, from the nominal, ``(K,)``.
+        lam: residuals that count as one independent one.
+        penalty: what each explanation costs.
+        design: whitened-free columns, ``(N, C, K)``.
+        target: residuals of the nominal model, ``(N, C)``.
+        weight: of the squares, ``(N, C)``.
+        block: number of the stretch, ``(N,)``.
+    """
+
+    columns: np.ndarray
+    terms: Mapping[str, tuple[int, ...]]
+    free: tuple[str, ...]
+    normal: np.ndarray
+    slope: np.ndarray
+    square: np.ndarray
+    slack: np.ndarray
+    always: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    lam: float
+    penalty: Mapping[str, float]
+    design: np.ndarray
+    target: np.ndarray
+    weight: np.ndarray
+    block: np.ndarray
+    _costs: dict = field(default_factory=dict)
+    _sums: dict = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        problem: Problem,
+        design: Mapping[int, np.ndarray],
+        units: Mapping[int, float],
+        target: np.ndarray,
+        weight: np.ndarray,
+        lam: float = 1.0,
+    ) -> "Linear":
+        """Set up from derivatives.
+
+        Args:
+            problem: the recording.
+            design: derivative by each row, by its number, ``(N, C)``.
+            units: of each row: what its prior's standard deviation is.
+            target: residuals of the nominal model, ``(N, C)``, finite.
+            weight: of the squares, ``(N, C)``.
+            lam: see there.
+        """
+        columns = np.array(sorted(design))
+        unit = np.array([units[k] for k in columns])
+        matrix = np.stack([design[k] for k in columns], axis=-1) * unit
+        place = {number: at for at, number in enumerate(columns)}
+        terms = {
+            name: tuple(place[k] for k in numbers if k in place)
+            for name, numbers in problem.terms.items()
+        }
+        terms = {name: found for name, found in terms.items() if found}
+        rows = [problem.rows[k] for k in columns]
+        always = np.array([row.nuisance for row in rows])
+        free = tuple(n for n, found in terms.items() if not always[found[0]])
+        low, high = (edge[columns] for edge in problem.bounds)
+        middle = problem.nominal[columns]
+        made = cls(
+            columns=columns,
+            terms=terms,
+            free=free,
+            normal=np.empty(0),
+            slope=np.empty(0),
+            square=np.empty(0),
+            slack=np.array([row.slack for row in rows]) / unit,
+            always=always,
+            low=(low - middle) / unit,
+            high=(high - middle) / unit,
+            lam=lam,
+            penalty=dict.fromkeys(free, KAPPA),
+            design=matrix,
+            target=target,
+            weight=weight,
+            block=problem.block,
+        )
+        return made._summed(matrix, target)
+
+    def _summed(self, design: np.ndarray, target: np.ndarray) -> "Linear":
+        count, size = int(self.block.max()) + 1, design.shape[-1]
+        normal = np.zeros((count, size, size))
+        slope, square = np.zeros((count, size)), np.zeros(count)
+        for number in range(count):
+            rows = self.block == number
+            part = design[rows].reshape(-1, size)
+            weight, values = self.weight[rows].ravel(), target[rows].ravel()
+            heavy = part * weight[:, None]
+            normal[number] = heavy.T @ part
+            slope[number] = heavy.T @ values
+            square[number] = (weight * values**2).sum()
+        return self._with(
+            design=design, target=target, normal=normal, slope=slope, square=square
+        )
+
+    def _with(self, **changes) -> "Linear":
+        return replace(self, **changes, _costs={}, _sums={})
+
+    def moved(self, change: np.ndarray, drop: str = "") -> "Linear":
+        """The same with a change of the prediction, ``(N, C)``, taken off the target.
+
+        Args:
+            change: of the predicted features.
+            drop: explanation that is no longer free (the change is its own).
+        """
+        target = self.target - change
+        count, size = len(self.square), self.design.shape[-1]
+        slope, square = np.zeros((count, size)), np.zeros(count)
+        for number in range(count):
+            rows = self.block == number
+            values = (self.weight[rows] * target[rows]).ravel()
+            slope[number] = self.design[rows].reshape(-1, size).T @ values
+            square[number] = values @ target[rows].ravel()
+        free = tuple(name for name in self.free if name != drop)
+        return self._with(target=target, slope=slope, square=square, free=free)
+
+    def of_blocks(self, kept: np.ndarray) -> "Linear":
+        """Some stretches alone, ``(B,)`` of booleans."""
+        return self._with(
+            normal=self.normal[kept], slope=self.slope[kept], square=self.square[kept]
+        )
+
+    def correlated(self, lam: float) -> "Linear":
+        """The same with as many residuals counting as one."""
+        return self._with(lam=lam)
+
+    def _total(self) -> tuple[np.ndarray, np.ndarray, float]:
+        if "all" not in self._sums:
+            self._sums["all"] = (
+                self.normal.sum(axis=0),
+                self.slope.sum(axis=0),
+                float(self.square.sum()),
+            )
+        return self._sums["all"]
+
+    def prior(self, support: Iterable[str], *, slack: bool = True) -> np.ndarray:
+        """Standard deviation of each row, ``(K,)``; 0 = exactly nominal."""
+        made = self.slack.copy() if slack else np.zeros(len(self.slack))
+        for name in support:
+            made[list(self.terms[name])] = 1.0
+        made[self.always] = 1.0
+        return made
+
+    def solve(
+        self, support: Iterable[str], *, slack: bool = True, without: int = -1
+    ) -> np.ndarray:
+        """Most probable rows, in units of their priors, ``(K,)``.
+
+        Args:
+            support: explanations that are in.
+            slack: whether the others may move within their slack.
+            without: number of a stretch that is left out.
+        """
+        normal, slope, _ = self._total()
+        if without >= 0:
+            normal, slope = normal - self.normal[without], slope - self.slope[without]
+        prior = self.prior(support, slack=slack)
+        used = np.flatnonzero(prior)
+        made = np.zeros(len(prior))
+        made[used] = np.linalg.solve(
+            self._curvature(normal, prior, used), slope[used] / self.lam
+        )
+        return made
+
+    def _curvature(self, normal, prior, used) -> np.ndarray:
+        return normal[np.ix_(used, used)] / self.lam + np.diag(prior[used] ** -2)
+
+    def covariance(self, support: Iterable[str]) -> np.ndarray:
+        """Posterior covariance of the rows, ``(K, K)``, in units of their priors."""
+        prior = self.prior(support)
+        used = np.flatnonzero(prior)
+        made = np.zeros((len(prior), len(prior)))
+        made[np.ix_(used, used)] = np.linalg.inv(
+            self._curvature(self._total()[0], prior, used)
+        )
+        return made
+
+    def cost(self, support: Iterable[str]) -> float:
+        """Minus the log evidence of a set with its prior, but for a constant.
+
+        Where a row of it would leave its bounds the set is no better than the one
+        without that explanation, and costs more.
+        """
+        key = frozenset(support)
+        if key not in self._costs:
+            self._costs[key] = self._cost(key)
+        return self._costs[key]
+
+    def _cost(self, key: Support) -> float:
+        normal, slope, square = self._total()
+        prior = self.prior(key)
+        used = np.flatnonzero(prior)
+        factor = np.linalg.cholesky(self._curvature(normal, prior, used))
+        half = np.linalg.solve(factor, slope[used] / self.lam)
+        value = 0.5 * square / self.lam - 0.5 * half @ half
+        value += np.log(np.diag(factor)).sum() + np.log(prior[used]).sum()
+        value += sum(self.penalty[name] for name in key)
+        found = np.zeros(len(prior))
+        found[used] = np.linalg.solve(factor.T, half)
+        beyond = (found < self.low - 1e-6) | (found > self.high + 1e-6)
+        if beyond.any():
+            out = {name for name in key if beyond[list(self.terms[name])].any()}
+            if out:
+                value = max(value, self.cost(key - out) + KAPPA * len(out))
+        return float(value)
+
+    def search(
+        self, start: Iterable[str] | None = None, *, quick: bool = False
+    ) -> tuple[float, Support]:
+        """The set of highest evidence: from all backward, from none forward and from a
+        given one, each improved by adding, dropping and swapping.
+
+        Args:
+            start: a further set to start from.
+            quick: from there alone, and without trying two against one.
+
+        Returns:
+            its cost, and the set.
+        """
+        starts = [] if quick else [self._backward(), frozenset()]
+        if start is not None:
+            starts.append(frozenset(start) & frozenset(self.free))
+        found = [self._improved(item, merge=not quick) for item in starts]
+        return min(found, key=lambda item: item[0])
+
+    def _backward(self) -> Support:
+        kept = frozenset(self.free)
+        while kept:
+            best = min((self.cost(kept - {n}), n) for n in sorted(kept))
+            if best[0] > self.cost(kept):
+                break
+            kept -= {best[1]}
+        return kept
+
+    def _improved(self, support: Support, merge: bool) -> tuple[float, Support]:
+        best = self.cost(support)
+        while True:
+            moves = list(self._moves(support, merge))
+            costs = [self.cost(item) for item in moves]
+            if not costs or min(costs) >= best - 1e-9:
+                return best, support
+            at = int(np.argmin(costs))
+            best, support = costs[at], moves[at]
+
+    def _moves(self, support: Support, merge: bool) -> Iterable[Support]:
+        inside, outside = sorted(support), [n for n in self.free if n not in support]
+        yield from (support - {name} for name in inside)
+        yield from (support | {name} for name in outside)
+        for name in inside:
+            yield from ((support - {name}) | {other} for other in outside)
+        if merge and len(support) <= MERGED:
+            for pair in itertools.combinations(inside, 2):
+                yield from ((support - set(pair)) | {other} for other in outside)
+
+    def _weighed(self) -> None:
+        if not self._costs:
+            self.search()
+
+    def near(self, within: float) -> list[tuple[float, Support]]:
+        """Sets that were weighed and cost no more than so much beyond the best."""
+        self._weighed()
+        least = min(self._costs.values())
+        found = [(c - least, s) for s, c in self._costs.items() if c <= least + within]
+        return sorted(found, key=lambda item: (item[0], sorted(item[1])))
+
+    def inclusion(self, name: str) -> float:
+        """Posterior probability of an explanation over all sets that were weighed."""
+        self._weighed()
+        costs = np.array(list(self._costs.values()))
+        inside = np.array([name in support for support in self._costs])
+        odds = np.exp(costs.min() - costs)
+        return float(odds[inside].sum() / odds.sum())
+
+    def rest(self, values: np.ndarray) -> np.ndarray:
+        """Residuals at values of the rows, ``(N, C)``."""
+        return self.target - self.design @ values
+
+    def squares(self, support: Iterable[str]) -> float:
+        """Weighted square of what a set leaves, the others exactly nominal."""
+        normal, slope, square = self._total()
+        values = self.solve(support, slack=False)
+        return float(square - 2 * slope @ values + values @ normal @ values)
+
+    def held_out(self, support: Iterable[str]) -> np.ndarray:
+        """Weighted square of each stretch, the rows fitted to the others, ``(B,)``."""
+        support = tuple(support)
+        made = np.empty(len(self.square))
+        for number in range(len(made)):
+            values = self.solve(support, slack=False, without=number)
+            made[number] = (
+                self.square[number]
+                - 2 * self.slope[number] @ values
+                + values @ self.normal[number] @ values
+            )
+        return made
+
+    def scores(self, values: np.ndarray) -> np.ndarray:
+        """Derivative of half the weighted square by stretch, ``(B, K)``."""
+        return self.slope - self.normal @ values
+
+    def since(self, name: str, block: int, label: str) -> "Linear":
+        """With a further explanation: that one, from a stretch on.
+
+        Args:
+            name: explanation.
+            block: first stretch in which it holds.
+            label: name of the new one.
+        """
+        old = list(self.terms[name])
+        size, more = self.design.shape[-1], len(old)
+        index = np.r_[np.arange(size), old]
+        on = np.arange(len(self.square)) >= block
+        normal = self.normal[:, index][:, :, index].copy()
+        slope = self.slope[:, index].copy()
+        normal[~on, size:, :] = 0.0
+        normal[~on, :, size:] = 0.0
+        slope[~on, size:] = 0.0
+        late = tuple(range(size, size + more))
+        grown = {key: getattr(self, key)[index] for key in ("columns", "low", "high")}
+        return self._with(
+            **grown,
+            slack=np.r_[self.slack, np.zeros(more)],
+            always=np.r_[self.always, np.zeros(more, dtype=bool)],
+            terms={**self.terms, label: late},
+            free=(*self.free, label),
+            penalty={**self.penalty, label: self.penalty[name]},
+            normal=normal,
+            slope=slope,
+        )
+
+
+def inflation(linear: Linear, values: np.ndarray) -> float:
+    """Variance of the stretches' scores over that of independent residuals.
+
+    The cluster-robust variance (Liang and Zeger, Biometrika 73, 1986) sees windows that
+    overlap, correlation of either sign and repeats; median over rows.
+    """
+    sums = (linear.scores(values) ** 2).sum(axis=0)
+    size = np.diagonal(linear.normal.sum(axis=0))
+    told = size > 1.0
+    count = len(linear.square)
+    if not told.any():
+        return 1.0
+    return float(np.median(sums[told] / size[told])) * count / max(count - 1, 1)
+
+
+def stretches(count: int, kept: Sequence[int]) -> np.ndarray:
+    """Which of so many stretches are kept, ``(count,)``."""
+    made = np.zeros(count, dtype=bool)
+    made[list(kept)] = True
+    return made

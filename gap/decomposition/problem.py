@@ -1,0 +1,193 @@
+"""A recording and a model made ready for the fit: `Problem`."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from bns.gap.decomposition.model import DecomposableModel
+from bns.gap.decomposition.row import Row
+from bns.gap.models.base import Windows
+from bns.gap.recordings import trial_labels
+from bns.worlds.trial import Trial
+
+FAR = 1e3  # residual of a diverged simulation
+SAMPLE = 12.0  # [s] of recording that a first look takes
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What every stage of the fit works on. N windows of all trials, C features.
+
+    Attributes:
+        model: nominal model.
+        trials: checked recording.
+        rows: R numbers that may be off.
+        windows: of each trial.
+        recorded: features, ``(N, C)``; NaN = not seen.
+        trial: number of the trial of each window, ``(N,)``.
+        block: number of its stretch, ``(N,)``, see `DecomposableModel.blocks`.
+        numbers: number of each trial in the recording.
+    """
+
+    model: DecomposableModel
+    trials: tuple[Trial, ...]
+    rows: tuple[Row, ...]
+    windows: tuple[Windows, ...]
+    recorded: np.ndarray
+    trial: np.ndarray
+    block: np.ndarray
+    numbers: tuple[int, ...]
+    onset: Mapping[str, int] = field(default_factory=dict)
+    """first trial of the rows that set in later, by name"""
+
+    @classmethod
+    def of(cls, trials: Sequence[Trial], model: DecomposableModel) -> "Problem":
+        """Features of a checked recording, and the model's rows."""
+        windows = tuple(model.joint_windows(trial) for trial in trials)
+        seen = [
+            model.compare(trial, trial.observed[:, : len(model.channels)], parts)
+            for trial, parts in zip(trials, windows, strict=True)
+        ]
+        counts = [len(parts) for parts in windows]
+        return cls(
+            model,
+            tuple(trials),
+            model.rows(trials),
+            windows,
+            np.concatenate(seen),
+            np.repeat(np.arange(len(trials)), counts),
+            model.blocks(trials, windows),
+            tuple(trial_labels.numbers(trials)),
+        )
+
+    @cached_property
+    def nominal(self) -> np.ndarray:
+        """Nominal values, ``(R,)``."""
+        return np.array([row.nominal for row in self.rows])
+
+    @cached_property
+    def sd(self) -> np.ndarray:
+        """Plausible departures, ``(R,)``."""
+        return np.array([row.sd for row in self.rows])
+
+    @cached_property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest values, ``(R,)`` each."""
+        low = np.array([row.low for row in self.rows])
+        return low, np.array([row.high for row in self.rows])
+
+    @cached_property
+    def terms(self) -> dict[str, tuple[int, ...]]:
+        """Numbers of the rows of each explanation, nuisances included."""
+        made: dict[str, tuple[int, ...]] = {}
+        for number, row in enumerate(self.rows):
+            made[row.term] = (*made.get(row.term, ()), number)
+        return made
+
+    @cached_property
+    def seen(self) -> np.ndarray:
+        """Which features were seen, ``(N, C)``."""
+        return np.isfinite(self.recorded)
+
+    def predict(
+        self,
+        values: Sequence[np.ndarray],
+        *,
+        fine: bool = True,
+        only: Sequence[int] | None = None,
+    ) -> np.ndarray:
+        """Predicted features, ``(E, N, C)``; NaN where a simulation diverged.
+
+        Args:
+            values: E sets of values of all rows, ``(R,)`` each.
+            fine: at the fine step.
+            only: numbers of the trials that are simulated, None = all; features of the
+                others are 0.
+        """
+        chosen = range(len(self.trials)) if only is None else only
+        trials = [self.trials[n] for n in chosen]
+        sets = [[self.changed(value, n) for n in chosen] for value in values]
+        made = self.model.paths(trials, sets, fine=fine)
+        count = len(self.channels)
+        out = np.zeros((len(values), len(self.trial), count))
+        inside = np.isin(self.trial, list(chosen))
+        for row, paths in zip(out, made, strict=True):
+            row[inside] = np.concatenate(
+                [
+                    self.model.compare(self.trials[n], path, self.windows[n])
+                    for n, path in zip(chosen, paths, strict=True)
+                ]
+            )
+        return out
+
+    @property
+    def channels(self) -> tuple:
+        """What is compared."""
+        return self.model.features
+
+    def changed(self, values: np.ndarray, trial: int) -> dict[str, float]:
+        """Rows that are not nominal in a trial, by name; what grows with the number of
+        the trial comes as what it has grown to."""
+        number = self.numbers[trial]
+        return {
+            row.name: float(value) * (number if row.per_trial else 1)
+            for row, value in zip(self.rows, values, strict=True)
+            if value != row.nominal and number >= self.onset.get(row.name, 0)
+        }
+
+    def residual(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Recorded minus predicted features, and the predicted ones, ``(N, C)``.
+
+        A diverged simulation leaves `FAR`; what was not seen stays NaN.
+        """
+        (made,) = self.predict([values])
+        lost = ~np.isfinite(made)
+        made = np.where(lost, 0.0, made)
+        rest = np.where(self.seen & lost, FAR, self.recorded - made)
+        return rest, made
+
+    @cached_property
+    def gap(self) -> np.ndarray:
+        """Residuals of the nominal model, ``(N, C)``."""
+        return self.residual(self.nominal)[0]
+
+    def slopes(self, values: np.ndarray, which: Sequence[int]) -> dict[int, np.ndarray]:
+        """Derivatives of the features by some rows, ``(N, C)`` each.
+
+        One whose simulation diverges is 0.
+        """
+        high = self.bounds[1]
+        sets, steps = [values], []
+        for number in which:
+            step = self.rows[number].difference
+            step = step if values[number] + step <= high[number] else -step
+            moved = values.copy()
+            moved[number] += step
+            sets.append(moved)
+            steps.append(step)
+        base, *made = self.predict(sets, fine=False)
+        return {
+            number: np.nan_to_num((path - base) / step, posinf=0.0, neginf=0.0)
+            for number, path, step in zip(which, made, steps, strict=True)
+        }
+
+    def sample(self, seconds: float = SAMPLE) -> list[int]:
+        """Numbers of trials that are a first look: spread over the recording, no two of
+        the same commands while others are left."""
+        count = len(self.trials)
+        order = sorted(range(count), key=lambda n: ((7 * n) % count, n))
+        told: set[bytes] = set()
+        fresh, again = [], []
+        for number in order:
+            key = self.trials[number].commands.values.round(3).tobytes()
+            (again if key in told else fresh).append(number)
+            told.add(key)
+        chosen, total = [], 0.0
+        for number in (*fresh, *again):
+            chosen.append(number)
+            total += self.trials[number].commands.duration
+            if total > seconds:
+                break
+        return sorted(chosen)

@@ -1,0 +1,159 @@
+"""How large a gap is beyond what measuring it scatters, and whether it recurs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bns import seeding
+from bns.gap.decomposition.problem import Problem
+
+THIRD = np.sqrt(20.0)  # third differences of noise: 1 + 9 + 9 + 1
+NORMAL = 1.4826
+DRAWS = 8  # of measurement noise, for what it does to features
+WILD = 8.0  # deviations of a full fit beyond which a window is left out
+APART = (0.6, 2.0)  # [s] between windows whose errors are compared: beyond a window's
+# length, so that they share no sample
+PIECE = 2.0  # [s] of a trial that count as independent
+SHORT = 0.5  # [s] that do once an autoregression is taken out
+SEARCHED = 1.0  # standard errors that the best of some ten lags exceeds by chance
+SURE = 3.0  # standard errors from which an error is said to recur
+
+
+@dataclass(frozen=True, eq=False)
+class Floor:
+    """What measuring alone scatters.
+
+    Attributes:
+        sigma: of each observed channel, ``(n_channels,)``.
+        sd: of each feature of each window, ``(N, C)``.
+    """
+
+    sigma: np.ndarray
+    sd: np.ndarray
+
+
+def floor(problem: Problem, *, seed: int = 0) -> Floor:
+    """The measurement's scatter, from third differences of the recording.
+
+    What moves slowly against the sampling drops out of these, jitter of the time stamps
+    does not.
+    """
+    count = len(problem.model.channels)
+    found = []
+    for trial in problem.trials:
+        seen = trial.observed[:, :count]
+        seen = seen[np.isfinite(seen).all(axis=1)]
+        found.append(np.abs(np.diff(seen, n=3, axis=0)))
+    sigma = NORMAL * np.median(np.concatenate(found), axis=0) / THIRD
+    rng = seeding.generator(seed, "gap", "floor")
+    squares = np.zeros_like(problem.recorded)
+    for _ in range(DRAWS):
+        parts = []
+        for trial, windows in zip(problem.trials, problem.windows, strict=True):
+            seen = trial.observed[:, :count]
+            moved = seen + sigma * rng.standard_normal(seen.shape)
+            parts.append(problem.model.compare(trial, moved, windows))
+        squares += (np.concatenate(parts) - problem.recorded) ** 2
+    mean = np.nanmean(squares / DRAWS, axis=0)
+    sd = np.sqrt(np.broadcast_to(mean, squares.shape))
+    return Floor(sigma, np.maximum(sd, problem.model.least))
+
+
+def kept(problem: Problem, left: np.ndarray, sd: np.ndarray) -> np.ndarray:
+    """Windows that are no wild points in a full fit's rest, ``(N, C)``."""
+    with np.errstate(invalid="ignore"):
+        return problem.seen & (np.abs(left) < WILD * sd)
+
+
+def excess(rest: np.ndarray, known: Floor, inside: np.ndarray) -> float:
+    """Mean square of residuals in units of the floor, beyond the floor's own."""
+    units = np.where(inside, np.nan_to_num(rest) / known.sd, 0.0)
+    return float((units**2).sum() / max(inside.sum(), 1) - 1.0)
+
+
+def recurrence(
+    problem: Problem, rest: np.ndarray, sd: np.ndarray, *, piece: float = PIECE
+) -> float:
+    """Standard errors by which errors of windows that share no sample go together.
+
+    Products of a residual with later ones of its trial, and with those at the same time
+    of trials that were told the same, are 0 in the mean for what only scatters. Either
+    all lags say it together or one of them does, positive or negative: an error that
+    swings recurs, too.
+
+    Args:
+        problem: the recording.
+        rest: residuals, ``(N, C)``.
+        sd: of them.
+        piece: seconds whose sum counts as one independent value.
+    """
+    units = np.clip(np.nan_to_num(rest) / sd, -4, 4)
+    part = _pieces(problem, piece)
+    count = int(part.max()) + 1
+    lags: dict[int, np.ndarray] = {}
+    for number, windows in enumerate(problem.windows):
+        rows = np.flatnonzero(problem.trial == number)
+        if len(rows) < 2:
+            continue
+        step = max(float(np.median(np.diff(windows.times))), 1e-6)
+        first = max(round(APART[0] / step), 1)
+        last = min(max(round(APART[1] / step), first), len(rows) - 1)
+        for lag in range(first, last + 1):
+            product = (units[rows[lag:]] * units[rows[:-lag]]).sum(axis=1)
+            sums = lags.setdefault(lag, np.zeros(count))
+            np.add.at(sums, part[rows[:-lag]], product)
+    same = np.zeros(count)
+    for one, other in repeats(problem):
+        a, b = (np.flatnonzero(problem.trial == n) for n in (one, other))
+        length = min(len(a), len(b))
+        product = (units[a[:length]] * units[b[:length]]).sum(axis=1)
+        np.add.at(same, part[a[:length]], product)
+    every = [*lags.values(), same]
+    alone = max(abs(_errors(sums)) for sums in every) - SEARCHED
+    return max(_errors(np.sum(every, axis=0)), _errors(same), alone)
+
+
+def scattered(problem: Problem, rest: np.ndarray, known: Floor, inside) -> float:
+    """Excess over the floor, per residual, of what differs between repeats: the
+    robot's own scatter; 0 where there are no repeats."""
+    units = np.where(inside, np.nan_to_num(rest) / known.sd, 0.0)
+    total, count = 0.0, 0
+    for one, other in repeats(problem):
+        a, b = (np.flatnonzero(problem.trial == n) for n in (one, other))
+        length = min(len(a), len(b))
+        both = inside[a[:length]] & inside[b[:length]]
+        apart = (units[a[:length]] - units[b[:length]])[both]
+        total, count = total + float((apart**2).sum()) / 2, count + int(both.sum())
+    return max(total / count - 1.0, 0.0) if count else 0.0
+
+
+def _errors(sums: np.ndarray) -> float:
+    """A sum of independent values over its standard error."""
+    size = np.sqrt((sums**2).sum())
+    return float(sums.sum() / size) if size > 0 else 0.0
+
+
+def _pieces(problem: Problem, length: float) -> np.ndarray:
+    """Number of the stretch of a length [s] that each window lies in, ``(N,)``."""
+    made, first = [], 0
+    for trial, windows in zip(problem.trials, problem.windows, strict=True):
+        number = ((windows.times - trial.times[0]) / length).astype(int)
+        made.append(first + number)
+        first += int(number.max(initial=0)) + 1
+    return np.concatenate(made)
+
+
+def repeats(problem: Problem, tolerance: float = 1e-3) -> list[tuple[int, int]]:
+    """Pairs of trials that were told the same, but for a tolerance and 20 ms."""
+    found = []
+    trials = problem.trials
+    for first in range(len(trials)):
+        for second in range(first + 1, len(trials)):
+            one, other = trials[first].commands, trials[second].commands
+            if one.values.shape != other.values.shape:
+                continue
+            same = np.abs(one.values - other.values).max(initial=0) < tolerance
+            late = np.abs(np.cumsum(one.durations - other.durations))
+            if same and late.max(initial=0) < 0.02:
+                found.append((first, second))
+    return found

@@ -1,0 +1,63 @@
+"""Rows: the numbers of a model that may differ from what it says."""
+
+from dataclasses import dataclass
+
+from bns.errors import BnsError
+
+
+@dataclass(frozen=True)
+class Row:
+    """One number of a model, and what is believed of it before a recording is seen.
+
+    Attributes:
+        name: of the number, "wheel_gain[left]".
+        nominal: the value that changes nothing.
+        sd: plausible size of a departure (standard deviation, unit of the number).
+        low, high: bounds.
+        unit: of the number.
+        slack: how far the nominal model may be off without that being a gap (standard
+            deviation); 0 = it is exact there.
+        levels: values to start from where a slope at the nominal does not lead.
+        smooth: whether there is a slope at the nominal.
+        stepped: whether the motion changes in steps with the value, so that only a
+            search among values fits it.
+        nuisance: fitted always and never an answer.
+        step: for differences; 0 = a tenth of `sd`.
+        per_trial: whether its effect grows with the number of the trial.
+        group: name of the explanation it belongs to; "" = its own. Rows of a group go
+            in and out together.
+        excite: which commands make it felt, in words.
+    """
+
+    name: str
+    nominal: float
+    sd: float
+    low: float
+    high: float
+    unit: str = "1"
+    slack: float = 0.0
+    levels: tuple[float, ...] = ()
+    smooth: bool = True
+    stepped: bool = False
+    nuisance: bool = False
+    step: float = 0.0
+    per_trial: bool = False
+    group: str = ""
+    excite: str = ""
+
+    def __post_init__(self):
+        if not (self.low <= self.nominal <= self.high and self.sd > 0):
+            raise BnsError(
+                f"Row {self.name!r}: the nominal value has to lie between low and "
+                "high, and sd has to be positive."
+            )
+
+    @property
+    def term(self) -> str:
+        """Name of the explanation it belongs to."""
+        return self.group or self.name
+
+    @property
+    def difference(self) -> float:
+        """Step for a derivative."""
+        return self.step or 0.1 * self.sd

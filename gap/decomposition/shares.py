@@ -1,0 +1,153 @@
+"""What each explanation of a fit closes, how sure it is, and what it ties with."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from bns.gap.decomposition import fit
+from bns.gap.decomposition.fit import Point
+from bns.gap.decomposition.linear import Linear, Support
+from bns.gap.decomposition.problem import Problem
+
+TIED = 3.0  # nats within which explanations tie: odds of 20 to 1
+CHOICE = 4.0  # nats within which the held-out error decides
+NINETY = 1.645  # standard deviations of a 90 % interval
+
+
+@dataclass(frozen=True)
+class Part:
+    """One explanation among several.
+
+    Attributes:
+        name: of the explanation.
+        values: of its rows, by name.
+        low, high: 90 % intervals of these.
+        last: share of the gap that goes when it is added last.
+        alone: share that it closes by itself.
+        sure: posterior probability that it is in.
+    """
+
+    name: str
+    values: dict[str, float]
+    low: dict[str, float]
+    high: dict[str, float]
+    last: float
+    alone: float
+    sure: float
+
+
+def parts(problem: Problem, point: Point) -> list[Part]:
+    """Explanations of a point, the largest share first."""
+    linear, support = point.linear, point.support
+    spread = NINETY * np.sqrt(np.diagonal(linear.covariance(support)))
+    none, every = linear.squares(()), linear.squares(linear.free)
+    whole = max(none - every, 1e-9)
+    left = linear.squares(support)
+    made = []
+    for name in support:
+        values, low, high = _values(problem, point, name, spread)
+        made.append(
+            Part(
+                name=name,
+                values=values,
+                low=low,
+                high=high,
+                last=(linear.squares(support - {name}) - left) / whole,
+                alone=(none - linear.squares({name})) / whole,
+                sure=linear.inclusion(name),
+            )
+        )
+    return sorted(made, key=lambda part: (-part.last, part.name))
+
+
+def _values(problem: Problem, point: Point, name: str, spread: np.ndarray):
+    place = {number: at for at, number in enumerate(point.linear.columns)}
+    values, low, high = {}, {}, {}
+    edges = problem.bounds
+    for number in problem.terms[name]:
+        row, value = problem.rows[number], float(point.values[number])
+        if number not in place:
+            continue
+        unit = row.sd if row.smooth else abs(value - row.nominal) or row.sd
+        width = float(spread[place[number]] * unit)
+        values[row.name] = value
+        low[row.name] = max(value - width, float(edges[0][number]))
+        high[row.name] = min(value + width, float(edges[1][number]))
+    return values, low, high
+
+
+def swaps(point: Point, within: float = TIED) -> list[Support]:
+    """Sets that the data can hardly tell from a point's, itself first: one explanation
+    is another, the evidence within so many nats."""
+    linear, support = point.linear, point.support
+    if not support:
+        return [support]
+    here = linear.cost(support)
+    outside = [name for name in linear.free if name not in support]
+    found = []
+    for name in sorted(support):
+        for other in outside:
+            swapped = (support - {name}) | {other}
+            cost = linear.cost(swapped) - here
+            if cost < within:
+                found.append((cost, swapped))
+    found.sort(key=lambda item: (item[0], sorted(item[1])))
+    return [support, *(swapped for _, swapped in found)]
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Plain squared errors on stretches that were not fitted.
+
+    Attributes:
+        linear: what is fitted.
+        plain: the same recording, every residual of a channel weighing the same.
+    """
+
+    linear: Linear
+    plain: Linear
+
+    @classmethod
+    def of(cls, problem: Problem, point: Point) -> "HeldOut":
+        """For a point's linear model."""
+        sd = np.sqrt(np.nanmean(point.rest**2, axis=0))
+        weight = np.where(problem.seen, 1 / sd**2, 0.0)
+        units = fit.units(problem, point.values)
+        whole = fit.target(problem, point.values, point.rest, point.slopes)
+        return cls(point.linear, Linear.of(problem, point.slopes, units, whole, weight))
+
+    def error(self, support: Iterable[str]) -> np.ndarray:
+        """Squared error of each stretch, the rows fitted to the others, ``(B,)``."""
+        support, plain = tuple(support), self.plain
+        made = np.empty(len(plain.square))
+        for number in range(len(made)):
+            values = self.linear.solve(support, slack=False, without=number)
+            made[number] = (
+                plain.square[number]
+                - 2 * plain.slope[number] @ values
+                + values @ plain.normal[number] @ values
+            )
+        return made
+
+
+def guarded(problem: Problem, point: Point) -> Support:
+    """The set of a point without what makes the plain held-out error worse; of those
+    within `CHOICE` nats by one change the one with the least."""
+    if not point.support:
+        return point.support
+    held = HeldOut.of(problem, point)
+    support = point.support
+    near = [s for cost, s in point.linear.near(CHOICE) if len(s ^ support) <= 2]
+    near = [s for s in near if len(s) <= len(support)]
+    best = support
+    if len(support) > 3:  # several at once: which of them is for the held-out error
+        best = min([support, *near], key=lambda s: held.error(s).sum())
+    while best:
+        total = held.error(best).sum()
+        without = {name: held.error(best - {name}).sum() for name in sorted(best)}
+        name = min(without, key=without.__getitem__)
+        if without[name] >= total:
+            break
+        best = best - {name}
+    return best

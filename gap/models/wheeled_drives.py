@@ -1,0 +1,285 @@
+"""Drives of a wheeled robot with any of its numbers changed, by MuJoCo itself."""
+
+import hashlib
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from bns import models
+from bns.gap.candidates.wheeled_rows import LEAD, parameter
+from bns.gap.core.segments import moved
+from bns.worlds.effects import registry
+from bns.worlds.effects.base import BodyEffect, ControlSignal, Effect
+from bns.worlds.physics import compile, observe, servo_joint
+from bns.worlds.physics.rollout import Compiled, Job, Pool, Segment
+from bns.worlds.trial import Commands, Trial
+
+FINE, COARSE = 0.002, 0.005  # [s] physics steps: of residuals, of differences
+KEPT = 0.01  # [s] between two poses that are kept
+DRIVES = 8_000  # kept, about 24 kB each
+AFTER = 0.05  # [s] that are simulated beyond the last command
+RESTING = 0.2  # [s] over which the pose at the start is the median of what was seen
+PLANES = ("floor_slope", "wheel_eccentricity")
+TRACKING = ("marker_mount", "tracker_latency", "tracker_scale", "clock_drift", LEAD)
+ORDER = (
+    "command_latency",
+    "wheel_intermittent",
+    "wheel_stuck_max",
+    "wheel_stuck_min",
+    "wheel_gain",
+    "dead_band",
+    "dead_zone",
+    "speed_saturation",
+    "battery_sag",
+    "motor_lag",
+    "wheel_backlash",
+)
+"""in which effects on commands follow each other, from what is told to the wheel"""
+SWITCHING = ("dead_band", "dead_zone", "speed_saturation", "wheel_stuck_max",
+             "wheel_stuck_min", "wheel_intermittent")  # fmt: skip
+FIXED = {"payload": {"z": 0.07}}
+
+
+@dataclass(frozen=True)
+class Changes:
+    """Rows of a drive that are not nominal, by what they change.
+
+    Attributes:
+        body: edits of the model.
+        command: effects on what is told, in order.
+        lost: share of every speed that a falling battery takes.
+        seen: values of what the tracker does, by row.
+    """
+
+    body: tuple[BodyEffect, ...]
+    command: tuple[Effect, ...]
+    lost: float
+    seen: Mapping[str, float]
+
+    @classmethod
+    def of(cls, values: Mapping[str, float]) -> "Changes":
+        """Sort the rows of a drive."""
+        terms: dict[str, dict[str, float]] = {}
+        seen = {}
+        for name, value in values.items():
+            if name.partition("[")[0].partition(".")[0] in TRACKING:
+                seen[name] = value
+            else:
+                terms.setdefault(term(name), {})[name] = value
+        lost = terms.pop("battery_fade", {}).get("battery_fade", 0.0)
+        made = [effect(name, rows) for name, rows in terms.items()]
+        body = tuple(item for item in made if item.stage == "body")
+        told = [item for item in made if item.stage != "body"]
+        told.sort(key=lambda item: ORDER.index(item.name))
+        return cls(body, tuple(told), lost, seen)
+
+
+def term(name: str) -> str:
+    """The explanation that a row belongs to."""
+    stem, _, rest = name.partition("[")
+    if stem.startswith(PLANES):
+        return name.rpartition(".")[0]
+    return name.partition("@")[0] if rest else name
+
+
+def effect(name: str, values: Mapping[str, float]) -> Effect:
+    """The effect of an explanation.
+
+    Args:
+        name: of the explanation.
+        values: of its rows that are not nominal, by name.
+    """
+    stem, _, side = name.partition("[")
+    given: dict[str, float | str] = {"wheel": side.rstrip("]")} if side else {}
+    if stem in PLANES:
+        x, y = (values.get(f"{name}.{axis}", 0.0) for axis in "xy")
+        size, way = [p.name for p in registry.get(stem).parameters]
+        length = min(float(np.hypot(x, y)), registry.get(stem).parameters[0].high)
+        return registry.make(stem, **given, **{size: length, way: np.arctan2(y, x)})
+    ((row, value),) = [item for item in values.items() if item[1]] or values.items()
+    if "@" in row:
+        given["direction"] = row.partition("@")[2]
+    about = parameter(stem)
+    value = min(max(float(value), about.low), about.high)
+    kind = stem.partition(".")[0]
+    given[about.name] = round(value) if about.integer else value
+    return registry.make(kind, **FIXED.get(kind, {}), **given)
+
+
+@lru_cache(maxsize=2000)
+def scene(robot: str, body: tuple[BodyEffect, ...], dt: float) -> Compiled:
+    """The robot's scene with edits, at a step [s]."""
+    spec = models.spec(robot, visuals=False)
+    servo_joint.fit(spec, models.robot(robot))
+    spec.option.timestep = dt
+    for item in body:
+        item.edit(spec)
+    spec.memory = compile.ARENA
+    return Compiled(spec.compile())
+
+
+class Drives:
+    """Simulates drives, keeping what was simulated.
+
+    Args:
+        robot: name of the robot model.
+        pool: threads of the physics.
+    """
+
+    def __init__(self, robot: str, pool: Pool):
+        self.robot, self._pool = robot, pool
+        self._per_command = models.robot(robot).ctrl_per_command
+        self._cache: OrderedDict[bytes, np.ndarray] = OrderedDict()
+
+    def paths(
+        self,
+        trials: Sequence[Trial],
+        sets: Sequence[Sequence[Mapping[str, float]]],
+        *,
+        fine: bool = True,
+    ) -> list[list[np.ndarray]]:
+        """Predicted poses, see `DecomposableModel.paths`."""
+        dt = FINE if fine else COARSE
+        starts = [start(trial) for trial in trials]
+        drives = [
+            [
+                (trial, Changes.of(values), begin)
+                for trial, values, begin in zip(trials, row, starts, strict=True)
+            ]
+            for row in sets
+        ]
+        keys = [[_key(*drive, dt) for drive in row] for row in drives]
+        wanted = {
+            key: drive
+            for names, row in zip(keys, drives, strict=True)
+            for key, drive in zip(names, row, strict=True)
+            if key not in self._cache
+        }
+        made = self._run(wanted, dt)
+        paths = [
+            [
+                tracked(drive[0], self._recall(key, made), drive[1].seen, drive[2])
+                for key, drive in zip(names, row, strict=True)
+            ]
+            for names, row in zip(keys, drives, strict=True)
+        ]
+        while len(self._cache) > DRIVES:
+            self._cache.popitem(last=False)
+        return paths
+
+    def _recall(self, key: bytes, made: Mapping[bytes, np.ndarray]) -> np.ndarray:
+        if key in made:
+            return made[key]
+        self._cache.move_to_end(key)
+        return self._cache[key]
+
+    def _run(self, wanted: Mapping[bytes, tuple], dt: float) -> dict[bytes, np.ndarray]:
+        """Poses from the origin every `KEPT` seconds, ``(S, 3)`` by key."""
+        jobs, yaws = [], []
+        for trial, changes, begin in wanted.values():
+            compiled = scene(self.robot, changes.body, dt)
+            yaw = heading(changes, begin)
+            speeds = told(trial.commands, changes.command, dt) * (1 - changes.lost)
+            jobs.append(
+                Job(
+                    compile.start_state(compiled, (0.0, 0.0, yaw)),
+                    (Segment(compiled, speeds * self._per_command),),
+                )
+            )
+            yaws.append(yaw)
+        every = round(KEPT / dt)
+        place = compile.free_joint(scene(self.robot, (), dt).model)
+        free = slice(1 + place.start, 1 + place.stop)
+        made = {
+            key: observe.planar(motion.states[:, free], yaw)[::every].copy()
+            for key, motion, yaw in zip(wanted, self._pool.map(jobs), yaws, strict=True)
+        }
+        self._cache.update(made)
+        return made
+
+
+def heading(changes: Changes, begin: np.ndarray) -> float:
+    """Heading at which a drive is simulated: the one seen, where it matters."""
+    if any(item.name == "floor_slope" for item in changes.body):
+        return round(float(begin[2] - changes.seen.get("marker_mount.yaw", 0.0)), 6)
+    return 0.0
+
+
+def _key(trial: Trial, changes: Changes, begin: np.ndarray, dt: float) -> bytes:
+    told_as = trial.commands.values.tobytes() + trial.commands.durations.tobytes()
+    words = [*map(str, (*changes.body, *changes.command)), repr(changes.lost)]
+    words += [repr(heading(changes, begin)), repr(dt)]
+    digest = hashlib.blake2b(told_as, digest_size=16)
+    digest.update(";".join(words).encode())
+    return digest.digest()
+
+
+def start(trial: Trial) -> np.ndarray:
+    """Pose seen at the start, ``(3,)``."""
+    seen = np.flatnonzero(np.isfinite(trial.observed[:, :3]).all(axis=1))
+    seen = seen[seen >= trial.boundaries[0]]
+    times = trial.times[seen]
+    count = max(3, int((times < times[0] + RESTING).sum()))
+    return np.median(trial.observed[seen[:count], :3], axis=0)
+
+
+def told(commands: Commands, effects: Sequence[Effect], dt: float) -> np.ndarray:
+    """Speeds told to both wheels at each physics step after effects, ``(S, 2)``.
+
+    A step in which a command ends gets the mean of both by their time, unless an effect
+    switches at a speed.
+    """
+    begins = np.concatenate([[0.0], np.cumsum(commands.durations)])
+    count = int(np.ceil(begins[-1] / dt)) + 1 + round(AFTER / dt)
+    at = np.arange(count) * dt
+    index = np.searchsorted(begins, at + dt / 2, side="right") - 1
+    index = np.where(index >= len(commands), -1, index)
+    held = np.where((index >= 0)[:, None], commands.values[np.maximum(index, 0)], 0.0)
+    values = held
+    if not any(item.name in SWITCHING for item in effects):
+        values = _averaged(commands, begins, np.append(at, at[-1] + dt), held)
+    signal = ControlSignal(at, values, index, ("left_speed", "right_speed"), dt)
+    rng, on = np.random.default_rng(0), np.ones(count, dtype=bool)
+    for item in effects:
+        values = item.apply(signal, on, rng)
+        signal = ControlSignal(at, values, index, signal.channels, dt)
+    return signal.values
+
+
+def _averaged(commands: Commands, begins, edges, held) -> np.ndarray:
+    way = np.cumsum(commands.values * commands.durations[:, None], axis=0)
+    way = np.concatenate([np.zeros((1, 2)), way])
+    area = np.stack([np.interp(edges, begins, column) for column in way.T], axis=1)
+    mean = np.diff(area, axis=0) / np.diff(edges)[:, None]
+    same = np.abs(mean - held).max(axis=1) < 1e-9
+    return np.where(same[:, None], held, mean)
+
+
+def tracked(
+    trial: Trial, poses: np.ndarray, seen: Mapping[str, float], begin: np.ndarray
+) -> np.ndarray:
+    """A path as the tracker would have shown it, ``(T, 3)``.
+
+    Args:
+        trial: recorded trial.
+        poses: every `KEPT` seconds.
+        seen: what the tracker does, by row.
+        begin: pose seen at the start.
+    """
+    turned = seen.get("marker_mount.yaw", 0.0)
+    path = moved(poses, begin - np.array([0.0, 0.0, turned]))
+    at = trial.times - trial.times[trial.boundaries[0]]
+    at = at / (1 + seen.get("clock_drift", 0.0)) + seen.get(LEAD, 0.0)
+    at = at - seen.get("tracker_latency", 0.0)
+    grid = np.arange(len(path)) * KEPT
+    made = np.stack([np.interp(at, grid, column) for column in path.T], axis=1)
+    cos, sin = np.cos(made[:, 2]), np.sin(made[:, 2])
+    dx, dy = seen.get("marker_mount.dx", 0.0), seen.get("marker_mount.dy", 0.0)
+    made[:, 0] += cos * dx - sin * dy
+    made[:, 1] += sin * dx + cos * dy
+    made[:, 2] += turned
+    made[:, :2] *= seen.get("tracker_scale", 1.0)
+    return made

@@ -1,0 +1,89 @@
+"""The joint fit on recordings: shares, statements, dates, and what is left out."""
+
+import numpy as np
+import pytest
+
+from bns.gap.bench.cases import commands
+from bns.gap.decomposition import diagnosis, rest
+from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.row import Row
+from bns.gap.diagnose import diagnose
+from bns.gap.models import wheeled_drives
+from bns.gap.recordings import check
+from bns.worlds.physics.wheeled_world import MujocoWorld
+from bns.worlds.trial import Commands
+
+NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.01"
+GAIN = "wheel_gain:wheel=left,factor=0.8"
+KEPT = ("wheel_gain[left]", "motor_lag[both]", "axle_length", "battery_fade")
+
+
+@pytest.fixture(scope="module")
+def recorded(model):
+    told = [
+        Commands(item.values[:4], item.durations[:4])
+        for item in commands(np.random.default_rng(5), 8)
+    ]
+    plain = MujocoWorld(reality=[NOISE], threads=1).run(told, seeds=range(8))
+    worn = MujocoWorld(reality=[GAIN, NOISE], threads=1).run(told, seeds=range(8))
+    return plain, worn
+
+
+def kept(trials, model):
+    few = [item for item in model.candidates() if item.name in KEPT]
+    return diagnose(trials, model, candidates=few, full=False)
+
+
+def test_damage_that_sets_in_is_dated_and_named(recorded, model):
+    plain, worn = recorded
+    found = kept([*plain[:5], *worn[5:]], model)
+    assert found.verdict.named == (("wheel_gain[left]",),)
+    assert found.change["trial"] == 5
+    assert found.best.magnitudes[0] == pytest.approx(0.8, abs=0.02)
+    assert "sets in at trial 5" in found.verdict.sentence
+
+
+def test_damage_that_was_always_there_has_no_date(recorded, model):
+    found = kept(recorded[1], model)
+    assert found.verdict.named == (("wheel_gain[left]",),)
+    assert not found.change
+    (part,) = found.decomposition["parts"]
+    assert part["last"] > 0.95 and part["alone"] > 0.95 and part["sure"] > 0.95
+    assert found.decomposition["left"] < 0.1
+    assert len(found.decomposition["statements"]) == 3
+
+
+def test_repeats_are_found_with_tolerance(model):
+    told = [Commands([[0.1, 0.05]], [2.0]), Commands([[0.1, 0.05]], [2.004])]
+    other = Commands([[0.1, 0.06]], [2.0])
+    trials = MujocoWorld(reality=[NOISE], threads=1).run([*told, other])
+    trials, _ = check.check(trials, model)
+    assert rest.repeats(Problem.of(trials, model)) == [(0, 1)]
+
+
+def test_a_problem_can_be_narrowed_but_keeps_its_nuisance(recorded, model):
+    problem = diagnosis.narrowed(Problem.of(recorded[0], model), ["axle_length"])
+    assert [row.name for row in problem.rows] == ["axle_length", "step_lead"]
+
+
+def test_every_row_of_a_wheeled_robot_makes_its_effect(recorded, model):
+    for row in model.rows(recorded[0]):
+        if row.nuisance:
+            continue
+        value = row.levels[0] if row.levels else row.nominal + row.difference
+        made = wheeled_drives.effect(row.term, {row.name: value})
+        assert not made.in_trial(1).is_nominal, row.name
+
+
+def test_speeds_told_are_averaged_over_a_step():
+    told = wheeled_drives.told(
+        Commands([[0.1, 0.2], [0.0, 0.0]], [0.013, 0.1]), (), 0.01
+    )
+    np.testing.assert_allclose(told[:3], [[0.1, 0.2], [0.03, 0.06], [0.0, 0.0]])
+
+
+def test_a_row_without_room_is_refused():
+    from bns.errors import BnsError
+
+    with pytest.raises(BnsError, match="between low and high"):
+        Row("x", 0.0, 1.0, 1.0, 2.0)

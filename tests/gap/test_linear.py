@@ -1,0 +1,166 @@
+"""Known answers of the linear fit: what is planted is found, what is not is not."""
+
+import numpy as np
+import pytest
+
+from bns.gap.decomposition.linear import KAPPA, Linear, inflation
+from bns.gap.decomposition.noise import Memory, correlated, scale, weights
+
+NAMES = ("a", "b", "c", "d", "e", "f")
+BLOCKS, EACH = 8, 60
+
+
+class Rows:
+    """Six rows with random columns; what a `Problem` gives a `Linear`."""
+
+    def __init__(self, rng, alike=(), low=-10.0):
+        from bns.gap.decomposition.row import Row
+
+        self.rows = tuple(
+            Row(name, 0.0, 1.0, low, 10.0, slack=0.02 if name == "f" else 0.0)
+            for name in NAMES
+        )
+        self.terms = {name: (at,) for at, name in enumerate(NAMES)}
+        self.nominal, self.sd = np.zeros(6), np.ones(6)
+        self.bounds = np.full(6, low), np.full(6, 10.0)
+        self.block = np.repeat(np.arange(BLOCKS), EACH)
+        self.columns = rng.normal(size=(6, BLOCKS * EACH, 2))
+        for first, second in alike:
+            self.columns[second] = self.columns[first]
+
+    def linear(self, target, sd=1.0, lam=1.0):
+        weight = np.full(target.shape, sd**-2.0)
+        design = dict(enumerate(self.columns))
+        return Linear.of(
+            self, design, dict.fromkeys(range(6), 1.0), target, weight, lam
+        )
+
+
+def planted(rng, problem, **effects):
+    target = rng.normal(size=(BLOCKS * EACH, 2))
+    for name, value in effects.items():
+        target = target + value * problem.columns[NAMES.index(name)]
+    return target
+
+
+@pytest.mark.parametrize(
+    "effects", [{}, {"a": 0.5}, {"a": 0.5, "c": -0.3}, {"b": 2.0, "d": 0.2, "e": 1.0}]
+)
+def test_what_is_planted_is_found_and_nothing_else(effects):
+    rng = np.random.default_rng(0)
+    problem = Rows(rng)
+    linear = problem.linear(planted(rng, problem, **effects))
+    _, found = linear.search()
+    assert found == frozenset(effects)
+    values = linear.solve(found)
+    for name, value in effects.items():
+        assert values[NAMES.index(name)] == pytest.approx(value, abs=0.15)
+
+
+def test_nothing_gives_nothing_nineteen_times_in_twenty():
+    claims = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        problem = Rows(rng)
+        claims += bool(problem.linear(planted(rng, problem)).search()[1])
+    assert claims <= 3
+
+
+def test_what_lies_within_the_slack_is_no_explanation():
+    rng = np.random.default_rng(1)
+    problem = Rows(rng)
+    assert problem.linear(planted(rng, problem, f=0.05)).search()[1] == frozenset()
+    assert problem.linear(planted(rng, problem, f=0.5)).search()[1] == {"f"}
+
+
+def test_what_looks_alike_costs_the_same():
+    rng = np.random.default_rng(2)
+    problem = Rows(rng, alike=[(0, 1)])
+    linear = problem.linear(planted(rng, problem, a=0.6))
+    cost, found = linear.search()
+    assert found in ({"a"}, {"b"})
+    assert linear.cost({"a"}) == pytest.approx(linear.cost({"b"}))
+    assert linear.cost({"a", "b"}) > cost + 0.5 * KAPPA
+    near = [support for _, support in linear.near(1.0)]
+    assert {"a"} in near and {"b"} in near
+    assert linear.inclusion("a") == pytest.approx(linear.inclusion("b"))
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say():
+    held = 0
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        problem = Rows(rng)
+        linear = problem.linear(planted(rng, problem, a=0.5))
+        spread = 1.645 * np.sqrt(linear.covariance({"a"})[0, 0])
+        held += abs(linear.solve({"a"})[0] - 0.5) < spread
+    assert 0.83 <= held / 200 <= 0.96
+
+
+def test_a_bound_is_kept():
+    rng = np.random.default_rng(3)
+    problem = Rows(rng, low=0.0)
+    assert problem.linear(planted(rng, problem, a=-0.5)).search()[1] == frozenset()
+
+
+def test_held_out_squares_fall_for_what_is_there_and_rise_for_what_is_not():
+    rng = np.random.default_rng(4)
+    problem = Rows(rng)
+    linear = problem.linear(planted(rng, problem, a=0.5))
+    nothing = linear.held_out(()).sum()
+    assert linear.held_out({"a"}).sum() < nothing
+    assert linear.held_out({"a", "b", "c", "d"}).sum() > linear.held_out({"a"}).sum()
+
+
+def test_a_row_that_sets_in_is_a_column_of_its_own():
+    rng = np.random.default_rng(5)
+    problem = Rows(rng)
+    target = planted(rng, problem)
+    late = problem.block >= 5
+    target[late] += 0.6 * problem.columns[0][late]
+    linear = problem.linear(target)
+    costs = {k: linear.since("a", k, "a@").cost({"a@"}) for k in range(1, BLOCKS)}
+    assert min(costs, key=costs.get) == 5
+    assert costs[5] < linear.cost({"a"}) - 3
+
+
+def test_residuals_that_repeat_count_once():
+    rng = np.random.default_rng(6)
+    problem = Rows(rng)
+    slow = np.repeat(rng.normal(size=(BLOCKS * EACH // 10, 2)), 10, axis=0)
+    trial = problem.block
+    assert correlated(slow, trial) > 5
+    assert correlated(rng.normal(size=slow.shape), trial) < 1.3
+    problem.columns = np.repeat(problem.columns[:, ::10], 10, axis=1)
+    linear = problem.linear(slow)
+    assert inflation(linear, linear.solve(())) > 4
+
+
+def test_the_noise_is_measured_and_grows_with_the_motion():
+    rng = np.random.default_rng(7)
+    speed = rng.uniform(0, 1, size=(4000, 1))
+    true = np.hypot(0.1, 0.5 * speed)
+    rest = true * rng.standard_t(4, size=speed.shape) / np.sqrt(2)
+    rest[::50] += 20.0  # wild points
+    made = scale(rest, speed, np.array([1e-3]))
+    middle = rest / made
+    assert np.median(np.abs(middle)) == pytest.approx(0.6745, rel=0.05)
+    slow, fast = speed[:, 0] < 0.1, speed[:, 0] > 0.9
+    assert made[fast].mean() / made[slow].mean() == pytest.approx(
+        true[fast].mean() / true[slow].mean(), rel=0.25
+    )
+    heavy = weights(rest, made, np.isfinite(rest)) * made**2
+    assert heavy[::50].max() < 0.15 < 0.9 < np.median(heavy)
+
+
+def test_an_autoregression_is_taken_out():
+    rng = np.random.default_rng(8)
+    trial = np.repeat(np.arange(4), 500)
+    values = np.zeros((2000, 1))
+    noise = rng.normal(size=2000)
+    for at in range(1, 2000):
+        values[at] = 0.9 * values[at - 1] + noise[at]
+    memory = Memory.of(values, trial, 1)
+    assert memory.factors[0, 0] == pytest.approx(0.9, abs=0.05)
+    assert correlated(memory(values), trial) < 1.3 < 5 < correlated(values, trial)
+    assert Memory.of(values, trial, 0)(values) is values
