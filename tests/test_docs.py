@@ -42,6 +42,8 @@ def test_links_lead_somewhere(page):
             continue
         target, _, anchor = link.partition("#")
         path = (page.parent / target) if target else page
+        if path.is_relative_to(ROOT / "docs" / "reference"):
+            continue  # made of docstrings by .ci/site.py
         assert path.exists(), f"{ids(page)} links to {link}, which is not there"
         if anchor and path.suffix == ".md":
             assert anchor in anchors(path), f"{ids(page)}: no heading for {link}"

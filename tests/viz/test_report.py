@@ -87,7 +87,8 @@ def test_several_runs_are_compared(record, tmp_path, unpictured):
     made = report.write({"one": record, "two": other}, tmp_path / "a.html")
     text = made.read_text(encoding="utf-8")
     assert "one against two" in text and "Side by side" in text
-    assert '<th scope="row">seed</th><td>0</td><td>7</td>' in text
+    cells = '<td data-label="one">0</td><td data-label="two">7</td>'
+    assert f'<th scope="row">seed</th>{cells}' in text
     assert "0.50 (" in text  # A12 of equal samples
 
 
