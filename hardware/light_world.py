@@ -82,7 +82,7 @@ class HardwareLight(HardwareWorld):
             cycles: commands of the trial, 1 to a million.
             cycle: duration of each, 0.2 to 60 [s].
             trial: its number, counted from 0.
-            seeds: of what is random, one at most.
+            seeds: of what is random, one; without it and `starts` nothing is done.
             starts: pose in the world frame, ``(1, 3)`` [m, m, rad]; None = a random
                 one.
 

@@ -201,7 +201,8 @@ def verdict(
 
     Args:
         says: what is claimed of side a: ">", "<", "=" or "?".
-        share: A12, or the share of runs above the number, 0 to 1.
+        share: A12; against a number the share of runs on the claimed side, with
+            `says` ">".
         p: two-sided, over the looks made.
         p_holm: that p, adjusted by Holm's method.
         equivalent: p of the two one-sided tests of equivalence; 1 = not shown.

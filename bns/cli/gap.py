@@ -26,7 +26,7 @@ def main(verb: str, argv: list[str]) -> int:
 
     Raises:
         UnknownNameError: no such verb of the gap diagnosis.
-        SystemExit: help was asked for, with code 0.
+        SystemExit: help was asked for, or nothing was given; with code 0.
     """
     del verb
     if not argv or argv[0] in (*HELP, HELP_ALL):

@@ -49,6 +49,9 @@ def runs_needed(a12: float, *, wanted: float = 0.8, level: float = LEVEL) -> flo
         a12: probability that a value of one side is larger than one of the other.
         wanted: power that is to be reached, 0 to 1.
         level: of significance.
+
+    Raises:
+        BnsError: an A12 outside 0 to 1.
     """
     if power(a12, MOST, MOST, level=level) < wanted:
         return float("inf")
