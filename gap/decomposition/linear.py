@@ -341,18 +341,17 @@ class Linear:
         """Derivative of half the weighted square by stretch, ``(B, K)``."""
         return self.slope - self.normal @ values
 
-    def since(self, name: str, block: int, label: str) -> "Linear":
-        """With a further explanation: that one, from a stretch on.
+    def since(self, name: str, on: np.ndarray, label: str) -> "Linear":
+        """With a further explanation: that one, in some stretches only.
 
         Args:
             name: explanation.
-            block: first stretch in which it holds.
+            on: in which stretches it holds, booleans ``(B,)``.
             label: name of the new one.
         """
         old = list(self.terms[name])
         size, more = self.design.shape[-1], len(old)
         index = np.r_[np.arange(size), old]
-        on = np.arange(len(self.square)) >= block
         normal = self.normal[:, index][:, :, index].copy()
         slope = self.slope[:, index].copy()
         normal[~on, size:, :] = 0.0

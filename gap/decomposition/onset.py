@@ -1,5 +1,6 @@
 """Damage that sets in: the trial from which an explanation holds."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +22,7 @@ class Onset:
     Attributes:
         name: of the explanation.
         place: of the first trial in which it holds.
-        trial: number of that trial.
+        trial: number of that trial, in all runs of the recording.
         gain: nats that the date brings.
     """
 
@@ -48,51 +49,79 @@ def dated(
     count = len(problem.trials)
     if count < TRIALS or int(problem.block.max()) + 1 != count:
         return None
+    cuts = _cuts(problem)
+    if not cuts:
+        return None
     tries = []
     for point in (start, best):
         base = point.linear.search(start=best.support)[1]
-        tries.append((*_best(point.linear, base, best.support), point, base))
-    cost, name, place, support, point, base = min(tries, key=lambda item: item[0])
+        tries.append((*_best(point.linear, base, best.support, cuts), point, base))
+    cost, cut, support, point, base = min(tries, key=lambda item: item[0])
     gain = point.linear.cost(base) - cost
-    if gain <= WORTH or not _lasting(point.linear, base, name, place, support):
+    if gain <= WORTH or not _lasting(point.linear, base, cut, support):
         return None
+    name, number = cut.name, cut.trial
     rows = [problem.rows[k].name for k in problem.terms[name]]
-    number = problem.numbers[place]
     split = replace(problem, onset=dict.fromkeys(rows, number))
-    values = _values(split, point, name, place, support)
+    values = _values(split, point, cut, support)
     wanted = (support - {LATE}) | {name}
     late = descent.descend(split, values, wanted, best.noise)
     costs = descent.costs(split, [best, late])
-    paid = np.log(count - 2)
+    paid = np.log(len(cuts))
     if name not in late.support or costs[1] + paid + WORTH > costs[0]:
         return None
+    place = problem.numbers.index(number)
     return split, late, Onset(name, place, number, float(costs[0] - costs[1] - paid))
 
 
-def _late(linear: Linear, name: str, place: int) -> Linear:
-    made = linear.since(name, place, LATE)
-    count = len(linear.square)
-    return replace(made, penalty={**made.penalty, LATE: KAPPA + np.log(count - 2)})
+@dataclass(frozen=True, eq=False)
+class _Cut:
+    """From when on an explanation holds.
+
+    Attributes:
+        trial: number of the first trial, in every run.
+        on: the trials from then on, booleans ``(T,)``.
+        paid: nats for having chosen among all moments.
+        name: of the explanation, empty = any.
+    """
+
+    trial: int
+    on: np.ndarray
+    paid: float
+    name: str = ""
 
 
-def _best(linear: Linear, base: Support, support: Support):
-    """Cost, name, place and set of the best explanation that sets in."""
-    found = (np.inf, "", 0, frozenset())
+def _cuts(problem: Problem) -> list[_Cut]:
+    """The moments that are tried: two trials before each at least."""
+    numbers = np.array(problem.numbers)
+    found = [k for k in sorted({*problem.numbers}) if (numbers < k).sum() >= 2]
+    return [_Cut(k, numbers >= k, float(np.log(len(found)))) for k in found]
+
+
+def _late(linear: Linear, cut: _Cut) -> Linear:
+    made = linear.since(cut.name, cut.on, LATE)
+    return replace(made, penalty={**made.penalty, LATE: KAPPA + cut.paid})
+
+
+def _best(linear: Linear, base: Support, support: Support, cuts: Sequence[_Cut]):
+    """Cost, moment and set of the best explanation that sets in."""
+    found = (np.inf, cuts[0], frozenset())
     for name in linear.free:
-        for place in range(2, len(linear.square)):
-            late = _late(linear, name, place)
+        for each in cuts:
+            cut = replace(each, name=name)
+            late = _late(linear, cut)
             for other in {frozenset(), base - {name}, support - {name}}:
                 if not other <= frozenset(late.free):
                     continue
                 cost = late.cost(other | {LATE})
                 if cost < found[0]:
-                    found = (cost, name, place, other | {LATE})
+                    found = (cost, cut, other | {LATE})
     return found
 
 
-def _lasting(linear: Linear, base, name: str, place: int, support: Support) -> bool:
+def _lasting(linear: Linear, base, cut: _Cut, support: Support) -> bool:
     """Whether the date brings as much with each trial left out."""
-    late = _late(linear, name, place)
+    late = _late(linear, cut)
     count = len(linear.square)
     for out in range(count):
         kept = np.arange(count) != out
@@ -102,12 +131,12 @@ def _lasting(linear: Linear, base, name: str, place: int, support: Support) -> b
     return True
 
 
-def _values(problem: Problem, point: Point, name: str, place: int, support: Support):
+def _values(problem: Problem, point: Point, cut: _Cut, support: Support):
     """Values of the rows by the linear model, those that set in at theirs."""
-    late = _late(point.linear, name, place)
+    late = _late(point.linear, cut)
     found = late.solve(support)
     values = placed(problem, point.linear, support - {LATE}, point.values)
-    for at, number in zip(late.terms[LATE], problem.terms[name], strict=False):
+    for at, number in zip(late.terms[LATE], problem.terms[cut.name], strict=False):
         row = problem.rows[number]
         values[number] = row.nominal + found[at] * row.sd
     return np.clip(values, *problem.bounds)

@@ -119,7 +119,10 @@ def test_a_row_that_sets_in_is_a_column_of_its_own():
     late = problem.block >= 5
     target[late] += 0.6 * problem.columns[0][late]
     linear = problem.linear(target)
-    costs = {k: linear.since("a", k, "a@").cost({"a@"}) for k in range(1, BLOCKS)}
+    costs = {
+        k: linear.since("a", np.arange(BLOCKS) >= k, "a@").cost({"a@"})
+        for k in range(1, BLOCKS)
+    }
     assert min(costs, key=costs.get) == 5
     assert costs[5] < linear.cost({"a"}) - 3
 
