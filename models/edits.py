@@ -15,6 +15,12 @@ def load(
 ) -> Any:
     """The robot's `mujoco.MjSpec`, its options applied.
 
+    Args:
+        robot: the robot's files and options.
+        scene: with the scene's floor and light; False = the robot alone.
+        visuals: with what is only seen; False = stripped.
+        options: chosen alternative by option; the others stay as in the file.
+
     Raises:
         UnknownNameError: an option or alternative that the robot does not offer.
         FormatError: a file that is missing or that MuJoCo cannot read.

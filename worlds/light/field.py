@@ -90,7 +90,9 @@ class LightField:
         return np.stack([lamp.position for lamp in self.lamps])
 
     def law(self) -> dict[str, np.ndarray]:
-        """The numbers of the light, see `bns.worlds.light.law`."""
+        """The numbers of the light by name; `bns.worlds.light.law` has their shapes and
+        units.
+        """
         return {
             "lamp_position": self.positions,
             "lamp_power": np.array([lamp.power for lamp in self.lamps]),

@@ -140,5 +140,7 @@ def _shadow(law: Law, poses: np.ndarray) -> np.ndarray:
 
 
 def stacked(laws: Sequence[Law]) -> dict[str, np.ndarray]:
-    """The laws of several robots as one, with a leading robot axis."""
+    """The laws of n robots as one, by name: each array with a leading robot axis, ``(n,
+    ...)``.
+    """
     return {name: np.stack([law[name] for law in laws]) for name in laws[0]}
