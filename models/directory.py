@@ -47,7 +47,8 @@ def texts(
 
     Args:
         name: of the robot.
-        templates: text of each file by the file's name, in which ``{name}`` may stand.
+        templates: name of each file's template, by the file's name, in which
+            ``{name}`` may stand.
         content: what the templates are filled with, by name.
     """
     return {

@@ -17,8 +17,8 @@ def load(
 
     Args:
         robot: the robot's files and options.
-        scene: with the scene's floor and light; False = the robot alone.
-        visuals: with what is only seen; False = stripped.
+        scene: with a floor, a light and a camera; False = the robot alone.
+        visuals: with what only shows; False = see `strip`.
         options: chosen alternative by option; the others stay as in the file.
 
     Raises:

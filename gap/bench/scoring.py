@@ -105,7 +105,7 @@ def intervals(
 
     Args:
         said: what was said of the case, as `said` gives it.
-        names: true effects, in the order in which they were fitted.
+        names: true effects, in the answer's order.
         rules: thresholds and widths of intervals.
     """
     made = []

@@ -196,7 +196,7 @@ def flexible(problem: Problem) -> np.ndarray:
     their sizes, signs and recent changes, products, heading, position and time.
 
     Returns:
-        ``(M, K)``: K directions of the M whitened residuals.
+        ``(N, k)``: k directions of N whitened residuals.
     """
     made = [
         columns(problem.model.regime(trial, windows))

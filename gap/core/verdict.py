@@ -192,7 +192,7 @@ def judge(
 
     Args:
         rung: the chosen size.
-        p_gap: probability of so large a gap without an effect.
+        p_gap: probability of so large a gap if there were none.
         rules: thresholds.
     """
     sets = tuple(names for names, score in rung.scores if score <= rules.tie)

@@ -110,7 +110,5 @@ def terms(z: np.ndarray) -> np.ndarray:
 
 
 def weights(z: np.ndarray) -> np.ndarray:
-    """Square roots of the weights that make least squares of the loss, each of one
-    residual.
-    """
+    """Root weight of each residual that makes least squares of the loss."""
     return np.sqrt(np.minimum(1.0, CLIP / np.maximum(np.abs(z), 1e-12)))

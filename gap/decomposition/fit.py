@@ -81,8 +81,7 @@ def smooth(problem: Problem, values: np.ndarray) -> list[int]:
 
 
 def columns(problem: Problem, values: np.ndarray) -> dict[int, np.ndarray]:
-    """Columns of the linear model; that of a row set to a level is the whole change
-    from nominal, over its size.
+    """Columns of the linear model; a row set to a level has its secant from nominal.
 
     Args:
         problem: the recording.
@@ -148,7 +147,7 @@ def first_noise(problem: Problem, rest: np.ndarray, motion: np.ndarray) -> Noise
     Args:
         problem: the recording.
         rest: residuals, ``(N, C)``.
-        motion: features by whose motion the noise may grow, ``(N, C)``.
+        motion: predicted features, with whose motion noise may grow, ``(N, C)``.
     """
     memory = Memory.none(problem.trial, rest.shape[1])
     sd = noise.scale(rest, problem.model.motion(motion), problem.model.least)

@@ -16,9 +16,7 @@ SPARE_BITS = 1 << 16  # an int16 that was read as unsigned is this much too larg
 
 
 def signed(raw: np.ndarray) -> np.ndarray:
-    """Undo the wrap of 16-bit numbers that were stored as unsigned: 65535 is -1. The
-    shape stays.
-    """
+    """Undo the wrap of 16-bit numbers stored as unsigned: 65535 is -1. Any shape."""
     raw = np.asarray(raw, dtype=np.float64)
     return np.where(raw >= SPARE_BITS // 2, raw - SPARE_BITS, raw)
 

@@ -91,8 +91,8 @@ class UnicycleModel:
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """See `GapModel.compare`: displacement in the robot's frame at the start of
-        each window, ``(..., W, 3)``.
+        """See `GapModel.compare`: displacement in the frame of each window's first
+        pose.
         """
         begin, end = observed[..., windows.first, :], observed[..., windows.last, :]
         return body_displacement(begin, end)

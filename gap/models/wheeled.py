@@ -131,8 +131,8 @@ class WheeledModel(DecomposableModel):
     def sketch(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
-        """As `simulate`, each ``(T, 3)``, but quicker: by the reduced dynamics where
-        they do.
+        """As `simulate`, each ``(T, 3)``, quicker: by the reduced dynamics where they
+        do.
         """
         return self._simulated(trials, effects, rough=True)
 
@@ -298,8 +298,8 @@ class WheeledModel(DecomposableModel):
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """See `GapModel.compare`: displacement in the robot's frame at the start of
-        each window, ``(..., W, 3)``.
+        """See `GapModel.compare`: displacement in the frame of each window's first
+        pose.
         """
         begin, end = observed[..., windows.first, :], observed[..., windows.last, :]
         return body_displacement(begin, end)

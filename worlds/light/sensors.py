@@ -59,8 +59,8 @@ class LightSensors:
     sight: Sight | None = None
 
     def law(self, field: LightField) -> dict[str, np.ndarray]:
-        """All numbers of light and sensors by name; `bns.worlds.light.law` has their
-        shapes and units.
+        """All numbers of light and sensors; shapes and units as in
+        `bns.worlds.light.law`.
         """
         scalars = (
             "exponent",

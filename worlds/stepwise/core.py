@@ -180,9 +180,7 @@ class Stepwise:
         return self.reset(self.seed).channels
 
     def state(self) -> np.ndarray | None:
-        """Full physics state of the robot now, ``(nstate,)``; None where the world has
-        no session.
-        """
+        """Physics state of the robot now, ``(nstate,)``; None without a session."""
         if self._session is None:
             return None
         now = self._session.cycle * self._session.setting.steps

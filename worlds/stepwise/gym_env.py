@@ -91,9 +91,7 @@ class RobotEnv(gymnasium.Env):
         return self._observation(seen), self._info(seen)
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """See `gymnasium.Env.step`: one command; the observation is like
-        `observation_space`.
-        """
+        """See `gymnasium.Env.step`: one command; observed as in `reset`."""
         seen = self.episode.act(action)
         return (
             self._observation(seen), seen.reward, seen.over,

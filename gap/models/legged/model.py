@@ -135,9 +135,7 @@ class WalkModel:
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
-        """See `GapModel.simulate`: poses [m, m, rad] and servo positions, ``(T, 3 +
-        J)`` each.
-        """
+        """See `GapModel.simulate`: poses [m, m, rad] and servo positions [rad]."""
         return [[self._walked(trial, items) for trial in trials] for items in effects]
 
     def _walked(self, trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
@@ -169,9 +167,7 @@ class WalkModel:
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """See `GapModel.compare`: the body's displacement in its frame, and servo
-        positions at the end, ``(..., W, 3 + J)``.
-        """
+        """See `GapModel.compare`: the body's displacement, then servo positions."""
         begin, end = observed[..., windows.first, :], observed[..., windows.last, :]
         moved = body_displacement(begin[..., :3], end[..., :3])
         return np.concatenate([moved, end[..., 3:]], axis=-1)

@@ -34,9 +34,7 @@ SCATTER = 0.188  # standard deviation of `unlikely` of a normal number
 
 
 def squeezed(departure: np.ndarray) -> np.ndarray:
-    """Departures, each so changed that large ones count less: a noisy sensor has many
-    of them. They are in units of a reading's noise.
-    """
+    """Departures, each in units of its noise, of which large ones count less."""
     return 2 * np.arcsinh(departure / 2) / SQUEEZED
 
 
@@ -234,9 +232,7 @@ class SightModel:
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """See `GapModel.compare`: departure and scatter at the end of each window,
-        ``(..., W, 2 R)``.
-        """
+        """See `GapModel.compare`: departure and scatter at each window's end."""
         return observed[..., windows.last, 3:]
 
     def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:

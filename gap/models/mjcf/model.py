@@ -152,9 +152,7 @@ class OwnModel(DecomposableModel):
         *,
         fine: bool = True,
     ) -> list[list[np.ndarray]]:
-        """See `DecomposableModel.paths`; the coarse step is that of the model. Each
-        ``(T, n_channels)``.
-        """
+        """See `DecomposableModel.paths`; the coarse step is that of the model."""
         pairs, leads = [], []
         for row in sets:
             for trial, values in zip(trials, row, strict=True):
@@ -294,9 +292,7 @@ class OwnModel(DecomposableModel):
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """See `GapModel.compare`: what is observed at the end of each window, ``(...,
-        W, C)``.
-        """
+        """See `GapModel.compare`: what is observed at the end of each window."""
         return observed[..., windows.last, :]
 
     def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:

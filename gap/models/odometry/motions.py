@@ -129,8 +129,7 @@ def wrapped(angles: np.ndarray) -> np.ndarray:
 
 
 def changed(magnitudes: Mapping[str, float]) -> np.ndarray:
-    """Changes of `NUMBERS`, from those that are not zero, in that order,
-    ``(len(NUMBERS),)``.
+    """Changes of `NUMBERS` in their order, ``(K,)``, from those that are not zero.
 
     Raises:
         ValueError: a name that is none of `NUMBERS`.

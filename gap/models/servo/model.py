@@ -71,8 +71,7 @@ class ServoModel:
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
-        """See `GapModel.simulate`: predicted angles, ``(T, n_channels)`` each; other
-        channels as recorded.
+        """See `GapModel.simulate`: predicted angles [rad]; other channels as recorded.
 
         Raises:
             BnsError: a trial is shorter than two samples.
@@ -120,9 +119,7 @@ class ServoModel:
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """See `GapModel.compare`: the angle at the end of each window, ``(..., W, 1)``
-        [rad].
-        """
+        """See `GapModel.compare`: the angle at the end of each window [rad]."""
         return observed[..., windows.last, :1]
 
     def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
