@@ -91,9 +91,7 @@ class UnicycleModel:
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """See `GapModel.compare`: displacement in the frame of each window's first
-        pose.
-        """
+        """See `GapModel.compare`: displacement in each window's first frame."""
         begin, end = observed[..., windows.first, :], observed[..., windows.last, :]
         return body_displacement(begin, end)
 

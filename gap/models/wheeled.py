@@ -131,9 +131,7 @@ class WheeledModel(DecomposableModel):
     def sketch(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
-        """As `simulate`, each ``(T, 3)``, quicker: by the reduced dynamics where they
-        do.
-        """
+        """As `simulate`, each ``(T, 3)``, by the reduced dynamics where they do."""
         return self._simulated(trials, effects, rough=True)
 
     def _simulated(
@@ -298,9 +296,7 @@ class WheeledModel(DecomposableModel):
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """See `GapModel.compare`: displacement in the frame of each window's first
-        pose.
-        """
+        """See `GapModel.compare`: displacement in each window's first frame."""
         begin, end = observed[..., windows.first, :], observed[..., windows.last, :]
         return body_displacement(begin, end)
 

@@ -44,7 +44,7 @@ def shares(
 def suspects(
     rests: Sequence[np.ndarray], names: Sequence[str], sigma: float
 ) -> Suspects:
-    """Joints and legs to be considered; arguments as `shares`.
+    """Joints and legs to be considered.
 
     Args:
         rests: recorded minus predicted positions of each trial, ``(T, J)`` [rad].

@@ -38,7 +38,7 @@ def analyse(
     most: int = 3,
     reference: Sequence[Trial] = (),
 ) -> tuple[Analysis, Analysis]:
-    """Motion and readings of recordings with light; arguments as `diagnose.analyse`.
+    """Motion and readings of recordings with light, each analysed by itself.
 
     Args:
         trials: recordings with light.

@@ -34,7 +34,10 @@ SCATTER = 0.188  # standard deviation of `unlikely` of a normal number
 
 
 def squeezed(departure: np.ndarray) -> np.ndarray:
-    """Departures, each in units of its noise, of which large ones count less."""
+    """Departures, each in units of its noise, of which large ones count less.
+
+    A noisy sensor has many of them.
+    """
     return 2 * np.arcsinh(departure / 2) / SQUEEZED
 
 

@@ -74,7 +74,7 @@ class ServoModel:
         """See `GapModel.simulate`: predicted angles [rad]; other channels as recorded.
 
         Raises:
-            BnsError: a trial is shorter than two samples.
+            BnsError: a trial is shorter than two hundredths of a second.
         """
         groups: dict[int, list[int]] = {}
         for number, trial in enumerate(trials):
