@@ -44,7 +44,13 @@ class FaultLog:
         self._unwritten: list[Fault] = []
 
     def note(self, kind: str, about: bytes | str = "", seen: bytes | str = "") -> None:
-        """Add a fault."""
+        """Add a fault.
+
+        Args:
+            kind: "no answer", "garbled answer", ...
+            about: command or part that it concerns.
+            seen: what was there instead.
+        """
         fault = Fault(round(self.clock.now(), 4), kind, _text(about), _text(seen))
         self.counts[kind] += 1
         if len(self.faults) < KEPT:

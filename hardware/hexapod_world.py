@@ -121,6 +121,12 @@ def told(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Goals as they are sent.
 
+    Args:
+        given: K commands.
+        stages: effects that act on them.
+        seed: of what is random in those.
+        trial: its number, counted from 0.
+
     Returns:
         of each command, ``(K, 18)``, and before the first one, ``(18,)`` [rad].
     """

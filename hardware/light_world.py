@@ -77,6 +77,15 @@ class HardwareLight(HardwareWorld):
     ) -> list[Trial]:
         """Let a controller drive the robot, see `LightWorld.drive`.
 
+        Args:
+            policy: the controller.
+            cycles: commands of the trial, 1 to a million.
+            cycle: duration of each, 0.2 to 60 [s].
+            trial: its number, counted from 0.
+            seeds: of what is random, one; without it and `starts` nothing is done.
+            starts: pose in the world frame, ``(1, 3)`` [m, m, rad]; None = a random
+                one.
+
         Raises:
             BnsError: more than one robot, a command that can not be, no robot there.
             SafetyStop: the robot was stopped.

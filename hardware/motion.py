@@ -106,7 +106,12 @@ class Mover(SafetyMonitor):
         self.clock.sleep(TICK)
 
     def drive(self, left: float, right: float, *, times: int = 2) -> Drive:
-        """Set the speeds [m/s] and remember them."""
+        """Set the speeds and remember them.
+
+        Args:
+            left, right: of the wheels over the floor [m/s].
+            times: how often they are sent, see `Khepera3.drive`.
+        """
         self._moving = self._moving or bool(left or right)
         drive = self.robot.drive(left, right, times=times)
         self._check.told(drive.at, left, right)
@@ -199,7 +204,13 @@ class Mover(SafetyMonitor):
     def until(
         self, moment: float, done: Performed, ends: Callable[[Sighting], bool]
     ) -> bool:
-        """Tick until a moment [s], or a sighting that ends it; whether none did."""
+        """Tick until a moment, or a sighting that ends it; whether none did.
+
+        Args:
+            moment: on the session's clock [s].
+            done: takes the sightings.
+            ends: whether a sighting ends it.
+        """
         while (left := moment - self.clock.now()) > 0.0005:
             for sighting in self.look():
                 done.sightings.append(sighting)

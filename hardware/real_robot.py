@@ -102,6 +102,14 @@ class RealRobot(ABC, Generic[RigT]):
     ) -> list[Trial]:
         """Execute one list of commands on the robot, see `World.run`.
 
+        Args:
+            commands: one list.
+            trial: its number, counted from 0; effects have their onset on it.
+            seeds: of what is random, one or none.
+
+        Returns:
+            the trial; none for no list.
+
         Raises:
             BnsError: more than one list, commands that the robot cannot be told, no
                 robot there.

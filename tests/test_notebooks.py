@@ -19,7 +19,8 @@ def cells(notebook):
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_a_notebook_is_the_page(page):
     made = jupytext.read(NOTEBOOKS / f"{page.stem}.ipynb")
-    again = f"jupytext --to ipynb --output-dir examples/notebooks {page}"
+    kept = f"examples/notebooks/{page.stem}.ipynb"
+    again = f"jupytext --to ipynb --output {kept} {page}"
     assert cells(made) == cells(jupytext.read(page)), f"make it again: {again}"
 
 

@@ -19,6 +19,11 @@ MOST_CURVES = 7
 def write(found: Results, folder: Path, measure: str) -> list[Path]:
     """Write curves.png and sensitivity.png; gives the files.
 
+    Args:
+        found: results of a campaign.
+        folder: where to; made if it is not there.
+        measure: that sensitivity.png shows.
+
     Raises:
         BnsError: there are no runs yet.
     """

@@ -50,6 +50,12 @@ def log_bars(stream, record: RunRecord, replicate: int, chosen: Sequence[Choice]
     A chart over trials could not be seen while the time line counts seconds; bars
     are on no time line. A series each for the trials before damage, after it, and
     for every chosen trial.
+
+    Args:
+        stream: Rerun's recording stream.
+        record: of the run.
+        replicate: which of its runs.
+        chosen: trials to set apart.
     """
     import rerun as rr
 

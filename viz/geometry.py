@@ -25,7 +25,13 @@ _SHEET = 0.002
 
 
 def entity(model, body: int, root: str) -> str:
-    """Entity path of a body: ``root/name``."""
+    """Entity path of a body: ``root/name``.
+
+    Args:
+        model: MuJoCo's.
+        body: its number in the model.
+        root: path under which the model's bodies are.
+    """
     name = model.body(body).name or f"body_{body}"
     return f"{root}/{name.replace('/', '_')}"
 
@@ -110,7 +116,14 @@ def send_poses(stream, model, times: Sequence, qpos, *, root: str = "world") -> 
 
 
 def xyzw(quaternion: np.ndarray) -> np.ndarray:
-    """MuJoCo's wxyz as Rerun's xyzw, along the last axis."""
+    """MuJoCo's wxyz as Rerun's xyzw, along the last axis.
+
+    Args:
+        quaternion: ``(..., 4)``, the real part first.
+
+    Returns:
+        ``(..., 4)``, the real part last.
+    """
     return np.roll(quaternion, -1, axis=-1)
 
 

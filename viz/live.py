@@ -60,7 +60,13 @@ class Stream:
         self._guard(lambda: self._open(url))
 
     def on_trial(self, number: int, step: Step, trials: Sequence[Trial] = ()) -> None:
-        """Send one trial, in one batch."""
+        """Send one trial, in one batch.
+
+        Args:
+            number: of the trial, counted from 0.
+            step: what the runs did in it.
+            trials: not used.
+        """
         self._guard(lambda: self._send(number, step))
 
     def close(self) -> None:

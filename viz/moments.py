@@ -66,7 +66,13 @@ def send(
 
 
 def duration(record: RunRecord, replicate: int, chosen: Sequence[Choice]) -> float:
-    """How long the chosen trials take one after another, pauses included [s]."""
+    """How long the chosen trials take one after another, pauses included [s].
+
+    Args:
+        record: of the run.
+        replicate: which of its runs.
+        chosen: the trials.
+    """
     numbers = [choice.trial for choice in chosen]
     told = tasks.of(record.config).durations(record, (replicate, numbers))
     return float(np.nansum(told)) + GAP * len(chosen)
@@ -78,7 +84,18 @@ def _durations(record: RunRecord, at, count: int) -> np.ndarray:
 
 
 def samples(record, at, trial: Trial | None, model):
-    """Times from the trial's start [s], planar poses and qpos of one trial."""
+    """Times, planar poses and qpos of one trial.
+
+    Args:
+        record: of the run.
+        at: replicate and trial, an index of its arrays.
+        trial: with all its samples; None = poses after commands, joined by arcs.
+        model: MuJoCo's, of the robot.
+
+    Returns:
+        times from the trial's start ``(n,)`` [s], poses ``(n, 3)`` [m, m, rad], qpos
+        ``(n, nq)``.
+    """
     if trial is None:
         return _sparse(record, at, model)
     step = np.diff(trial.times, prepend=-np.inf)

@@ -5,6 +5,15 @@ PARAMETERS = {"trials": 10}
 
 
 def resets(trial: int, onset: int, *, trials: float) -> set[str]:
-    """The population, before trials k, 2 k, ..."""
+    """The population, before trials k, 2 k, ...
+
+    Args:
+        trial: number of the trial that comes next, counted from 0.
+        onset: first damaged trial; not used.
+        trials: k, from one reset to the next.
+
+    Returns:
+        names of what is reset: "population", or none.
+    """
     del onset
     return {"population"} if trial > 0 and trial % trials == 0 else set()

@@ -86,6 +86,12 @@ def run(
 def opened(campaign: Campaign, out: Path, *, resume: bool, lock: Lock) -> CampaignStore:
     """The store to go on with, or a new one, in a directory that is locked.
 
+    Args:
+        campaign: what is to run.
+        out: directory of the store.
+        resume: whether to go on with a store that is there.
+        lock: held on that directory; the store keeps it.
+
     Raises:
         BnsError: the directory is not free, or holds a campaign of another seed.
     """

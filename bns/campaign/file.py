@@ -113,7 +113,17 @@ def read(path: Path | str, *, sure: bool = False) -> Campaign:
 def from_content(
     content: Mapping[str, Any], name: str, *, sure: bool = False
 ) -> Campaign:
-    """The campaign in the content of a TOML file; see `read`."""
+    """The campaign in the content of a TOML file; see `read`.
+
+    Args:
+        content: tables and keys, as parsed.
+        name: of the campaign, where the content gives none.
+        sure: take a very large one.
+
+    Raises:
+        UnknownNameError: a key or table that campaign files do not have.
+        BnsError: a value that is not allowed, an empty campaign, or a very large one.
+    """
     for key in content:
         if key not in TOP + TABLES:
             raise UnknownNameError("key of a campaign file", key, TOP + TABLES)

@@ -179,8 +179,15 @@ def content(schema: Any, name: object) -> dict[str, Any]:
 def from_table(head: Mapping[str, Any], table: Any, name: str) -> Part:
     """The part of a head and its figures.
 
+    Args:
+        head: what is said of the part: format, schema, key, facts, blocks.
+        table: Arrow table of the figures, a row per replicate and trial, block after
+            block.
+        name: of the file, for messages.
+
     Raises:
-        FormatError: they are not of this format, or of a newer version.
+        FormatError: they are not of this format, of a newer version, or rows are
+            missing or too many.
     """
     if head.get("format") != FORMAT or type(head.get("schema")) is not int:
         raise FormatError(f"{name} is no part of a campaign.")

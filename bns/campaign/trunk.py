@@ -138,6 +138,11 @@ def read(path: Path, *, seed: int, trials: int) -> Trunk | None:
     """The trunk in a file; None where there is none of this seed and length.
 
     A file that cannot be read is as good as none: the trials are trained again.
+
+    Args:
+        path: of the file; it need not be there.
+        seed: of the batch that is to go on from it.
+        trials: how many it has to hold.
     """
     if not path.is_file():
         return None

@@ -48,6 +48,14 @@ def measure(name: str) -> Measure:
 def of(record: RunRecord, name: str) -> np.ndarray:
     """A measure of every run that has it.
 
+    Args:
+        record: R runs.
+        name: of the measure.
+
+    Returns:
+        ``(n,)``, n <= R, in the measure's unit; runs without a value (NaN) are left
+        out.
+
     Raises:
         BnsError: the runs lack a column that it needs.
     """
@@ -152,6 +160,9 @@ def onset_of_improvement(record: RunRecord) -> np.ndarray:
 
     The cost is smoothed over five trials; the rise is from its mean over the ten
     trials before the damage to its peak after.
+
+    Returns:
+        ``(R,)``, counted from 0.
     """
     start = _onset(record)
     found = np.full(record.replicates, np.inf)

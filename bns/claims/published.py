@@ -147,6 +147,11 @@ def _why_stale(row: Row, claim: Claim, cell: Cell, world: str, among: Library) -
 def row(claim: Claim, found: Finding, *, world: str) -> dict[str, Any]:
     """A finding as it is published, nothing rounded.
 
+    Args:
+        claim: that the comparison belongs to.
+        found: its finding.
+        world: key of the investigation's `worlds`.
+
     Raises:
         BnsError: it is not known from what it was made.
     """
@@ -196,7 +201,12 @@ def text(rows: Sequence[Row], settings: Mapping[str, provenance.Settings]) -> st
 def write(
     path: Path, rows: Sequence[Row], settings: Mapping[str, provenance.Settings]
 ) -> None:
-    """Publish findings; arguments as for `text`.
+    """Publish findings as `text` writes them.
+
+    Args:
+        path: of the file, replaced whole.
+        rows: the findings.
+        settings: digest of a side -> its settings, see `text`.
 
     Raises:
         StorageError: no space, or no permission.

@@ -43,7 +43,13 @@ class Session:
 
 
 def directory(world: str, *, quick: bool, root: Path = ROOT) -> Path:
-    """Where the runs for claims in a world are kept."""
+    """Where the runs for claims in a world are kept.
+
+    Args:
+        world: key of the investigation's `worlds`.
+        quick: whether they are the small and short versions, kept apart.
+        root: of all claims.
+    """
     return root / (f"{world}-quick" if quick else world)
 
 

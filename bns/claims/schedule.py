@@ -120,7 +120,14 @@ def jobs(wanted: Sequence[Due], done: Mapping[str, int], store: Path) -> list[Jo
 
 
 def job(member: Member, start: int, count: int, store: Path) -> Job:
-    """The batch of a block of runs of a side."""
+    """The batch of a block of runs of a side.
+
+    Args:
+        member: the side.
+        start: first replicate of the block.
+        count: replicates of the block.
+        store: directory in which the trunks are kept, too.
+    """
     config, name = member.config, member.identity
     length = trunk.shared(config)
     root = identity(trunk.bare(config)) if length else name

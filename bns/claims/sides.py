@@ -80,6 +80,11 @@ def trials_needed(investigation: str, side: str, *, onset: int) -> int:
 
     A side of which only is asked whether it recovers (or solves the task) within k
     trials need not go on after those.
+
+    Args:
+        investigation: "A" to "D".
+        side: names of pieces.
+        onset: first damaged trial, counted from 0; -1 = there is no damage.
     """
     most = 0
     for cell in _cells(investigation, side):
@@ -107,6 +112,11 @@ def _cells(investigation: str, side: str) -> tuple[Cell, ...]:
 def settings_of(investigation: str, side: str, world: str) -> Mapping[str, Any]:
     """All settings of a side, defaults included; see `bns.claims.provenance`.
 
+    Args:
+        investigation: "A" to "D".
+        side: names of pieces.
+        world: key of the investigation's `worlds`.
+
     Raises:
         BnsError: as `member`.
     """
@@ -118,6 +128,11 @@ def settings_of(investigation: str, side: str, world: str) -> Mapping[str, Any]:
 def digest_of(investigation: str, side: str, world: str) -> str:
     """The digest of `settings_of`.
 
+    Args:
+        investigation: "A" to "D".
+        side: names of pieces.
+        world: key of the investigation's `worlds`.
+
     Raises:
         BnsError: as `member`.
     """
@@ -125,7 +140,16 @@ def digest_of(investigation: str, side: str, world: str) -> str:
 
 
 def missing(investigation: str, cell: Cell, *, world: str) -> str:
-    """Why a cell cannot run; empty where it can."""
+    """Why a cell cannot run; empty where it can.
+
+    Args:
+        investigation: "A" to "D".
+        cell: the comparison.
+        world: key of the investigation's `worlds`.
+
+    Returns:
+        a sentence without its full stop, of the first side that cannot be made.
+    """
     for side in cell.sides:
         try:
             member(investigation, side, world=world)

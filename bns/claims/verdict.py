@@ -197,7 +197,19 @@ def stops(says: str, share: float, p: float, alike: float) -> bool:
 def verdict(
     says: str, share: float, p: float, p_holm: float, *, equivalent: float = 1.0
 ) -> str:
-    """The verdict of one comparison by the rule above."""
+    """The verdict of one comparison by the rule above.
+
+    Args:
+        says: what is claimed of side a: ">", "<", "=" or "?".
+        share: A12; against a number the share of runs on the claimed side, with
+            `says` ">".
+        p: two-sided, over the looks made.
+        p_holm: that p, adjusted by Holm's method.
+        equivalent: p of the two one-sided tests of equivalence; 1 = not shown.
+
+    Returns:
+        "holds", "direction only", "null" or "reversed".
+    """
     if says == "=":
         if equivalent < ALIKE:
             return "holds"

@@ -29,7 +29,16 @@ class Arguments:
 
 
 def main(verb: str, argv: list[str]) -> int:
-    """Run the verb; gives the exit code."""
+    """Run the verb; gives the exit code.
+
+    Args:
+        verb: "examples".
+        argv: words after it.
+
+    Raises:
+        UnknownNameError: no such example.
+        BnsError: the directory to copy to exists, or cannot be written.
+    """
     del verb
     given = parse(Arguments, argv, prog="bns examples")
     if given.copy:

@@ -18,7 +18,16 @@ VERBS = {
 
 
 def main(verb: str, argv: list[str]) -> int:
-    """Run a verb of the gap diagnosis; gives the exit code."""
+    """Run a verb of the gap diagnosis; gives the exit code.
+
+    Args:
+        verb: "gap".
+        argv: words after it.
+
+    Raises:
+        UnknownNameError: no such verb of the gap diagnosis.
+        SystemExit: help was asked for, or nothing was given; with code 0.
+    """
     del verb
     if not argv or argv[0] in (*HELP, HELP_ALL):
         print(_manual())

@@ -38,7 +38,14 @@ OUT = {"camera": "camera.json", "wheels": "wheels.json", "servos": "servos.toml"
 
 
 def calibrate(given: Any) -> int:
-    """`bns hardware calibrate`."""
+    """`bns hardware calibrate`; gives the exit code.
+
+    Args:
+        given: its arguments.
+
+    Raises:
+        BnsError: the file exists, or the calibration failed.
+    """
     out = Path(given.out or OUT[given.what])
     if out.exists():
         raise BnsError(f"{out} exists and is not overwritten; give another --out.")
@@ -87,7 +94,15 @@ def _wheels(given: Any, out: Path) -> Iterator[str]:
 
 
 def record(given: Any) -> int:
-    """`bns hardware record`."""
+    """`bns hardware record`; gives the exit code.
+
+    Args:
+        given: its arguments.
+
+    Raises:
+        BnsError: ``--move`` is not given, the dataset exists, or a trial failed; trials
+            done before are written.
+    """
     from bns.worlds.data import dataset
 
     if not given.move:

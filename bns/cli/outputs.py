@@ -33,7 +33,14 @@ def live(choice: str, config: RunConfig) -> Iterator[Callable | None]:
 def write(
     record: RunRecord, out: Path, *, recording: bool = True, report: bool = True
 ) -> None:
-    """Write recording and report, then say where everything is."""
+    """Write recording and report, then say where everything is.
+
+    Args:
+        record: of a run.
+        out: its directory.
+        recording: whether to write the recording.
+        report: whether to write the report.
+    """
     made = {"data": out}
     if report:
         with working("drawing the report"):

@@ -25,7 +25,16 @@ class Arguments:
 
 
 def main(verb: str, argv: list[str]) -> int:
-    """Run the verb; gives the exit code."""
+    """Run the verb; gives the exit code.
+
+    Args:
+        verb: "report".
+        argv: words after it.
+
+    Raises:
+        BnsError: no run is given, a run without a trial, or a file at the report's
+            place that is not one.
+    """
     given = parse(Arguments, argv, prog="bns report")
     if not given.directories:
         raise BnsError("No run was given: give one or more run directories.")

@@ -54,7 +54,16 @@ class Arguments:
 
 
 def main(verb: str, argv: list[str]) -> int:
-    """Run the verb; gives the exit code."""
+    """Run the verb; gives the exit code.
+
+    Args:
+        verb: "run".
+        argv: words after it: preset, TOML file or run directory, then options.
+
+    Raises:
+        BnsError: nothing to run is given, an option comes before it, or there is none
+            of that name.
+    """
     if not argv:
         from bns import presets
 

@@ -12,6 +12,11 @@ PIPED = 160
 def show(head: Sequence[str], rows: Sequence[Sequence[str]], *, json: bool) -> None:
     """Print rows under their heads, as wide as the terminal or as `COLUMNS` says; as
     JSON one object per row.
+
+    Args:
+        head: names of the columns.
+        rows: cells as text, as many in each row as in `head`.
+        json: print JSON, not a table.
     """
     if json:
         found = [dict(zip(head, row, strict=True)) for row in rows]

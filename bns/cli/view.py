@@ -34,7 +34,16 @@ class Arguments:
 
 
 def main(verb: str, argv: list[str]) -> int:
-    """Run the verb; gives the exit code."""
+    """Run the verb; gives the exit code.
+
+    Args:
+        verb: "view".
+        argv: words after it.
+
+    Raises:
+        BnsError: more than one of ``--png``, ``--gif``, ``--mp4`` and ``--web``, or
+            nothing there to show.
+    """
     given = parse(Arguments, argv, prog="bns view")
     os.environ.setdefault("RERUN_ANALYTICS", "0")
     if sum(map(bool, (given.png, given.gif, given.mp4, given.web))) > 1:

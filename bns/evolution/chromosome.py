@@ -75,7 +75,13 @@ class Encoding:
         )
 
     def random(self, runs: int, population: int, draws: Draws) -> Population:
-        """Uniformly random genes, uniformly random lengths."""
+        """Uniformly random genes, uniformly random lengths.
+
+        Args:
+            runs: R.
+            population: P, individuals of each run.
+            draws: source of randomness.
+        """
         lengths = draws.uniform(runs, population)
         genes = draws.uniform(runs, population, self.max_commands, 3)
         return self.individuals(genes, lengths)

@@ -94,6 +94,11 @@ def simulated_binary(
 def coins_needed(kind: str, points: int, genes_shape: tuple[int, ...]) -> tuple:
     """Shape of the uniform numbers that `cross` takes for N pairs, ``(R, N, ...)``.
 
+    Args:
+        kind: operator, one of `KINDS`.
+        points: cuts in each parent, where the operator is "n-point".
+        genes_shape: of the children's genes, ``(R, N, K, 3)``.
+
     Raises:
         UnknownNameError: no such operator.
     """

@@ -32,7 +32,13 @@ class Genes(Protocol):
         """Genes of an individual: places times kinds."""
 
     def random(self, runs: int, population: int, draws: Draws) -> Population:
-        """Random individuals."""
+        """Random individuals.
+
+        Args:
+            runs: R.
+            population: P, individuals of each run.
+            draws: source of randomness.
+        """
 
     def individuals(self, coins: Tensor, coins_lengths: Tensor) -> Population:
         """Random individuals from uniform numbers."""

@@ -72,7 +72,13 @@ class Goals:
         return self.max_commands, len(self.channels)
 
     def random(self, runs: int, population: int, draws: Draws) -> Population:
-        """Goals uniform around half-way."""
+        """Goals uniform around half-way.
+
+        Args:
+            runs: R.
+            population: P, individuals of each run.
+            draws: source of randomness.
+        """
         coins = draws.uniform(runs, population, *self.gene_shape)
         return self.individuals(coins, coins[..., 0, 0])
 
@@ -119,7 +125,7 @@ class GoalBreeder(Breeder):
     def breed(
         self, population: Population, cost: Tensor, rates: Rates, coins: Coins
     ) -> Population:
-        """The next generation, see `Breeder.breed`."""
+        """See `Breeder.breed`; goals are kept within their bounds."""
         bred = super().breed(population, cost, rates, coins)
         low, high = self.encoding.low, self.encoding.high
         return bred._replace(genes=torch.minimum(torch.maximum(bred.genes, low), high))

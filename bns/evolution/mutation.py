@@ -23,7 +23,13 @@ def bounded_uniform(share: Tensor, genes: Tensor, magnitude: Tensor) -> Tensor:
 
 
 def uniform_range(share: Tensor, genes: Tensor, low: Tensor, high: Tensor) -> Tensor:
-    """Eq 2.18: with equal chance go uniformly towards the upper or lower bound."""
+    """Eq 2.18: with equal chance go uniformly towards the upper or lower bound.
+
+    Args:
+        share: uniform numbers, as `genes`.
+        genes: ``(R, P, K, 3)``.
+        low, high: gene bounds, ``(3,)``.
+    """
     up = share < 0.5
     part = torch.where(up, 2 * share, 2 * share - 1)
     return torch.where(up, genes + part * (high - genes), genes - part * (genes - low))

@@ -53,7 +53,12 @@ class Step:
         )
 
     def to_arrays(self) -> dict[str, np.ndarray]:
-        """Everything as named arrays, none of them of objects."""
+        """Everything as named arrays, none of them of objects.
+
+        Returns:
+            name -> array: "column.NAME" ``(R,)``, "array.NAME" with the run first,
+            "trials" (JSON as uint8), and the samples of trial n as "trialn.NAME".
+        """
         stored = {f"column.{name}": value for name, value in self.columns.items()}
         stored |= {f"array.{name}": value for name, value in self.arrays.items()}
         meta = [_trial_meta(trial) for trial in self.trials]
@@ -91,7 +96,16 @@ def assemble(
     damage_onset: np.ndarray,
     directory: str = "",
 ) -> RunRecord:
-    """The record of the steps done so far (none: a record of zero trials)."""
+    """The record of the steps done so far (none: a record of zero trials).
+
+    Args:
+        config: of the run: R replicates, commands of K places.
+        steps: one a trial, T of them, in order.
+        versions: package -> version, of what ran.
+        conditions: what else is known of how it ran.
+        damage_onset: first damaged trial of each replicate, ``(R,)``.
+        directory: of the run; empty where it is not stored.
+    """
     runs, longest = config.replicates, config.controller.max_commands
     empty = {
         name: np.zeros((runs, 0, longest + (name != "sent"), 3)) for name in ARRAYS

@@ -163,7 +163,11 @@ class Learner(ABC):
 
     @abstractmethod
     def state(self) -> dict[str, np.ndarray]:
-        """All that the next trial depends on, as plain arrays."""
+        """All that the next trial depends on, as plain arrays.
+
+        Returns:
+            name -> array, each as `restore` takes it.
+        """
 
     @abstractmethod
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:

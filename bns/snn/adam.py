@@ -35,7 +35,18 @@ class AdamState(NamedTuple):
 def adam(
     theta: Tensor, grad: Tensor, state: AdamState, rate: Tensor, step: Tensor
 ) -> tuple[Tensor, AdamState]:
-    """One step of Adam, as in `torch.optim.Adam`; steps count from 1."""
+    """One step of Adam, as in `torch.optim.Adam`; steps count from 1.
+
+    Args:
+        theta: weights, ``(R, D)``.
+        grad: their gradient, ``(R, D)``.
+        state: moments before the step.
+        rate: learning rate, of no dimension or broadcasting to `theta`.
+        step: number of this step, from 1, of no dimension.
+
+    Returns:
+        weights and moments after the step.
+    """
     first = torch.lerp(state.first, grad, 1 - BETAS[0])
     second = torch.lerp(state.second, grad.square(), 1 - BETAS[1])
     size = rate / (1 - BETAS[0] ** step)

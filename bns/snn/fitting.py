@@ -65,7 +65,13 @@ def fit(
 
 
 def mean_error(shape: Shape, theta: Tensor, patterns: Patterns) -> Tensor:
-    """Mean squared error of scaled outputs on all patterns, ``(R,)``."""
+    """Mean squared error of scaled outputs on all patterns, ``(R,)``.
+
+    Args:
+        shape: of the networks.
+        theta: weights ``(R, D)``.
+        patterns: scaled; padding counts nothing.
+    """
     inputs, targets, weight = patterns
     shaped = targets.unsqueeze(2) if shape.outputs == 1 else targets.unsqueeze(1)
     error = (forward(shape, theta, inputs) - shaped) * weight
@@ -75,7 +81,17 @@ def mean_error(shape: Shape, theta: Tensor, patterns: Patterns) -> Tensor:
 
 
 def dropout(shape: Shape, rate: float, inputs: Tensor, draws: Draws) -> Tensor:
-    """Factors of the hidden neurons: 0, or 1 / (1 - rate)."""
+    """Factors of the hidden neurons: 0, or 1 / (1 - rate).
+
+    Args:
+        shape: of the networks.
+        rate: probability that a neuron is dropped, below 1.
+        inputs: of the networks, ``(R, I, N)``; only their shape counts.
+        draws: source of randomness.
+
+    Returns:
+        ``(R, G, H, N)``.
+    """
     runs, _, patterns = inputs.shape
     coins = draws.uniform(runs, shape.groups, shape.hidden, patterns)
     return (coins >= rate).float() / (1.0 - rate)

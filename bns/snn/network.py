@@ -106,6 +106,14 @@ def fused_hidden_layer(shape: Shape, theta: Tensor, inputs: Tensor) -> Tensor:
 
     Compiled, it never writes the activations to memory and is two to three times
     faster on large batches; not compiled, it is slower.
+
+    Args:
+        shape: sizes.
+        theta: weights ``(R, D)``.
+        inputs: ``(R, I, N)``.
+
+    Returns:
+        ``(R, G, H, N)``.
     """
     w1, b1, _, _ = shape.split(theta)
     total = b1 + w1[:, :, :1] * inputs[:, :1]
@@ -141,6 +149,12 @@ def predict(
     shape: Shape, theta: Tensor, inputs: Tensor, *, fused: bool = False
 ) -> Tensor:
     """Scaled prediction: the three networks' outputs, or the ensemble's mean.
+
+    Args:
+        shape: sizes.
+        theta: weights ``(R, D)``.
+        inputs: scaled inputs ``(R, I, N)``.
+        fused: use the form meant for compilation.
 
     Returns:
         ``(R, 3, N)``.

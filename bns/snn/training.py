@@ -69,7 +69,16 @@ def gradient(
 
 
 def rprop(theta: Tensor, grad: Tensor, state: RpropState) -> tuple[Tensor, RpropState]:
-    """One Rprop step (Riedmiller and Braun 1993, as in `torch.optim.Rprop`)."""
+    """One Rprop step (Riedmiller and Braun 1993, as in `torch.optim.Rprop`).
+
+    Args:
+        theta: weights, ``(R, D)``.
+        grad: their gradient, ``(R, D)``.
+        state: gradient and step sizes before.
+
+    Returns:
+        weights and state after the step.
+    """
     agree = grad * state.previous
     factor = torch.where(agree > 0, GROW, torch.where(agree < 0, SHRINK, 1.0))
     step = (state.step * factor).clamp(STEP_MIN, STEP_MAX)
@@ -87,10 +96,20 @@ def epoch(
     keep: Tensor | None = None,
     decay: float = 0.0,
 ) -> tuple[Tensor, RpropState]:
-    """One full-batch epoch; arguments as in `gradient`.
+    """One full-batch epoch.
 
-    `decay` adds half of it times the squared weights to the loss: without, weights
-    grow on data that repeat themselves, and the SNN errs by metres off the data.
+    `decay` adds half of it times the squared weights to the loss: without, weights grow
+    on data that repeat themselves, and the SNN errs by metres off the data.
+
+    Args:
+        shape: sizes.
+        theta: weights ``(R, D)``.
+        state: gradient and step sizes before.
+        inputs, targets, weight, keep: as in `gradient`.
+        decay: of the weights; 0 = none.
+
+    Returns:
+        weights and state after the epoch.
     """
     grad = gradient(shape, theta, inputs, targets, weight, keep)
     return rprop(theta, grad + decay * theta, state)

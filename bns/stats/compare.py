@@ -108,7 +108,15 @@ def compare(records: Sequence[RunRecord], names: Sequence[str] = ()) -> Comparis
 
 
 def values(record: RunRecord, measure: str) -> np.ndarray:
-    """One number per replicate, without those that have none."""
+    """One number per replicate, without those that have none.
+
+    Args:
+        record: R finished runs.
+        measure: "observation", "solve" or "recover".
+
+    Returns:
+        ``(n,)``, n <= R: cost, or trials (inf = never).
+    """
     found = {
         "observation": stats.observation_after,
         "solve": stats.trials_to_solve,
@@ -118,7 +126,13 @@ def values(record: RunRecord, measure: str) -> np.ndarray:
 
 
 def side(name: str, measure: str, sample: np.ndarray) -> Side:
-    """One run on one measure."""
+    """One run on one measure.
+
+    Args:
+        name: of the run.
+        measure: one of `MEASURES`.
+        sample: its values, ``(n,)``; infinite = never.
+    """
     reached = int(np.isfinite(sample).sum())
     return Side(name, measure, len(sample), reached, stats.median_interval(sample))
 

@@ -59,7 +59,14 @@ def p_of_u(u: float, n_a: int, n_b: int) -> float:
 
 
 def holm(p: Sequence[float]) -> np.ndarray:
-    """p values adjusted for their number by Holm's step-down method, in order."""
+    """p values adjusted for their number by Holm's step-down method, in order.
+
+    Args:
+        p: of n tests.
+
+    Returns:
+        ``(n,)``, 1 at most.
+    """
     p = np.asarray(p, dtype=np.float64)
     order = np.argsort(p, kind="stable")
     factors = len(p) - np.arange(len(p))

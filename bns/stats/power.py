@@ -43,7 +43,16 @@ def power(a12: float, n_a: int, n_b: int, *, level: float = LEVEL) -> float:
 
 
 def runs_needed(a12: float, *, wanted: float = 0.8, level: float = LEVEL) -> float:
-    """Runs a side for a power; infinite where no number up to 100,000 is enough."""
+    """Runs a side for a power; infinite where no number up to 100,000 is enough.
+
+    Args:
+        a12: probability that a value of one side is larger than one of the other.
+        wanted: power that is to be reached, 0 to 1.
+        level: of significance.
+
+    Raises:
+        BnsError: an A12 outside 0 to 1.
+    """
     if power(a12, MOST, MOST, level=level) < wanted:
         return float("inf")
     low, high = 1, MOST

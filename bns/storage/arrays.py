@@ -29,6 +29,11 @@ def write_npz(
 ) -> None:
     """Write arrays without pickle; the same arrays give the same bytes.
 
+    Args:
+        path: of the file, replaced whole.
+        arrays: name -> array, of any shape.
+        compressed: whether to deflate them.
+
     Raises:
         TypeError: an array holds Python objects.
         StorageError: no space, or no permission.
@@ -49,6 +54,9 @@ def read_npz(path: Path | str, *, most: int = reading.DATA) -> dict[str, np.ndar
     Args:
         path: of the file.
         most: bytes that the arrays may have.
+
+    Returns:
+        name -> array, of the shape and type stored.
 
     Raises:
         FormatError: absent, torn, damaged, encrypted, too large, or not such a file.

@@ -21,6 +21,9 @@ def read(
         wanted: names of the columns; None = all.
         delimiter: between columns.
 
+    Returns:
+        name -> column, ``(N,)``, N rows.
+
     Raises:
         FormatError: not there, no table, a column missing, twice or not of numbers.
     """

@@ -229,6 +229,12 @@ def tables(
 ) -> dict[str, Kind]:
     """Each table of some content as `typed` makes it; errors say which it is.
 
+    Args:
+        content: name -> table, as parsed.
+        kind: what each has to be, see `typed`.
+        name: of the file, for messages.
+        todo: what to do if one is not, a sentence.
+
     Raises:
         FormatError: as `typed`.
     """

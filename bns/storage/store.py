@@ -143,7 +143,11 @@ class RunStore:
         npz.write_npz(self.directory / "state.npz", arrays)
 
     def read_state(self) -> tuple[int, dict[str, np.ndarray]]:
-        """Trials done and the learner's state after them (0, empty at the start)."""
+        """Trials done and the learner's state after them (0, empty at the start).
+
+        Raises:
+            FormatError: the file is damaged, or no state of a run.
+        """
         path = self.directory / "state.npz"
         if not path.exists():
             return 0, {}

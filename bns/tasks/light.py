@@ -237,7 +237,8 @@ class LightTask(Task):
     def execute(
         self, world: Any, tried: Sequence[Any], *, trial: int, seeds: Sequence[int]
     ) -> list[Trial]:
-        """Each controller drives a robot, from where the world starts it."""
+        """See `Task.execute`; each controller drives a robot from where the world
+        starts it."""
         driven: list[Trial] = world.drive(
             GenomePolicy.of(tried),
             cycles=tried[0].cycles,

@@ -135,6 +135,15 @@ def score(
 
     Commands after the last objective cost nothing but `command_cost`; with
     `charge_unused`, places beyond the list cost the standing robot's distance.
+
+    Args:
+        x, y: position after each command in the world frame, ``(K, ...)`` [m].
+        lengths: commands in each list, ``(...)``.
+        goals: east and north of each objective, in order [m].
+        config: how paths are scored.
+
+    Returns:
+        cost ``(...)`` and objectives reached ``(...)`` (int64).
     """
     count, radius = len(goals), config.radius * CENTIMETRES
     active = torch.zeros_like(lengths)
@@ -256,7 +265,7 @@ class NavigationTask(WheeledTask):
         return Route.of(self.config.task, device)
 
     def fitness(self, trials: Sequence[Trial]) -> np.ndarray:
-        """Algorithm 5, see `score`."""
+        """See `Task.fitness`; Algorithm 5 as in `score`."""
         return self._scored(trials)[0]
 
     def _scored(self, trials: Sequence[Trial]) -> tuple[np.ndarray, np.ndarray]:

@@ -40,13 +40,22 @@ class Bay:
         return 0.0, 0.0, math.radians(self.config.start_yaw)
 
     def judge(self, x: Tensor, y: Tensor, yaw: Tensor, lengths: Tensor) -> Tensor:
-        """Distance [cm] and wrong heading of the end, and what commands cost."""
+        """See `PathGoal.judge`: distance [cm] and wrong heading of the end, and what
+        commands cost."""
         away, wrong = self.off(x[-1], y[-1], yaw[-1])
         commands = self.config.command_cost * lengths.to(x.dtype)
         return CENTIMETRES * away + TURN_COST * wrong + commands
 
     def off(self, x: Tensor, y: Tensor, yaw: Tensor) -> tuple[Tensor, Tensor]:
-        """How far poses are from the bay: distance [m], heading [rad], each >= 0."""
+        """How far poses are from the bay: distance [m], heading [rad], each >= 0.
+
+        Args:
+            x, y: positions in the world frame, ``(...)`` [m].
+            yaw: headings, ``(...)`` [rad].
+
+        Returns:
+            distance and heading, each ``(...)``.
+        """
         east, north, heading = self.pose
         wrong = torch.remainder(yaw - heading + math.pi, 2 * math.pi) - math.pi
         away = ((x - east).square() + (y - north).square() + 1e-12).sqrt()

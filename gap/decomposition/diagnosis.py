@@ -105,7 +105,7 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
     left = point.linear.rest(point.linear.solve(point.support))
     plain = left if not point.noise.memory.factors.size else point.rest
     held = shares.HeldOut.of(problem, point)
-    none, some = (held.error(s).sum() for s in ((), point.support))
+    none, some = held.nominal(start.rest), held.error(point.support).sum()
     least = held.error(point.linear.free).sum()
     return Decomposition(
         problem=problem,

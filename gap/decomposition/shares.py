@@ -103,10 +103,12 @@ class HeldOut:
     Attributes:
         linear: what is fitted.
         plain: the same recording, every residual of a channel weighing the same.
+        weight: of each residual in `plain`, ``(N, C)``; 0 = not seen.
     """
 
     linear: Linear
     plain: Linear
+    weight: np.ndarray
 
     @classmethod
     def of(cls, problem: Problem, point: Point) -> "HeldOut":
@@ -115,7 +117,14 @@ class HeldOut:
         weight = np.where(problem.seen, 1 / sd**2, 0.0)
         units = fit.units(problem, point.values)
         whole = fit.target(problem, point.values, point.rest, point.slopes)
-        return cls(point.linear, Linear.of(problem, point.slopes, units, whole, weight))
+        plain = Linear.of(problem, point.slopes, units, whole, weight)
+        return cls(point.linear, plain, weight)
+
+    def nominal(self, rest: np.ndarray) -> float:
+        """Squared error of the nominal model as it was simulated, whose residuals
+        ``(N, C)`` are `rest`: slopes at the fit do not reach back to the nominal values
+        of what is not smooth."""
+        return float((self.weight * np.nan_to_num(rest) ** 2).sum())
 
     def error(self, support: Iterable[str]) -> np.ndarray:
         """Squared error of each stretch, the rows fitted to the others, ``(B,)``."""

@@ -62,7 +62,13 @@ def checked(body: bytes) -> bytes:
 
 
 def status(servo: int, error: int, parameters: bytes = b"") -> bytes:
-    """A status packet."""
+    """A status packet.
+
+    Args:
+        servo: its number.
+        error: a bit for each of `ERRORS` that holds, the first lowest.
+        parameters: what was read, if anything.
+    """
     return checked(bytes([servo, len(parameters) + 2, error]) + parameters)
 
 

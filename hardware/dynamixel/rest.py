@@ -23,7 +23,13 @@ class Rest:
         self.since = now
 
     def servo(self, number: int, units: int, now: float) -> None:
-        """A servo's position was read."""
+        """A servo's position was read.
+
+        Args:
+            number: of the servo.
+            units: its position [position units].
+            now: time of the reading [s].
+        """
         if abs(units - self._units.get(number, -9)) > UNITS:
             self._units[number], self.since = units, now
 

@@ -132,7 +132,14 @@ class EmulatedCamera:
         self._number, self._image = -1, np.zeros((0, 0), np.uint8)
 
     def read(self, timeout: float) -> Frame | None:
-        """The next picture, see `Source.read`; older ones not yet seen are skipped."""
+        """The next picture, see `Source.read`; older ones not yet seen are skipped.
+
+        Args:
+            timeout: how long to wait for one [s].
+
+        Raises:
+            BnsError: the emulated robot has ended.
+        """
         until = time.monotonic() + timeout
         while True:
             wait = (

@@ -70,7 +70,11 @@ class ThreadedEyes:
             self._error = error
 
     def poll(self) -> list[Sighting]:
-        """Sightings since the last call, see `Eyes.poll`."""
+        """Sightings since the last call, see `Eyes.poll`.
+
+        Raises:
+            BnsError: the camera is lost, or the tracker's thread has failed.
+        """
         if self._error:
             raise BnsError(str(self._error))
         if not self._thread.is_alive() and not self._done.is_set():

@@ -91,6 +91,9 @@ def picture(number: int, *, cell: int = 40, border: float = 1.0) -> np.ndarray:
         number: in the dictionary.
         cell: pixels of a cell.
         border: of white around it, in cells.
+
+    Returns:
+        ``(N, N)``, 0 black, 255 white.
     """
     tag = cv2().aruco.generateImageMarker(dictionary(), number, cell * CELLS)
     return np.pad(tag, round(cell * border), constant_values=255)

@@ -63,7 +63,11 @@ class DeviceCamera:
             )
 
     def read(self, timeout: float) -> Frame | None:
-        """The next picture, see `Source.read`; waits as long as the driver does."""
+        """The next picture, see `Source.read`; waits as long as the driver does.
+
+        Raises:
+            BnsError: the camera gives no more pictures.
+        """
         del timeout
         good, picture = self._capture.read()
         if not good:
@@ -99,7 +103,11 @@ class VideoFile:
         self._count = 0
 
     def read(self, timeout: float) -> Frame | None:
-        """The next picture, see `Source.read`."""
+        """The next picture, see `Source.read`.
+
+        Raises:
+            BnsError: the video is at its end.
+        """
         del timeout
         good, picture = self._capture.read()
         if not good:

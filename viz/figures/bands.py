@@ -35,7 +35,13 @@ def band(axes, values: np.ndarray, colour: str, label: str, *, mean: bool = Fals
 
 
 def mark_damage(axes, runs: Mapping[str, RunRecord], *, text: bool = True) -> None:
-    """A dashed line where damage begins; one if all runs agree."""
+    """A dashed line where damage begins; one if all runs agree.
+
+    Args:
+        axes: Matplotlib's.
+        runs: name -> record, as drawn in them.
+        text: whether to write "damage" beside the line.
+    """
     for onset in onsets(runs):
         axes.axvline(onset - 0.5, color=style.DAMAGE, ls="--", linewidth=1.2)
         if text:
@@ -63,7 +69,13 @@ def onsets(runs: Mapping[str, RunRecord]) -> list[int]:
 
 
 def finish(axes, runs: Mapping[str, RunRecord], *, legend: bool = True) -> None:
-    """Limits, label of the trial axis, legend where several runs are shown."""
+    """Limits, label of the trial axis, legend where several runs are shown.
+
+    Args:
+        axes: Matplotlib's.
+        runs: name -> record, as drawn in them.
+        legend: whether there is one.
+    """
     longest = max(record.trials for record in runs.values())
     axes.set_xlim(-0.5, max(longest - 0.5, 0.5))
     axes.set_xlabel("trial in the world")

@@ -100,7 +100,14 @@ def log_static(stream, seen: View) -> None:
 
 
 def send(stream, seen: View, number: int, start: float) -> None:
-    """Log one trial: robots in motion, paths, arrows; they vanish after it."""
+    """Log one trial: robots in motion, paths, arrows; they vanish after it.
+
+    Args:
+        stream: Rerun's recording stream.
+        seen: the recording beside its predictions.
+        number: of the trial, counted from 0.
+        start: of the trial on the time line [s].
+    """
     import rerun as rr
 
     trial = seen.trials[number]

@@ -49,7 +49,13 @@ class Engine(Protocol):
 
 
 def outcome(key: str, timed: tuple[bytes | str, float], seconds: float) -> Outcome:
-    """The outcome in what `work.timed` gave."""
+    """The outcome in what `work.timed` gave.
+
+    Args:
+        key: of the job.
+        timed: the bytes of its part, or why it failed; and the time it took [s].
+        seconds: from its start to its end, as the driver saw it [s].
+    """
     given, computed = timed
     if isinstance(given, str):
         return Outcome(key, None, given, seconds, computed=computed)

@@ -52,7 +52,13 @@ class Detector:
 
     @classmethod
     def fresh(cls, config: WatchConfig, runs: int, channels: int) -> "Detector":
-        """A detector that has seen nothing."""
+        """A detector that has seen nothing.
+
+        Args:
+            config: thresholds, and H, the trials that a history has.
+            runs: R.
+            channels: C.
+        """
         return cls(config, np.full((runs, config.history, channels), np.nan))
 
     def update(self, innovations: np.ndarray) -> Alarms:

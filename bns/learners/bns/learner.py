@@ -316,7 +316,13 @@ class Bns(Learner):
 
 
 def replaced(population: Population, rows: np.ndarray, fresh: Population) -> Population:
-    """A population with other individuals in the rows marked, ``(R I,)`` bool."""
+    """A population with other individuals in some rows.
+
+    Args:
+        population: of all rows.
+        rows: which are replaced, ``(R I,)`` bool.
+        fresh: a population of the same shape, from which those rows are taken.
+    """
     which = torch.from_numpy(rows).to(population.genes.device)
     return Population(
         torch.where(which[:, None, None, None], fresh.genes, population.genes),

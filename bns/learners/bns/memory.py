@@ -28,7 +28,16 @@ class Trainer(Protocol):
     """What fits networks to patterns."""
 
     def train(self, shape: Shape, theta: Tensor, patterns: fitting.Patterns) -> Fit:
-        """New weights ``(R, D)``, and the mean squared error after it ``(R,)``."""
+        """Fit the networks of all runs.
+
+        Args:
+            shape: of the networks.
+            theta: weights before, ``(R, D)``.
+            patterns: what to train on.
+
+        Returns:
+            new weights ``(R, D)``, and the mean squared error after training ``(R,)``.
+        """
 
 
 class PatternBuffer:
@@ -54,7 +63,13 @@ class PatternBuffer:
         self.targets = [np.zeros((0, sizes[1]), np.float32) for _ in range(runs)]
 
     def append(self, run: int, inputs: np.ndarray, targets: np.ndarray) -> None:
-        """Add a trial's patterns, inputs and targets; old ones slide out."""
+        """Add a trial's patterns; those older than the run's window slide out.
+
+        Args:
+            run: whose they are.
+            inputs: scaled, ``(N, I)``.
+            targets: scaled, ``(N, O)``.
+        """
         keep = self.windows[run] or None
         for store, new in ((self.inputs, inputs), (self.targets, targets)):
             joined = np.concatenate([store[run], new.astype(np.float32)])
@@ -201,7 +216,13 @@ class Memory:
         return Patterns(self.buffer.inputs[run], self.buffer.targets[run])
 
     def append(self, run: int, trial: int, patterns: Patterns) -> None:
-        """Keep a trial's patterns."""
+        """Keep a trial's patterns.
+
+        Args:
+            run: whose they are.
+            trial: number of the trial.
+            patterns: N of them; those older than the run's window slide out.
+        """
         self.buffer.append(run, patterns.inputs, patterns.targets)
         mark = np.full(len(patterns.inputs), trial)
         joined = np.concatenate([self.trials[run], mark])

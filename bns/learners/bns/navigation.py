@@ -45,7 +45,14 @@ class PathEvaluator(Protocol):
     def judge(
         self, theta: Tensor, inputs: Tensor, lengths: Tensor, *, fused: bool = False
     ) -> Tensor:
-        """Predicted cost ``(R, P)`` from inputs."""
+        """Predicted cost ``(R, P)`` from inputs.
+
+        Args:
+            theta: weights ``(R, D)``.
+            inputs: as `inputs` gives them, ``(R, I, K * P)``.
+            lengths: commands in each list, ``(R, P)``.
+            fused: use the form meant for compilation.
+        """
 
     def cost(self, theta: Tensor, population: Population) -> Tensor:
         """Predicted cost of a population, ``(R, P)``."""
@@ -212,7 +219,7 @@ class Evaluator:
     def judge(
         self, theta: Tensor, inputs: Tensor, lengths: Tensor, *, fused: bool = False
     ) -> Tensor:
-        """Predicted cost ``(R, P)`` from inputs; arguments as in `path`."""
+        """See `PathEvaluator.judge`; arguments as in `path`."""
         x, y, yaw = (
             part.movedim(1, 0)
             for part in self.path(theta, inputs, lengths, fused=fused)

@@ -136,7 +136,18 @@ class Problem(ABC):
         rates: Rates,
         coins: Coins,
     ) -> tuple[Population, Tensor]:
-        """The next population and its costs, from uniform numbers drawn beforehand."""
+        """The next population and its costs, from uniform numbers drawn beforehand.
+
+        Args:
+            memories: what the runs know.
+            population: of all rows.
+            cost: predicted, ``(R I, P / I)``.
+            rates: mutation settings.
+            coins: this generation's random numbers.
+
+        Returns:
+            the population, and its predicted costs ``(R I, P / I)``.
+        """
 
     def evolve(
         self,
@@ -146,7 +157,18 @@ class Problem(ABC):
         rates: Rates,
         generations: int,
     ) -> tuple[Population, Tensor]:
-        """Some generations; gives the population and its costs."""
+        """Some generations, one after another.
+
+        Args:
+            memories: what the runs know.
+            population: of all rows.
+            cost: predicted, ``(R I, P / I)``.
+            rates: mutation settings.
+            generations: how many.
+
+        Returns:
+            the last population, and its predicted costs ``(R I, P / I)``.
+        """
         for _ in range(generations):
             coins = self.breeder.draw(self.draws, rates)
             population, cost = self.generation(memories, population, cost, rates, coins)
@@ -159,7 +181,13 @@ class Problem(ABC):
     def restart(
         self, trial: int, memories: Sequence[Memory], population: Population
     ) -> Population:
-        """What the task's own adaptations leave of a population before a trial."""
+        """What the task's own adaptations leave of a population before a trial.
+
+        Args:
+            trial: number of the trial that comes next, counted from 0.
+            memories: what the runs know.
+            population: of all rows.
+        """
         del trial, memories
         return population
 
@@ -170,7 +198,17 @@ class Problem(ABC):
         population: Population,
         cost: Tensor,
     ) -> tuple[Population, Tensor]:
-        """What happens among islands before evolution; gives all and their costs."""
+        """What happens among islands before evolution; on most tasks nothing.
+
+        Args:
+            trial: number of the trial that comes next, counted from 0.
+            memories: what the runs know.
+            population: of all rows.
+            cost: predicted, ``(R I, P / I)``.
+
+        Returns:
+            the population, and its predicted costs ``(R I, P / I)``.
+        """
         del trial, memories
         return population, cost
 
@@ -195,6 +233,11 @@ class Problem(ABC):
     ) -> dict[str, np.ndarray]:
         """What the networks foresaw of the controllers tried.
 
+        Args:
+            memories: what the runs knew before the trial.
+            chosen: the individuals that were tried, the first of each run.
+            tried: what came of them, R trials.
+
         Returns:
             predicted ``(R, K + 1, 3)``, fitness_predicted ``(R,)`` and own figures.
         """
@@ -216,13 +259,34 @@ class Problem(ABC):
         memories: Sequence[Memory],
         new: Sequence[Patterns],
     ) -> np.ndarray:
-        """RMS errors of the networks on a trial's patterns, as `errors` names them;
-        NaN without patterns."""
+        """RMS errors of a run's networks on a trial's patterns; NaN without patterns.
+
+        Args:
+            run: which.
+            trial: what was observed.
+            memories: what the runs know, not yet trained on it.
+            new: the trial's patterns for each memory.
+
+        Returns:
+            a number for each name in `errors`, ``(len(errors),)``.
+        """
 
     def innovation(
         self, run: int, memories: Sequence[Memory], new: Sequence[Patterns]
     ) -> np.ndarray:
-        """How surprising a trial is in each of `channels`, see `change_detection`."""
+        """How surprising a trial is in each of `channels`, see `change_detection`.
+
+        Args:
+            run: which.
+            memories: what the runs know, not yet trained on the trial.
+            new: the trial's patterns for each memory.
+
+        Returns:
+            ``(C,)``, C channels; NaN where nothing was seen.
+
+        Raises:
+            NotImplementedError: the task has no channels.
+        """
         raise NotImplementedError
 
     @abstractmethod
@@ -241,6 +305,11 @@ class Problem(ABC):
     ) -> tuple[Tensor, Tensor]:
         """Train all runs' networks of a shape from fresh step sizes.
 
+        Args:
+            shape: of the networks.
+            theta: weights before, ``(R, D)``.
+            patterns: what to train on.
+
         Returns:
             new weights ``(R, D)``, and the mean squared error after training ``(R,)``.
         """
@@ -254,7 +323,11 @@ class Problem(ABC):
         return fitting.fit(shape, snn, theta, patterns, self.draws, epoch)
 
     def state(self) -> dict[str, np.ndarray]:
-        """What the next trial depends on beside population and memories."""
+        """What the next trial depends on beside population and memories.
+
+        Returns:
+            name -> array, each as `restore` takes it; none by default.
+        """
         return {}
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:  # noqa: B027

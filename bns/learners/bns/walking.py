@@ -79,7 +79,7 @@ class WalkEvaluator:
     def judge(
         self, theta: Tensor, seen: Tensor, lengths: Tensor, *, fused: bool = False
     ) -> Tensor:
-        """Predicted cost ``(R, P)`` from inputs; `fused` changes nothing here."""
+        """See `PathEvaluator.judge`; `fused` changes nothing here."""
         del fused
         return self.worth(self.members(theta, seen), lengths.shape[1])
 

@@ -73,7 +73,13 @@ class Weights:
         return self.max_commands, 1
 
     def random(self, rows: int, population: int, draws: Draws) -> Population:
-        """Uniformly random weights."""
+        """Uniformly random weights.
+
+        Args:
+            rows: R I, the islands of all runs.
+            population: P, individuals of each row.
+            draws: source of randomness.
+        """
         coins = draws.uniform(rows, population, *self.gene_shape)
         return self.individuals(coins, coins[..., 0, 0])
 
@@ -260,7 +266,8 @@ class LightProblem(Problem):
     def restart(
         self, trial: int, memories: Sequence[Memory], population: Population
     ) -> Population:
-        """Fresh random populations now and then, but for the elitists (B2)."""
+        """See `Problem.restart`; fresh random populations now and then, but for the
+        elitists (B2)."""
         every = np.array([config.light.reset_every for config in self.configs])
         turn = (every > 0) & (trial > 0) & (trial % np.maximum(every, 1) == 0)
         if not turn.any():
@@ -278,7 +285,7 @@ class LightProblem(Problem):
         population: Population,
         cost: Tensor,
     ) -> tuple[Population, Tensor]:
-        """Migrants go and the worst islands start anew, see `Problem.settle`."""
+        """See `Problem.settle`; migrants go and the worst islands start anew."""
         light = self.config.light
         if trial > 0 and trial % light.migration_every == 0:
             population = islands.migrate(population, cost, light, self.draws)

@@ -205,7 +205,16 @@ class Simulator:
         )
 
     def look(self, thetas: Thetas, state: State, noise: Noise | None = None) -> Tensor:
-        """Brightness that the robots see now, ``(R, 2, S, P)``."""
+        """Brightness that the robots see now, ``(R, 2, S, P)``.
+
+        Args:
+            thetas: weights of the SNNs.
+            state: robots at the start of a cycle.
+            noise: added to the brightness; None = none.
+
+        Returns:
+            0 to 1, left and right.
+        """
         runs, starts, count = state.ahead.shape
         views = self.views(state.ahead.flatten(1), state.left.flatten(1))
         said = predict(self.sensors, thetas.sensors, views, fused=True)
@@ -244,7 +253,14 @@ class Simulator:
         state: State,
         noise: Noise | None = None,
     ) -> State:
-        """`step` without what was seen: the form to compile."""
+        """`step` without what was seen: the form to compile.
+
+        Args:
+            thetas: weights of the SNNs.
+            layers: weights of the controllers, see `Controllers.layers`.
+            state: before the cycle.
+            noise: added to the SNNs' outputs; None = none.
+        """
         return self.step(thetas, layers, state, noise)[0]
 
 
