@@ -131,7 +131,18 @@ def analyse(
     most: int = 3,
     reference: Sequence[Trial] = (),
 ) -> Analysis:
-    """From a recording to a verdict with all it rests on, see `diagnose`."""
+    """From a recording to a verdict with all it rests on, see `diagnose`.
+
+    Args:
+        trials: recorded commands and observations.
+        model: nominal model.
+        seed: of what is drawn.
+        candidates: explanations to consider; None = the model's, and of a model that
+            suspects some these first.
+        rules: thresholds, None = those of the package.
+        most: largest number of effects at once.
+        reference: recordings of the same robot in which nothing was changed.
+    """
     clock = _Clock()
     with clock("check"):
         trials, faults = _checked(trials, model)

@@ -43,7 +43,14 @@ def text(template: str, content: Mapping[str, Any]) -> str:
 def texts(
     name: str, templates: Mapping[str, str], content: Mapping[str, Any]
 ) -> dict[str, str]:
-    """A robot's files by their names, of templates by those (`{name}`: the robot's)."""
+    """A robot's files by their names, of templates by those (`{name}`: the robot's).
+
+    Args:
+        name: of the robot.
+        templates: name of each file's template, by the file's name, in which
+            ``{name}`` may stand.
+        content: what the templates are filled with, by name.
+    """
     return {
         file.format(name=name): text(template, content)
         for file, template in templates.items()

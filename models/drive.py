@@ -13,7 +13,13 @@ RAMP, STEADY = 2.0, 1.0
 
 
 def smooth(model: Any, seconds: float, seed: int) -> np.ndarray:
-    """Random controls over the whole range without jumps, shape ``(S, nu)``."""
+    """Random controls over the whole range without jumps, shape ``(S, nu)``.
+
+    Args:
+        model: a `mujoco.MjModel`; its control ranges and time step count.
+        seconds: duration.
+        seed: of rates and phases.
+    """
     rng = np.random.default_rng(seed)
     steps = round(seconds / model.opt.timestep)
     times = np.arange(steps) * model.opt.timestep

@@ -15,6 +15,12 @@ def load(
 ) -> Any:
     """The robot's `mujoco.MjSpec`, its options applied.
 
+    Args:
+        robot: the robot's files and options.
+        scene: with a floor, a light and a camera; False = the robot alone.
+        visuals: with what only shows; False = see `strip`.
+        options: chosen alternative by option; the others stay as in the file.
+
     Raises:
         UnknownNameError: an option or alternative that the robot does not offer.
         FormatError: a file that is missing or that MuJoCo cannot read.

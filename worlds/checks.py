@@ -36,6 +36,13 @@ def of_kind(kind: str, robot: RobotModel) -> RobotModel:
 def bounded(name: str, value: float, low: float, high: float, unit: str) -> float:
     """The number, if it is inside its bounds.
 
+    Args:
+        name: what the number is called, for the message.
+        value: the number.
+        low: smallest that is allowed.
+        high: largest that is allowed.
+        unit: of all three, for the message.
+
     Raises:
         OutOfBoundsError: it is not, or it is no number.
     """
@@ -72,6 +79,11 @@ def shared(
 ) -> tuple[Sequence[Damage], Sequence[int]]:
     """A damage and a seed for each of the robots; without seeds 0, 1, 2, ...
 
+    Args:
+        damage: one for all robots, or one for each.
+        seeds: one for each robot, or none.
+        robots: how many there are.
+
     Raises:
         BnsError: there are other numbers of them, or a negative seed.
     """
@@ -107,7 +119,17 @@ def several(kind: type[T], name: str, given: Any) -> tuple[T, ...]:
 
 
 def one(kind: type[T], name: str, given: object) -> T:
-    """One of a kind, as itself or as a table with its fields; see `several`."""
+    """One of a kind, as itself or as a table with its fields; see `several`.
+
+    Args:
+        kind: a dataclass.
+        name: what one of it is called, for messages.
+        given: one of the kind, or a table with its fields.
+
+    Raises:
+        BnsError: it is neither, or the kind does not take its fields.
+        UnknownNameError: a field that the kind does not have.
+    """
     if isinstance(given, kind):
         return given
     known = [field.name for field in fields(kind)]  # type: ignore[arg-type]

@@ -142,6 +142,9 @@ def factory(world: Corrected, make: Callable[..., Any]) -> Callable[..., Any]:
     Args:
         world: the kept one.
         make: the registry's `make`, for its base.
+
+    Raises:
+        BnsError: (by what is returned) the settings name another robot.
     """
 
     def made(**settings: Any) -> Any:

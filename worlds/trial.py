@@ -188,7 +188,11 @@ class Trial:
         object.__setattr__(self, "boundaries", boundaries)
 
     def channel(self, name: str) -> np.ndarray:
-        """Samples of the channel `name`, shape ``(T,)``."""
+        """Samples of the channel `name`, shape ``(T,)``.
+
+        Raises:
+            BnsError: the trial has no such channel.
+        """
         names = [channel.name for channel in self.channels]
         if name not in names:
             raise BnsError(f"Trial has no channel {name!r}; it has {', '.join(names)}.")

@@ -58,6 +58,12 @@ def make(directory: Path, answers: Path, cases: Iterable[tuple[str, Case]]) -> i
 def run(directory: Path, model: GapModel, said: Path, *, seed: int = 0) -> int:
     """Diagnose the cases that are missing in `said`, appending as they come.
 
+    Args:
+        directory: of the cases, one dataset in each sub-directory.
+        model: nominal model.
+        said: JSON Lines file of diagnoses; cases named in it are skipped.
+        seed: of what each diagnosis draws.
+
     Returns:
         How many were run.
     """

@@ -87,7 +87,13 @@ class Case:
 def commands(
     rng: np.random.Generator, count: int = TRIALS, *, robot: str = "khepera3"
 ) -> list[Commands]:
-    """Random wheel speeds that a robot takes, each held for 0.4 to 1.6 s."""
+    """Random wheel speeds that a robot takes, each held for 0.4 to 1.6 s.
+
+    Args:
+        rng: source of the speeds and times.
+        count: number of lists of commands, one for each trial.
+        robot: a wheeled robot, by name; its speed limit counts.
+    """
     fastest = excitation.fastest(float(models.robot(robot).limits.min()))
     made = []
     for _ in range(count):
@@ -130,7 +136,14 @@ def tracker(rng: np.random.Generator) -> list[Effect]:
 def record(
     told: Sequence[Commands], effects: Sequence[Effect], seed: int, robot: str
 ) -> tuple[Trial, ...]:
-    """Run the robot; time stamps jitter by a few milliseconds."""
+    """Run the robot; time stamps jitter by a few milliseconds.
+
+    Args:
+        told: commands of each trial.
+        effects: what the robot departs by.
+        seed: of the world and of the jitter.
+        robot: a wheeled robot, by name.
+    """
     world = MujocoWorld(robot, reality=effects, threads=2, name="real")
     seeds = [seeding.integer(seed, "case", "world", n) for n in range(len(told))]
     made = []

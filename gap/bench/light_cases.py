@@ -85,7 +85,13 @@ def pose_sd(effects: Sequence[Effect]) -> tuple[float, float, float]:
 
 
 def record(seed: int, effects: Sequence[Effect], *, singles: bool) -> tuple[Trial, ...]:
-    """Drive the robots; the same habits and starts for the same seed."""
+    """Drive the robots; the same habits and starts for the same seed.
+
+    Args:
+        seed: of habits, starts and the world.
+        effects: what robot, light and tracker depart by, in any order.
+        singles: as of `LightWorld`.
+    """
     order = {"command": 0, "actuator": 1, "body": 2, "sensor": 3, "tracking": 4}
     world = LightWorld(
         singles=singles,

@@ -24,7 +24,13 @@ LARGE = 3.0  # sizes from which effects have to be named
 
 
 def said(made: Analysis, case: Case, model: GapModel) -> dict[str, Any]:
-    """What a diagnosis said of a case, the oracle and the baselines, as plain data."""
+    """What a diagnosis said of a case, the oracle and the baselines, as plain data.
+
+    Args:
+        made: analysis of the case.
+        case: with the true answer.
+        model: nominal model that was diagnosed with.
+    """
     answer, problem = case.answer, made.problem
     found = report(made)
     choice = made.choice
@@ -95,7 +101,13 @@ def judged(row: dict[str, Any], rules: verdict.Calibration) -> dict[str, Any]:
 def intervals(
     said: dict[str, Any], names: Sequence[str], rules: verdict.Calibration
 ) -> list[list[float]]:
-    """Value, half interval and nominal value of each true effect that was fitted."""
+    """Value, half interval and nominal value of each true effect that was fitted.
+
+    Args:
+        said: what was said of the case, as `said` gives it.
+        names: true effects, in the answer's order.
+        rules: thresholds and widths of intervals.
+    """
     made = []
     for name, found in zip(names, errors(said, rules), strict=False):
         value, error, nominal = found
@@ -192,7 +204,13 @@ def size(row: dict[str, Any]) -> float:
 
 
 def of(rows: Sequence[dict], kind: str, smallest: float = 0.0) -> list[dict]:
-    """Rows of a kind whose effects are at least this large, errors left out."""
+    """Rows of a kind whose effects are at least this large, errors left out.
+
+    Args:
+        rows: cases with what was said of them.
+        kind: of case.
+        smallest: least size of the effects that count.
+    """
     return [
         row
         for row in rows

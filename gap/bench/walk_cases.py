@@ -96,7 +96,14 @@ def record(
     seed: int,
     robot: str = "phantomx",
 ) -> tuple[Trial, ...]:
-    """Let the robot walk, seen by a noisy tracker."""
+    """Let the robot walk, seen by a noisy tracker.
+
+    Args:
+        told: commands of each trial.
+        effects: what the robot departs by; the tracker's noise is added.
+        seed: of the world.
+        robot: a walking robot, by name.
+    """
     noise = registry.make(
         "tracker_noise", position_sd=TRACKER[0], heading_sd=TRACKER[2]
     )
@@ -115,6 +122,9 @@ def build(seed: int, kind: str, model: WalkModel) -> WalkCase:
         seed: of everything in it.
         kind: of `SIZES`; "lost" (a leg, or a joint, as a whole); or "none".
         model: nominal model.
+
+    Raises:
+        BnsError: no effect of the kind was found that the robot can walk with.
     """
     rng = seeding.generator(seed, "walk case", kind)
     told = commands(rng, model)

@@ -113,7 +113,14 @@ class LightCandidate(Candidate):
         branch: int = 0,
         extras: Mapping[str, float] | None = None,
     ) -> Effect:
-        """The effect at a magnitude, clipped to the bounds."""
+        """The effect at a magnitude, clipped to the bounds.
+
+        Args:
+            magnitude: in the candidate's unit; clipped to its bounds.
+            branch: index into `branches`.
+            extras: values beside the magnitude, by name, that go before those of the
+                branch.
+        """
         value = min(max(float(magnitude), self.low), self.high)
         values = {**self.fixed, **self.branches[branch], **(extras or {})}
         if self.effect == "light_displaced":

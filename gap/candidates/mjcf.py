@@ -79,7 +79,13 @@ class OwnCandidate(Candidate):
         branch: int = 0,
         extras: Mapping[str, float] | None = None,
     ) -> Effect:
-        """The effect at a magnitude, clipped to the bounds."""
+        """The effect at a magnitude, clipped to the bounds.
+
+        Args:
+            magnitude: in the candidate's unit; clipped to its bounds.
+            branch: index into `branches`.
+            extras: not used; such effects have none.
+        """
         del extras
         value = min(max(float(magnitude), self.low), self.high)
         values = {**self.fixed, **self.branches[branch], self.parameter: value}

@@ -130,7 +130,13 @@ def coarser(windows: Windows, length: float) -> Windows:
 
 
 def derivative(model: GapModel, trial: Trial, windows: Windows) -> np.ndarray:
-    """Derivative of the features by the observations, ``(W * C, T, n_channels)``."""
+    """Derivative of the features by the observations, ``(W * C, T, n_channels)``.
+
+    Args:
+        model: nominal model.
+        trial: recorded trial; what was not seen counts as zero.
+        windows: W windows into it.
+    """
     seen = np.where(np.isfinite(trial.observed), trial.observed, 0.0)
     count, channels = seen.shape
     moved = np.repeat(seen[None], count * channels, axis=0)

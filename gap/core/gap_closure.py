@@ -31,6 +31,13 @@ def quantify(
     model reaches if its rest has no structure left, else 1, which is what the noise
     was estimated to give.
 
+    Args:
+        problem: the recording.
+        null: its null distributions and flexible directions.
+        search: supports that were fitted, by size.
+        best: the chosen support.
+        seed: of the bootstrap.
+
     Returns:
         before, after, floor, ceiling: energies; singles: after each effect alone;
         closed: (before - after) / (before - floor) with a 90 % bootstrap interval
@@ -96,6 +103,9 @@ def flexible(
         null: its flexible directions.
         rest: what is predicted; None = all that the nominal model leaves.
         folds: groups of trials.
+
+    Returns:
+        summed loss of each trial, ``(n_trials,)``.
     """
     rest, rows = problem.rest if rest is None else rest, problem.whiten.rows
     made = np.zeros(len(rows))

@@ -58,7 +58,13 @@ class Rung:
 
 
 def rungs(problem: Problem, search: Search, null: Null) -> tuple[Rung, ...]:
-    """All sizes for which a support was fitted, nothing first."""
+    """All sizes for which a support was fitted, nothing first.
+
+    Args:
+        problem: the recording.
+        search: supports that were fitted, by size.
+        null: what is left is tested against it.
+    """
     found = [(search.nothing,), *search.sizes]
     return tuple(
         _rung(size, points, search.nothing, problem, null)

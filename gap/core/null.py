@@ -36,7 +36,13 @@ class Null:
 
     @classmethod
     def of(cls, problem: Problem, curves: Curves, *, seed: int = 0) -> "Null":
-        """By drawing whitened recordings without an effect."""
+        """By drawing whitened recordings without an effect.
+
+        Args:
+            problem: the recording.
+            curves: its signatures.
+            seed: of the drawn recordings.
+        """
         rng = seeding.generator(seed, "gap", "null")
         rows = curves.signature
         size = np.maximum((rows.astype(float) ** 2).sum(axis=1), 1e-12)
@@ -188,6 +194,9 @@ def flexible(problem: Problem) -> np.ndarray:
 
     Each feature channel is a linear function of what went on in the window: commands,
     their sizes, signs and recent changes, products, heading, position and time.
+
+    Returns:
+        ``(N, k)``: k directions of N whitened residuals.
     """
     made = [
         columns(problem.model.regime(trial, windows))

@@ -28,7 +28,13 @@ def sizes(problem: Problem, best: Point, rung: Rung) -> np.ndarray:
 
 
 def text(problem: Problem, best: Point, rung: Rung) -> str:
-    """One sentence on it: its share of the gap, and how far it moves the robot."""
+    """One sentence on it: its share of the gap, and how far it moves the robot.
+
+    Args:
+        problem: the recording.
+        best: the best support.
+        rung: what is known of its size.
+    """
     window = float(np.median(np.concatenate([w.durations for w in problem.windows])))
     found = []
     for value, channel in zip(

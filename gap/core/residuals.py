@@ -51,7 +51,17 @@ def _mean(square: np.ndarray, axis: int) -> np.ndarray:
 
 
 def by_trial(problem: Problem, effects: Sequence[Effect], horizon: float) -> np.ndarray:
-    """Mean squared residual of each trial over windows of a length, ``(N, C)``."""
+    """Mean squared residual of each trial over windows of a length, ``(N, C)``.
+
+    Args:
+        problem: the recording.
+        effects: added to the nominal model.
+        horizon: length of the windows [s].
+
+    Returns:
+        by trial and feature, in the feature's unit squared; NaN where a trial has no
+        window of that length.
+    """
     (predicted,) = problem.model.simulate(problem.trials, [tuple(effects)])
     rows = []
     for trial, made, windows in zip(

@@ -144,7 +144,7 @@ def overlapping(trial: Trial, length: float) -> Windows:
 
 
 def thinned(poses: np.ndarray) -> np.ndarray:
-    """Every `EVERY`-th pose; the last interval is made whole by going on straight."""
+    """Every `EVERY`-th pose, ``(T, 3)``; beyond the end it goes on straight."""
     missing = -(len(poses) - 1) % EVERY
     if missing:
         beyond = poses[-1] + np.arange(1, missing + 1)[:, None] * (
@@ -155,7 +155,7 @@ def thinned(poses: np.ndarray) -> np.ndarray:
 
 
 def coarse(poses: np.ndarray) -> np.ndarray:
-    """Poses in steps of `COARSE` around their mean, headings going on beyond pi."""
+    """Poses ``(T, 3)`` in steps of `COARSE` around their mean, headings unwrapped."""
     poses = np.column_stack([poses[:, :2], np.unwrap(poses[:, 2])])
     mean, step = poses.mean(axis=0), np.array(COARSE)
     return mean + step * np.round((poses - mean) / step)

@@ -251,6 +251,11 @@ def held_out(
     The magnitudes are fitted again without each group of trials, along the slopes of
     the fit on all.
 
+    Args:
+        problem: the recording.
+        point: a fitted support.
+        folds: groups of trials.
+
     Returns:
         summed loss; loss by trial, ``(n_trials,)``.
     """

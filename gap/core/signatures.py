@@ -41,7 +41,7 @@ class Curves:
     diverged: tuple[str, ...]
 
     def levels(self, candidate: int) -> np.ndarray:
-        """Indices of a candidate's levels."""
+        """Indices of a candidate's levels, ``(K,)``."""
         return np.flatnonzero(self.owner == candidate)
 
     def index(self, name: str) -> int:

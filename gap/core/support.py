@@ -26,7 +26,13 @@ class Term:
 
     @classmethod
     def at(cls, candidate: Candidate, branch: int, magnitude: float) -> "Term":
-        """With the extras of the branch."""
+        """With the extras of the branch.
+
+        Args:
+            candidate: the explanation.
+            branch: index into its branches.
+            magnitude: in its unit.
+        """
         values = {**candidate.fixed, **candidate.branches[branch]}
         extras = tuple(float(values.get(name, 0.0)) for name in candidate.extras)
         return cls(candidate, branch, float(magnitude), extras)
@@ -86,7 +92,16 @@ class Point:
 def evaluate(
     problem: Problem, supports: Sequence[Sequence[Term]], *, rough: bool = False
 ) -> list[Point]:
-    """The loss of supports as they are, in one batch of simulations."""
+    """The loss of supports as they are, in one batch of simulations.
+
+    Args:
+        problem: the recording.
+        supports: terms of each.
+        rough: by the quicker simulation, where the model has one.
+
+    Returns:
+        one point for each support, without slopes.
+    """
     if not supports:
         return []
     effects = [[term.effect() for term in terms] for terms in supports]

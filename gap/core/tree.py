@@ -71,7 +71,14 @@ def regime(problem: Problem, *, seed: int = 0) -> dict[str, Any]:
 def grow(
     table: Mapping[str, np.ndarray], target: np.ndarray, depth: int, share: float = 1.0
 ) -> Node:
-    """The tree that lowers the squared error most at every split."""
+    """The tree that lowers the squared error most at every split.
+
+    Args:
+        table: what may split, by name, each ``(W,)``.
+        target: what is explained, ``(W,)``.
+        depth: number of splits that may follow one another.
+        share: of all windows that these are; 1 at the root.
+    """
     leaf = Node(float(target.mean()), share)
     least = max(int(LEAST * len(target) / share), 10)
     if depth == 0 or len(target) < 2 * least:

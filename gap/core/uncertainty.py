@@ -15,7 +15,13 @@ FLAT = 1e-9  # of a slope: a whole magnitude (a leg is there or not) has none
 def intervals(
     problem: Problem, point: Point, rules: Calibration
 ) -> tuple[tuple[tuple[float, float], ...], float]:
-    """90 % interval of each magnitude; condition of the fit."""
+    """90 % interval of each magnitude; condition of the fit.
+
+    Args:
+        problem: the recording.
+        point: a fitted support.
+        rules: widths of intervals.
+    """
     deviations, condition = spreads(problem, point)
     spans = []
     for term, deviation in zip(point.terms, deviations, strict=True):

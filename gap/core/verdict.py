@@ -188,7 +188,13 @@ def decide(
 def judge(
     rung: Rung, p_gap: float, rules: Calibration
 ) -> tuple[str, tuple[tuple[str, ...], ...], tuple[tuple[str, ...], ...]]:
-    """Kind, named supports and the 90 % set, see `Verdict`."""
+    """Kind, named supports and the 90 % set, see `Verdict`.
+
+    Args:
+        rung: the chosen size.
+        p_gap: probability of so large a gap if there were none.
+        rules: thresholds.
+    """
     sets = tuple(names for names, score in rung.scores if score <= rules.tie)
     near = tuple(names for names, score in rung.scores if score <= rules.sure)
     if p_gap > rules.alpha_gap and rung.size < 2:

@@ -42,7 +42,14 @@ class Whitener:
         windows: Sequence[Windows],
         floor: Floor,
     ) -> "Whitener":
-        """The whitener of a recording, without uncertain directions."""
+        """The whitener of a recording, without uncertain directions.
+
+        Args:
+            model: nominal model.
+            trials: the recording.
+            windows: of each trial.
+            floor: what measuring and the robot itself scatter.
+        """
         factors, rows, at = [], [], 0
         for trial, parts in zip(trials, windows, strict=True):
             jacobian = derivative(model, trial, parts) * floor.sigma
@@ -103,5 +110,5 @@ def terms(z: np.ndarray) -> np.ndarray:
 
 
 def weights(z: np.ndarray) -> np.ndarray:
-    """Square roots of the weights that make least squares of the loss."""
+    """Root weight of each residual that makes least squares of the loss."""
     return np.sqrt(np.minimum(1.0, CLIP / np.maximum(np.abs(z), 1e-12)))

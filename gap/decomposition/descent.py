@@ -46,7 +46,17 @@ def _held_out(problem: Problem, point: Point) -> float:
 def descend(
     problem: Problem, values: np.ndarray, support: Iterable[str], known: Noise
 ) -> Point:
-    """Fit a set, make the problem linear there, search again, until the set stays."""
+    """Fit a set, make the problem linear there, search again, until the set stays.
+
+    Args:
+        problem: the recording.
+        values: of all rows to start from, ``(R,)``.
+        support: explanations to start from.
+        known: noise to start from.
+
+    Returns:
+        the last point, after `TURNS` searches at most.
+    """
     support, slopes, at = frozenset(support), None, None
     for _ in range(TURNS):
         values, rest = newton(problem, values, _fitted(problem, support), known)
@@ -82,7 +92,13 @@ def costs(problem: Problem, points: Sequence[Point]) -> list[float]:
 
 
 def relinearised(problem: Problem, point: Point, known: Noise) -> Linear:
-    """A point's linear model under another noise."""
+    """A point's linear model under another noise.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+        known: the other noise.
+    """
     whole = fit.target(problem, point.values, point.rest, point.slopes)
     linear = Linear.of(
         problem,

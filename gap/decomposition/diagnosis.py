@@ -129,7 +129,13 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
 
 
 def refitted(problem: Problem, point: Point, support: Support) -> Point:
-    """A point with a smaller set, fitted to the simulation."""
+    """A point with a smaller set, fitted to the simulation.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+        support: the smaller set.
+    """
     from bns.gap.decomposition import fit
 
     values = fit.placed(problem, point.linear, support, point.values)
@@ -191,7 +197,15 @@ def narrowed(problem: Problem, names: Sequence[str]) -> Problem:
 def recorded(
     made: Decomposition, *, faults, seed: int, clock: Clock, full: bool
 ) -> Diagnosis:
-    """A decomposition written down."""
+    """A decomposition written down.
+
+    Args:
+        made: the decomposition.
+        faults: what the check of the recording found.
+        seed: of what is drawn.
+        clock: of the stages; "where" is added to it if `full`.
+        full: with localisation and the plain gap.
+    """
     problem, model = made.problem, made.problem.model
     where: dict[str, Any] = {}
     closed = _closed(made)
@@ -363,7 +377,18 @@ def _at_bound(problem: Problem, part: Part) -> bool:
 
 
 def shown_effect(problem: Problem, name: str, part: Part, _shape):
-    """Text, magnitude, interval and unit of an explanation."""
+    """Text, magnitude, interval and unit of an explanation.
+
+    Args:
+        problem: the recording.
+        name: of the explanation.
+        part: its values and intervals.
+        _shape: not used.
+
+    Returns:
+        text; magnitude, which for several numbers is the length of the departure of the
+        first two; its interval; unit of the first.
+    """
     rows = {row.name: row for row in problem.rows}
     units = rows[next(iter(part.values))].unit
     made = problem.model.effect(name, part.values)

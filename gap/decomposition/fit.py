@@ -81,8 +81,15 @@ def smooth(problem: Problem, values: np.ndarray) -> list[int]:
 
 
 def columns(problem: Problem, values: np.ndarray) -> dict[int, np.ndarray]:
-    """Columns of the linear model; that of a row set to a level is the whole change
-    from nominal, over its size."""
+    """Columns of the linear model; a row set to a level has its secant from nominal.
+
+    Args:
+        problem: the recording.
+        values: of all rows, ``(R,)``.
+
+    Returns:
+        by number of the row, each ``(N, C)``.
+    """
     wanted = smooth(problem, values)
     made = problem.slopes(values, [k for k in wanted if problem.rows[k].smooth])
     for number in wanted:
@@ -92,7 +99,16 @@ def columns(problem: Problem, values: np.ndarray) -> dict[int, np.ndarray]:
 
 
 def secant(problem: Problem, values: np.ndarray, number: int) -> np.ndarray:
-    """Change of the features from nominal to a row's value, over that of the row."""
+    """Change of the features from nominal to a row's value, over that of the row.
+
+    Args:
+        problem: the recording.
+        values: of all rows, ``(R,)``.
+        number: of the row; its value is not the nominal one.
+
+    Returns:
+        ``(N, C)``; 0 where it is not a number.
+    """
     without = values.copy()
     without[number] = problem.nominal[number]
     here, there = problem.predict([values, without], fine=False)
@@ -111,7 +127,14 @@ def units(problem: Problem, values: np.ndarray) -> dict[int, float]:
 def target(
     problem: Problem, values: np.ndarray, rest: np.ndarray, slopes: Mapping
 ) -> np.ndarray:
-    """Residuals of the nominal model by the linear one, ``(N, C)``."""
+    """Residuals of the nominal model by the linear one, ``(N, C)``.
+
+    Args:
+        problem: the recording.
+        values: of all rows, ``(R,)``.
+        rest: residuals there, ``(N, C)``; those not seen count as zero.
+        slopes: derivatives by number of the row, each ``(N, C)``.
+    """
     made = np.nan_to_num(rest)
     for number, slope in slopes.items():
         made = made + slope * (values[number] - problem.nominal[number])
@@ -119,7 +142,13 @@ def target(
 
 
 def first_noise(problem: Problem, rest: np.ndarray, motion: np.ndarray) -> Noise:
-    """A guess before any fit."""
+    """A guess before any fit.
+
+    Args:
+        problem: the recording.
+        rest: residuals, ``(N, C)``.
+        motion: predicted features, with whose motion noise may grow, ``(N, C)``.
+    """
     memory = Memory.none(problem.trial, rest.shape[1])
     sd = noise.scale(rest, problem.model.motion(motion), problem.model.least)
     return Noise(sd, memory, 2.0)
@@ -142,6 +171,9 @@ def linearised(
         known: noise to start from.
         slopes: derivatives from before, None = taken anew.
         order: of the autoregression, None = as in the noise.
+
+    Returns:
+        the linear model; the noise; derivatives by number of the row, each ``(N, C)``.
     """
     order = known.order if order is None else order
     wanted = smooth(problem, values)
@@ -300,7 +332,14 @@ def _slopes(problem: Problem, values, which, only) -> dict[int, np.ndarray]:
 def placed(
     problem: Problem, linear: Linear, support: Iterable[str], values: np.ndarray
 ) -> np.ndarray:
-    """Values of a set by the linear model, ``(R,)``; rows set to a level keep it."""
+    """Values of a set by the linear model, ``(R,)``; rows set to a level keep it.
+
+    Args:
+        problem: the recording.
+        linear: the problem made linear.
+        support: the set of explanations.
+        values: of all rows, ``(R,)``, for the rows set to a level.
+    """
     support = frozenset(support)
     found = linear.solve(support)
     made = problem.nominal.copy()

@@ -131,6 +131,13 @@ def zoomed(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The best values of rows set to levels, between the levels beside.
 
+    Args:
+        problem: the recording.
+        values: of all rows, ``(R,)``.
+        rest: residuals there, ``(N, C)``.
+        support: explanations that are in; only their rows are tried.
+        known: the noise.
+
     Returns:
         values and residuals.
     """

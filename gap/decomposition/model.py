@@ -74,7 +74,13 @@ class DecomposableModel(ABC):
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """Features of observations or predictions, ``(..., W, C)``."""
+        """Features of observations or predictions, ``(..., W, C)``.
+
+        Args:
+            trial: recorded trial.
+            observed: ``(..., T, n_channels)``, recorded or simulated.
+            windows: W windows into the trial.
+        """
 
     @abstractmethod
     def effect(self, term: str, values: Mapping[str, float]) -> Effect | None:

@@ -61,7 +61,13 @@ def loss(rest: np.ndarray, sd: np.ndarray) -> float:
 
 
 def weights(rest: np.ndarray, sd: np.ndarray, seen: np.ndarray) -> np.ndarray:
-    """Weights of squares whose gradient is that of `loss`, ``(N, C)``."""
+    """Weights of squares whose gradient is that of `loss`, ``(N, C)``.
+
+    Args:
+        rest: residuals, ``(N, C)``.
+        sd: their standard deviations, ``(N, C)``.
+        seen: which of them were seen, ``(N, C)``; others weigh nothing.
+    """
     units = np.nan_to_num(rest) / sd / HUBER
     return np.where(seen, 1 / np.sqrt(1 + units**2) / sd**2, 0.0)
 
@@ -113,7 +119,13 @@ class Memory:
 
     @classmethod
     def of(cls, rest: np.ndarray, trial: np.ndarray, order: int) -> "Memory":
-        """The autoregression of a rest, by its clipped autocovariance."""
+        """The autoregression of a rest, by its clipped autocovariance.
+
+        Args:
+            rest: residuals, ``(N, C)``.
+            trial: number of the trial of each, ``(N,)``.
+            order: number of lags; 0 = no memory.
+        """
         if order == 0:
             return cls.none(trial, rest.shape[1])
         factors = np.array([_regression(c, trial, order) for c in rest.T])

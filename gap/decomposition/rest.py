@@ -60,13 +60,25 @@ def floor(problem: Problem, *, seed: int = 0) -> Floor:
 
 
 def kept(problem: Problem, left: np.ndarray, sd: np.ndarray) -> np.ndarray:
-    """Windows that are no wild points in a full fit's rest, ``(N, C)``."""
+    """Windows that are no wild points in a full fit's rest, ``(N, C)``.
+
+    Args:
+        problem: the recording.
+        left: residuals of the full fit, ``(N, C)``.
+        sd: their standard deviations, ``(N, C)``.
+    """
     with np.errstate(invalid="ignore"):
         return problem.seen & (np.abs(left) < WILD * sd)
 
 
 def excess(rest: np.ndarray, known: Floor, inside: np.ndarray) -> float:
-    """Mean square of residuals in units of the floor, beyond the floor's own."""
+    """Mean square of residuals in units of the floor, beyond the floor's own.
+
+    Args:
+        rest: residuals, ``(N, C)``.
+        known: the floor.
+        inside: which residuals count, ``(N, C)``.
+    """
     units = np.where(inside, np.nan_to_num(rest) / known.sd, 0.0)
     return float((units**2).sum() / max(inside.sum(), 1) - 1.0)
 
@@ -115,7 +127,14 @@ def recurrence(
 
 def scattered(problem: Problem, rest: np.ndarray, known: Floor, inside) -> float:
     """Excess over the floor, per residual, of what differs between repeats: the
-    robot's own scatter; 0 where there are no repeats."""
+    robot's own scatter; 0 where there are no repeats.
+
+    Args:
+        problem: the recording.
+        rest: residuals, ``(N, C)``.
+        known: the floor.
+        inside: which residuals count, ``(N, C)``.
+    """
     units = np.where(inside, np.nan_to_num(rest) / known.sd, 0.0)
     total, count = 0.0, 0
     for one, other in repeats(problem):

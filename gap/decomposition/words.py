@@ -18,7 +18,14 @@ def sized(sizes: Sequence[float], channels: Sequence) -> str:
 
 
 def size(before: Sequence[float], beyond: Sequence[float], channels, window) -> str:
-    """First statement: how large the gap is beyond what measuring scatters."""
+    """First statement: how large the gap is beyond what measuring scatters.
+
+    Args:
+        before: size of the gap by feature, in its unit.
+        beyond: the same without what measuring scatters.
+        channels: the features.
+        window: length of a window [s].
+    """
     return (
         f"Recorded and predicted motion differ by {sized(before, channels)} over "
         f"{window:.2g} s; beyond what measuring scatters that is "
@@ -27,7 +34,13 @@ def size(before: Sequence[float], beyond: Sequence[float], channels, window) -> 
 
 
 def part(found: Part, unit: str, main: str) -> str:
-    """One explanation with its magnitude and share."""
+    """One explanation with its magnitude and share.
+
+    Args:
+        found: the explanation.
+        unit: of its main number; "1" = none.
+        main: name of the row that is said.
+    """
     value = found.values.get(main, 0.0)
     shown = "" if unit == "1" else f" {unit}"
     low, high = found.low.get(main, value), found.high.get(main, value)
@@ -40,7 +53,14 @@ def part(found: Part, unit: str, main: str) -> str:
 def explained(
     parts: Sequence[str], closed: float, onset: str, tied: Sequence[str]
 ) -> str:
-    """Second statement: what explains how much of it."""
+    """Second statement: what explains how much of it.
+
+    Args:
+        parts: texts of the explanations, as `part` gives them.
+        closed: share of the gap that they close, held out.
+        onset: sentence on when it set in; "" = none.
+        tied: names of rivals that the data cannot tell from it.
+    """
     if not parts:
         return "No effect of the library explains any of it."
     text = f"{' and '.join(parts)} {'explains' if len(parts) == 1 else 'explain'} "
@@ -54,7 +74,13 @@ def explained(
 
 
 def left(share: float, recurs: bool, sizes: str) -> str:
-    """Third statement: how large the rest is, and whether it recurs."""
+    """Third statement: how large the rest is, and whether it recurs.
+
+    Args:
+        share: of the gap that is left.
+        recurs: whether it is the same whenever the motion is.
+        sizes: how large it is, in words.
+    """
     if not recurs:
         return "What is left does not recur: the robot scatters it, or the camera."
     return (

@@ -16,7 +16,7 @@ SPARE_BITS = 1 << 16  # an int16 that was read as unsigned is this much too larg
 
 
 def signed(raw: np.ndarray) -> np.ndarray:
-    """Undo the wrap of 16-bit numbers that were stored as unsigned: 65535 is -1."""
+    """Undo the wrap of 16-bit numbers stored as unsigned: 65535 is -1. Any shape."""
     raw = np.asarray(raw, dtype=np.float64)
     return np.where(raw >= SPARE_BITS // 2, raw - SPARE_BITS, raw)
 
@@ -27,6 +27,12 @@ def despiked(angle: np.ndarray) -> tuple[np.ndarray, int]:
     A packet that was lost reads as raw 0, for a single sample: more than `SPIKE` from
     the median of its seven neighbours, which no servo does. It becomes the mean of its
     good neighbours.
+
+    Args:
+        angle: samples, ``(T,)`` [rad].
+
+    Returns:
+        the mended angles, ``(T,)``; how many were replaced.
     """
     angle = np.asarray(angle, dtype=np.float64)
     if not len(angle):

@@ -79,7 +79,16 @@ def terms(
     pulled: np.ndarray,
     limit: np.ndarray,
 ) -> np.ndarray:
-    """What the change of speed is linear in, of one drive: ``(S, TERMS)``."""
+    """What the change of speed is linear in, of one drive: ``(S, TERMS)``.
+
+    Args:
+        speed: forward and turning speed, ``(S, 2)`` [m/s, rad/s].
+        wheel: speeds of both wheels from the two speeds, ``(2, 2)``.
+        told: speeds told, as `halved` gives them, ``(S, 4)`` [m/s]; the last two enter
+            as they are.
+        pulled: gravity along forward and left, ``(S, 2)`` [m/s^2].
+        limit: lag of each wheel beyond which its motor gives no more, ``(2,)`` [m/s].
+    """
     made = np.empty((TERMS, len(speed)))
     made[8] = 1.0
     made[9:11] = told[:, 2:].T

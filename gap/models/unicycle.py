@@ -81,7 +81,7 @@ class UnicycleModel:
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
-        """Predicted poses, see `GapModel.simulate`."""
+        """See `GapModel.simulate`: predicted poses, each ``(T, 3)`` [m, m, rad]."""
         return [[_path(trial, items) for trial in trials] for items in effects]
 
     def windows(self, trial: Trial) -> Windows:
@@ -91,12 +91,12 @@ class UnicycleModel:
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """Displacement in the robot's frame at the start of each window."""
+        """See `GapModel.compare`: displacement in each window's first frame."""
         begin, end = observed[..., windows.first, :], observed[..., windows.last, :]
         return body_displacement(begin, end)
 
     def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
-        """Commands, their changes, and time."""
+        """Commands, their changes, and time, each ``(W,)``."""
         index, since, at = segments.told(trial, windows)
         told = trial.commands.values
         before = np.vstack([told[:1], told[:-1]])[index]

@@ -102,7 +102,7 @@ class WheeledModel(DecomposableModel):
         *,
         fine: bool = True,
     ) -> list[list[np.ndarray]]:
-        """Predicted poses, see `DecomposableModel.paths`."""
+        """See `DecomposableModel.paths`: poses, each ``(T, 3)`` [m, m, rad]."""
         return self._drives.paths(trials, sets, fine=fine)
 
     def joint_windows(self, trial: Trial) -> Windows:
@@ -125,13 +125,13 @@ class WheeledModel(DecomposableModel):
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
-        """Predicted poses, see `GapModel.simulate`."""
+        """See `GapModel.simulate`: predicted poses, each ``(T, 3)`` [m, m, rad]."""
         return self._simulated(trials, effects, rough=False)
 
     def sketch(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
-        """As `simulate`, quicker: by the reduced dynamics where they do."""
+        """As `simulate`, each ``(T, 3)``, by the reduced dynamics where they do."""
         return self._simulated(trials, effects, rough=True)
 
     def _simulated(
@@ -296,7 +296,7 @@ class WheeledModel(DecomposableModel):
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """Displacement in the robot's frame at the start of each window."""
+        """See `GapModel.compare`: displacement in each window's first frame."""
         begin, end = observed[..., windows.first, :], observed[..., windows.last, :]
         return body_displacement(begin, end)
 

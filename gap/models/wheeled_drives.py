@@ -111,7 +111,13 @@ def effect(name: str, values: Mapping[str, float]) -> Effect:
 
 @lru_cache(maxsize=2000)
 def scene(robot: str, body: tuple[BodyEffect, ...], dt: float) -> Compiled:
-    """The robot's scene with edits, at a step [s]."""
+    """The robot's scene with edits, at a step [s].
+
+    Args:
+        robot: by name.
+        body: edits of the model, applied in order.
+        dt: physics step [s].
+    """
     spec = models.spec(robot, visuals=False)
     servo_joint.fit(spec, models.robot(robot))
     spec.option.timestep = dt
@@ -141,7 +147,7 @@ class Drives:
         *,
         fine: bool = True,
     ) -> list[list[np.ndarray]]:
-        """Predicted poses, see `DecomposableModel.paths`."""
+        """See `DecomposableModel.paths`: poses, each ``(T, 3)`` [m, m, rad]."""
         dt = FINE if fine else COARSE
         starts = [start(trial) for trial in trials]
         drives = [
@@ -231,6 +237,11 @@ def told(commands: Commands, effects: Sequence[Effect], dt: float) -> np.ndarray
 
     A step in which a command ends gets the mean of both by their time, unless an effect
     switches at a speed.
+
+    Args:
+        commands: wheel speeds [m/s] and how long each is held.
+        effects: on commands and actuators, applied in order.
+        dt: physics step [s].
     """
     begins = np.concatenate([[0.0], np.cumsum(commands.durations)])
     count = int(np.ceil(begins[-1] / dt)) + 1 + round(AFTER / dt)

@@ -146,7 +146,14 @@ def blank(
     name: str = "",
     conditions: Mapping[str, float] | None = None,
 ) -> Trial:
-    """A trial that nobody has run yet: as the nominal model would do it."""
+    """A trial that nobody has run yet: as the nominal model would do it.
+
+    Args:
+        commands: to be told.
+        model: nominal model.
+        name: of the world in which it will be run.
+        conditions: of the trial, by name.
+    """
     ends = np.concatenate([[0.0], np.cumsum(commands.durations)])
     grid = np.arange(0.0, ends[-1] + 1e-9, SAMPLE)
     times = np.unique(np.concatenate([grid, ends]).round(6))

@@ -14,7 +14,14 @@ SCHEMA, VERSION = "bns-diagnosis-partial", 1
 
 
 def write(trials: Sequence[Trial], model: GapModel, error: BnsError, out: Path) -> Path:
-    """Keep what the check found, and why the rest is missing; gives the file."""
+    """Keep what the check found, and why the rest is missing; gives the file.
+
+    Args:
+        trials: the recording.
+        model: nominal model.
+        error: what stopped the diagnosis.
+        out: directory for the file, made if missing.
+    """
     try:
         usable, faults = check.check(trials, model)
     except BnsError:

@@ -64,7 +64,16 @@ def change(
     margin: float,
     excite: dict[str, str],
 ) -> str:
-    """What would change the answer, in words."""
+    """What would change the answer, in words.
+
+    Args:
+        kind: of the verdict.
+        best: the best support.
+        tied: supports that cannot be told from it.
+        second: names of the next best support; () = none.
+        margin: how much larger its loss is.
+        excite: what a recording needs in order to show each effect, by name.
+    """
     wanted = sorted({excite.get(n, "") for p in tied for n in p.names} - {""})
     if kind == "either":
         return f"A recording with {' and '.join(wanted)} may separate them."

@@ -73,8 +73,14 @@ class ColumnMap:
     ) -> "ColumnMap":
         """A map from names of columns, and units where they are not SI.
 
+        Args:
+            columns: name of the column of each channel; time and pose are needed.
+            units: of channels that are not in SI units.
+            robot: that the recording is of.
+
         Raises:
             BnsError: a channel missing, or a unit that is missing or unknown.
+            UnknownNameError: a unit of a channel that has no column.
         """
         units = dict(units or {})
         for name in units:

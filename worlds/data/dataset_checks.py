@@ -191,6 +191,12 @@ def _text(value: object) -> str:
 def rows(header: dict, samples: int, commands: int, where: Path) -> None:
     """Stop if tables are shorter or longer than the header says.
 
+    Args:
+        header: of the dataset.
+        samples: number of rows of the table of samples.
+        commands: number of rows of the table of commands.
+        where: file that the message names.
+
     Raises:
         FormatError: they are.
     """
@@ -245,6 +251,11 @@ def flags(about: dict, where: Path) -> dict[str, Any]:
 
 def handled(about: dict, commands: int, where: Path) -> list[bool]:
     """Which commands of a trial the robot was handled in.
+
+    Args:
+        about: the trial's entry in the header.
+        commands: number of commands of the trial.
+        where: file that the message names.
 
     Raises:
         FormatError: no list of indices of commands.

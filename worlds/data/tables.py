@@ -34,7 +34,13 @@ def numbers(replicates: Sequence[int]) -> list[int]:
 def of_samples(
     trials: Sequence[Trial], replicates: Sequence[int], numbers: Sequence[int]
 ) -> Table:
-    """Columns with one row per sample."""
+    """Columns with one row per sample.
+
+    Args:
+        trials: N trials with the same channels.
+        replicates: number of the replicate of each.
+        numbers: number of each trial in its replicate.
+    """
     counts = [len(trial.times) for trial in trials]
     observed = np.concatenate([trial.observed for trial in trials])
     names = [channel.name for channel in trials[0].channels]
@@ -49,7 +55,13 @@ def of_samples(
 def of_commands(
     trials: Sequence[Trial], replicates: Sequence[int], numbers: Sequence[int]
 ) -> Table:
-    """Columns with one row per command."""
+    """Columns with one row per command.
+
+    Args:
+        trials: N trials with the same commands' channels.
+        replicates: number of the replicate of each.
+        numbers: number of each trial in its replicate.
+    """
     counts = [len(trial.commands) for trial in trials]
     values = np.concatenate([trial.commands.values for trial in trials])
     names = [channel.name for channel in trials[0].commands.channels]
@@ -110,6 +122,12 @@ def split(
 ) -> Iterator[Table]:
     """The rows of each trial, in the order of `keys` (replicate, trial).
 
+    Args:
+        table: with the columns ``replicate`` and ``trial``.
+        keys: replicate and trial of each, all different.
+        path: of the table, for messages.
+        allow_empty: whether a trial may have no rows.
+
     Raises:
         FormatError: rows of another trial, of one in two places, or of none.
     """
@@ -143,6 +161,13 @@ def trial(
     where: str,
 ) -> Trial:
     """One trial from its rows.
+
+    Args:
+        samples: the trial's rows of the table of samples.
+        commands: its rows of the table of commands.
+        channels: what was observed.
+        told: what was commanded.
+        where: the trial's place, for messages.
 
     Raises:
         FormatError: rows that make no trial.

@@ -256,6 +256,9 @@ class OpticsEffect(Effect):
         Args:
             law: every number by name; not to be written to.
             sensors: names of the S sensors.
+
+        Returns:
+            every number by name, of the same shape as in `law`.
         """
 
 
@@ -300,4 +303,10 @@ class TrackingEffect(Effect):
     def apply(
         self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Time stamps ``(T,)`` and poses ``(T, 3)`` after the effect."""
+        """Time stamps ``(T,)`` and poses ``(T, 3)`` after the effect.
+
+        Args:
+            signal: time stamps and poses (not to be written to).
+            active: where in time the effect is on, shape ``(T,)``.
+            rng: the only source of randomness.
+        """

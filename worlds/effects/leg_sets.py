@@ -153,7 +153,13 @@ def chosen(spec: Any, which: str) -> Iterator[Any]:
 
 
 def bodies(spec: Any, legs: str, part: str) -> Iterator[Any]:
-    """One part's bodies of a set of legs (text), of those that an `MjSpec` has."""
+    """One part's bodies of a set of legs (text), of those that an `MjSpec` has.
+
+    Args:
+        spec: a `mujoco.MjSpec`.
+        legs: a set of legs as text, see `read`.
+        part: end of the bodies' names, such as "tibia".
+    """
     for leg in read(legs):
         body = spec.body(f"{LEGS[leg - 1]}_{part}")
         if body is not None:

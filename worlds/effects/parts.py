@@ -59,6 +59,11 @@ def part(kind: str) -> tuple[Part]:
 def among(names: Sequence[str], which: str, kind: str) -> list[int]:
     """Indices of the names that a part stands for.
 
+    Args:
+        names: of all parts of the kind.
+        which: a name, a pattern with ``*``, or "all".
+        kind: of the parts, for the message.
+
     Raises:
         UnknownNameError: it stands for none.
     """
@@ -103,7 +108,16 @@ def _of(some: list[Any], which: str, kind: str) -> list[Any]:
 
 
 def in_file(spec: Any, joint: Any, value: float) -> float:
-    """A position of a joint [rad or m] in the units of the model's file."""
+    """A position of a joint [rad or m] in the units of the model's file.
+
+    Args:
+        spec: the `mujoco.MjSpec` that the joint is of.
+        joint: a hinge or a slide.
+        value: the position [rad or m].
+
+    Returns:
+        degrees for a hinge of a model that is written in degrees, else as given.
+    """
     hinge = joint.type == HINGE
     return float(np.rad2deg(value)) if hinge and spec.compiler.degree else value
 

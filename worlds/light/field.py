@@ -90,7 +90,7 @@ class LightField:
         return np.stack([lamp.position for lamp in self.lamps])
 
     def law(self) -> dict[str, np.ndarray]:
-        """The numbers of the light, see `bns.worlds.light.law`."""
+        """The numbers of the light; shapes and units as in `bns.worlds.light.law`."""
         return {
             "lamp_position": self.positions,
             "lamp_power": np.array([lamp.power for lamp in self.lamps]),

@@ -140,5 +140,5 @@ def _shadow(law: Law, poses: np.ndarray) -> np.ndarray:
 
 
 def stacked(laws: Sequence[Law]) -> dict[str, np.ndarray]:
-    """The laws of several robots as one, with a leading robot axis."""
+    """The laws of several robots as one, each array with a leading robot axis."""
     return {name: np.stack([law[name] for law in laws]) for name in laws[0]}

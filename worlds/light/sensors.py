@@ -59,7 +59,9 @@ class LightSensors:
     sight: Sight | None = None
 
     def law(self, field: LightField) -> dict[str, np.ndarray]:
-        """All numbers of light and sensors, see `bns.worlds.light.law`."""
+        """All numbers of light and sensors; shapes and units as in
+        `bns.worlds.light.law`.
+        """
         scalars = (
             "exponent",
             "dark",

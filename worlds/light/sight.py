@@ -128,7 +128,13 @@ class Rays:
         self._hit = np.zeros(1, np.int32)
 
     def free(self, site: str, azimuth: float, elevation: float) -> bool:
-        """Whether nothing of the robot is in a direction [rad] from a sensor."""
+        """Whether nothing of the robot is in a direction [rad] from a sensor.
+
+        Args:
+            site: name of the sensor's site.
+            azimuth: of the direction [rad].
+            elevation: of the direction above the horizontal [rad].
+        """
         level = np.cos(elevation)
         way = [level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)]
         return self._first(self._start(site), np.array(way)) < 0

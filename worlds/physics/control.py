@@ -88,7 +88,14 @@ def disturbed(
     seed: int,
     trial: int,
 ) -> np.ndarray:
-    """The signal's values after the command and actuator effects, ``(S, C)``."""
+    """The signal's values after the command and actuator effects, ``(S, C)``.
+
+    Args:
+        given: the commands on the physics grid.
+        effects: applied in order, each where it is active.
+        seed: of the effects that draw.
+        trial: number of the trial.
+    """
     for placed in effects:
         values = placed.effect.apply(
             given, placed.active(given.times), placed.generator(seed, trial)

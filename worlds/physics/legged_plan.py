@@ -117,6 +117,12 @@ def refuse_fallen(
 ) -> None:
     """Stop if the robot does not stand at the start of trial 0.
 
+    Args:
+        robot: by name.
+        reality: effects of the real robot; without any nothing is checked.
+        start: pose [m, m, rad].
+        channels: the robot's commands.
+
     Raises:
         BnsError: it is tilted too far or lies on its belly, or the physics diverges.
     """

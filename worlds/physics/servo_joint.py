@@ -82,6 +82,12 @@ def read(actuator: Any) -> tuple[Law, float]:
 def write(spec: Any, actuator: Any, values: Law, powered: float = 1.0) -> None:
     """Write a law into an actuator and its joint.
 
+    Args:
+        spec: the `mujoco.MjSpec` that is written to.
+        actuator: of the servo.
+        values: numbers of the law by name.
+        powered: share of the motor that is connected, 0..1.
+
     Raises:
         BnsError: a number that a joint can not represent differs from nominal.
     """

@@ -104,5 +104,13 @@ def law(values: Mapping[str, object]) -> Law:
 
 
 def clipped(name: str, value: np.ndarray) -> np.ndarray:
-    """A number of the law pulled back to its bounds."""
+    """A number of the law pulled back to its bounds.
+
+    Args:
+        name: of the number.
+        value: of any shape, in the number's unit.
+
+    Returns:
+        like `value`.
+    """
     return np.clip(value, NUMBERS[name].low, NUMBERS[name].high)

@@ -173,7 +173,20 @@ class MujocoWorld(PhysicsWorld[Plan]):
         seeds: Sequence[int] = (),
         starts: np.ndarray | None = None,
     ) -> Session:
-        """The same robots, to be told one command at a time; arguments as `drive`."""
+        """The same robots, to be told one command at a time; arguments as `drive`.
+
+        Args:
+            cycles: most commands of the session.
+            cycle: duration of each [s].
+            trial: number of this trial, counted from 0.
+            seeds: of what is random, one a robot; empty means 0, 1, 2, ...
+            starts: poses in the world frame, ``(n, 3)`` [m, m, rad]; None = where this
+                world's trials start.
+
+        Raises:
+            BnsError: there is no robot; numbers of robots disagree; a start or a number
+                of cycles that can not be.
+        """
         n = self._robots(seeds, starts)
         if not n:
             raise BnsError("There is no robot: give a start or a seed at least.")

@@ -98,6 +98,11 @@ class PhysicsWorld(ABC, Generic[PlanT]):
     ) -> list[Trial]:
         """Execute one list of commands on each of N robots, see `World.run`.
 
+        Args:
+            commands: N lists of commands, one a robot.
+            trial: number of this trial, counted from 0.
+            seeds: of what is random, one a robot; empty means 0, 1, 2, ...
+
         Raises:
             BnsError: numbers of commands, seeds and damages disagree; commands that
                 the robot cannot be told.
@@ -111,7 +116,13 @@ class PhysicsWorld(ABC, Generic[PlanT]):
     def plan(
         self, commands: Sequence[Commands], *, trial: int = 0, seeds: Sequence[int] = ()
     ) -> list[PlanT]:
-        """What `run` hands to the physics, for benches and tests; arguments alike."""
+        """What `run` hands to the physics, for benches and tests; arguments alike.
+
+        Args:
+            commands: N lists of commands, one a robot.
+            trial: number of this trial, counted from 0.
+            seeds: of what is random, one a robot; empty means 0, 1, 2, ...
+        """
         damages, seeds = shared(self.damage, seeds, len(commands))
         return [
             self._plan(item, damage, trial, seed)

@@ -79,6 +79,11 @@ class StaticSnnWorld:
     ) -> list[Trial]:
         """Execute one list of commands on each of N robots, see `World.run`.
 
+        Args:
+            commands: N lists of commands, one a robot.
+            trial: number of this trial, counted from 0.
+            seeds: of what is random, one a robot; empty means 0, 1, 2, ...
+
         Raises:
             BnsError: numbers of commands, seeds and damages disagree; commands that
                 the robot cannot be told.

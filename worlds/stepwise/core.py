@@ -95,6 +95,10 @@ class Stepwise:
 
         Returns:
             The trial so far: no command, one sample.
+
+        Raises:
+            BnsError: a seed that can not be; a start in a world that takes none for an
+                episode.
         """
         self.seed, self._told = int(bounded("seed", seed, 0, 2**63, "1")), []
         starts = None if start is None else np.array([start], dtype=np.float64)
@@ -176,7 +180,7 @@ class Stepwise:
         return self.reset(self.seed).channels
 
     def state(self) -> np.ndarray | None:
-        """Full physics state of the robot now; None where the world has no session."""
+        """Physics state of the robot now, ``(nstate,)``; None without a session."""
         if self._session is None:
             return None
         now = self._session.cycle * self._session.setting.steps

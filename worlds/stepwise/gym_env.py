@@ -68,6 +68,13 @@ class RobotEnv(gymnasium.Env):
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Begin an episode; the same seed gives the same one.
 
+        Args:
+            seed: of the episode; None = the generator goes on.
+            options: "start", a pose [m, m, rad], and "trial", the number of the trial.
+
+        Returns:
+            the observation, like `observation_space`; further values by name.
+
         Raises:
             BnsError: an option that there is not, or a start that can not be.
         """
@@ -84,7 +91,7 @@ class RobotEnv(gymnasium.Env):
         return self._observation(seen), self._info(seen)
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        """Do one command, see `gymnasium.Env.step`."""
+        """See `gymnasium.Env.step`: one command; observed as in `reset`."""
         seen = self.episode.act(action)
         return (
             self._observation(seen), seen.reward, seen.over,

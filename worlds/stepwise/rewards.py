@@ -102,7 +102,7 @@ class StayByLight:
         self._scale = max(self._away(trial), 1e-3)
 
     def goal(self) -> np.ndarray:
-        """Nothing: the robot has its sensors."""
+        """Nothing, ``(0,)``: the robot has its sensors."""
         return np.zeros(0)
 
     def of(self, trial: Trial) -> float:
@@ -130,7 +130,7 @@ class Distance:
         self._before = 0.0
 
     def goal(self) -> np.ndarray:
-        """Nothing."""
+        """Nothing, ``(0,)``."""
         return np.zeros(0)
 
     def of(self, trial: Trial) -> float:

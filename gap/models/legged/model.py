@@ -135,7 +135,7 @@ class WalkModel:
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
-        """Predicted poses and servo positions, see `GapModel.simulate`."""
+        """See `GapModel.simulate`: poses [m, m, rad] and servo positions [rad]."""
         return [[self._walked(trial, items) for trial in trials] for items in effects]
 
     def _walked(self, trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
@@ -167,7 +167,7 @@ class WalkModel:
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """The body's displacement in its frame, and servo positions at the end."""
+        """See `GapModel.compare`: the body's displacement, then servo positions."""
         begin, end = observed[..., windows.first, :], observed[..., windows.last, :]
         moved = body_displacement(begin[..., :3], end[..., :3])
         return np.concatenate([moved, end[..., 3:]], axis=-1)

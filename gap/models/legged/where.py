@@ -44,7 +44,13 @@ def shares(
 def suspects(
     rests: Sequence[np.ndarray], names: Sequence[str], sigma: float
 ) -> Suspects:
-    """Joints and legs to be considered; arguments as `shares`."""
+    """Joints and legs to be considered.
+
+    Args:
+        rests: recorded minus predicted positions of each trial, ``(T, J)`` [rad].
+        names: of the joints.
+        sigma: of the readings [rad].
+    """
     share = shares(rests, names, sigma)
     by_leg = {
         leg: sum(value for name, value in share.items() if name.startswith(leg))

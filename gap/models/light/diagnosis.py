@@ -38,7 +38,17 @@ def analyse(
     most: int = 3,
     reference: Sequence[Trial] = (),
 ) -> tuple[Analysis, Analysis]:
-    """Motion and readings of recordings with light; arguments as `diagnose.analyse`."""
+    """Motion and readings of recordings with light, each analysed by itself.
+
+    Args:
+        trials: recordings with light.
+        model: nominal model of the motion.
+        seed: of what is drawn.
+        candidates: explanations to consider, of motion and light; None = all.
+        rules: thresholds, None = those of the package.
+        most: largest number of effects at once.
+        reference: recordings of the same robot in which nothing was changed.
+    """
     given = {"seed": seed, "most": most}
     names = {item.name for item in model.candidates()}
     split: list = [None, None]
@@ -72,7 +82,14 @@ def look(
     rules: Calibration | None = None,
     **given: Any,
 ) -> Analysis:
-    """What readings say by themselves; arguments as `diagnose.analyse`."""
+    """What readings say by themselves; arguments as `diagnose.analyse`.
+
+    Args:
+        trials: recordings with light.
+        sight: model of the readings.
+        rules: thresholds, None = those of the package.
+        **given: further arguments of `diagnose.analyse`.
+    """
     made = single.analyse(trials, sight, rules=light_rules(rules), **given)
     return confirmed(weighed(made))
 
@@ -119,7 +136,13 @@ def _stretch(trial: Trial, begin: int, end: int) -> Trial:
 
 
 def report(motion: Analysis, seen: Analysis, *, full: bool = True) -> Diagnosis:
-    """Both analyses written down as one."""
+    """Both analyses written down as one.
+
+    Args:
+        motion: analysis of the motion.
+        seen: analysis of the readings.
+        full: with localisation and closed fractions.
+    """
     first, second = (single.report(part, full=full) for part in (motion, seen))
     answer = merged(first.verdict, second.verdict)
     main = second if first.verdict.kind == "no gap" else first

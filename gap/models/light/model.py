@@ -34,17 +34,20 @@ SCATTER = 0.188  # standard deviation of `unlikely` of a normal number
 
 
 def squeezed(departure: np.ndarray) -> np.ndarray:
-    """Departures of which large ones count less: a noisy sensor has many of them."""
+    """Departures, each in units of its noise, of which large ones count less.
+
+    A noisy sensor has many of them.
+    """
     return 2 * np.arcsinh(departure / 2) / SQUEEZED
 
 
 def stretched(seen: np.ndarray) -> np.ndarray:
-    """Departures from what `squeezed` made of them."""
+    """Departures from what `squeezed` made of each of them."""
     return 2 * np.sinh(seen * SQUEEZED / 2)
 
 
 def unlikely(departure: np.ndarray) -> np.ndarray:
-    """How far from expected, whatever the sign: 0..1."""
+    """How far each departure is from expected, whatever the sign: 0..1."""
     return 1 - np.exp(-0.5 * (departure / WIDTH) ** 2)
 
 
@@ -195,7 +198,7 @@ class SightModel:
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
-        """Expected departures and scatter, see `GapModel.simulate`."""
+        """See `GapModel.simulate`: expected departures and scatter of each reading."""
         return [[self._expected(trial, items) for trial in trials] for items in effects]
 
     def _expected(self, trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
@@ -232,7 +235,7 @@ class SightModel:
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """Departure and scatter at the end of each window, ``(..., W, 2 R)``."""
+        """See `GapModel.compare`: departure and scatter at each window's end."""
         return observed[..., windows.last, 3:]
 
     def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:

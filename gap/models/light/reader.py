@@ -187,7 +187,13 @@ def _noise(count: int, draws: int, sensors: int) -> np.ndarray:
 
 
 def extra(count: int, draws: int, channels: int) -> np.ndarray:
-    """Further noise of each reading and draw, ``(T, D, R)``."""
+    """Further noise of each reading and draw, ``(T, D, R)``.
+
+    Args:
+        count: T, number of readings.
+        draws: D, number of draws.
+        channels: R, number of sensors.
+    """
     return _noise(count, draws, channels)[3]
 
 

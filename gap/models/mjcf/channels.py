@@ -41,6 +41,15 @@ class Work:
 
 
 def compiled(path: Path, told: Sequence[Told]) -> mujoco.MjModel:
+    """The robot's model with the loops of its commands, compiled.
+
+    Args:
+        path: MJCF file.
+        told: commands, with their actuators and gains.
+
+    Raises:
+        FormatError: there is no such file, or MuJoCo cannot compile it.
+    """
     if not path.is_file():
         raise FormatError(f"There is no model file {path}.")
     try:
@@ -51,7 +60,16 @@ def compiled(path: Path, told: Sequence[Told]) -> mujoco.MjModel:
 
 
 def commands(work: Work, told: list[Column], seen: list[Column]) -> None:
-    """Which actuator each command goes to, in which unit; loops that are missing."""
+    """Which actuator each command goes to, in which unit; loops that are missing.
+
+    Args:
+        work: the description so far; gets commands, guesses and the model with loops.
+        told: columns of commands.
+        seen: columns of readings.
+
+    Raises:
+        BnsError: no column is a command of an actuator of the model.
+    """
     model = work.model
     told = [c for c in told if matching.quantity(c) != tables.EFFORT or not work.loop]
     owners = {
@@ -87,6 +105,7 @@ def commands(work: Work, told: list[Column], seen: list[Column]) -> None:
 
 
 def joints(model: mujoco.MjModel) -> list[str]:
+    """Names of a model's hinges and slides; those without a name are left out."""
     return [
         model.joint(j).name
         for j in range(model.njnt)
@@ -192,10 +211,12 @@ def tolds(work: Work) -> list[Told]:
 
 
 def factor(unit: str) -> float:
+    """What a value in a unit is multiplied by for SI; 1 for an unknown unit."""
     return next((row[unit] for row in FACTORS.values() if unit in row), 1.0)
 
 
 def si_unit(unit: str) -> str:
+    """The SI unit that goes with a unit; an unknown unit as it is."""
     return next((si for si, row in FACTORS.items() if unit in row), unit)
 
 

@@ -82,6 +82,14 @@ def state(trial: Trial, row: int, config: OwnConfig) -> dict[str, list[float]]:
     """Position and speed of each observed joint at a sample.
 
     A speed that is observed itself is taken as the mean around the sample.
+
+    Args:
+        trial: the recording.
+        row: index of the sample.
+        config: which joint each column observes.
+
+    Returns:
+        position [rad or m] and speed, per second, by joint.
     """
     found: dict[str, list[float]] = {}
     near = around(trial.times, np.isfinite(trial.observed).all(axis=1), row)
@@ -99,7 +107,16 @@ def state(trial: Trial, row: int, config: OwnConfig) -> dict[str, list[float]]:
 
 
 def around(times: np.ndarray, seen: np.ndarray, row: int) -> np.ndarray:
-    """Samples near a row: within `HALF` of it, `LEAST` on each side where there are."""
+    """Samples near a row: within `HALF` of it, `LEAST` on each side where there are.
+
+    Args:
+        times: of the samples [s], ``(T,)``.
+        seen: whether each was seen, ``(T,)``.
+        row: index of the sample in the middle.
+
+    Returns:
+        indices of samples that were seen.
+    """
     rows = np.flatnonzero(seen)
     place = int(np.searchsorted(rows, row))
     inside = np.abs(times[rows] - times[row]) <= HALF

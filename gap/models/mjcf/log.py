@@ -40,6 +40,14 @@ def read(path: str, config: OwnConfig) -> list[Trial]:
 def channels(table: Table, config: OwnConfig, path: str) -> dict[str, np.ndarray]:
     """Columns of a log by channel, in SI units, and `time`, `trial`, `command_time`.
 
+    Args:
+        table: the log's columns.
+        config: which column is which channel, and its unit.
+        path: of the log, for messages.
+
+    Returns:
+        each ``(T,)``; without a column of trials all are trial 0.
+
     Raises:
         FormatError: a column is missing.
     """

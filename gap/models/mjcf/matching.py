@@ -100,6 +100,11 @@ def roles(
 
     By the format; by words in the name; an actuator's own name, where a joint has
     another one or is seen in another column.
+
+    Args:
+        columns: of the log.
+        actuators: names in the model.
+        joints: names in the model.
     """
     told, seen = [], []
     own = set(actuators) - set(joints)

@@ -152,8 +152,7 @@ class OwnModel(DecomposableModel):
         *,
         fine: bool = True,
     ) -> list[list[np.ndarray]]:
-        """Predicted samples, see `DecomposableModel.paths`; the coarse step is that of
-        the model."""
+        """See `DecomposableModel.paths`; the coarse step is that of the model."""
         pairs, leads = [], []
         for row in sets:
             for trial, values in zip(trials, row, strict=True):
@@ -179,7 +178,7 @@ class OwnModel(DecomposableModel):
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
-        """Predicted samples, see `GapModel.simulate`."""
+        """See `GapModel.simulate`: predicted samples, each ``(T, n_channels)``."""
         pairs = [(trial, items) for items in effects for trial in trials]
         made = self._predicted(pairs, self._parts())
         count = len(trials)
@@ -293,11 +292,12 @@ class OwnModel(DecomposableModel):
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """What is observed at the end of each window, ``(..., W, C)``."""
+        """See `GapModel.compare`: what is observed at the end of each window."""
         return observed[..., windows.last, :]
 
     def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
-        """Commands, their changes, time, and the predicted readings and their speed.
+        """Commands, their changes, time, and the predicted readings and their speed,
+        each ``(W,)``.
 
         Predicted and not recorded ones: the noise of these is part of what is tested.
         """

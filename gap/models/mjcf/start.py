@@ -19,6 +19,11 @@ def place(data: mujoco.MjData, trial: Trial, view: View) -> None:
 
     Joints whose state the trial's conditions hold get it, with their speeds; else those
     that were observed start at their first sample, at rest.
+
+    Args:
+        data: of the simulation; written to.
+        trial: recorded trial.
+        view: which joint each observed column is.
     """
     state = trial.conditions.get(STATE)
     if not isinstance(state, dict):
@@ -37,6 +42,13 @@ def before(
 
     Those that were recorded, and before them the first of these; at rest if none were.
     A trial that starts where it was recorded was told its first command before.
+
+    Args:
+        trial: recorded trial.
+        rest: commands that hold the robot at rest, ``(C,)``.
+        count: number of steps.
+        config: of the robot.
+        dt: physics step [s].
     """
     rows = trial.conditions.get(BEFORE)
     if not isinstance(rows, list) or not rows:

@@ -14,6 +14,12 @@ from bns.gap.models.mjcf.effects import OWNERS
 
 
 def toml(work: Work, out: Path) -> str:
+    """The description of a robot as the text of a TOML file.
+
+    Args:
+        work: what was found in the model and the log.
+        out: where the file will be; the model's path is relative to it.
+    """
     model = os.path.relpath(work.path.resolve(), out.resolve().parent)
     lines = [
         f"# By `bns gap describe {work.path.name} {Path(work.log).name}`; see "

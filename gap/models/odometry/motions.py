@@ -100,7 +100,13 @@ class Motions:
     def driven(
         self, left: float = 0.0, right: float = 0.0, axle: float = 0.0
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Way of the axle's middle [m] and turn [rad], each ``(K,)``."""
+        """Way of the axle's middle [m] and turn [rad], each ``(K,)``.
+
+        Args:
+            left: relative change of the left wheel's way.
+            right: relative change of the right wheel's way.
+            axle: relative change of the axle's length.
+        """
         ways = (1 + left) * self.left, (1 + right) * self.right
         return (ways[0] + ways[1]) / 2, (ways[1] - ways[0]) / ((1 + axle) * self.axle)
 
@@ -123,7 +129,7 @@ def wrapped(angles: np.ndarray) -> np.ndarray:
 
 
 def changed(magnitudes: Mapping[str, float]) -> np.ndarray:
-    """Changes of `NUMBERS`, from those that are not zero.
+    """Changes of `NUMBERS` in their order, ``(K,)``, from those that are not zero.
 
     Raises:
         ValueError: a name that is none of `NUMBERS`.
@@ -163,7 +169,15 @@ def start(motions: Motions) -> np.ndarray:
 
 
 def robust(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Linear fit with Cauchy's weights, their scale the median of the rest's size."""
+    """Linear fit with Cauchy's weights, their scale the median of the rest's size.
+
+    Args:
+        columns: ``(N, K)``.
+        target: ``(N,)``.
+
+    Returns:
+        factors of the columns, ``(K,)``.
+    """
     weight = np.ones(len(target))
     for _ in range(ROUNDS):
         root = np.sqrt(weight)

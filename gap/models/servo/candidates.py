@@ -87,6 +87,9 @@ def columns(law: Law, sets: Sequence[Sequence[Effect]]) -> Law:
 
     Returns:
         Arrays ``(R, E)`` where the sets differ, else as given.
+
+    Raises:
+        BnsError: an effect that does not act on a servo.
     """
     made = []
     for effects in sets:

@@ -71,7 +71,11 @@ class ServoModel:
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
-        """Predicted samples, see `GapModel.simulate`; other channels as recorded."""
+        """See `GapModel.simulate`: predicted angles [rad]; other channels as recorded.
+
+        Raises:
+            BnsError: a trial is shorter than two hundredths of a second.
+        """
         groups: dict[int, list[int]] = {}
         for number, trial in enumerate(trials):
             groups.setdefault(int(trial.times[-1] / SAMPLE), []).append(number)
@@ -97,7 +101,11 @@ class ServoModel:
         return np.broadcast_to(made, (len(batch), len(effects), made.shape[-1]))
 
     def windows(self, trial: Trial) -> Windows:
-        """Windows of `WINDOW` seconds, between samples that were seen."""
+        """Windows of `WINDOW` seconds, between samples that were seen.
+
+        Raises:
+            BnsError: a trial has no two samples with an angle.
+        """
         fine = np.flatnonzero(np.isfinite(trial.channel("angle")))
         if len(fine) < 2:
             raise BnsError("A servo trial has no two samples with an angle.")
@@ -111,7 +119,7 @@ class ServoModel:
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """The angle at the end of each window, ``(..., W, 1)`` [rad]."""
+        """See `GapModel.compare`: the angle at the end of each window [rad]."""
         return observed[..., windows.last, :1]
 
     def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:

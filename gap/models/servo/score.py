@@ -104,6 +104,14 @@ def refined(
 
     The coarse curve's cost is that of a straight line between two simulations; here it
     becomes that of a short one.
+
+    Args:
+        runs: recorded runs.
+        nominal: simulation without effects.
+        scores: of the coarse curves.
+        candidates: explanations by name.
+        whiteners: one matrix of each run.
+        best: number of candidates that are simulated again.
     """
     residuals = servo_curves.residuals(runs, nominal)
     top = scores.ranked[:best]
@@ -133,6 +141,15 @@ def _near(candidate: Candidate, at: float) -> np.ndarray:
 def whiteners(
     runs: Runs, discrepancy: Discrepancy, without: Sequence[object] = ()
 ) -> list[np.ndarray]:
-    """One whitening matrix per run, by its trajectory and told gain."""
+    """One whitening matrix per run, by its trajectory and told gain.
+
+    Args:
+        runs: R recorded runs.
+        discrepancy: what the nominal model leaves by itself.
+        without: as of `Discrepancy.whitener`.
+
+    Returns:
+        R matrices, each for the residuals of one run.
+    """
     told = zip(runs.labels["trajectory"], runs.told["gain"], strict=True)
     return [discrepancy.whitener(kind, gain, without=without) for kind, gain in told]

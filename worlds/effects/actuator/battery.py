@@ -39,6 +39,7 @@ class BatterySag(ActuatorEffect):
     def apply(
         self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
+        """See `CommandEffect.apply`."""
         values = signal.values.copy()
         if self.is_nominal:
             return values
@@ -95,6 +96,7 @@ class BatteryFade(ActuatorEffect):
     def apply(
         self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
+        """See `CommandEffect.apply`."""
         values = signal.values.copy()
         if not self.is_nominal:
             values[active] *= np.exp(-self["per_trial"] * self["trials"])

@@ -32,6 +32,7 @@ class MotorLag(ActuatorEffect):
     def apply(
         self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
+        """See `CommandEffect.apply`."""
         values = signal.values.copy()
         if self.is_nominal:
             return values
@@ -74,6 +75,7 @@ class WheelBacklash(ActuatorEffect):
     def apply(
         self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
+        """See `CommandEffect.apply`."""
         values = signal.values.copy()
         if self.is_nominal:
             return values

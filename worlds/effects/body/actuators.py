@@ -38,6 +38,7 @@ class ActuatorGain(BodyEffect):
     parameters = _factor("force over the model's", 0.7)
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         for item in parts.actuators(spec, self["part"]):
@@ -73,6 +74,11 @@ class ActuatorKp(BodyEffect):
     parameters = _factor("kp over the model's", 0.7)
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`.
+
+        Raises:
+            BnsError: an actuator has no such gain to scale.
+        """
         if self.is_nominal:
             return
         for item in _servos(spec, self["part"], 1, "position gain"):
@@ -93,6 +99,11 @@ class ActuatorKd(BodyEffect):
     parameters = _factor("kd over the model's", 0.5)
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`.
+
+        Raises:
+            BnsError: an actuator has no such gain to scale.
+        """
         if self.is_nominal:
             return
         for item in _servos(spec, self["part"], 2, "damping gain"):
@@ -114,6 +125,11 @@ class ActuatorTorqueLimit(BodyEffect):
     parameters = _factor("largest force over the model's", 0.5)
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`.
+
+        Raises:
+            BnsError: an actuator has no force range to scale.
+        """
         if self.is_nominal:
             return
         for item in parts.actuators(spec, self["part"]):

@@ -33,6 +33,7 @@ class FloorFriction(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         for body in (*bodies.grounded(spec), spec.worldbody):
@@ -70,6 +71,7 @@ class FloorSlope(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         pull = float(np.linalg.norm(spec.option.gravity))  # [m/s2]
@@ -105,6 +107,7 @@ class FloorCompliance(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         for body in spec.bodies:

@@ -112,6 +112,7 @@ class JointStribeck(BodyEffect):
     quickness: ClassVar[float] = 0.4  # of the bristles, per physics step
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         import mujoco
@@ -165,6 +166,7 @@ class JointBacklash(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         for joint in parts.joints(spec, self["part"]):
@@ -197,6 +199,7 @@ class EncoderOffset(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         for joint in parts.joints(spec, self["part"]):

@@ -33,6 +33,7 @@ class BodyMass(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         for body in parts.bodies(spec, self["part"]):
@@ -64,6 +65,7 @@ class BodyCentre(BodyEffect):
     parameters = (_shift("x"), _shift("y"), _shift("z"))
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         for body in parts.bodies(spec, self["part"]):
@@ -98,6 +100,7 @@ class BodyLength(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         for body in parts.bodies(spec, self["part"]):
@@ -165,6 +168,7 @@ class GeomFriction(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         for geom in parts.geoms(spec, self["part"]):

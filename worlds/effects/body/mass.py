@@ -45,6 +45,7 @@ class Payload(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         body = bodies.base(spec)
@@ -72,6 +73,7 @@ class CentreOfMass(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         body = bodies.base(spec)

@@ -29,6 +29,7 @@ class AxleLength(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         left, right = (bodies.wheel(spec, side) for side in ("left", "right"))
@@ -63,6 +64,7 @@ class WheelDiameter(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         for side in self.wheels():
@@ -102,6 +104,7 @@ class RollingDrag(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         for side in self.wheels():
@@ -133,6 +136,11 @@ class TorqueLimit(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`.
+
+        Raises:
+            BnsError: an actuator has no force range to scale.
+        """
         if self.is_nominal:
             return
         for side in self.wheels():
@@ -181,6 +189,7 @@ class WheelEccentricity(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         for side in self.wheels():
@@ -211,6 +220,11 @@ class CasterDrag(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`.
+
+        Raises:
+            BnsError: the robot rests on its wheels alone.
+        """
         if self.is_nominal:
             return
         base = bodies.base(spec)

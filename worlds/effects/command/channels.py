@@ -59,7 +59,7 @@ class CommandDelay(_Channel):
     )
 
     def change(self, told: np.ndarray, dt: float) -> np.ndarray:
-        """The signal shifted."""
+        """The signal shifted in time, ``(S,)``."""
         at = np.arange(len(told)) - self["delay"] / dt
         return np.interp(at, np.arange(len(told)), told)
 
@@ -72,7 +72,7 @@ class CommandLag(_Channel):
     parameters = _number("time_constant", "s", 0.0, "of a first-order lag", 0.2)
 
     def change(self, told: np.ndarray, dt: float) -> np.ndarray:
-        """The signal through a first-order filter."""
+        """The signal through a first-order filter, ``(S,)``."""
         from scipy.signal import lfilter
 
         keep = np.exp(-dt / max(self["time_constant"], 1e-9))
@@ -88,7 +88,7 @@ class CommandGain(_Channel):
     parameters = _number("factor", "1", 1.0, "what arrives over what was told", 0.8)
 
     def change(self, told: np.ndarray, dt: float) -> np.ndarray:
-        """The signal scaled."""
+        """The signal scaled, ``(S,)``."""
         return told * self["factor"]
 
 
@@ -103,7 +103,7 @@ class CommandOffset(_Channel):
     )
 
     def change(self, told: np.ndarray, dt: float) -> np.ndarray:
-        """The signal shifted in value."""
+        """The signal shifted in value, ``(S,)``."""
         return told + self["added"]
 
 
@@ -118,7 +118,7 @@ class CommandDeadZone(_Channel):
     )
 
     def change(self, told: np.ndarray, dt: float) -> np.ndarray:
-        """The signal with what is small set to zero."""
+        """The signal with what is small set to zero, ``(S,)``."""
         return np.where(np.abs(told) < self["size"], 0.0, told)
 
 
@@ -139,7 +139,7 @@ class CommandLimit(_Channel):
         return type(self)(values)
 
     def change(self, told: np.ndarray, dt: float) -> np.ndarray:
-        """The signal within the limit."""
+        """The signal within the limit, ``(S,)``."""
         return np.clip(told, -self["limit"], self["limit"])
 
 
@@ -157,7 +157,7 @@ class CommandRate(_Channel):
     )
 
     def change(self, told: np.ndarray, dt: float) -> np.ndarray:
-        """The signal followed at the largest rate, from its first value on."""
+        """The signal followed at the largest rate from its first value, ``(S,)``."""
         most = dt / self["time_per_unit"]
         made, now = np.empty_like(told), told[0]
         for at, goal in enumerate(told):

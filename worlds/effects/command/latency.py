@@ -31,6 +31,7 @@ class CommandLatency(CommandEffect):
     def apply(
         self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
+        """See `CommandEffect.apply`."""
         values = signal.values.copy()
         if self.is_nominal:
             return values

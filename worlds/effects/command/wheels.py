@@ -36,6 +36,7 @@ class WheelGain(CommandEffect):
     def apply(
         self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
+        """See `CommandEffect.apply`."""
         values = signal.values.copy()
         for column in columns(self, signal):
             values[active, column] *= self["factor"]
@@ -65,6 +66,7 @@ class DeadBand(CommandEffect):
     def apply(
         self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
+        """See `CommandEffect.apply`."""
         values = signal.values.copy()
         for column in columns(self, signal):
             slow = np.abs(values[:, column]) < self["speed"]
@@ -95,6 +97,7 @@ class DeadZone(CommandEffect):
     def apply(
         self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
+        """See `CommandEffect.apply`."""
         values = signal.values.copy()
         if self.is_nominal:
             return values
@@ -128,6 +131,7 @@ class SpeedSaturation(CommandEffect):
     def apply(
         self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
+        """See `CommandEffect.apply`."""
         values = signal.values.copy()
         if self.is_nominal:
             return values
@@ -176,6 +180,7 @@ class WheelIntermittent(CommandEffect):
     def apply(
         self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
+        """See `CommandEffect.apply`."""
         values = signal.values.copy()
         if self.is_nominal:
             return values
@@ -227,6 +232,7 @@ class StuckWheel(CommandEffect):
     def apply(
         self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
+        """See `CommandEffect.apply`."""
         values = signal.values.copy()
         if self.is_nominal:
             return values

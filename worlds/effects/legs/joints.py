@@ -29,6 +29,7 @@ class JointWeak(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         for actuator in chosen(spec, self["joint"]):
@@ -74,6 +75,7 @@ class JointLocked(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         joint = spec.joint(self["joint"])
@@ -114,6 +116,7 @@ class LooseHorn(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         joint = spec.joint(self["joint"])

@@ -31,6 +31,7 @@ class LinkLength(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         factor = self["factor"]
@@ -64,6 +65,7 @@ class FootSlippery(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         for body in shins(spec, self["legs"]):

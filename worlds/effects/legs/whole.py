@@ -37,6 +37,7 @@ class LegMissing(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         gone = set()
@@ -52,6 +53,7 @@ class LegMissing(BodyEffect):
                 spec.delete(pair)
 
     def lost(self) -> frozenset[int]:
+        """See `Effect.lost`."""
         return frozenset(read(self["legs"]) if self["loss"] else ())
 
 
@@ -76,6 +78,7 @@ class LegLimp(BodyEffect):
     )
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         for leg in read(self["legs"]):
@@ -85,6 +88,7 @@ class LegLimp(BodyEffect):
                 servo_joint.write(spec, actuator, law, powered)
 
     def lost(self) -> frozenset[int]:
+        """See `Effect.lost`."""
         return frozenset(read(self["legs"]) if self["loss"] > 0.5 else ())
 
 
@@ -114,6 +118,7 @@ class LegRaised(CommandEffect):
     def apply(
         self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
+        """See `CommandEffect.apply`."""
         values = signal.values.copy()
         if self.is_nominal:
             return values
@@ -125,4 +130,5 @@ class LegRaised(CommandEffect):
         return values
 
     def lost(self) -> frozenset[int]:
+        """See `Effect.lost`."""
         return frozenset(read(self["legs"]) if self["blend"] > 0.5 else ())

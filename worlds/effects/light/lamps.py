@@ -28,6 +28,7 @@ class LightAmbient(OpticsEffect):
     def change(
         self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
     ) -> dict[str, np.ndarray]:
+        """See `OpticsEffect.change`."""
         return {**law, "ambient": law["ambient"] + self["added"]}
 
 
@@ -52,6 +53,7 @@ class LightDimmed(OpticsEffect):
     def change(
         self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
     ) -> dict[str, np.ndarray]:
+        """See `OpticsEffect.change`."""
         return {**law, "lamp_power": law["lamp_power"] * self["factor"]}
 
 
@@ -85,6 +87,7 @@ class LightDisplaced(OpticsEffect):
     def change(
         self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
     ) -> dict[str, np.ndarray]:
+        """See `OpticsEffect.change`."""
         shift = np.array([self["x"], self["y"], 0.0])
         return {**law, "lamp_position": law["lamp_position"] + shift}
 
@@ -120,6 +123,7 @@ class LightFlicker(OpticsEffect):
     def change(
         self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
     ) -> dict[str, np.ndarray]:
+        """See `OpticsEffect.change`."""
         lamps = np.ones_like(law["lamp_power"])
         if self.is_nominal:
             return dict(law)
@@ -171,6 +175,7 @@ class LightShadow(OpticsEffect):
     def change(
         self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
     ) -> dict[str, np.ndarray]:
+        """See `OpticsEffect.change`."""
         if self.is_nominal:
             return dict(law)
         return {

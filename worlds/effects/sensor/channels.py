@@ -60,7 +60,7 @@ class ReadingGain(_Channel):
     )
 
     def change(self, times: np.ndarray, readings: np.ndarray) -> np.ndarray:
-        """The readings scaled."""
+        """The readings scaled, ``(T,)``."""
         return readings * self["factor"]
 
 
@@ -82,7 +82,7 @@ class ReadingOffset(_Channel):
     )
 
     def change(self, times: np.ndarray, readings: np.ndarray) -> np.ndarray:
-        """The readings shifted in value."""
+        """The readings shifted in value, ``(T,)``."""
         return readings + self["added"]
 
 
@@ -104,5 +104,5 @@ class ReadingDelay(_Channel):
     )
 
     def change(self, times: np.ndarray, readings: np.ndarray) -> np.ndarray:
-        """The readings shifted in time."""
+        """The readings shifted in time, ``(T,)``."""
         return np.interp(times - self["delay"], times, readings)

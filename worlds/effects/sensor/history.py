@@ -34,6 +34,7 @@ class SensorDrift(SensorEffect):
         active: np.ndarray,
         rng: np.random.Generator,
     ) -> np.ndarray:
+        """See `SensorEffect.apply`."""
         changed = readings.copy()
         if self.is_nominal:
             return changed
@@ -71,6 +72,7 @@ class SensorFrozen(SensorEffect):
         active: np.ndarray,
         rng: np.random.Generator,
     ) -> np.ndarray:
+        """See `SensorEffect.apply`."""
         changed = readings.copy()
         if self.is_nominal:
             return changed
@@ -108,6 +110,7 @@ class SensorResponseTime(SensorEffect):
         active: np.ndarray,
         rng: np.random.Generator,
     ) -> np.ndarray:
+        """See `SensorEffect.apply`."""
         changed = readings.copy()
         if self.is_nominal:
             return changed

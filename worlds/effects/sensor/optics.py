@@ -30,6 +30,7 @@ class SensorDead(OpticsEffect):
     def change(
         self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
     ) -> dict[str, np.ndarray]:
+        """See `OpticsEffect.change`."""
         gain = law["sensitivity"].copy()
         gain[columns(self, sensors)] *= 1 - self["loss"]
         return {**law, "sensitivity": gain}
@@ -57,6 +58,7 @@ class SensorMisaligned(OpticsEffect):
     def change(
         self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
     ) -> dict[str, np.ndarray]:
+        """See `OpticsEffect.change`."""
         heading = law["heading"].copy()
         heading[columns(self, sensors)] += self["angle"]
         return {**law, "heading": heading}
@@ -84,6 +86,7 @@ class SensorNoise(OpticsEffect):
     def change(
         self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
     ) -> dict[str, np.ndarray]:
+        """See `OpticsEffect.change`."""
         noise = law["noise"].copy()
         noise[columns(self, sensors)] *= self["factor"]
         return {**law, "noise": noise}

@@ -54,6 +54,15 @@ class SensorGain(_EachReading):
     )
 
     def read(self, readings: np.ndarray, on: tuple[np.ndarray, ...]) -> np.ndarray:
+        """The readings that are on, scaled, within the converter's range.
+
+        Args:
+            readings: of all sensors, ``(T, S)`` [counts].
+            on: indices of the rows and columns in which the effect is on.
+
+        Returns:
+            like ``readings[on]``.
+        """
         return limited(readings[on] * self["factor"])
 
 
@@ -76,6 +85,15 @@ class SensorOffset(_EachReading):
     )
 
     def read(self, readings: np.ndarray, on: tuple[np.ndarray, ...]) -> np.ndarray:
+        """The readings that are on, shifted, within the converter's range.
+
+        Args:
+            readings: of all sensors, ``(T, S)`` [counts].
+            on: indices of the rows and columns in which the effect is on.
+
+        Returns:
+            like ``readings[on]``.
+        """
         return limited(readings[on] + self["counts"])
 
 
@@ -98,6 +116,15 @@ class SensorSaturation(_EachReading):
     )
 
     def read(self, readings: np.ndarray, on: tuple[np.ndarray, ...]) -> np.ndarray:
+        """The readings that are on, none below the level.
+
+        Args:
+            readings: of all sensors, ``(T, S)`` [counts].
+            on: indices of the rows and columns in which the effect is on.
+
+        Returns:
+            like ``readings[on]``.
+        """
         return np.maximum(readings[on], self["level"])
 
 
@@ -168,6 +195,15 @@ class SensorCrosstalk(_EachReading):
     )
 
     def read(self, readings: np.ndarray, on: tuple[np.ndarray, ...]) -> np.ndarray:
+        """The readings that are on, with a share of the mean of both sensors beside.
+
+        Args:
+            readings: of all sensors, ``(T, S)`` [counts].
+            on: indices of the rows and columns in which the effect is on.
+
+        Returns:
+            like ``readings[on]``.
+        """
         beside = (np.roll(readings, 1, axis=1) + np.roll(readings, -1, axis=1)) / 2
         return readings[on] + self["share"] * (beside[on] - readings[on])
 
@@ -210,6 +246,7 @@ class SensorIntermittent(SensorEffect):
         active: np.ndarray,
         rng: np.random.Generator,
     ) -> np.ndarray:
+        """See `SensorEffect.apply`."""
         changed = readings.copy()
         if self.is_nominal:
             return changed
@@ -250,6 +287,7 @@ class SensorSwapped(SensorEffect):
         active: np.ndarray,
         rng: np.random.Generator,
     ) -> np.ndarray:
+        """See `SensorEffect.apply`."""
         changed = readings.copy()
         if self.is_nominal:
             return changed

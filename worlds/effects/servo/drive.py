@@ -137,6 +137,7 @@ class ServoCurrentLimit(ServoEffect):
     )
 
     def change(self, law: Mapping[str, np.ndarray]) -> Law:
+        """See `ServoEffect.change`."""
         value = np.minimum(law["current_limit"], self["current"])
         return {**law, "current_limit": value}
 

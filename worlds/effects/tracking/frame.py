@@ -27,6 +27,7 @@ class TrackerRotation(TrackingEffect):
     def apply(
         self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
     ) -> tuple[np.ndarray, np.ndarray]:
+        """See `TrackingEffect.apply`."""
         poses = signal.poses.copy()
         if self.is_nominal:
             return signal.times.copy(), poses
@@ -60,6 +61,7 @@ class TrackerScale(TrackingEffect):
     def apply(
         self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
     ) -> tuple[np.ndarray, np.ndarray]:
+        """See `TrackingEffect.apply`."""
         poses = signal.poses.copy()
         poses[active, :2] *= self["factor"]
         return signal.times.copy(), poses
@@ -92,6 +94,7 @@ class TrackerShift(TrackingEffect):
     def apply(
         self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
     ) -> tuple[np.ndarray, np.ndarray]:
+        """See `TrackingEffect.apply`."""
         poses = signal.poses.copy()
         if not self.is_nominal:
             poses[active, :2] += np.array([self["dx"], self["dy"]])
@@ -114,6 +117,7 @@ class MarkerMount(TrackingEffect):
     def apply(
         self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
     ) -> tuple[np.ndarray, np.ndarray]:
+        """See `TrackingEffect.apply`."""
         poses = signal.poses.copy()
         if self.is_nominal:
             return signal.times.copy(), poses

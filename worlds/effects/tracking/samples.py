@@ -37,6 +37,7 @@ class TrackerNoise(TrackingEffect):
     def apply(
         self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
     ) -> tuple[np.ndarray, np.ndarray]:
+        """See `TrackingEffect.apply`."""
         poses = signal.poses.copy()
         if self.is_nominal:
             return signal.times.copy(), poses
@@ -80,6 +81,7 @@ class TrackerDropouts(TrackingEffect):
     def apply(
         self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
     ) -> tuple[np.ndarray, np.ndarray]:
+        """See `TrackingEffect.apply`."""
         poses = signal.poses.copy()
         if self.is_nominal:
             return signal.times.copy(), poses
@@ -118,6 +120,7 @@ class TrackerLatency(TrackingEffect):
     def apply(
         self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
     ) -> tuple[np.ndarray, np.ndarray]:
+        """See `TrackingEffect.apply`."""
         poses = signal.poses.copy()
         if self.is_nominal:
             return signal.times.copy(), poses
@@ -155,6 +158,7 @@ class ClockDrift(TrackingEffect):
     def apply(
         self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
     ) -> tuple[np.ndarray, np.ndarray]:
+        """See `TrackingEffect.apply`."""
         times = signal.times.copy()
         if self.is_nominal:
             return times, signal.poses.copy()
