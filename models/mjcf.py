@@ -80,7 +80,8 @@ def check(path: Path, *, depth: int = 0) -> None:
     if root.tag not in ("mujoco", "mujocoinclude", "robot"):
         raise FormatError(f"{path} is no MJCF: its root is <{root.tag[:40]}>.")
     folders = _folders(root, path.parent)
-    level, copies = [(root, 1)], 0
+    level: list[tuple[xml.Element, float]] = [(root, 1.0)]
+    copies = 0.0
     for nesting in range(reading.DEEPEST + 1):
         if not level:
             return

@@ -34,9 +34,10 @@ def _tables(file: Path) -> dict[str, Table]:
     for name, table in tables.items():
         if not (table.source and table.unit):
             raise FormatError(f"{file}: {name} lacks a source or unit.")
-        if (table.low is None) != (table.high is None):
+        low, high = table.low, table.high
+        if (low is None) != (high is None):
             raise FormatError(f"{file}: {name} needs both low and high, or none.")
-        if table.low is not None and not table.low <= table.value <= table.high:
+        if low is not None and high is not None and not low <= table.value <= high:
             raise FormatError(f"{file}: {name} is not between its low and high.")
     return tables
 

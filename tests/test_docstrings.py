@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from tests.sources import modules
 
-LEFT = 250
+LEFT = 0
 """of all public functions, classes and methods"""
 MANY = 3
 """arguments from which a docstring has to say what they are"""
@@ -27,7 +27,9 @@ def public(tree):
 
 
 def lacks(node) -> list[str]:
-    """What the docstring of a public name lacks."""
+    """What the docstring of a public name lacks; overloads have none of their own."""
+    if any(ast.unparse(mark) == "overload" for mark in node.decorator_list):
+        return []
     text = ast.get_docstring(node)
     if not text:
         return ["a docstring"]

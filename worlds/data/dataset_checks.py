@@ -106,8 +106,8 @@ def plausible(trial: Trial, where: str) -> None:
     if len(trial.times) and np.abs(trial.times).max() > LONGEST:
         raise FormatError(f"{where}: a time is beyond {LONGEST:g} s; times are in s.")
     for column, channel in enumerate(trial.channels):
-        most = FARTHEST.get(channel.unit) if channel.name in POSE else None
-        most = most or np.finfo(np.float32).max
+        known = FARTHEST if channel.name in POSE else {}
+        most = known.get(channel.unit, float(np.finfo(np.float32).max))
         seen = np.abs(trial.observed[:, column])
         if np.nanmax(seen, initial=0.0) > most:
             raise FormatError(

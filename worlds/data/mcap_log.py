@@ -85,6 +85,7 @@ def _messages(path: Path, topics: set[str]) -> dict[str, list]:
         ) from None
     found: dict[str, list] = {topic: [] for topic in topics}
     decoders: dict[int, Callable[[bytes], Any]] = {}
+    broken: tuple[type[Exception], ...] = (*_broken(), McapError)
     try:
         with reading.regular(path) as file:
             reader = make_reader(file, validate_crcs=True)
@@ -98,10 +99,10 @@ def _messages(path: Path, topics: set[str]) -> dict[str, list]:
                 found[channel.topic].append((stamps, value))
     except BnsError:
         raise
-    except (*_broken(), McapError) as error:
+    except broken as error:
         raise FormatError(f"{path} cannot be read as MCAP: {error}.") from error
-    for topic, log in found.items():
-        if not log:
+    for topic, messages in found.items():
+        if not messages:
             raise FormatError(f"{path} has no message on the topic {topic!r}.")
     return found
 

@@ -65,7 +65,8 @@ def kept(robot: str, names: tuple[str, ...]) -> BodySight:
     file = models.path(robot) / FILE
     if file.is_file():
         kind = dict[str, list[tuple[Finite, Finite]]]
-        known = reading.typed(reading.read_json(file), kind, file)
+        read = reading.typed(reading.read_json(file), kind, file)
+        known = {name: [[*pair] for pair in pairs] for name, pairs in read.items()}
     else:
         known = cast(robot)
     missing = [name for name in names if name not in known]
