@@ -104,9 +104,10 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
     inside = rest.kept(problem, full, point.noise.sd)
     left = point.linear.rest(point.linear.solve(point.support))
     plain = left if not point.noise.memory.factors.size else point.rest
-    held = shares.HeldOut.of(problem, point)
+    held = shares.HeldOut.of(problem, point, shares.PIECES)
     none, some = held.nominal(start.rest), held.error(point.support).sum()
     least = held.error(point.linear.free).sum()
+    share = float((none - some) / max(none - min(least, some), 1e-9))
     return Decomposition(
         problem=problem,
         start=start,
@@ -124,7 +125,7 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
             piece=rest.SHORT if point.noise.order else rest.PIECE,
         ),
         scatter=rest.scattered(problem, plain, known, inside),
-        closed=float((none - some) / max(none - min(least, some), 1e-9)),
+        closed=share if point.support else 0.0,
     )
 
 

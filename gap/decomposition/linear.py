@@ -120,6 +120,10 @@ class Linear:
         )
         return made._summed(matrix, target)
 
+    def in_blocks(self, block: np.ndarray) -> "Linear":
+        """The same model with other stretches, ``(N,)``, numbered from 0."""
+        return self._with(block=block)._summed(self.design, self.target)
+
     def _summed(self, design: np.ndarray, target: np.ndarray) -> "Linear":
         count, size = int(self.block.max()) + 1, design.shape[-1]
         normal = np.zeros((count, size, size))

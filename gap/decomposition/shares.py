@@ -1,7 +1,7 @@
 """What each explanation of a fit closes, how sure it is, and what it ties with."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from bns.gap.decomposition.problem import Problem
 
 TIED = 3.0  # nats within which explanations tie: odds of 20 to 1
 CHOICE = 4.0  # nats within which the held-out error decides
+PIECES = 4  # of a stretch, each left out by itself for the share that is closed
 NINETY = 1.645  # standard deviations of a 90 % interval
 
 
@@ -111,14 +112,26 @@ class HeldOut:
     weight: np.ndarray
 
     @classmethod
-    def of(cls, problem: Problem, point: Point) -> "HeldOut":
-        """For a point's linear model."""
+    def of(cls, problem: Problem, point: Point, pieces: int = 1) -> "HeldOut":
+        """For a point's linear model.
+
+        Args:
+            problem: the recording.
+            point: the fit.
+            pieces: how many parts of each stretch are left out by themselves. More than
+                one lets an effect that shows in a single trial be fitted to a part of
+                that trial; windows beside a cut overlap by half.
+        """
+        linear = point.linear
+        if pieces > 1:
+            problem = replace(problem, block=_pieces(problem.block, pieces))
+            linear = linear.in_blocks(problem.block)
         sd = np.sqrt(np.nanmean(point.rest**2, axis=0))
         weight = np.where(problem.seen, 1 / sd**2, 0.0)
         units = fit.units(problem, point.values)
         whole = fit.target(problem, point.values, point.rest, point.slopes)
         plain = Linear.of(problem, point.slopes, units, whole, weight)
-        return cls(point.linear, plain, weight)
+        return cls(linear, plain, weight)
 
     def nominal(self, rest: np.ndarray) -> float:
         """Squared error of the nominal model as it was simulated, whose residuals
@@ -138,6 +151,15 @@ class HeldOut:
                 + values @ plain.normal[number] @ values
             )
         return made
+
+
+def _pieces(block: np.ndarray, count: int) -> np.ndarray:
+    """Each stretch of windows ``(N,)`` cut into so many, numbered through."""
+    made = np.empty_like(block)
+    for number in np.unique(block):
+        rows = np.flatnonzero(block == number)
+        made[rows] = number * count + np.arange(len(rows)) * count // len(rows)
+    return np.unique(made, return_inverse=True)[1]
 
 
 def guarded(problem: Problem, point: Point) -> Support:

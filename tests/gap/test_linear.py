@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from bns.gap.decomposition import shares
 from bns.gap.decomposition.linear import KAPPA, Linear, inflation
 from bns.gap.decomposition.noise import Memory, correlated, scale, weights
 
@@ -110,6 +111,19 @@ def test_held_out_squares_fall_for_what_is_there_and_rise_for_what_is_not():
     nothing = linear.held_out(()).sum()
     assert linear.held_out({"a"}).sum() < nothing
     assert linear.held_out({"a", "b", "c", "d"}).sum() > linear.held_out({"a"}).sum()
+
+
+def test_what_one_stretch_alone_shows_is_held_out_in_parts_of_it():
+    rng = np.random.default_rng(6)
+    problem = Rows(rng)
+    problem.columns[0][problem.block != 3] = 0.0
+    linear = problem.linear(planted(rng, problem, a=3.0))
+    assert linear.held_out({"a"}).sum() > 0.9 * linear.held_out(()).sum()
+    block = shares._pieces(problem.block, shares.PIECES)
+    assert np.array_equal(np.unique(block), np.arange(BLOCKS * shares.PIECES))
+    parts = linear.in_blocks(block)
+    assert parts.squares(()) == pytest.approx(linear.squares(()))
+    assert parts.held_out({"a"}).sum() < 0.7 * parts.held_out(()).sum()
 
 
 def test_a_row_that_sets_in_is_a_column_of_its_own():
