@@ -29,14 +29,13 @@ _SMOOTH = (
     ("rolling_drag.torque", 0.004, 0, 0.03, True,
      {"step": 5e-4, "levels": (0.004, 0.01)}),
     ("rolling_drag.viscous", 2e-4, 0, 0.01, True, {"step": 2e-5}),
-    ("centre_of_mass.dx", 0.008, -0.02, 0.03, False, {"slack": 7e-4}),
-    ("centre_of_mass.dy", 0.008, -0.03, 0.03, False, {"slack": 5e-4}),
-    ("payload", 0.4, 0, 2, False, {"slack": 0.01, "levels": (0.3, 0.8)}),
+    ("centre_of_mass.dx", 0.008, -0.02, 0.03, False, {"slack": 7e-4, "family": "centre_of_mass"}),
+    ("centre_of_mass.dy", 0.008, -0.03, 0.03, False, {"slack": 5e-4, "family": "centre_of_mass"}),
     ("tracker_scale", 0.02, 0.8, 1.25, False, {}),
     ("clock_drift", 0.02, -0.1, 0.1, False, {}),
-    ("marker_mount.dx", 0.008, -0.06, 0.06, False, {"slack": 2e-4}),
-    ("marker_mount.dy", 0.008, -0.06, 0.06, False, {"slack": 2e-4}),
-    ("marker_mount.yaw", 0.04, -0.5, 0.5, False, {"slack": 1e-3}),
+    ("marker_mount.dx", 0.008, -0.06, 0.06, False, {"slack": 2e-4, "family": "marker_mount"}),
+    ("marker_mount.dy", 0.008, -0.06, 0.06, False, {"slack": 2e-4, "family": "marker_mount"}),
+    ("marker_mount.yaw", 0.04, -0.5, 0.5, False, {"slack": 1e-3, "family": "marker_mount"}),
     ("battery_sag.per_second", 0.015, 0, 0.2, False, {}),
     ("battery_sag.per_metre", 0.08, 0, 2, False, {}),
     ("battery_fade", 0.01, 0, 0.2, False, {"per_trial": True}),
@@ -44,6 +43,14 @@ _SMOOTH = (
     ("caster_drag", 0.2, 0, 1, False, {"step": 0.05}),
     ("wheel_backlash", 0.004, 0, 0.03, True, {"step": 1e-3, "levels": (0.005,)}),
 )  # fmt: skip
+# a mass that is carried and its moments about the middle of the axle, and about the top
+# plate
+_LOAD = (
+    ("payload.mass", 0.4, 0.0, 2.0, "kg", {"slack": 0.01, "levels": (0.3, 0.8)}),
+    ("payload.mx", 0.015, -0.1, 0.1, "kg m", {"slack": 4e-4}),
+    ("payload.my", 0.015, -0.1, 0.1, "kg m", {"slack": 4e-4}),
+    ("payload.mz", 0.04, -0.1, 0.3, "kg m", {}),
+)
 _PLANES = (("floor_slope", 0.03, 0.3, False), ("wheel_eccentricity", 1e-3, 4e-3, True))
 """explanations with a size and a direction: two rows each, along x and y"""
 
@@ -55,6 +62,11 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
         trials: a recording; levels of dead bands and limits lie between its speeds.
     """
     made = [row for entry in _SMOOTH for row in _smooth(*entry)]
+    made += [
+        Row(name, 0.0, sd, low, high, unit=unit, group="payload",
+            excite=EXCITE["payload"], **given)
+        for name, sd, low, high, unit, given in _LOAD
+    ]  # fmt: skip
     made.append(Row(LEAD, 0.0, 0.003, -0.02, 0.02, unit="s", nuisance=True, step=0.001))
     for name, sd, high, sided in _PLANES:
         for side in SIDES[:2] if sided else ("",):

@@ -147,11 +147,12 @@ def _others(problem: Problem, start: Point, first: Point) -> list[Point]:
     order = sorted(linear.free, key=lambda name: linear.cost({name}))[:SINGLES]
     few = problem.sample(fit.ROUGH)
     few = None if len(few) == len(problem.trials) else few
+    starts = [(n, placed(problem, linear, {n}, start.values)) for n in order]
+    starts += levels.alone(problem, start, SINGLES)
     tried = []
-    for name in order:
-        values = placed(problem, linear, {name}, start.values)
+    for name, values in starts:
         fitted = _fitted(problem, {name})
-        values, rest = newton(problem, values, fitted, start.noise, turns=4, only=few)
+        values, rest = newton(problem, values, fitted, start.noise, turns=6, only=few)
         tried.append((first.noise.loss(rest), name, values))
     _, name, values = min(tried, key=lambda item: item[0])
     made = [descend(problem, values, {name}, first.noise)]

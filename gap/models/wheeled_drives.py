@@ -11,7 +11,7 @@ import numpy as np
 from bns import models
 from bns.gap.candidates.wheeled_rows import LEAD, parameter
 from bns.gap.core.segments import moved
-from bns.worlds.effects import registry
+from bns.worlds.effects import bodies, registry
 from bns.worlds.effects.base import BodyEffect, ControlSignal, Effect
 from bns.worlds.physics import compile, observe, servo_joint
 from bns.worlds.physics.rollout import Compiled, Job, Pool, Segment
@@ -40,7 +40,7 @@ ORDER = (
 """in which effects on commands follow each other, from what is told to the wheel"""
 SWITCHING = ("dead_band", "dead_zone", "speed_saturation", "wheel_stuck_max",
              "wheel_stuck_min", "wheel_intermittent")  # fmt: skip
-FIXED = {"payload": {"z": 0.07}}
+LIGHT = 0.03  # [kg] below which a payload's moments do not tell its place
 
 
 @dataclass(frozen=True)
@@ -60,8 +60,8 @@ class Changes:
     seen: Mapping[str, float]
 
     @classmethod
-    def of(cls, values: Mapping[str, float]) -> "Changes":
-        """Sort the rows of a drive."""
+    def of(cls, values: Mapping[str, float], robot: str) -> "Changes":
+        """Sort the rows of a drive of a robot."""
         terms: dict[str, dict[str, float]] = {}
         seen = {}
         for name, value in values.items():
@@ -70,7 +70,8 @@ class Changes:
             else:
                 terms.setdefault(term(name), {})[name] = value
         lost = terms.pop("battery_fade", {}).get("battery_fade", 0.0)
-        made = [effect(name, rows) for name, rows in terms.items()]
+        made = load(terms.pop("payload"), robot) if "payload" in terms else []
+        made += [effect(name, rows) for name, rows in terms.items()]
         body = tuple(item for item in made if item.stage == "body")
         told = [item for item in made if item.stage != "body"]
         told.sort(key=lambda item: ORDER.index(item.name))
@@ -80,7 +81,7 @@ class Changes:
 def term(name: str) -> str:
     """The explanation that a row belongs to."""
     stem, _, rest = name.partition("[")
-    if stem.startswith(PLANES):
+    if stem.startswith(PLANES) or stem.startswith("payload."):
         return name.rpartition(".")[0]
     return name.partition("@")[0] if rest else name
 
@@ -99,6 +100,8 @@ def effect(name: str, values: Mapping[str, float]) -> Effect:
         size, way = [p.name for p in registry.get(stem).parameters]
         length = min(float(np.hypot(x, y)), registry.get(stem).parameters[0].high)
         return registry.make(stem, **given, **{size: length, way: np.arctan2(y, x)})
+    if stem == "payload":
+        return carried(values)
     ((row, value),) = [item for item in values.items() if item[1]] or values.items()
     if "@" in row:
         given["direction"] = row.partition("@")[2]
@@ -106,7 +109,60 @@ def effect(name: str, values: Mapping[str, float]) -> Effect:
     value = min(max(float(value), about.low), about.high)
     kind = stem.partition(".")[0]
     given[about.name] = round(value) if about.integer else value
-    return registry.make(kind, **FIXED.get(kind, {}), **given)
+    return registry.make(kind, **given)
+
+
+def carried(values: Mapping[str, float]) -> Effect:
+    """A payload from its mass and its moments.
+
+    Args:
+        values: of its rows: mass [kg]; mx and my about the middle of the axle and mz
+            about the top plate [kg m].
+    """
+    about = registry.get("payload").parameters
+    mass = float(np.clip(values.get("payload.mass", 0.0), 0.0, about[0].high))
+    place = {}
+    for edge in about[1:]:
+        away = values.get(f"payload.m{edge.name}", 0.0) / max(mass, LIGHT)
+        place[edge.name] = float(np.clip(edge.nominal + away, edge.low, edge.high))
+    return registry.make("payload", mass=mass, **place)
+
+
+def load(values: Mapping[str, float], robot: str) -> list[BodyEffect]:
+    """The edits that a payload is simulated by.
+
+    A light one, whose place would be far off for its moments, is a mass above the axle
+    and a shift of the common centre of mass: so its moments have a slope at no mass.
+
+    Args:
+        values: of its rows that are not nominal.
+        robot: by name.
+    """
+    mass = max(float(values.get("payload.mass", 0.0)), 0.0)
+    if mass > LIGHT:
+        return [carried(values)]
+    made = [registry.make("payload", mass=mass)] if mass else []
+    moved = {}
+    for edge in registry.get("centre_of_mass").parameters:
+        moment = values.get(f"payload.m{edge.name[1:]}", 0.0)
+        away = moment / (base_mass(robot) + mass)
+        moved[edge.name] = float(np.clip(away, edge.low, edge.high))
+    return [*made, registry.make("centre_of_mass", **moved)]
+
+
+@lru_cache
+def base_mass(robot: str) -> float:
+    """Mass of the body that carries the wheels [kg]."""
+    spec = models.spec(robot, visuals=False)
+    return bodies.Inertial.of(spec, bodies.base(spec)).mass
+
+
+@lru_cache(maxsize=4000)
+def begun(
+    robot: str, body: tuple[BodyEffect, ...], dt: float, yaw: float
+) -> np.ndarray:
+    """Full physics state at rest at the origin with a heading [rad], see `scene`."""
+    return compile.start_state(scene(robot, body, dt), (0.0, 0.0, yaw))
 
 
 @lru_cache(maxsize=2000)
@@ -152,7 +208,7 @@ class Drives:
         starts = [start(trial) for trial in trials]
         drives = [
             [
-                (trial, Changes.of(values), begin)
+                (trial, Changes.of(values, self.robot), begin)
                 for trial, values, begin in zip(trials, row, starts, strict=True)
             ]
             for row in sets
@@ -191,7 +247,7 @@ class Drives:
             speeds = told(trial.commands, changes.command, dt) * (1 - changes.lost)
             jobs.append(
                 Job(
-                    compile.start_state(compiled, (0.0, 0.0, yaw)),
+                    begun(self.robot, changes.body, dt, yaw),
                     (Segment(compiled, speeds * self._per_command),),
                 )
             )

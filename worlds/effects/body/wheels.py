@@ -39,17 +39,16 @@ class AxleLength(BodyEffect):
 
 
 class WheelDiameter(BodyEffect):
-    """The wheel's rolling radius changes; the robot stays level.
+    """The wheel's rolling radius changes; its axle stays where it is on the body.
 
-    The wheel's axle is moved up on the body by as much as the radius grows, so that the
-    wheel touches the floor where it did: the speed changes, the attitude does not (a
-    true robot would lean by 0.13 deg for 1 % of one diameter), and the start pose needs
-    no settling. The wheel's mass and inertia stay.
+    So the robot leans (by 0.13 deg for 1 % of one diameter), and with two worn wheels
+    comes down on its casters, which take weight off the wheels. The wheel's mass and
+    inertia stay.
     """
 
     name = "wheel_diameter"
     doc = "a wheel is larger or smaller than the model's"
-    source = "published diameters are 41, 42 and 42.4 mm (3 %); level attitude assumed"
+    source = "published diameters are 41, 42 and 42.4 mm (3 %)"
     choices = (WHEEL,)
     parameters = (
         Parameter(
@@ -69,10 +68,8 @@ class WheelDiameter(BodyEffect):
             return
         for side in self.wheels():
             body = bodies.wheel(spec, side)
-            radius = max(geom.size[0] for geom in bodies.contact_geoms(body))
             for geom in body.geoms:
                 geom.size[0] *= self["factor"]
-            body.pos[2] += (self["factor"] - 1) * radius
 
 
 class RollingDrag(BodyEffect):
