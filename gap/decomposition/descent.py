@@ -2,6 +2,7 @@
 around it; and which of several is the best."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -84,11 +85,16 @@ def better(problem: Problem, points: Sequence[Point]) -> Point:
 
 
 def costs(problem: Problem, points: Sequence[Point]) -> list[float]:
-    """Costs of points, all under the noise of the one that leaves least."""
-    least = min(points, key=lambda p: float(np.log(p.noise.sd).mean()))
+    """Costs of points, each under its own noise with what that noise costs; as many
+    residuals count as one for all."""
     lam = min(point.noise.lam for point in points)
-    known = Noise(least.noise.sd, least.noise.memory, lam)
-    return [relinearised(problem, p, known).cost(p.support) for p in points]
+    found = []
+    for point in points:
+        known = replace(point.noise, lam=lam)
+        cost = relinearised(problem, point, known).cost(point.support)
+        size = np.log(known.sd[problem.seen]).sum() / lam
+        found.append(float(cost + size))
+    return found
 
 
 def relinearised(problem: Problem, point: Point, known: Noise) -> Linear:

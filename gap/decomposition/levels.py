@@ -193,8 +193,9 @@ def _zoom(problem: Problem, values, rest, number: int, known: Noise):
         losses = [known.loss(rest - (path - base)) for path in made]
         at = int(np.argmin(losses))
         if losses[at] < known.loss(rest) - GAIN:
-            values = sets[at]
-            rest, _ = problem.residual(values)
+            left, _ = problem.residual(sets[at])
+            if known.loss(left) < known.loss(rest):  # at the fine step as well
+                values, rest = sets[at], left
         width = (high - low) / (PARTS - 1)
         low, high = max(values[number] - width, row.low), values[number] + width
         high = min(high, row.high)
