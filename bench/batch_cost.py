@@ -5,16 +5,15 @@ from dataclasses import replace
 from statistics import median
 from typing import Any
 
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "learner time per run: 30 in a batch against 1 alone, per trial"
-BAR = "<= 0.4 x"
 LIMIT = 0.4
 THREADS = 2
 BATCH = 30
 
 
-def run(quick: bool) -> Result:
+@bench("learner time per run: 30 in a batch against 1 alone, per trial", bar="<= 0.4 x")
+def batch_cost(quick: bool) -> Result:
     """The same preset as a batch of 1 and of 30, both compiled, trials interleaved."""
     trials, warm = (6, 3) if quick else (25, 5)
     sizes = (1, BATCH) if quick else (1, 3, 10, BATCH)

@@ -8,16 +8,18 @@ from pathlib import Path
 import numpy as np
 
 from bench._readers import fingerprint, make, readers
-from bench.result import Result
+from bench.result import Result, bench
 from bns import seeding
 from bns.errors import BnsError
 
-DOC = "single bits flipped in every kind of stored file: accepted with other content"
-BAR = "0 of 400 a kind"
 FLIPS = 400
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "single bits flipped in every kind of stored file: accepted with other content",
+    bar="0 of 400 a kind",
+)
+def bit_flips(quick: bool) -> Result:
     """Flip, read, compare every number and word with what was read before."""
     count = 20 if quick else FLIPS
     logging.getLogger("bns").setLevel(logging.ERROR)

@@ -13,16 +13,18 @@ from pathlib import Path
 import numpy as np
 
 from bench._campaigns import held, text
-from bench.result import Result
+from bench.result import Result, bench
 from bns import seeding
 from bns.campaign.store import CampaignStore
 
-DOC = "200 batches, 30 workers killed at random, then the driver, resumed: batches kept"
-BAR = "200 of 200, none twice, the bytes of an undisturbed campaign"
 WORKERS = 2
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "200 batches, 30 workers killed at random, then the driver, resumed: batches kept",
+    bar="200 of 200, none twice, the bytes of an undisturbed campaign",
+)
+def campaign_kill(quick: bool) -> Result:
     """Kill (SIGKILL) workers while the first 150 batches run, the driver after 160."""
     batches, kills = (20, 3) if quick else (200, 30)
     rng = seeding.generator(0, "bench", "campaign-kill")

@@ -12,7 +12,7 @@ import numpy as np
 import torch
 
 from bench import experiments
-from bench.result import Result
+from bench.result import Result, bench
 from bns import seeding
 from bns.draws import Draws
 from bns.evolution.chromosome import Encoding, Population
@@ -25,11 +25,11 @@ from bns.units import metres_per_second
 RUNS, POPULATION, GENERATIONS = 1, 100, 12
 
 
-DOC = "damages of four that direct evolution in the damaged world solves"
-BAR = "none: printed beside recover-window"
-
-
-def run(quick: bool) -> Result:
+@bench(
+    "damages of four that direct evolution in the damaged world solves",
+    bar="none: printed beside recover-window",
+)
+def ceiling(quick: bool) -> Result:
     """One direct evolution a damage; quick: what is known already, no new one.
 
     Needs the runs of `recover-window`, and trains them where they are missing.

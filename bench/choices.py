@@ -8,12 +8,10 @@ import os
 from dataclasses import replace
 
 from bench import experiments, solving
-from bench.result import Result
+from bench.result import Result, bench
 from bns import stats
 from bns.experiment.config import RunConfig
 
-DOC = "sweep of the dissertation's silent settings: variants that beat the defaults"
-BAR = "none: the table behind docs/choices.md"
 ONSET, TRIALS, RUNS = 12, 40, 8
 
 VARIANTS: dict[str, tuple[str, object]] = {
@@ -40,7 +38,11 @@ VARIANTS: dict[str, tuple[str, object]] = {
 }
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "sweep of the dissertation's silent settings: variants that beat the defaults",
+    bar="none: the table behind docs/choices.md",
+)
+def choices(quick: bool) -> Result:
     """8 runs of 40 trials a variant; quick: 3 variants, 2 runs of 6 trials."""
     names = list(VARIANTS)[:3] if quick else list(VARIANTS)
     with experiments.pool_of_workers() as pool:

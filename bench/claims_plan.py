@@ -2,18 +2,19 @@
 
 from dataclasses import asdict
 
-from bench.result import Result
+from bench.result import Result, bench
 from bns.claims import price, runner
 from bns.claims.claim import INVESTIGATIONS, claims
 
-DOC = (
-    "processor hours planned for all claims in MuJoCo, trials shared, looks as expected"
-)
-BAR = "<= 80 h"
 MOST = 80
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "processor hours planned for all claims in MuJoCo, trials shared, "
+    "looks as expected",
+    bar="<= 80 h",
+)
+def claims_plan(quick: bool) -> Result:
     """The plan of `bns claims plan`, in both worlds; the rates are `claims-price`'s."""
     del quick
     every = list(claims().values())

@@ -11,12 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.result import Result
+from bench.result import Result, bench
 from bns.claims import price, sides
 from bns.experiment.config import RunConfig
 
-DOC = "seconds of a processor for one trial of one run of the dearest learner"
-BAR = "none: bns/claims/data/price.toml is to have these rates"
 RUNS = 10
 CASES = {
     "navigation": ("A", "left-20"),
@@ -26,7 +24,11 @@ CASES = {
 SOON, LATE = 8, {"navigation": 60}
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "seconds of a processor for one trial of one run of the dearest learner",
+    bar="none: bns/claims/data/price.toml is to have these rates",
+)
+def claims_price(quick: bool) -> Result:
     """Three learners; quick: navigation alone, and for a few trials."""
     found = {
         name: rates(name, trials=6 if quick else LATE.get(name, 2 * SOON))

@@ -1,16 +1,14 @@
 """Findings that are shown as current and are not of today's settings and code."""
 
 from bench._claims import judged
-from bench.result import Result
+from bench.result import Result, bench
 from bns.claims import provenance, published, sides
 from bns.claims.claim import claims
 from bns.claims.report import Judged
 
-DOC = "findings shown as current that do not match today's settings or code"
-BAR = "0"
 
-
-def run(quick: bool) -> Result:
+@bench("findings shown as current that do not match today's settings or code", bar="0")
+def claims_stale(quick: bool) -> Result:
     """Every side of every finding shown, its settings resolved anew; and those stale.
 
     The settings kept with a finding have to give its digest, too.

@@ -6,10 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "closed-loop World.drive of 30 robots against bare mujoco.rollout of its cycles"
-BAR = "<= 1.25 x"
 LIMIT = 1.25
 ROBOTS, CYCLES, THREADS = 30, 50, 2
 
@@ -32,7 +30,11 @@ class Networks:
         return 0.12 * np.tanh(speeds), memory
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "closed-loop World.drive of 30 robots against bare mujoco.rollout of its cycles",
+    bar="<= 1.25 x",
+)
+def closed_loop_overhead(quick: bool) -> Result:
     """Median of interleaved ratios, in one process, over several kinds of damage.
 
     The bare call gets the controls that the closed loop sent, cycle by cycle, all

@@ -5,14 +5,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from bench.processes import finish
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "time of what `make demo` runs after installation, on 2 cores"
-BAR = "<= 3 min"
 LIMIT = 3.0  # min
 
 
-def run(quick: bool) -> Result:
+@bench("time of what `make demo` runs after installation, on 2 cores", bar="<= 3 min")
+def demo_time(quick: bool) -> Result:
     """Run the preset `demo` into an empty directory; quick: stopped after 55 s."""
     with TemporaryDirectory() as scratch:
         out = Path(scratch) / "demo"

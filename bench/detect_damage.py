@@ -10,19 +10,21 @@ alarms are those of the unharmed twins, all trials before the damage among them.
 import numpy as np
 
 from bench import forking, light_runs
-from bench.result import Result
+from bench.result import Result, bench
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
 
-DOC = "share of costly damages detected within 2 trials, and false alarms"
-BAR = ">= 95 % detected, <= 1 false alarm per 500 undamaged trials"
 SHARE, ALARMS, COSTLY = 0.95, 1.0, 1.2
 RUNS = 30  # of each damage
 AFTER = 2  # trials from the damage on
 OVER_BEFORE = ("costly over the trials before", "of those detected")
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "share of costly damages detected within 2 trials, and false alarms",
+    bar=">= 95 % detected, <= 1 false alarm per 500 undamaged trials",
+)
+def detect_damage(quick: bool) -> Result:
     """`RUNS` of each of nine damages, from trial 20 on, nobody told (table 6.7)."""
     configs = {damage: watched(damage) for damage in light_runs.ALL}
     twin = watched("unharmed")

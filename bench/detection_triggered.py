@@ -10,18 +10,19 @@ from dataclasses import replace
 import numpy as np
 
 from bench import detect_damage, forking, light_runs, solving
-from bench.result import Result
+from bench.result import Result, bench
 from bns import stats
 from bns.experiment.config import RunConfig
 
-DOC = "cost after damage (O), detected over told, worst of four damages"
-BAR = "<= 1.05"
 LIMIT = 1.05
 RUNS = 30  # a side
 AFTER = 20  # trials from the damage on
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "cost after damage (O), detected over told, worst of four damages", bar="<= 1.05"
+)
+def detection_triggered(quick: bool) -> Result:
     """Four damages (table 6.7), detected as in `detect-damage` and told.
 
     What is triggered is the population reset.

@@ -12,11 +12,9 @@ from pathlib import Path
 from unittest import mock
 
 from bench._campaigns import tiny
-from bench.result import Result
+from bench.result import Result, bench
 from bns.errors import BnsError
 
-DOC = "no space at each write of a run, a campaign, a diagnosis: what was there is lost"
-BAR = "0 writes"
 SMALL = (8, 24, 48, 96, 160, 256, 384, 640, 1024)  # [KiB] of real file systems
 MOST = 400  # writes of one command
 
@@ -70,7 +68,11 @@ class Full:
             yield
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "no space at each write of a run, a campaign, a diagnosis: what was there is lost",
+    bar="0 writes",
+)
+def disk_full(quick: bool) -> Result:
     """Fail at each write in turn, compare with before, then repeat the command."""
     lost: list[str] = []
     writes: dict[str, int] = {}

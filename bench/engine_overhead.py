@@ -6,18 +6,20 @@ from pathlib import Path
 from statistics import median
 
 from bench._campaigns import tiny
-from bench.result import Result
+from bench.result import Result, bench
 from bns.campaign import drive
 from bns.campaign.engines import registry
 from bns.campaign.file import Campaign, from_content
 
-DOC = "time per batch beside its computation, one worker, batches of demo size"
-BAR = "<= 2 % of the batch's time"
 LIMIT = 2.0
 ENGINES = ("local", "ray")
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "time per batch beside its computation, one worker, batches of demo size",
+    bar="<= 2 % of the batch's time",
+)
+def engine_overhead(quick: bool) -> Result:
     """From the end of one batch to the end of the next, less what it computed.
 
     That holds giving out the job, the way back, storing with fsync, and the log. The

@@ -5,17 +5,19 @@ from hashlib import sha256
 from pathlib import Path
 
 from bench._campaigns import held, tiny
-from bench.result import Result
+from bench.result import Result, bench
 from bns.campaign import drive
 from bns.campaign.engines import registry
 from bns.errors import MissingDependencyError
 
-DOC = "engines whose stores hold the same bytes: in process, local pool of 2, Ray"
-BAR = "3 of 3"
 ENGINES = ("inline", "local", "ray")
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "engines whose stores hold the same bytes: in process, local pool of 2, Ray",
+    bar="3 of 3",
+)
+def engines_agree(quick: bool) -> Result:
     """One campaign on each; members alone in a batch, and sharing one."""
     members = 3 if quick else 6
     digests: dict[str, str] = {}

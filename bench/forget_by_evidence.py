@@ -3,18 +3,20 @@
 import numpy as np
 
 from bench import forking, light_runs, solving
-from bench.result import Result
+from bench.result import Result, bench
 from bns import stats
 
-DOC = "cost after damage (O), evidence over the best window, worst of nine damages"
-BAR = "<= 1.05 on every damage"
 LIMIT = 1.05
 WINDOWS = (0, 150, 300, 600)
 RUNS = 30  # a side
 DRAWS = 4000  # of runs, to tell what chance alone does
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "cost after damage (O), evidence over the best window, worst of nine damages",
+    bar="<= 1.05 on every damage",
+)
+def forget_by_evidence(quick: bool) -> Result:
     """`RUNS` a side of each damage, light following; nobody is told."""
     sides = {damage: _sides(damage) for damage in light_runs.ALL}
     wanted = [config for side in sides.values() for config in side.values()]

@@ -9,19 +9,21 @@ from dataclasses import replace
 import numpy as np
 
 from bench import experiments, solving
-from bench.result import Result
+from bench.result import Result, bench
 from bns import stats
 from bns.experiment.config import RunConfig
 from bns.experiment.config_watch import WatchConfig
 from bns.experiment.record import RunRecord
 
-DOC = "cost after damage (O) in navigation, evidence over window 150, worst of four"
-BAR = "none: printed beside recover-window"
 LIMIT = 70  # trials, as in `recover-window`
 SOON = 2  # trials from the damage on
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "cost after damage (O) in navigation, evidence over window 150, worst of four",
+    bar="none: printed beside recover-window",
+)
+def forget_navigation(quick: bool) -> Result:
     """30 runs a side of each damage (from trial 30 of 100); quick: few and short."""
     sides = {
         damage: (_forgetting(damage), experiments.damaged(damage, window=150))

@@ -9,11 +9,9 @@ from pathlib import Path
 
 from bench._fuzz import Found, attempt, quiet
 from bench._readers import make, readers
-from bench.result import Result
+from bench.result import Result, bench
 from bench.runner import RESULTS
 
-DOC = "files of every kind made wrong and read: tracebacks, hangs, wrong acceptances"
-BAR = "0 of 1,000,000"
 INPUTS, QUICK = 1_000_000, 4000
 BLOCK = 200  # seeds of every reader in a process of its own, which may die
 MEMORY = 10 << 30  # [bytes] of address space of such a process
@@ -23,7 +21,11 @@ KEPT = RESULTS / "fuzz.part.jsonl"
 """a line a block that is done: a bench that is stopped goes on from there"""
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "files of every kind made wrong and read: tracebacks, hangs, wrong acceptances",
+    bar="0 of 1,000,000",
+)
+def fuzz(quick: bool) -> Result:
     """Every input follows from its reader and seed, so that each can be had again.
 
     Resumes after the blocks that are in `bench/results/fuzz.part.jsonl`; remove that to

@@ -1,13 +1,11 @@
 """Effects that look alike are reported as a set, never one alone."""
 
 from bench.gap_runner import ensure
-from bench.result import Result
-
-DOC = "effects that look alike are reported as a set, never one alone"
-BAR = ">= 0.95"
+from bench.result import Result, bench
 
 
-def run(quick: bool) -> Result:
+@bench("effects that look alike are reported as a set, never one alone", bar=">= 0.95")
+def gap_alias(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
     from bns.gap.bench import scoring
 

@@ -3,13 +3,13 @@
 from statistics import median
 
 from bench.gap_runner import ensure
-from bench.result import Result
-
-DOC = "gap closed by what the tool chose against the true effects fitted"
-BAR = ">= 0.90"
+from bench.result import Result, bench
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "gap closed by what the tool chose against the true effects fitted", bar=">= 0.90"
+)
+def gap_closed(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
     from bns.gap.bench import scoring
 

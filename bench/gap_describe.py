@@ -9,14 +9,16 @@ from time import perf_counter
 import numpy as np
 
 from bench._describe_logs import ROBOTS, Logged
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "robots that come from an MJCF and a log to a verdict without editing a file"
-BAR = "4 of 4"
 SEED, TRIALS, FEW = 11, 6, 3
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "robots that come from an MJCF and a log to a verdict without editing a file",
+    bar="4 of 4",
+)
+def gap_describe(quick: bool) -> Result:
     """Describe and diagnose each; `quick`: describe only, shorter logs."""
     details = {}
     for number, (name, make) in enumerate(ROBOTS.items()):

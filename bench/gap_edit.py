@@ -3,13 +3,11 @@
 from statistics import median
 
 from bench.gap_runner import ensure
-from bench.result import Result
-
-DOC = "error of the edited twin against that of the true one"
-BAR = "<= 1.5 x"
+from bench.result import Result, bench
 
 
-def run(quick: bool) -> Result:
+@bench("error of the edited twin against that of the true one", bar="<= 1.5 x")
+def gap_edit(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
     from bns.gap.bench import scoring
 

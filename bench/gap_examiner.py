@@ -19,11 +19,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from bench.result import Result
+from bench.result import Result, bench
 from bns.errors import BnsError
 
-DOC = "an examiner's recordings: wheeled singles named"
-BAR = ">= 0.95"
 BAR_VALUE = 0.95
 SEEDS = (101,)  # of development; those of the score are given on the command line
 VARIABLE = "BNS_EXAMINER"
@@ -71,7 +69,8 @@ def examiner() -> Path:
     return found
 
 
-def run(quick: bool) -> Result:
+@bench("an examiner's recordings: wheeled singles named", bar=">= 0.95")
+def gap_examiner(quick: bool) -> Result:
     """The cases of the development seed; quick takes the first of each kind."""
     rows = [row for seed in SEEDS for row in scored(seed, quick=quick)]
     figures = table(rows)

@@ -1,13 +1,14 @@
 """No-effect recordings in which a gap is claimed; effects found."""
 
 from bench.gap_runner import ensure
-from bench.result import Result
-
-DOC = "no-effect recordings in which a gap is claimed; effects found"
-BAR = "<= 0.03, >= 0.95 found at 3 x"
+from bench.result import Result, bench
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "no-effect recordings in which a gap is claimed; effects found",
+    bar="<= 0.03, >= 0.95 found at 3 x",
+)
+def gap_false_alarm(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
     from bns.gap.bench import scoring
 

@@ -9,10 +9,8 @@ import time
 from typing import Any
 
 from bench._gap_cases import Cases
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "withheld effects of the hexapod named, aliases merged, leg right, at 3 x"
-BAR = ">= 0.90, <= 300 s a case"
 COUNTS = {"large": 56, "none": 32, "lost": 16}
 # Seeds from 70 000 on were scored once, with a floor that was assumed.
 # Those from 170 000 on were scored once, with curves of a fixed grid.
@@ -56,7 +54,11 @@ def one(kind: str, seed: int) -> dict[str, Any]:
     return plain(row)
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "withheld effects of the hexapod named, aliases merged, leg right, at 3 x",
+    bar=">= 0.90, <= 300 s a case",
+)
+def gap_hexapod(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
     from bns.gap.bench import scoring
 

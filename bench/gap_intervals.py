@@ -1,13 +1,14 @@
 """90 % intervals of the magnitudes of named effects: how many hold the truth."""
 
 from bench.gap_runner import ensure
-from bench.result import Result
-
-DOC = "90 % intervals of magnitudes that hold the truth, where it was named"
-BAR = "0.85 to 0.95"
+from bench.result import Result, bench
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "90 % intervals of magnitudes that hold the truth, where it was named",
+    bar="0.85 to 0.95",
+)
+def gap_intervals(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
     from bns.gap.bench import scoring
     from bns.gap.core import conformal

@@ -1,16 +1,19 @@
 """Factory against published calibration of a real Khepera III, from its motions."""
 
 from bench.real_data import needed
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "Khepera III odometry: place and angle of the laser against the published ones"
-BAR = "<= 3 sigma (published), axle or both diameters tied, plan a long straight drive"
 BAR_VALUE = 3.0
 TIED = {"axle", "both_diameters"}
 MOUNT = {"mount_x": "l_x", "mount_y": "l_y", "mount_angle": "l_theta"}
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "Khepera III odometry: place and angle of the laser against the published ones",
+    bar="<= 3 sigma (published), axle or both diameters tied, plan a long "
+    "straight drive",
+)
+def gap_khepera_odometry(quick: bool) -> Result:
     """One diagnosis of 4396 intervals; quick changes nothing."""
     from bns.gap.importers import khepera3_odometry
     from bns.gap.models.odometry import diagnosis

@@ -2,10 +2,8 @@
 
 import numpy as np
 
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "Odometry of made-up robots: wheels, axle and sensor's mount at any heading found"
-BAR = "50 of 50: all numbers within 3 sigma, with and without straight drives"
 SEED, CASES, QUICK = 2026, 50, 10
 INTERVALS, SECONDS, AXLE = 1500, 0.8, 0.0884
 SCATTER = np.array([7e-4, 5e-4, 1.7e-3])  # [m, m, rad] of a laser's scan matching
@@ -28,7 +26,11 @@ IN_SPINS = ((), ("axle",), ("both_diameters",))
 mount farther out"""
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "Odometry of made-up robots: wheels, axle and sensor's mount at any heading found",
+    bar="50 of 50: all numbers within 3 sigma, with and without straight drives",
+)
+def gap_odometry_mounts(quick: bool) -> Result:
     """Fifty cases, ten of each way to drive; quick makes ten.
 
     The figure is of the fit of all numbers together. A support that is named holds the

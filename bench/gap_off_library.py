@@ -1,13 +1,11 @@
 """Effects outside the library called none of the library."""
 
 from bench.gap_runner import ensure
-from bench.result import Result
-
-DOC = "effects outside the library called none of the library"
-BAR = ">= 0.75"
+from bench.result import Result, bench
 
 
-def run(quick: bool) -> Result:
+@bench("effects outside the library called none of the library", bar=">= 0.75")
+def gap_off_library(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
     from bns.gap.bench import scoring
 

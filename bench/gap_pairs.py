@@ -1,13 +1,11 @@
 """Two withheld effects, both named and no other, aliases merged."""
 
 from bench.gap_runner import ensure
-from bench.result import Result
-
-DOC = "two withheld effects, both named and no other, aliases merged"
-BAR = ">= 0.75"
+from bench.result import Result, bench
 
 
-def run(quick: bool) -> Result:
+@bench("two withheld effects, both named and no other, aliases merged", bar=">= 0.75")
+def gap_pairs(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
     from bns.gap.bench import scoring
 

@@ -9,10 +9,8 @@ true one; or what is left besides it is what the plan said no command can part f
 import json
 
 from bench._gap_cases import DIRECTORY
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "ties that the planned command resolves"
-BAR = ">= 0.8 of ties"
 SEED = 6_000_000  # from 4,000,000 on were the cases of the round before
 TIES, MOST = 25, 100  # ties to judge; cases to look for them in
 SIZES = (1.0, 8.0)  # of the effects over what the poor recording shows
@@ -23,7 +21,8 @@ SIGMA = (0.001, 0.001, 0.008)  # of it by channel
 FILE = DIRECTORY / "gap3_plan.jsonl"
 
 
-def run(quick: bool) -> Result:
+@bench("ties that the planned command resolves", bar=">= 0.8 of ties")
+def gap_plan(quick: bool) -> Result:
     """Look for ties, plan, record, diagnose again."""
     from bns.gap.models.wheeled import WheeledModel
 

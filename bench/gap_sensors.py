@@ -14,12 +14,8 @@ from dataclasses import asdict
 from typing import Any
 
 from bench._gap_cases import Cases
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = (
-    "withheld effects on sensors and lamps named, aliases merged, at 3 x detectability"
-)
-BAR = ">= 0.95"
 COUNTS = {"single": 160, "none": 60, "motion": 12, "off-library": 40}
 # Seeds from 60 000, from 160 000 and from 180 000 on were scored once each, with the
 # diagnosis as it was then. Those from 280 000 on: planned first, scored once.
@@ -73,7 +69,11 @@ def off_library() -> tuple:
     return (Narrower(), Nonlinear(), Coarse())
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "withheld effects on sensors and lamps named, aliases merged, at 3 x detectability",
+    bar=">= 0.95",
+)
+def gap_sensors(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
     from bns.gap.bench import scoring
 

@@ -1,14 +1,16 @@
 """Withheld single effects named, aliases merged, at 3 x their detectability."""
 
 from bench.gap_runner import ensure
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "withheld single effects named, aliases merged, at 3 x their detectability"
-BAR = ">= 0.95"
 ANGLE = 11.48  # [deg] whose cosine is 0.98
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "withheld single effects named, aliases merged, at 3 x their detectability",
+    bar=">= 0.95",
+)
+def gap_synthetic(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
     from bns.gap.bench import scoring
 

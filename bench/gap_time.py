@@ -3,13 +3,11 @@
 import time
 
 from bench.gap_runner import ensure
-from bench.result import Result
-
-DOC = "wall time of one wheeled case in a fresh process"
-BAR = "<= 30 s"
+from bench.result import Result, bench
 
 
-def run(quick: bool) -> Result:
+@bench("wall time of one wheeled case in a fresh process", bar="<= 30 s")
+def gap_time(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
 
     rows = ensure(quick)

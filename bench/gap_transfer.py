@@ -10,12 +10,8 @@ the real world, than what was evolved with the true effect.
 from itertools import repeat
 
 from bench import experiments
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = (
-    "transfer loss of controllers evolved in the corrected simulator over the nominal's"
-)
-BAR = "<= 0.5 x"
 HIDDEN = (
     "wheel_gain:wheel=left,factor=0.8",
     "dead_band:wheel=right,speed=0.05",
@@ -33,7 +29,12 @@ SIZE, GENERATIONS, SEEDS = 7, 100, 1  # of the evolution: times genes; controlle
 SEED = 4_000_000
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "transfer loss of controllers evolved in the corrected simulator over "
+    "the nominal's",
+    bar="<= 0.5 x",
+)
+def gap_transfer(quick: bool) -> Result:
     """One case per hidden effect."""
     from statistics import median
 

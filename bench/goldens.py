@@ -24,10 +24,7 @@ from pathlib import Path
 
 from bench import _goldens_content as content
 from bench import _goldens_logs as logs
-from bench.result import Result
-
-DOC = "tiny runs, diagnoses, a campaign and a report: items whose bytes are as before"
-BAR = "all"
+from bench.result import Result, bench
 
 ROOT = Path(__file__).resolve().parents[1]
 KEPT = Path(__file__).resolve().parent / "goldens.json"
@@ -130,7 +127,11 @@ adaptation.window = [0, 30]
 """
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "tiny runs, diagnoses, a campaign and a report: items whose bytes are as before",
+    bar="all",
+)
+def goldens(quick: bool) -> Result:
     """Compare; the figure is the number of items that are as before."""
     kept = stored(KEPT).get(key(), {}).get("items", {})
     with tempfile.TemporaryDirectory(prefix="goldens-") as place:

@@ -5,17 +5,19 @@ from collections import Counter
 import numpy as np
 
 from bench._hardware import resumed
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "trials over a line with 1 % lost bytes, 1 % corrupted packets, mute answers"
-BAR = "no wrong trial accepted, no hang, every fault logged (60 min of trials)"
 PARTS, MINUTES = 6, 10.0  # each part is a session of its own, with its own seed
 LOST, CORRUPTED, MUTE = 0.01, 0.01, 0.005
 FAR, TURNED = 0.005, np.deg2rad(3.0)  # m, rad: what a command's end may be off
 ASTRAY = 0.03  # m that a wheel may be led astray within a command: 0.25 s at 0.12 m/s
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "trials over a line with 1 % lost bytes, 1 % corrupted packets, mute answers",
+    bar="no wrong trial accepted, no hang, every fault logged (60 min of trials)",
+)
+def hardware_fault_storm(quick: bool) -> Result:
     """Sessions in virtual time: emulated robot, line, camera and tracker.
 
     A trial that is accepted is wrong if a pose at a command's end is off the true one

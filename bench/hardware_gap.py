@@ -4,16 +4,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "a recording over the emulated port, camera and tracker, its hidden effect named"
-BAR = "the withheld effect is named"
 HIDDEN = "wheel_gain:wheel=left,factor=0.85"
 TRIALS, COMMANDS = 8, 10
 RATE = 30.0  # pictures a second
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "a recording over the emulated port, camera and tracker, its hidden effect named",
+    bar="the withheld effect is named",
+)
+def hardware_gap(quick: bool) -> Result:
     """Excitation as `bns hardware record` drives it, on a robot with a weak wheel.
 
     Virtual time: line, drawn frames and tracker as in a session. The figure is 1 where

@@ -7,15 +7,17 @@ from pathlib import Path
 import numpy as np
 
 from bench._hardware import emulator, folder, learned
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "one BNS run over an emulated port and camera in real time, wheel damaged midway"
-BAR = "solved before the damage, and again after it; every trial recorded"
 TRIALS, ONSET, WINDOW = 64, 20, 75
 QUICK = {"trials": 4, "onset": 2}
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "one BNS run over an emulated port and camera in real time, wheel damaged midway",
+    bar="solved before the damage, and again after it; every trial recorded",
+)
+def hardware_khepera(quick: bool) -> Result:
     """`bns run khepera-simple --world hardware` on `bns hardware emulate khepera3`.
 
     The left wheel is 20 % slower from trial 21 on, in software as in the dissertation.

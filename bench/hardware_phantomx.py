@@ -7,10 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from bench._hardware import emulator, folder, learned
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "a walk learned over an emulated bus in real time, two legs raised midway"
-BAR = "a walk learned over 20 trials, damage applied; <= 5 % deadlines missed"
 TRIALS, ONSET = 30, 20
 QUICK = {"trials": 2, "onset": 1}
 DAMAGE = "leg_raised:legs=1,5,blend=1"
@@ -18,7 +16,11 @@ ADEQUATE = 0.70  # m, `walk.adequate`: what a tripod gait by hand covers, about
 MOST = 0.05  # share of frames
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "a walk learned over an emulated bus in real time, two legs raised midway",
+    bar="a walk learned over 20 trials, damage applied; <= 5 % deadlines missed",
+)
+def hardware_phantomx(quick: bool) -> Result:
     """`bns run hexapod-walk --world hardware` on `bns hardware emulate phantomx`.
 
     A walk is learned where a controller carries the robot 0.70 m within the first 20

@@ -13,10 +13,8 @@ from statistics import median
 from bench._drives import DRIVES, Drive, Driver, Log
 from bench._hardware import emulator, folder, resumed
 from bench._ways import CLOCK, QUICK, WAYS, WHEELED, Scene
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "time to the stop order and to standstill of a moving robot, 21 ways to fail"
-BAR = "order <= 0.2 s; standstill <= 0.35 s or what the robot's own ramp costs"
 LIMIT, STAND = 0.2, 0.35  # s
 RAMP = (
     0.42  # s from order to standstill that the emulated Khepera's wheels need, 0.1 m/s
@@ -28,7 +26,11 @@ SINKS, LASTS = 0.3, 0.1  # s until a hexapod sinks, s that rest lasts
 WATCHED = 3.0  # s for which a robot is watched after the event
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "time to the stop order and to standstill of a moving robot, 21 ways to fail",
+    bar="order <= 0.2 s; standstill <= 0.35 s or what the robot's own ramp costs",
+)
+def hardware_stop(quick: bool) -> Result:
     """Drive emulated robots in real time, let something happen, read their logs.
 
     The time counts from the event (for the cable, a reset and the power: from when the

@@ -7,21 +7,23 @@ import numpy as np
 
 from bench import experiments, hexapod_runs
 from bench.hexapod_runs import spread
-from bench.result import Result
+from bench.result import Result, bench
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
 
 if TYPE_CHECKING:
     from bns.learners.bns.learner import Bns
 
-DOC = "repaired fitness: correlation of predicted and real displacement by trial 50"
-BAR = ">= 0.8 and no zero-distance optimum"
 LIMIT = 0.8
 TRIALS, RUNS = 50, 3
 SOME = 30  # walks of a population that are tried
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "repaired fitness: correlation of predicted and real displacement by trial 50",
+    bar=">= 0.8 and no zero-distance optimum",
+)
+def hexapod_fitness(quick: bool) -> Result:
     """Each form, 3 undamaged runs of 50 trials; quick: one of 12.
 
     The figure is the median over runs of Pearson's correlation between the distance

@@ -4,18 +4,18 @@ import numpy as np
 
 from bench import hexapod_ceiling, hexapod_loads, hexapod_runs, solving
 from bench.hexapod_runs import spread
-from bench.result import Result
+from bench.result import Result, bench
 from bns.experiment.record import RunRecord
 
-DOC = (
-    "trials until the hexapod walks as far as the best tripod made by hand in its time"
-)
-BAR = "median <= 100 trials, stretch 40"
 LIMIT, STRETCH = 100, 40
 LATE = 10  # trials at the end of a run that say how far it has come
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "trials until the hexapod walks as far as the best tripod made by hand in its time",
+    bar="median <= 100 trials, stretch 40",
+)
+def hexapod_gait(quick: bool) -> Result:
     """30 runs of 100 trials; quick: one of 12.
 
     Adequate is a trial in which the robot gets as far as the tripod gait within the

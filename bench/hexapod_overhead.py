@@ -7,16 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "World.run of 12 hexapods against bare mujoco.rollout, same models and controls"
-BAR = "<= 1.10 x"
 LIMIT = 1.10
 ROBOTS, COMMANDS, THREADS = 12, 11, 2
 REACH = 0.5  # [rad] goals around half-way, in which nothing falls
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "World.run of 12 hexapods against bare mujoco.rollout, same models and controls",
+    bar="<= 1.10 x",
+)
+def hexapod_overhead(quick: bool) -> Result:
     """Median of interleaved ratios of processor time, in one process.
 
     Processor time, because it is the same on a busy machine; ratios of wall time are

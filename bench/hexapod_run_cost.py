@@ -4,16 +4,18 @@ import time
 from dataclasses import replace
 
 from bench import hexapod_runs
-from bench.result import Result
+from bench.result import Result, bench
 from bns.experiment.config import RunConfig
 
-DOC = "processor time of one hexapod run of 200 trials, window 300"
-BAR = "<= 10 min on 2 cores"
 LIMIT = 10.0
 TRIALS, BATCH, SOME = 200, 6, 10
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "processor time of one hexapod run of 200 trials, window 300",
+    bar="<= 10 min on 2 cores",
+)
+def hexapod_run_cost(quick: bool) -> Result:
     """The preset, one run of 200 trials on two threads; quick: 12 small trials.
 
     Processor time, because it is the same on a busy machine: on a quiet one the run

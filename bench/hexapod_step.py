@@ -5,10 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "end of a hexapod's trial against that at 0.5 ms steps, by step and friction cone"
-BAR = "tripod's distance within 1 %"
 LIMIT = 0.01
 HOLD = 0.6  # [s] of a command; fixed here, so that all ways see the same goals
 FINEST = (0.0005, "elliptic", 10.0)
@@ -24,7 +22,11 @@ WAYS = (
 """step [s], cone, impratio"""
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "end of a hexapod's trial against that at 0.5 ms steps, by step and friction cone",
+    bar="tripod's distance within 1 %",
+)
+def hexapod_step(quick: bool) -> Result:
     """The model's own way against the finest, and other ways beside it.
 
     Lists: the tripod gait, and random goals within 0.5 rad; goals as ramps.

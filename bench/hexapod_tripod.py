@@ -4,17 +4,19 @@ from itertools import product
 
 import numpy as np
 
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "distance of the tripod gait made by hand, eleven commands of the hexapod"
-BAR = "the farthest of a grid of such gaits"
 COMMANDS = 11
 LIMIT = 1.5  # [s] of a command
 STRIDES, LIFTS = (0.14, 0.16, 0.18), (0.045, 0.06)
 REACHES, HEIGHTS = (0.12, 0.13, 0.14, 0.15), (0.12, 0.13, 0.14)
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "distance of the tripod gait made by hand, eleven commands of the hexapod",
+    bar="the farthest of a grid of such gaits",
+)
+def hexapod_tripod(quick: bool) -> Result:
     """`gait.BEST` against every gait of the grid that legs can reach.
 
     The figure is the distance of `gait.BEST` [m]; the bar holds where none of the grid

@@ -3,17 +3,19 @@
 import numpy as np
 
 from bench import forking, light_runs, solving
-from bench.result import Result
+from bench.result import Result, bench
 from bns import stats
 from bns.experiment.record import RunRecord
 
-DOC = "cost of the last ten trials over the first ten with an intermittent wheel"
-BAR = "noise-aware: no decline (<= 1.0); the plain one beside it"
 SPAN = 10
 RUNS = 30  # a side
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "cost of the last ten trials over the first ten with an intermittent wheel",
+    bar="noise-aware: no decline (<= 1.0); the plain one beside it",
+)
+def intermittent_wheel(quick: bool) -> Result:
     """`RUNS` a side, every fifth command lost from trial 20 of 40, no adaptation."""
     sides = {
         name: light_runs.damaged(

@@ -1,12 +1,13 @@
 """How closely the Khepera III model drives like the laboratory's robot."""
 
-from bench.result import Result
-
-DOC = "largest deviation of the Khepera's four calibration figures from the robot's"
-BAR = "<= 100 % of what is allowed (3 % speed and spin, 10 % starting losses)"
+from bench.result import Result, bench
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "largest deviation of the Khepera's four calibration figures from the robot's",
+    bar="<= 100 % of what is allowed (3 % speed and spin, 10 % starting losses)",
+)
+def khepera_calibration(quick: bool) -> Result:
     """Drive straight and spin from rest; quick changes nothing, it takes a second."""
     from bns import models
     from bns.models.khepera3 import calibration

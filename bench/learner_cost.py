@@ -4,16 +4,18 @@ import time
 from dataclasses import replace
 from statistics import median
 
-from bench.result import Result
+from bench.result import Result, bench
 from bns.experiment.config import RunConfig
 
-DOC = "learner time against bare physics time of the same trials, window 150"
-BAR = "<= 1.5 x"
 LIMIT = 1.5
 THREADS = 2
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "learner time against bare physics time of the same trials, window 150",
+    bar="<= 1.5 x",
+)
+def learner_cost(quick: bool) -> Result:
     """30 runs x 100 trials of `khepera-simple`, start-up and compilation included.
 
     The bare physics are the rollouts of the very same trials, trial by trial in

@@ -7,11 +7,9 @@ begins without a window. Reported as they come out.
 import numpy as np
 
 from bench import experiments, solving
-from bench.result import Result
+from bench.result import Result, bench
 from bns.experiment.record import RunRecord
 
-DOC = "nulls A9, A11-A13, A23, claims A8, A21 and A24's onset: nulls found null"
-BAR = "none: reported as they come out"
 LEVEL = 0.05
 
 RATE, MAGNITUDE = 0.2, 3500.0  # dissertation, table 4.1
@@ -42,7 +40,11 @@ def _sides() -> dict[str, tuple[dict[str, object], dict[str, object], str]]:
 NULLS = ("A9", "A11", "A12", "A13", "A23")
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "nulls A9, A11-A13, A23, claims A8, A21 and A24's onset: nulls found null",
+    bar="none: reported as they come out",
+)
+def nulls_a(quick: bool) -> Result:
     """30 runs a side; O of eq 3.1, Mann-Whitney, share of pairs won with interval."""
     sides = _sides()
     configs = {

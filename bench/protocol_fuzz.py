@@ -2,10 +2,8 @@
 
 import numpy as np
 
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "answers replaced by random, cut, foreign and endless bytes, both protocols"
-BAR = "no crash, no hang"
 CASES = 3000
 LONGEST = 5.0  # s of the session's clock that one call may take
 
@@ -41,7 +39,11 @@ class Fuzz:
         """Nothing moves."""
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "answers replaced by random, cut, foreign and endless bytes, both protocols",
+    bar="no crash, no hang",
+)
+def protocol_fuzz(quick: bool) -> Result:
     """Every call of the driver, again and again, in virtual time.
 
     Allowed are a proper value and a `BnsError`; anything else counts as a crash, more

@@ -6,15 +6,12 @@ from pathlib import Path
 from typing import Any
 
 from bench._campaigns import held, tiny
-from bench.result import Result
+from bench.result import Result, bench
 from bns.campaign import drive
 from bns.campaign.engines.base import Beat, Outcome
 from bns.campaign.engines.inline import InlineEngine
 from bns.campaign.engines.ray_engine import RayEngine
 from bns.campaign.plan import Job
-
-DOC = "batches done on two local Ray nodes of which one is killed mid-run"
-BAR = "all, with the bytes of one process"
 
 
 class Killing:
@@ -41,7 +38,11 @@ class Killing:
             yield outcome
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "batches done on two local Ray nodes of which one is killed mid-run",
+    bar="all, with the bytes of one process",
+)
+def ray_node_kill(quick: bool) -> Result:
     """A node of one CPU each; the second is killed after a third of the batches."""
     from ray.cluster_utils import Cluster
 

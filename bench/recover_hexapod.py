@@ -4,15 +4,17 @@ import numpy as np
 
 from bench import hexapod_ceiling, hexapod_runs, solving
 from bench.hexapod_runs import spread
-from bench.result import Result
+from bench.result import Result, bench
 from bns.experiment.record import RunRecord
 
-DOC = "worst median of trials until a damaged hexapod walks 90 % as far as before"
-BAR = "median <= 30 trials for types 0, 1, 3 and <= 46 for types 2, 5; window 300"
 MILD, LIMIT_MILD, LIMIT = ("type0", "type1", "type3"), 30, 46
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "worst median of trials until a damaged hexapod walks 90 % as far as before",
+    bar="median <= 30 trials for types 0, 1, 3 and <= 46 for types 2, 5; window 300",
+)
+def recover_hexapod(quick: bool) -> Result:
     """Damage from trial 100 of 150; quick: one run of 12 trials.
 
     The runs of all types are those of `hexapod-gait` up to the damage. The figure is

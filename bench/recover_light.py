@@ -8,20 +8,22 @@ table 6.7 does not have.
 import numpy as np
 
 from bench import forking, light_runs, solving
-from bench.result import Result
+from bench.result import Result, bench
 from bns import stats
 from bns.experiment.record import RunRecord
 from bns.tasks.light import LampGoal
 
-DOC = "most trials to recover (median, over four damages) in light following, T6.7"
-BAR = "slow wheel / noisy / minimum / maximum sensor: median <= 12 / 10 / 12 / 10"
 MEDIANS = {"slow-wheel": 12, "noisy": 10, "minimum": 12, "maximum": 10}
 RUNS = 30  # of each damage
 SILENT = {"readings": "balanced", "charge_stopped": "far"}  # as in the preset
 THESIS = {"slow-wheel": 10, "noisy": 4, "minimum": "8 and 9", "maximum": 7}
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "most trials to recover (median, over four damages) in light following, T6.7",
+    bar="slow wheel / noisy / minimum / maximum sensor: median <= 12 / 10 / 12 / 10",
+)
+def recover_light(quick: bool) -> Result:
     """`RUNS` of each damage, from trial 20 of 40."""
     configs = {
         damage: light_runs.damaged(damage, runs=RUNS) for damage in light_runs.DAMAGES

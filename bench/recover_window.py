@@ -6,15 +6,17 @@ stands the ceiling (`python -m bench ceiling`), where it has been run: what evol
 """
 
 from bench import ceiling, experiments, solving
-from bench.result import Result
+from bench.result import Result, bench
 from bns import stats
 
-DOC = "fewest runs (over four damages) that recover within 70 trials, window 150"
-BAR = ">= 27 of 30 in each; median <= 16 trials for 20 %; all four solvable at all"
 LIMIT, FEWEST, MEDIAN = 70, 27, 16
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "fewest runs (over four damages) that recover within 70 trials, window 150",
+    bar=">= 27 of 30 in each; median <= 16 trials for 20 %; all four solvable at all",
+)
+def recover_window(quick: bool) -> Result:
     """30 runs of each damage (from trial 30 of 100); quick: few and short."""
     configs = {d: experiments.damaged(d, window=150) for d in experiments.DAMAGES}
     records = experiments.records(configs.values(), quick=quick)

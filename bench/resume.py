@@ -11,11 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bench.result import Result
+from bench.result import Result, bench
 from bns import seeding
-
-DOC = "runs killed (SIGKILL) at random moments that resume to the same bytes"
-BAR = "10 of 10"
 
 MAY_DIFFER = ("timing.jsonl",)
 SETTINGS = (
@@ -26,7 +23,11 @@ SETTINGS = (
 )  # fmt: skip
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "runs killed (SIGKILL) at random moments that resume to the same bytes",
+    bar="10 of 10",
+)
+def resume(quick: bool) -> Result:
     """Kill and resume; a moment is a random share of an undisturbed run's time."""
     count = 2 if quick else 10
     rng = seeding.generator(0, "bench", "resume")

@@ -6,14 +6,16 @@ from typing import Any
 
 import torch
 
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "robot time per second of the SNN's rollouts against that of the physics"
-BAR = "none: printed"
 POPULATION, PHYSICS = 3000, 30  # controllers a call: 30 runs of 100, one of each run
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "robot time per second of the SNN's rollouts against that of the physics",
+    bar="none: printed",
+)
+def rollouts(quick: bool) -> Result:
     """The same random controllers in both, one thread each, interleaved."""
     repeats = 3 if quick else 15
     evaluator, population, theta = _population()

@@ -10,15 +10,17 @@ from itertools import pairwise
 from statistics import median
 
 from bench.processes import finish
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "seconds per trial and peak memory against runs in a batch and threads"
-BAR = "none: printed"
 RUNS, THREADS = (1, 3, 10, 30), (1, 2)
 TRIALS, WARM = 12, 4
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "seconds per trial and peak memory against runs in a batch and threads",
+    bar="none: printed",
+)
+def scaling(quick: bool) -> Result:
     """Every case in a process of its own; quick: one thread, 1 and 3 runs, eager."""
     cases = [(runs, threads) for threads in THREADS for runs in RUNS]
     cases = [(1, 1), (3, 1)] if quick else cases

@@ -11,14 +11,12 @@ from functools import partial
 
 import numpy as np
 
-from bench.result import Result
+from bench.result import Result, bench
 from bns import seeding
 from bns.claims import verdict
 from bns.claims.claim import Cell
 from bns.stats.equivalence import MARGIN
 
-DOC = "a difference found where there is none, over looks at 10 to 100 runs a side"
-BAR = "<= 5 % at worst; power >= 80 % at A12 = 0.71; no difference shown at 0.64 <= 5 %"
 MANY, FEW = 4000, 200
 LARGE = 0.71  # a large effect, after Vargha and Delaney
 SHIFT = 0.7826  # of a normal distribution by which A12 is 0.71
@@ -27,7 +25,12 @@ LEVEL, POWER = 0.05, 0.8
 Draw = Callable[[np.random.Generator], tuple[np.ndarray, np.ndarray]]
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "a difference found where there is none, over looks at 10 to 100 runs a side",
+    bar="<= 5 % at worst; power >= 80 % at A12 = 0.71; no difference shown at "
+    "0.64 <= 5 %",
+)
+def sequential_design(quick: bool) -> Result:
     """Each case so many times: the worst level, the least power."""
     many = FEW if quick else MANY
     level = {name: judged(name, ">", draw, many) for name, draw in SAME.items()}

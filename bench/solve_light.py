@@ -8,18 +8,20 @@ half a round in the same time, which the slowest robot on the goal radius does n
 import numpy as np
 
 from bench import experiments, light_runs, solving
-from bench.result import Result
+from bench.result import Result, bench
 from bns import stats
 from bns.experiment.record import RunRecord
 from bns.tasks.light import LampGoal
 
-DOC = "median trials until the robot circles the lamp, undamaged, settings T5.19"
-BAR = "median <= 6 trials, >= 27 of 30 runs within 15"
 MEDIAN, FEWEST, LIMIT = 6, 27, 15
 HALF = 180.0  # [deg]
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "median trials until the robot circles the lamp, undamaged, settings T5.19",
+    bar="median <= 6 trials, >= 27 of 30 runs within 15",
+)
+def solve_light(quick: bool) -> Result:
     """30 runs of the preset `khepera-light`, 15 trials each."""
     config = light_runs.undamaged()
     record = experiments.records([config], quick=quick)[config.preset]

@@ -1,14 +1,15 @@
 """Trials until the undamaged Khepera III solves the simple problem."""
 
 from bench import experiments, solving
-from bench.result import Result
+from bench.result import Result, bench
 from bns import stats
 
-DOC = "median trials to solve the simple problem, undamaged"
-BAR = "median <= 12 trials, >= 28 of 30 runs within 30"
 
-
-def run(quick: bool) -> Result:
+@bench(
+    "median trials to solve the simple problem, undamaged",
+    bar="median <= 12 trials, >= 28 of 30 runs within 30",
+)
+def solve_simple(quick: bool) -> Result:
     """30 runs of the preset `khepera-simple` without damage, 30 trials each."""
     config = experiments.undamaged("simple")
     record = experiments.records([config], quick=quick)[config.preset]

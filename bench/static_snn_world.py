@@ -1,14 +1,15 @@
 """The dissertation's own fake real world beside the physics: the same experiments."""
 
 from bench import experiments, solving
-from bench.result import Result
+from bench.result import Result, bench
 from bns import stats
 
-DOC = "the same experiments in the static-SNN world and in MuJoCo, side by side"
-BAR = "none: printed beside the physics world's"
 
-
-def run(quick: bool) -> Result:
+@bench(
+    "the same experiments in the static-SNN world and in MuJoCo, side by side",
+    bar="none: printed beside the physics world's",
+)
+def static_snn_world(quick: bool) -> Result:
     """Solving both problems and recovering from four damages with three windows."""
     found: dict[str, object] = {}
     for problem in ("simple", "infinity"):

@@ -3,16 +3,15 @@
 import sys
 
 from bench.processes import finish
-from bench.result import Result
+from bench.result import Result, bench
 from bench.versions import ROOT
 
-DOC = "time of the whole test suite, one process, on 2 cores"
-BAR = "<= 8 min"
 LIMIT = 8.0  # min
 SHARE = 8  # a quick figure runs every so many-th test file
 
 
-def run(quick: bool) -> Result:
+@bench("time of the whole test suite, one process, on 2 cores", bar="<= 8 min")
+def suite_time(quick: bool) -> Result:
     """Run pytest in a process of its own; quick: a share of the files, scaled up."""
     files = sorted(str(p.relative_to(ROOT)) for p in ROOT.glob("tests/**/test_*.py"))
     chosen = files[::SHARE] if quick else []

@@ -2,15 +2,18 @@
 
 import numpy as np
 
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "tracking of the robot's tag on rendered 720p and 1080p frames: position error"
-BAR = "median <= 1 mm, 1 deg at 720p; <= 0.3 mm, 0.3 deg at 1080p; height +20 mm found"
 BARS = {720: (1.0, 1.0), 1080: (0.3, 0.3)}  # mm, deg
 WRONG = 0.020  # m
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "tracking of the robot's tag on rendered 720p and 1080p frames: position error",
+    bar="median <= 1 mm, 1 deg at 720p; <= 0.3 mm, 0.3 deg at 1080p; height "
+    "+20 mm found",
+)
+def tracking(quick: bool) -> Result:
     """Poses all over the board; the camera's place comes from the floor tags.
 
     The figure is the median position error at 1080p.

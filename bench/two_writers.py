@@ -11,12 +11,10 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 from bench._campaigns import text
-from bench.result import Result
+from bench.result import Result, bench
 from bench.runner import RESULTS
 from bns import seeding
 
-DOC = "two processes told the same --out at random offsets: directories of both"
-BAR = "0 of 200"
 PAIRS = 200
 LATEST = 1.0  # [s] by which the second is later: as long as the first one takes
 KINDS = ("run", "resumed run", "campaign", "run", "diagnosis")
@@ -32,7 +30,11 @@ SETTINGS = (
 )  # fmt: skip
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "two processes told the same --out at random offsets: directories of both",
+    bar="0 of 200",
+)
+def two_writers(quick: bool) -> Result:
     """The two have other seeds, so that what is mixed can be told."""
     count = 4 if quick else PAIRS
     rng = seeding.generator(0, "bench", "two-writers")

@@ -1,18 +1,18 @@
 """The dissertation's claims A15-A18: a sliding window against none, four damages."""
 
 from bench import experiments, solving
-from bench.result import Result
+from bench.result import Result, bench
 from bns import stats
 
-DOC = (
-    "window 150 and 300 against none on four damages (claims A15-A18): cells that hold"
-)
-BAR = "better in all 8 cells, p < 0.01 each"
 CLAIMS = dict(zip(experiments.DAMAGES, ("A15", "A16", "A17", "A18"), strict=True))
 LEVEL = 0.01
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "window 150 and 300 against none on four damages (claims A15-A18): cells that hold",
+    bar="better in all 8 cells, p < 0.01 each",
+)
+def window_claims(quick: bool) -> Result:
     """30 runs a side, damage at trial 30 of 100; O of eq 3.1, Mann-Whitney, A12."""
     sides = {
         (damage, window): experiments.damaged(damage, **_adaptation(window))

@@ -6,16 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from bench.result import Result
+from bench.result import Result, bench
 
-DOC = "World.run of 30 robots against bare mujoco.rollout, same models and controls"
-BAR = "<= 1.10 x"
 LIMIT = 1.10
 ROBOTS, COMMANDS, THREADS = 30, 12, 2
 STEP = 0.005  # [s]
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "World.run of 30 robots against bare mujoco.rollout, same models and controls",
+    bar="<= 1.10 x",
+)
+def world_overhead(quick: bool) -> Result:
     """Median of interleaved ratios, in one process.
 
     Three worlds: undamaged, every robot with its own wheel gain (a signal effect), and
