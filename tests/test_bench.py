@@ -13,9 +13,6 @@ from bench.table import page, table
 from bns.errors import BnsError
 from tests.sources import ROOT
 
-MODULES = sorted((ROOT / "bench").glob("*.py"))
-FRAMEWORK = {"__init__", "__main__", "processes", "result", "runner", "table"}
-FRAMEWORK |= {"versions"}
 BENCHES = discover()
 KEYS = ["name", "figure", "unit", "bar", "holds", "n", "seconds", "command"]
 KEYS += ["versions", "machine", "commit", "date", "quick", "details"]
@@ -34,18 +31,16 @@ def small(monkeypatch):
     return Bench(name="small", module="none", doc="how small", bar="<= 1.10 x")
 
 
-@pytest.mark.parametrize(
-    "path", sorted((ROOT / "bench").glob("*.py")), ids=lambda p: p.stem
-)
-def test_a_module_is_a_bench_or_framework_or_helper(path):
-    helper = path.stem in FRAMEWORK or path.stem.startswith("_")
-    tree = ast.parse(path.read_text())
-    names = {n.name for n in tree.body if isinstance(n, ast.FunctionDef)}
-    if path.stem.replace("_", "-") not in BENCHES:
-        assert helper or "run" not in names, f"{path.name} lacks DOC or BAR as text"
-        return
-    (run,) = [n for n in tree.body if getattr(n, "name", "") == "run"]
-    assert [a.arg for a in run.args.args + run.args.kwonlyargs] == ["quick"]
+def test_every_function_marked_as_a_bench_is_found_once_and_takes_quick():
+    marked = []
+    for path in (ROOT / "bench").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef) and any(
+                ast.unparse(mark).startswith("bench(") for mark in node.decorator_list
+            ):
+                marked.append(node.name.replace("_", "-"))
+                assert [a.arg for a in node.args.args] == ["quick"], node.name
+    assert sorted(marked) == sorted(BENCHES)
 
 
 @pytest.mark.parametrize("bench", BENCHES.values(), ids=lambda bench: bench.name)

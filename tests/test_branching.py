@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from bench import branching, experiments
+from bench.learning import branching, experiments
 from bns.errors import BnsError
 from bns.experiment.run import train
 from bns.storage.store import RunStore

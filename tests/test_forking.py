@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from bench import experiments, forking
+from bench.learning import experiments, forking
 from bns.experiment.config import AdaptationConfig, WorldConfig
 from bns.experiment.config_watch import WatchConfig
 from bns.experiment.run import train

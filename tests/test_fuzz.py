@@ -4,8 +4,8 @@ import warnings
 
 import pytest
 
-from bench import _fuzz
-from bench._readers import make, readers
+from bench.storage import reading
+from bench.storage.readers import make, readers
 
 INPUTS = 30
 """of each reader; `python -m bench fuzz` tries more"""
@@ -22,11 +22,11 @@ def home(tmp_path_factory):
 @pytest.mark.parametrize("reader", readers(), ids=lambda reader: reader.name)
 def test_wrong_files_are_refused_by_one_line(reader, home):
     assert reader.sane(reader.read(home)) == ""
-    found = _fuzz.Found()
+    found = reading.Found()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for seed in range(INPUTS):
-            _fuzz.attempt(reader, home, seed, found)
+            reading.attempt(reader, home, seed, found)
     assert found.cases == []
     assert found.counts["inputs"] == INPUTS
     skips = reader.name == "timing.jsonl"  # lines that are torn are left out

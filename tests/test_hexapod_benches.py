@@ -5,14 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench import (
-    hexapod_ceiling,
-    hexapod_evidence,
-    hexapod_loads,
-    hexapod_runs,
-    recover_hexapod,
-    solving,
-)
+from bench.learning import solving
+from bench.walking import ceiling, evidence, loads
+from bench.walking import recover as recover_hexapod
+from bench.walking import runs as hexapod_runs
 from bns import presets
 from bns.experiment.record import RunRecord
 from tests.bns.walkers import small
@@ -91,8 +87,8 @@ def test_what_a_learner_would_have_forgotten_is_told_from_its_record():
     runs = replace(record(np.zeros((2, 12))), sent=sent)
     runs.poses[..., 0] = np.linspace(0, 1, 12)
     runs.poses[1, 9:] *= -1.0  # the second robot goes the other way from trial 9 on
-    assert not hexapod_evidence.forgets(runs)[0].any()
-    assert hexapod_evidence.forgets(runs)[1].argmax() == 10  # one trial says nothing
+    assert not evidence.forgets(runs)[0].any()
+    assert evidence.forgets(runs)[1].argmax() == 10  # one trial says nothing
 
 
 def test_the_search_climbs_and_stays_within_the_stops(monkeypatch):
@@ -103,9 +99,9 @@ def test_the_search_climbs_and_stays_within_the_stops(monkeypatch):
         assert legs == "type0"
         return np.array([10.0 - np.abs(np.clip(goal, -3, 3) - x).mean() for x in lists])
 
-    monkeypatch.setattr(hexapod_ceiling, "distances", distances)
+    monkeypatch.setattr(ceiling, "distances", distances)
     start = np.zeros((2, 18))
-    goals, farthest, step = hexapod_ceiling.search(
+    goals, farthest, step = ceiling.search(
         start, "type0", step=0.1, seed=1, generations=20
     )
     assert 0 < step < 1
@@ -118,6 +114,6 @@ def test_the_search_climbs_and_stays_within_the_stops(monkeypatch):
 
 
 def test_a_robot_that_stands_stands_on_its_feet():
-    feet, *others = hexapod_loads.shares([np.zeros((1, 18))])[0]
+    feet, *others = loads.shares([np.zeros((1, 18))])[0]
     assert feet == pytest.approx(1.0)
     assert others == [0.0, 0.0, 0.0]

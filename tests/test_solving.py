@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bench import solving
+from bench.learning import solving
 
 
 def test_waiting_times_say_how_many_came():

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench import experiments
+from bench.learning import experiments
 from bns import presets, stats
 from bns.campaign.engines.inline import InlineEngine
 from bns.campaign.identity import identity
@@ -44,7 +44,7 @@ def test_a_claim_is_tested_or_says_why_not(claim):
 
 
 def test_p_values_are_those_of_the_tables():
-    with open(ROOT / "bench" / "p_values.csv") as file:
+    with open(ROOT / "bench" / "claims" / "p_values.csv") as file:
         printed = Counter(row["p"] for row in csv.DictReader(file))
     assert sum(printed.values()) == 178
     own = [cell for _, cell in CELLS if not cell.variant]

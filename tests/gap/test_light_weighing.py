@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bench.gap_light_effects import Coarse
-from bench.gap_sensors import _likened
+from bench.gap.sensors import _likened
+from bench.gap.strange_effects import Coarse
 from bns.gap import diagnose
 from bns.gap.bench import light_cases
 from bns.gap.core.fit import Term

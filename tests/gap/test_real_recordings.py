@@ -1,9 +1,9 @@
-"""Diagnoses of real recordings, where there are any; see `bench.real_data`."""
+"""Diagnoses of real recordings, where there are any; see `bench.gap.real_data`."""
 
 import numpy as np
 import pytest
 
-from bench import real_data, servo_cases
+from bench.gap import real_data, servo_cases
 from bns.gap.importers import khepera3_odometry, mrclam6, xl330
 from bns.gap.models.odometry.diagnosis import diagnose
 from bns.gap.models.odometry.motions import Motions
