@@ -19,7 +19,7 @@ from bns.worlds.effects.base import (
 )
 from bns.worlds.effects.parts import Part
 from bns.worlds.physics import servo_law
-from tests.worlds.subjects import (
+from tests.worlds.effects.subjects import (
     DT,
     STEPS,
     as_bytes,

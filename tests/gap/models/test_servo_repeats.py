@@ -9,7 +9,7 @@ from bns.gap.models.servo import diagnosis, repeats
 from bns.gap.models.servo.candidates import candidates
 from bns.gap.models.servo.runs import Runs
 from bns.gap.models.servo.verdict import LEVEL, MANY, Null
-from tests.gap.test_servo import CELLS, NAMES, NOMINAL, recorded
+from tests.gap.models.test_servo import CELLS, NAMES, NOMINAL, recorded
 
 SECOND = 100  # samples
 

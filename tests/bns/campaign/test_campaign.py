@@ -18,7 +18,7 @@ from bns.campaign.store import CampaignStore
 from bns.campaign.table import table
 from bns.errors import BnsError, FormatError
 from bns.storage import files, reading
-from tests.bns.campaigns import campaign
+from tests.bns.campaign.campaigns import campaign
 from tests.bns.contents import contents
 
 TIMES = ("log.jsonl",)

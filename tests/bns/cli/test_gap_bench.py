@@ -7,8 +7,9 @@ import pytest
 
 from bns.__main__ import main
 from bns.worlds.data import dataset
+from tests.sources import ROOT
 
-ARM = str(Path(__file__).parents[2] / "examples" / "arm" / "arm.toml")
+ARM = str(ROOT / "examples" / "arm" / "arm.toml")
 
 
 @pytest.fixture(scope="module")

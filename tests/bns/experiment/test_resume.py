@@ -3,7 +3,6 @@
 import errno
 import os
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,8 +19,9 @@ from bns.experiment.run import train
 from bns.storage import files
 from bns.storage.store import load
 from tests.bns.contents import contents
+from tests.sources import ROOT
 
-FAKES = Path(__file__).parent / "fakes.py"
+FAKES = ROOT / "tests" / "bns" / "fakes.py"
 KILLED = -9
 
 

@@ -9,7 +9,7 @@ from bns.experiment.config import AdaptationConfig, SnnConfig, WorldConfig
 from bns.experiment.config_watch import WatchConfig
 from bns.learners.bns.navigation import WheeledProblem, ways
 from bns.snn.scaling import AXLE
-from tests.bns.test_learner import SMALL, batch, play
+from tests.bns.learners.test_learner import SMALL, batch, play
 
 WATCH = WatchConfig(detect=True, forget=True, warmup=4, history=8)
 

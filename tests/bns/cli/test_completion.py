@@ -4,12 +4,12 @@ import os
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from bns.__main__ import main
 from bns.cli.completion import SCRIPTS, candidates
+from tests.sources import ROOT
 
 ASKED = {
     "verb": (["comp"], {"compare", "completion"}),
@@ -85,7 +85,7 @@ def test_a_shell_completes(shell, tmp_path):
         timeout=60,
         check=False,
         stdin=subprocess.DEVNULL,
-        cwd=Path(__file__).parents[2],
+        cwd=ROOT,
         env={
             **os.environ,
             "PATH": f"{tmp_path}:{os.environ['PATH']}",

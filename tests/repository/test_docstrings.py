@@ -1,7 +1,7 @@
 """Public names say what they are, what they raise, and what their arguments are.
 
 `LEFT` is how many still lack something; it may only fall. `python -m
-tests.test_docstrings` lists them.
+tests.repository.test_docstrings` lists them.
 """
 
 import ast

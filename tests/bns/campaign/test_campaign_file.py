@@ -7,7 +7,7 @@ from bns.campaign.plan import Job, plan
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig
 from bns.experiment.loading import from_mapping, to_mapping
-from tests.bns.campaigns import CONTENT, campaign
+from tests.bns.campaign.campaigns import CONTENT, campaign
 
 
 def test_a_grid_is_every_combination():

@@ -10,8 +10,8 @@ from bns.worlds.effects.base import CommandEffect, OpticsEffect, SensorEffect
 from bns.worlds.light import law as light_law
 from bns.worlds.light import sensors as light_sensors
 from bns.worlds.light.field import LightField
-from tests.worlds import subjects
-from tests.worlds.subjects import DT, light, read
+from tests.worlds.effects import subjects
+from tests.worlds.effects.subjects import DT, light, read
 
 EVERY = [registry.get(name) for name in registry.names()]
 EVERY = [kind for kind in EVERY if "wheeled" in kind.robots]

@@ -6,7 +6,7 @@ import pytest
 
 from bns.worlds.effects import listing, registry
 from bns.worlds.effects.base import ServoEffect
-from tests.worlds.subjects import compiled, on_part
+from tests.worlds.effects.subjects import compiled, on_part
 
 ON_BODY = [
     name

@@ -6,7 +6,7 @@ import pytest
 
 from bns.errors import BnsError, UnknownNameError
 from bns.worlds.effects import registry
-from tests.worlds.subjects import ARM, told
+from tests.worlds.effects.subjects import ARM, told
 
 G = 9.81  # [m/s2]
 ROD = """

@@ -5,7 +5,7 @@ import numpy as np
 from bns.gap import store
 from bns.gap.models.odometry import record
 from bns.gap.models.odometry.diagnosis import diagnose
-from tests.gap.test_odometry import motions
+from tests.gap.models.test_odometry import motions
 
 
 def test_it_is_stored_and_planned_like_every_other(tmp_path):

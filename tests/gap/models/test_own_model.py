@@ -1,7 +1,6 @@
 """A stranger's robot: planted effects are named; what is wrong with a file is said."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -15,8 +14,9 @@ from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.models.mjcf.effects import CLASSES, OWNERS
 from bns.gap.models.mjcf.model import OwnModel
 from bns.worlds.data import dataset
+from tests.sources import ROOT
 
-ARM = Path(__file__).parents[2] / "examples" / "arm" / "arm.toml"
+ARM = ROOT / "examples" / "arm" / "arm.toml"
 KEPT = (
     "joint_damping[elbow]",
     "body_mass[forearm]",
