@@ -2,26 +2,23 @@
 
 import numpy as np
 
-from bns.worlds.effects.base import Parameter, SensorEffect
+from bns.worlds.effects.base import SensorEffect, strength
 from bns.worlds.effects.common import spans
 from bns.worlds.effects.sensors import SENSOR, columns, limited
 
 
 class SensorDrift(SensorEffect):
-    """A sensor's readings are shifted more and more, from when it sets in."""
+    """A sensor's readings drift with time."""
 
     name = "sensor_drift"
-    doc = "a sensor's readings drift with time"
     source = "assumed: a sensor that warms up"
     choices = (SENSOR,)
     parameters = (
-        Parameter(
+        strength(
             "rate",
-            unit="count/s",
-            nominal=0.0,
-            low=-1000.0,
-            high=1000.0,
-            doc="added for each second that it lasts; bounds assumed",
+            "count/s",
+            (-1000.0, 1000.0),
+            "added for each second that it lasts; bounds assumed",
             example=-40.0,
         ),
     )
@@ -46,20 +43,17 @@ class SensorDrift(SensorEffect):
 
 
 class SensorFrozen(SensorEffect):
-    """A sensor goes on giving what it gave before it froze, or first in the trial."""
+    """A sensor repeats one reading."""
 
     name = "sensor_frozen"
-    doc = "a sensor repeats one reading"
     source = "assumed: a converter that no longer updates"
     choices = (SENSOR,)
     parameters = (
-        Parameter(
+        strength(
             "blend",
-            unit="1",
-            nominal=0.0,
-            low=0.0,
-            high=1.0,
-            doc="from the reading (0) to the frozen one (1)",
+            "1",
+            (0.0, 1.0),
+            "from the reading (0) to the frozen one (1)",
             example=1.0,
         ),
     )
@@ -84,20 +78,17 @@ class SensorFrozen(SensorEffect):
 
 
 class SensorResponseTime(SensorEffect):
-    """Readings follow the light as a filter of first order does."""
+    """A sensor's readings lag behind."""
 
     name = "sensor_response_time"
-    doc = "a sensor's readings lag behind"
     source = "thesis 5.2.2 gives 50 ms for an answer; a lag beyond that is assumed"
     choices = (SENSOR,)
     parameters = (
-        Parameter(
+        strength(
             "time_constant",
-            unit="s",
-            nominal=0.0,
-            low=0.0,
-            high=10.0,
-            doc="of the filter; 0 = none; bounds assumed",
+            "s",
+            (0.0, 10.0),
+            "of the filter; 0 = none; bounds assumed",
             example=0.5,
         ),
     )

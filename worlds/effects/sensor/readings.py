@@ -5,7 +5,7 @@ from abc import abstractmethod
 import numpy as np
 
 from bns.models.light_sites import twin
-from bns.worlds.effects.base import Parameter, SensorEffect
+from bns.worlds.effects.base import Parameter, SensorEffect, factor, strength
 from bns.worlds.effects.common import rarer
 from bns.worlds.effects.sensors import FULL_SCALE, SENSOR, columns, limited
 
@@ -36,20 +36,13 @@ class _EachReading(SensorEffect):
 
 
 class SensorGain(_EachReading):
-    """A reading is multiplied by a factor, within the converter's range."""
+    """A sensor's readings are scaled."""
 
     name = "sensor_gain"
-    doc = "a sensor's readings are scaled"
     source = "assumed: a supply or amplifier that has changed"
     parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.0,
-            high=4.0,
-            doc="reading after over reading before; bounds assumed",
-            example=0.8,
+        factor(
+            (0.0, 4.0), "reading after over reading before; bounds assumed", example=0.8
         ),
     )
 
@@ -67,19 +60,16 @@ class SensorGain(_EachReading):
 
 
 class SensorOffset(_EachReading):
-    """A constant is added to a reading, within the converter's range."""
+    """A sensor's readings are shifted."""
 
     name = "sensor_offset"
-    doc = "a sensor's readings are shifted"
     source = "assumed: a dirty or heated sensor"
     parameters = (
-        Parameter(
+        strength(
             "counts",
-            unit="count",
-            nominal=0.0,
-            low=-4095.0,
-            high=4095.0,
-            doc="added to each reading; the whole range",
+            "count",
+            (-4095.0, 4095.0),
+            "added to each reading; the whole range",
             example=-500.0,
         ),
     )
@@ -98,19 +88,16 @@ class SensorOffset(_EachReading):
 
 
 class SensorSaturation(_EachReading):
-    """A sensor saturates early: no reading is below a level (bright is small)."""
+    """A sensor saturates before full light."""
 
     name = "sensor_saturation"
-    doc = "a sensor saturates before full light"
     source = "assumed: a load resistor or supply that has changed"
     parameters = (
-        Parameter(
+        strength(
             "level",
-            unit="count",
-            nominal=0.0,
-            low=0.0,
-            high=FULL_SCALE,
-            doc="smallest reading; 0 = down to full light",
+            "count",
+            (0.0, FULL_SCALE),
+            "smallest reading; 0 = down to full light",
             example=1500.0,
         ),
     )
@@ -131,13 +118,11 @@ class SensorSaturation(_EachReading):
 def _stuck(extreme: str, reading: float) -> tuple[Parameter, ...]:
     """The parameters of a sensor that is stuck at an extreme reading."""
     return (
-        Parameter(
+        strength(
             "blend",
-            unit="1",
-            nominal=0.0,
-            low=0.0,
-            high=1.0,
-            doc=f"from the reading (0) to the {extreme} (1)",
+            "1",
+            (0.0, 1.0),
+            f"from the reading (0) to the {extreme} (1)",
             example=1.0,
         ),
         Parameter(
@@ -159,37 +144,32 @@ class _StuckSensor(_EachReading):
 
 
 class SensorStuckMax(_StuckSensor):
-    """A sensor always returns the maximum value (dark)."""
+    """A sensor always reads the maximum: it reads dark."""
 
     name = "sensor_stuck_max"
-    doc = "a sensor always reads the maximum: it reads dark"
     source = "thesis 6.2.1: always returns the maximum sensor value"
     parameters = _stuck("maximum", FULL_SCALE)
 
 
 class SensorStuckMin(_StuckSensor):
-    """A sensor always returns the minimum value (bright)."""
+    """A sensor always reads the minimum: it reads bright."""
 
     name = "sensor_stuck_min"
-    doc = "a sensor always reads the minimum: it reads bright"
     source = "thesis 6.2.1: always returns the minimum sensor value"
     parameters = _stuck("minimum", 0.0)
 
 
 class SensorCrosstalk(_EachReading):
-    """A share of a reading comes from the two sensors beside it on the ring."""
+    """Neighbouring sensors leak into a reading."""
 
     name = "sensor_crosstalk"
-    doc = "neighbouring sensors leak into a reading"
     source = "assumed: one multiplexer serves all sensors"
     parameters = (
-        Parameter(
+        strength(
             "share",
-            unit="1",
-            nominal=0.0,
-            low=0.0,
-            high=0.5,
-            doc="of the reading that is the neighbours' mean; bounds assumed",
+            "1",
+            (0.0, 0.5),
+            "of the reading that is the neighbours' mean; bounds assumed",
             example=0.2,
         ),
     )
@@ -209,10 +189,9 @@ class SensorCrosstalk(_EachReading):
 
 
 class SensorIntermittent(SensorEffect):
-    """Every m-th reading of a trial is the minimum value instead."""
+    """Every m-th reading of a sensor is the minimum."""
 
     name = "sensor_intermittent"
-    doc = "every m-th reading of a sensor is the minimum"
     source = "thesis 6.2.1 and 6.3.1: once every m readings; m is silent"
     choices = (SENSOR,)
     parameters = (
@@ -226,13 +205,11 @@ class SensorIntermittent(SensorEffect):
             example=3,
             integer=True,
         ),
-        Parameter(
+        strength(
             "reading",
-            unit="count",
-            nominal=0.0,
-            low=0.0,
-            high=FULL_SCALE,
-            doc="what is read then",
+            "count",
+            (0.0, FULL_SCALE),
+            "what is read then",
             example=0.0,
             scales=False,
         ),
@@ -262,19 +239,16 @@ class SensorIntermittent(SensorEffect):
 
 
 class SensorSwapped(SensorEffect):
-    """What the left sensors read is given for the right ones, and vice versa."""
+    """Left and right sensors are exchanged."""
 
     name = "sensor_swapped"
-    doc = "left and right sensors are exchanged"
     source = "assumed: a plug in the wrong socket"
     parameters = (
-        Parameter(
+        strength(
             "blend",
-            unit="1",
-            nominal=0.0,
-            low=0.0,
-            high=1.0,
-            doc="from their own reading (0) to that of their twin (1)",
+            "1",
+            (0.0, 1.0),
+            "from their own reading (0) to that of their twin (1)",
             example=1.0,
         ),
     )
