@@ -1,5 +1,7 @@
 """What wheels are told: gains, dead bands, limits, and wheels that are stuck."""
 
+from abc import abstractmethod
+
 import numpy as np
 
 from bns.worlds.effects.base import (
@@ -20,36 +22,47 @@ from bns.worlds.effects.common import (
 )
 
 
-class WheelGain(CommandEffect):
-    """A wheel turns at a share of the speed it is told."""
+class _EachCommand(CommandEffect):
+    """A command of the chosen wheels becomes another one, whatever came before."""
 
-    name = "wheel_gain"
-    source = "thesis 4.2.3 and 6.2.1: a wheel slowed to a share of its intended speed"
     memoryless = True
     choices = (WHEEL,)
-    parameters = (
-        factor(
-            (0.0, 2.0), "speed reached over speed told; bounds assumed", example=0.8
-        ),
-    )
 
     def apply(
         self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
         """See `CommandEffect.apply`."""
         values = signal.values.copy()
-        for column in columns(self, signal):
-            values[active, column] *= self["factor"]
+        if not self.is_nominal:
+            for column in columns(self, signal):
+                values[active, column] = self._turned(values[active, column])
         return values
 
+    @abstractmethod
+    def _turned(self, told: np.ndarray) -> np.ndarray:
+        """Speeds instead of those told [m/s], any shape."""
 
-class DeadBand(CommandEffect):
+
+class WheelGain(_EachCommand):
+    """A wheel turns at a share of the speed it is told."""
+
+    name = "wheel_gain"
+    source = "thesis 4.2.3 and 6.2.1: a wheel slowed to a share of its intended speed"
+    parameters = (
+        factor(
+            (0.0, 2.0), "speed reached over speed told; bounds assumed", example=0.8
+        ),
+    )
+
+    def _turned(self, told: np.ndarray) -> np.ndarray:
+        return told * self["factor"]
+
+
+class DeadBand(_EachCommand):
     """Speeds below a magnitude give a stop."""
 
     name = "dead_band"
     source = "regulated minimum 2,000 units (13.9 mm/s): Khepera III manual 2.2 p. 14"
-    memoryless = True
-    choices = (WHEEL,)
     parameters = (
         strength(
             "speed",
@@ -60,24 +73,15 @@ class DeadBand(CommandEffect):
         ),
     )
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """See `CommandEffect.apply`."""
-        values = signal.values.copy()
-        for column in columns(self, signal):
-            slow = np.abs(values[:, column]) < self["speed"]
-            values[active & slow, column] = 0.0
-        return values
+    def _turned(self, told: np.ndarray) -> np.ndarray:
+        return np.where(np.abs(told) < self["speed"], 0.0, told)
 
 
-class DeadZone(CommandEffect):
+class DeadZone(_EachCommand):
     """A wheel turns slower than it is told by a constant."""
 
     name = "dead_zone"
     source = "the dead zone of control engineering; bounds assumed"
-    memoryless = True
-    choices = (WHEEL,)
     parameters = (
         strength(
             "speed",
@@ -88,27 +92,15 @@ class DeadZone(CommandEffect):
         ),
     )
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """See `CommandEffect.apply`."""
-        values = signal.values.copy()
-        if self.is_nominal:
-            return values
-        for column in columns(self, signal):
-            told = values[active, column]
-            left = np.maximum(np.abs(told) - self["speed"], 0.0)
-            values[active, column] = np.sign(told) * left
-        return values
+    def _turned(self, told: np.ndarray) -> np.ndarray:
+        return np.sign(told) * np.maximum(np.abs(told) - self["speed"], 0.0)
 
 
-class SpeedSaturation(CommandEffect):
+class SpeedSaturation(_EachCommand):
     """A wheel turns no faster than a limit."""
 
     name = "speed_saturation"
     source = "limits of 48,000 and 43,000 units: Khepera III manual 2.2 p. 14"
-    memoryless = True
-    choices = (WHEEL,)
     parameters = (
         Parameter(
             "limit",
@@ -121,17 +113,8 @@ class SpeedSaturation(CommandEffect):
         ),
     )
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """See `CommandEffect.apply`."""
-        values = signal.values.copy()
-        if self.is_nominal:
-            return values
-        limit = self["limit"]
-        for column in columns(self, signal):
-            values[active, column] = np.clip(values[active, column], -limit, limit)
-        return values
+    def _turned(self, told: np.ndarray) -> np.ndarray:
+        return np.clip(told, -self["limit"], self["limit"])
 
 
 class WheelIntermittent(CommandEffect):
