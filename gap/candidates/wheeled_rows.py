@@ -1,6 +1,7 @@
 """Numbers of a wheeled robot that may be off, and how far they plausibly are."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -86,6 +87,11 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
             ]
     for side in SIDES:
         made += _rough(side, trials)
+    made = [
+        replace(row, joins=tuple(row.name.replace("[both]", f"[{s}]") for s in SIDES[:2]))
+        if row.name.endswith("[both]") else row
+        for row in made
+    ]  # fmt: skip
     made.append(
         Row("floor_friction", 1.0, 0.3, 0.01, 3.0, smooth=False,
             levels=(0.02, 0.05, 0.1, 0.25), excite=EXCITE["floor_friction"])

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bns.gap.decomposition import descent, onset, rest, shares, words
+from bns.gap.decomposition import descent, onset, rest, shares, ties, words
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.model import DecomposableModel
@@ -98,7 +98,7 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         problem, point, late = found
     support = shares.guarded(problem, point)
     if support != point.support:
-        point = refitted(problem, point, support)
+        point = descent.refitted(problem, point, support)
     known = rest.floor(problem, seed=seed)
     full = point.linear.rest(point.linear.solve(point.linear.free))
     inside = rest.kept(problem, full, point.noise.sd)
@@ -113,7 +113,7 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         start=start,
         point=point,
         parts=tuple(shares.parts(problem, point)),
-        tied=tuple(shares.swaps(point)),
+        tied=tuple(ties.tied(problem, point)),
         onset=late,
         floor=known,
         before=rest.excess(start.rest, known, inside),
@@ -127,23 +127,6 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         scatter=rest.scattered(problem, plain, known, inside),
         closed=share if point.support else 0.0,
     )
-
-
-def refitted(problem: Problem, point: Point, support: Support) -> Point:
-    """A point with a smaller set, fitted to the simulation.
-
-    Args:
-        problem: the recording.
-        point: a fitted set.
-        support: the smaller set.
-    """
-    from bns.gap.decomposition import fit
-
-    values = fit.placed(problem, point.linear, support, point.values)
-    fitted = set(support) | fit.nuisances(problem)
-    values, left = fit.newton(problem, values, fitted, point.noise)
-    linear, known, slopes = fit.linearised(problem, values, left, point.noise)
-    return Point(values, support, left, linear, slopes, known)
 
 
 class Clock:
@@ -335,7 +318,7 @@ def _main(made: Decomposition, part: Part) -> tuple[str, str]:
 def _fits(made: Decomposition) -> tuple[Fit, ...]:
     """The fits of what is named, of each alone, and of nothing."""
     linear = made.point.linear
-    wanted = list(made.tied)
+    wanted = [s for s in made.tied if s <= set(linear.terms)]
     order = sorted(linear.free, key=lambda name: linear.cost({name}))[:SINGLES]
     wanted += [frozenset({n}) for n in order if frozenset({n}) not in wanted]
     if frozenset() not in wanted:

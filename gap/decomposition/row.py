@@ -28,6 +28,7 @@ class Row:
             in and out together.
         family: name of the cause that explanations share; one of them or all cost as
             much. "" = its own.
+        joins: explanations that are this one where they hold alike.
         excite: which commands make it felt, in words.
     """
 
@@ -46,6 +47,7 @@ class Row:
     per_trial: bool = False
     group: str = ""
     family: str = ""
+    joins: tuple[str, ...] = ()
     excite: str = ""
 
     def __post_init__(self):

@@ -64,7 +64,9 @@ def shortened(
             continue
         begin = trial.times[0] + (span - length) * ((number * GOLDEN) % 1.0)
         first = int(np.searchsorted(trial.times, begin - before))
-        last = min(int(np.searchsorted(trial.times, begin + length)), len(trial.times) - 1)
+        last = min(
+            int(np.searchsorted(trial.times, begin + length)), len(trial.times) - 1
+        )
         begun = 0.0 if first == 0 else before
         made.append((piece(trial, first, last), begun))
     return made
