@@ -52,7 +52,10 @@ _LOAD = (
     ("payload.my", 0.015, -0.1, 0.1, "kg m", {"slack": 4e-4}),
     ("payload.mz", 0.04, -0.1, 0.3, "kg m", {}),
 )
-_PLANES = (("floor_slope", 0.03, 0.3, False), ("wheel_eccentricity", 1e-3, 4e-3, True))
+_PLANES = (
+    ("floor_slope", 0.03, 0.3, False, ()),
+    ("wheel_eccentricity", 1e-3, 4e-3, True, (-1.5e-3, 1.5e-3)),
+)
 """explanations with a size and a direction: two rows each, along x and y"""
 
 
@@ -69,7 +72,7 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
         for name, sd, low, high, unit, given in _LOAD
     ]  # fmt: skip
     made.append(Row(LEAD, 0.0, 0.003, -0.02, 0.02, unit="s", nuisance=True, step=0.001))
-    for name, sd, high, sided in _PLANES:
+    for name, sd, high, sided, levels in _PLANES:
         for side in SIDES[:2] if sided else ("",):
             term = f"{name}[{side}]" if side else name
             made += [
@@ -80,6 +83,7 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
                     -high,
                     high,
                     group=term,
+                    levels=levels,
                     unit=_unit(name),
                     excite=EXCITE.get(name, "any drive"),
                 )

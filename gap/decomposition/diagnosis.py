@@ -22,6 +22,7 @@ MOST = 0.5  # share of the gap beyond which what is left is most of it
 FELT = 0.02  # of the floor's variance: a gap below shows in no picture
 LARGE = 2.0  # variances of the floor: more than heavy tails of any camera's noise
 SCATTER = 3.0  # times what differs between repeats
+BROKEN = 0.05  # of its motion: no sound robot scatters by as much (assumed)
 SINGLES = 8  # explanations whose share alone is reported
 
 
@@ -40,6 +41,7 @@ class Decomposition:
         before, after: excess over the floor of the nominal model and of `point`.
         recurs: standard errors by which what `point` leaves recurs.
         scatter: excess over the floor of what differs between repeats.
+        moved: mean square of the recorded motion in units of the floor.
         closed: share closed on stretches that were not fitted.
     """
 
@@ -54,6 +56,7 @@ class Decomposition:
     after: float
     recurs: float
     scatter: float
+    moved: float
     closed: float
 
     @property
@@ -62,12 +65,20 @@ class Decomposition:
         return max(self.after, 0.0) / max(self.before, self.after, 1e-9)
 
     @property
+    def recurring(self) -> bool:
+        """Whether the rest is the same whenever the motion is."""
+        return self.recurs > rest.SURE
+
+    @property
     def lasting(self) -> bool:
         """Whether the rest is more than scatter: it recurs, or it is far beyond what
-        measuring scatters and what differs between repeats."""
+        measuring scatters and what differs between repeats, or beyond what a sound
+        robot may scatter (what happens at one place, or by chance)."""
+        if np.sqrt(max(self.after, 0.0) / self.moved) > BROKEN and self.after > LARGE:
+            return True
         if self.after <= self.scatter:
             return False
-        if self.recurs > rest.SURE:
+        if self.recurring:
             return self.after > FELT
         return self.after > max(LARGE, SCATTER * self.scatter)
 
@@ -104,9 +115,9 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
     inside = rest.kept(problem, full, point.noise.sd)
     left = point.linear.rest(point.linear.solve(point.support))
     plain = left if not point.noise.memory.factors.size else point.rest
-    held = shares.HeldOut.of(problem, point, shares.PIECES)
+    held = shares.HeldOut.of(problem, point, shares.PIECES, inside)
     none, some = held.nominal(start.rest), held.error(point.support).sum()
-    least = held.error(point.linear.free).sum()
+    least = held.nominal(known.sd)
     share = float((none - some) / max(none - min(least, some), 1e-9))
     return Decomposition(
         problem=problem,
@@ -125,6 +136,7 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
             piece=rest.SHORT if point.noise.order else rest.PIECE,
         ),
         scatter=rest.scattered(problem, plain, known, inside),
+        moved=max(rest.excess(problem.recorded, known, inside), 1.0),
         closed=share if point.support else 0.0,
     )
 
@@ -294,7 +306,7 @@ def statements(made: Decomposition) -> list[str]:
     return [
         words.size(before, beyond, features, window),
         words.explained(listed, made.closed, date, swapped),
-        words.left(made.left, made.lasting, words.sized(left, features)),
+        words.left(made.left, made.lasting, made.recurring, words.sized(left, features)),
     ]
 
 

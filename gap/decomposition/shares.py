@@ -95,7 +95,13 @@ class HeldOut:
     fixed: Mapping[str, tuple[np.ndarray, np.ndarray]]
 
     @classmethod
-    def of(cls, problem: Problem, point: Point, pieces: int = 1) -> "HeldOut":
+    def of(
+        cls,
+        problem: Problem,
+        point: Point,
+        pieces: int = 1,
+        inside: np.ndarray | None = None,
+    ) -> "HeldOut":
         """For a point's linear model.
 
         Args:
@@ -104,13 +110,14 @@ class HeldOut:
             pieces: how many parts of each stretch are left out by themselves. More than
                 one lets an effect that shows in a single trial be fitted to a part of
                 that trial; windows beside a cut overlap by half.
+            inside: which residuals count, ``(N, C)``; None = all that were seen.
         """
         linear = point.linear
         if pieces > 1:
             problem = replace(problem, block=_pieces(problem.block, pieces))
             linear = linear.in_blocks(problem.block)
         sd = np.sqrt(np.nanmean(point.rest**2, axis=0))
-        weight = np.where(problem.seen, 1 / sd**2, 0.0)
+        weight = np.where(problem.seen if inside is None else inside, 1 / sd**2, 0.0)
         units = fit.units(problem, point.values)
         whole = fit.target(problem, point.values, point.rest, point.slopes)
         plain = Linear.of(problem, point.slopes, units, whole, weight)
