@@ -306,7 +306,9 @@ def statements(made: Decomposition) -> list[str]:
     return [
         words.size(before, beyond, features, window),
         words.explained(listed, made.closed, date, swapped),
-        words.left(made.left, made.lasting, made.recurring, words.sized(left, features)),
+        words.left(
+            made.left, made.lasting, made.recurring, words.sized(left, features)
+        ),
     ]
 
 
@@ -323,7 +325,11 @@ def _sizes(made: Decomposition, left: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def _main(made: Decomposition, part: Part) -> tuple[str, str]:
     """Unit and name of the row that stands for an explanation."""
     rows = {row.name: row for row in made.problem.rows}
-    name = max(part.values, key=lambda n: abs(part.values[n] - rows[n].nominal))
+    moved = [n for n in part.values if part.values[n] != rows[n].nominal]
+    name = (moved or [*part.values])[0]
+    alike = [n for n in moved if rows[n].unit == rows[name].unit]
+    if alike:
+        name = max(alike, key=lambda n: abs(part.values[n] - rows[n].nominal))
     return rows[name].unit, name
 
 

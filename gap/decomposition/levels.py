@@ -78,7 +78,8 @@ def alone(problem: Problem, point: Point, most: int) -> list[tuple[str, np.ndarr
     found: dict[str, tuple[float, tuple[int, float]]] = {}
     for _, (number, value), linear in _scored(problem, point, todo, problem.sample()):
         term = problem.rows[number].term
-        linear = replace(linear, free=(*linear.free, term), _costs={})
+        free = dict.fromkeys((*linear.free, term))
+        linear = replace(linear, free=tuple(free), _costs={})
         cost = min(linear.cost({term}), linear.cost(()))
         if term not in found or cost < found[term][0]:
             found[term] = (cost, (number, value))
@@ -149,7 +150,8 @@ def _scored(problem: Problem, point: Point, todo, only: list[int] | None):
         if (point.linear.weight * change**2).sum() < FELT:
             continue
         term = problem.rows[number].term
-        linear = point.linear.moved(change, drop=term)
+        several = len(problem.terms[term]) > 1
+        linear = point.linear.moved(change, drop="" if several else term)
         linear = linear if inside is None else linear.of_blocks(inside)
         costs = [linear.cost(_in(linear, s)) for s in (point.support, frozenset())]
         found.append((min(costs), which, linear))

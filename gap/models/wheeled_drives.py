@@ -40,6 +40,7 @@ ORDER = (
 """in which effects on commands follow each other, from what is told to the wheel"""
 SWITCHING = ("dead_band", "dead_zone", "speed_saturation", "wheel_stuck_max",
              "wheel_stuck_min", "wheel_intermittent")  # fmt: skip
+BREAKAWAY = "rolling_drag.breakaway"  # told below it, a wheel at rest stays there
 LIGHT = 0.03  # [kg] below which a payload's moments do not tell its place
 
 
@@ -71,7 +72,10 @@ class Changes:
                 terms.setdefault(term(name), {})[name] = value
         lost = terms.pop("battery_fade", {}).get("battery_fade", 0.0)
         made = load(terms.pop("payload"), robot) if "payload" in terms else []
-        made += [effect(name, rows) for name, rows in terms.items()]
+        for name, rows in terms.items():
+            whole = name.startswith(PLANES)
+            parts = [rows] if whole else [{row: rows[row]} for row in rows]
+            made += [effect(name, part) for part in parts]
         body = tuple(item for item in made if item.stage == "body")
         told = [item for item in made if item.stage != "body"]
         told.sort(key=lambda item: ORDER.index(item.name))
@@ -83,6 +87,8 @@ def term(name: str) -> str:
     stem, _, rest = name.partition("[")
     if stem.startswith(PLANES) or stem.startswith("payload."):
         return name.rpartition(".")[0]
+    if stem == BREAKAWAY:
+        return f"rolling_drag.torque[{rest}"
     return name.partition("@")[0] if rest else name
 
 
@@ -102,7 +108,10 @@ def effect(name: str, values: Mapping[str, float]) -> Effect:
         return registry.make(stem, **given, **{size: length, way: np.arctan2(y, x)})
     if stem == "payload":
         return carried(values)
-    ((row, value),) = [item for item in values.items() if item[1]] or values.items()
+    moved = [item for item in values.items() if item[1]]
+    row, value = (moved or [*values.items()])[0]
+    if row.startswith(BREAKAWAY):
+        return registry.make("dead_band", **given, speed=float(value))
     if "@" in row:
         given["direction"] = row.partition("@")[2]
     about = parameter(stem)

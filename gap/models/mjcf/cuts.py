@@ -43,7 +43,7 @@ def pieces(trial: Trial, config: OwnConfig) -> list[Trial]:
 
 
 def _begun(part: Trial, whole: Trial, first: int, config: OwnConfig) -> Trial:
-    conditions = {**piece.conditions, start.STATE: state(whole, first, config)}
+    conditions = {**part.conditions, start.STATE: state(whole, first, config)}
     past = commands_before(whole, first)
     if past:
         conditions |= {start.BEFORE: past, start.STEP: GRID}
