@@ -30,13 +30,18 @@ _SMOOTH = (
     ("rolling_drag.torque", 0.004, 0, 0.03, True,
      {"step": 5e-4, "levels": (0.004, 0.01)}),
     ("rolling_drag.viscous", 2e-4, 0, 0.01, True, {"step": 2e-5}),
-    ("centre_of_mass.dx", 0.008, -0.02, 0.03, False, {"slack": 7e-4, "family": "centre_of_mass"}),
-    ("centre_of_mass.dy", 0.008, -0.03, 0.03, False, {"slack": 5e-4, "family": "centre_of_mass"}),
+    ("centre_of_mass.dx", 0.008, -0.02, 0.03, False,
+     {"slack": 7e-4, "family": "centre_of_mass"}),
+    ("centre_of_mass.dy", 0.008, -0.03, 0.03, False,
+     {"slack": 5e-4, "family": "centre_of_mass"}),
     ("tracker_scale", 0.02, 0.8, 1.25, False, {}),
     ("clock_drift", 0.02, -0.1, 0.1, False, {}),
-    ("marker_mount.dx", 0.008, -0.06, 0.06, False, {"slack": 2e-4, "family": "marker_mount"}),
-    ("marker_mount.dy", 0.008, -0.06, 0.06, False, {"slack": 2e-4, "family": "marker_mount"}),
-    ("marker_mount.yaw", 0.04, -0.5, 0.5, False, {"slack": 1e-3, "family": "marker_mount"}),
+    ("marker_mount.dx", 0.008, -0.06, 0.06, False,
+     {"slack": 2e-4, "family": "marker_mount"}),
+    ("marker_mount.dy", 0.008, -0.06, 0.06, False,
+     {"slack": 2e-4, "family": "marker_mount"}),
+    ("marker_mount.yaw", 0.04, -0.5, 0.5, False,
+     {"slack": 1e-3, "family": "marker_mount"}),
     ("battery_sag.per_second", 0.015, 0, 0.2, False, {}),
     ("battery_sag.per_metre", 0.08, 0, 2, False, {}),
     ("battery_fade", 0.01, 0, 0.2, False, {"per_trial": True}),
@@ -91,16 +96,18 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
             ]
     for side in SIDES:
         made += _rough(side, trials)
-    made = [
-        replace(row, joins=tuple(row.name.replace("[both]", f"[{s}]") for s in SIDES[:2]))
-        if row.name.endswith("[both]") else row
-        for row in made
-    ]  # fmt: skip
+    made = [_joining(row) if row.name.endswith("[both]") else row for row in made]
     made.append(
         Row("floor_friction", 1.0, 0.3, 0.01, 3.0, smooth=False,
             levels=(0.02, 0.05, 0.1, 0.25), excite=EXCITE["floor_friction"])
     )  # fmt: skip
     return tuple(made)
+
+
+def _joining(row: Row) -> Row:
+    """A row of both wheels, which is one of each that hold alike."""
+    parts = tuple(row.name.replace("[both]", f"[{side}]") for side in SIDES[:2])
+    return replace(row, joins=parts)
 
 
 def _smooth(

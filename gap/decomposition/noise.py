@@ -4,8 +4,8 @@ The standard deviation of a feature grows with its motion and with what explanat
 change of it, ``s^2 = a^2 + b^2 v^2 + c^2 m^2``: `a` is the measurement's, `b` holds the
 jitter of time stamps times speed and scatter in proportion to speed, `c` how inexactly
 the simulation shows what it explains (a wheel that slides is predicted to a fifth, one
-that is 3 % larger to a hundredth). Tails are heavy, so all is robust, and neighbouring residuals are
-correlated, so they count as fewer.
+that is 3 % larger to a hundredth). Tails are heavy, so all is robust, and neighbouring
+residuals are correlated, so they count as fewer.
 """
 
 from dataclasses import dataclass
