@@ -155,12 +155,6 @@ def _rough(side: str, trials: Sequence[Trial]) -> list[Row]:
             stepped=True, levels=(2.0, 3.0, 4.0, 5.0, 6.0, 8.0), excite="any drive"),
     ]  # fmt: skip
     if bands := _bands(speeds):
-        # dry friction at rest is larger than in motion: a wheel starts above a speed
-        made.append(
-            Row(f"rolling_drag.breakaway[{side}]", 0.0, 0.05, 0.0, 0.2, unit="m/s",
-                smooth=False, stepped=True, levels=bands,
-                group=f"rolling_drag.torque[{side}]", excite=EXCITE["dead_band"])
-        )  # fmt: skip
         made.append(
             Row(f"dead_band[{side}]", 0.0, 0.05, 0.0, 0.2, unit="m/s", smooth=False,
                 stepped=True, levels=bands, excite=EXCITE["dead_band"])

@@ -40,7 +40,6 @@ ORDER = (
 """in which effects on commands follow each other, from what is told to the wheel"""
 SWITCHING = ("dead_band", "dead_zone", "speed_saturation", "wheel_stuck_max",
              "wheel_stuck_min", "wheel_intermittent")  # fmt: skip
-BREAKAWAY = "rolling_drag.breakaway"  # told below it, a wheel at rest stays there
 LIGHT = 0.03  # [kg] below which a payload's moments do not tell its place
 
 
@@ -87,8 +86,6 @@ def term(name: str) -> str:
     stem, _, rest = name.partition("[")
     if stem.startswith(PLANES) or stem.startswith("payload."):
         return name.rpartition(".")[0]
-    if stem == BREAKAWAY:
-        return f"rolling_drag.torque[{rest}"
     return name.partition("@")[0] if rest else name
 
 
@@ -110,8 +107,6 @@ def effect(name: str, values: Mapping[str, float]) -> Effect:
         return carried(values)
     moved = [item for item in values.items() if item[1]]
     row, value = (moved or [*values.items()])[0]
-    if row.startswith(BREAKAWAY):
-        return registry.make("dead_band", **given, speed=float(value))
     if "@" in row:
         given["direction"] = row.partition("@")[2]
     about = parameter(stem)
