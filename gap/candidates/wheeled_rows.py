@@ -26,7 +26,7 @@ _SMOOTH = (
     ("axle_length", 0.04, 0.7, 1.3, False, {"slack": 0.004}),
     ("motor_lag", 0.06, 0, 2, True, {"levels": (0.1, 0.25, 0.6), "step": 0.01}),
     ("command_latency", 0.05, 0, 1, False, {"levels": (0.1, 0.2, 0.4), "step": 0.01}),
-    ("tracker_latency", 0.05, 0, 1, False, {"step": 0.005}),
+    ("tracker_latency", 0.05, 0, 1, False, {"step": 0.01}),
     ("rolling_drag.torque", 0.004, 0, 0.03, True,
      {"step": 5e-4, "levels": (0.004, 0.01)}),
     ("rolling_drag.viscous", 2e-4, 0, 0.01, True, {"step": 2e-5}),

@@ -68,11 +68,11 @@ def descend(
         slopes, at = (slopes, at) if near else (None, values.copy())
         linear, known, slopes = linearised(problem, values, rest, known, slopes)
         found = linear.search(start=support)[1]
-        point = Point(values, found, rest, linear, slopes, known)
         if found == support:
-            return point
+            break
         support = found
         values = placed(problem, linear, support, values)
+    # the last fit was under the noise of the point before
     values, rest = newton(problem, values, _fitted(problem, support), known, turns=2)
     return Point(values, support, rest, linear, slopes, known)
 

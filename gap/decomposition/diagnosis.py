@@ -115,11 +115,7 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
     inside = rest.kept(problem, full, point.noise.sd)
     left = point.linear.rest(point.linear.solve(point.support))
     plain = left if not point.noise.memory.factors.size else point.rest
-    held = shares.HeldOut.of(problem, point, shares.PIECES, inside)
-    none, some = held.nominal(start.rest), held.error(point.support).sum()
-    least = held.nominal(known.sd)
-    share = float((none - some) / max(none - min(least, some), 1e-9))
-    return Decomposition(
+    made = Decomposition(
         problem=problem,
         start=start,
         point=point,
@@ -137,8 +133,22 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         ),
         scatter=rest.scattered(problem, plain, known, inside),
         moved=max(rest.excess(problem.recorded, known, inside), 1.0),
-        closed=share if point.support else 0.0,
+        closed=0.0,
     )
+    return replace(made, closed=_closable(made, inside)) if point.support else made
+
+
+def _closable(made: Decomposition, inside: np.ndarray) -> float:
+    """Share that is closed on stretches that were not fitted, of what can be closed:
+    down to what measuring scatters, or where the rest is no more than scatter to what
+    all explanations together leave."""
+    problem, point = made.problem, made.point
+    held = shares.HeldOut.of(problem, point, shares.PIECES, inside)
+    none, some = held.nominal(made.start.rest), held.error(point.support).sum()
+    least = held.nominal(made.floor.sd)
+    if not made.lasting:
+        least = held.error(point.linear.free).sum()
+    return float((none - some) / max(none - min(least, some), 1e-9))
 
 
 class Clock:

@@ -24,8 +24,8 @@ AFTER = 0.05  # [s] that are simulated beyond the last command
 RESTING = 0.2  # [s] over which the pose at the start is the median of what was seen
 PLANES = ("floor_slope", "wheel_eccentricity")
 TRACKING = ("marker_mount", "tracker_latency", "tracker_scale", "clock_drift", LEAD)
+LATENCY = "command_latency"  # comes before all others, at any fraction of a step
 ORDER = (
-    "command_latency",
     "wheel_intermittent",
     "wheel_stuck_max",
     "wheel_stuck_min",
@@ -50,12 +50,14 @@ class Changes:
     Attributes:
         body: edits of the model.
         command: effects on what is told, in order.
+        late: seconds by which commands come late.
         lost: share of every speed that a falling battery takes.
         seen: values of what the tracker does, by row.
     """
 
     body: tuple[BodyEffect, ...]
     command: tuple[Effect, ...]
+    late: float
     lost: float
     seen: Mapping[str, float]
 
@@ -70,6 +72,7 @@ class Changes:
             else:
                 terms.setdefault(term(name), {})[name] = value
         lost = terms.pop("battery_fade", {}).get("battery_fade", 0.0)
+        late = terms.pop(LATENCY, {}).get(LATENCY, 0.0)
         made = load(terms.pop("payload"), robot) if "payload" in terms else []
         for name, rows in terms.items():
             whole = name.startswith(PLANES)
@@ -78,7 +81,7 @@ class Changes:
         body = tuple(item for item in made if item.stage == "body")
         told = [item for item in made if item.stage != "body"]
         told.sort(key=lambda item: ORDER.index(item.name))
-        return cls(body, tuple(told), lost, seen)
+        return cls(body, tuple(told), late, lost, seen)
 
 
 def term(name: str) -> str:
@@ -125,6 +128,8 @@ def carried(values: Mapping[str, float]) -> Effect:
     """
     about = registry.get("payload").parameters
     mass = float(np.clip(values.get("payload.mass", 0.0), 0.0, about[0].high))
+    if any(value for name, value in values.items() if name != "payload.mass"):
+        mass = max(mass, LIGHT)
     place = {}
     for edge in about[1:]:
         away = values.get(f"payload.m{edge.name}", 0.0) / max(mass, LIGHT)
@@ -248,7 +253,8 @@ class Drives:
         for trial, changes, begin in wanted.values():
             compiled = scene(self.robot, changes.body, dt)
             yaw = heading(changes, begin)
-            speeds = told(trial.commands, changes.command, dt) * (1 - changes.lost)
+            speeds = told(trial.commands, changes.command, dt, changes.late)
+            speeds = speeds * (1 - changes.lost)
             jobs.append(
                 Job(
                     begun(self.robot, changes.body, dt, yaw),
@@ -276,7 +282,7 @@ def heading(changes: Changes, begin: np.ndarray) -> float:
 def _key(trial: Trial, changes: Changes, begin: np.ndarray, dt: float) -> bytes:
     told_as = trial.commands.values.tobytes() + trial.commands.durations.tobytes()
     words = [*map(str, (*changes.body, *changes.command)), repr(changes.lost)]
-    words += [repr(heading(changes, begin)), repr(dt)]
+    words += [repr(heading(changes, begin)), repr(dt), repr(changes.late)]
     digest = hashlib.blake2b(told_as, digest_size=16)
     digest.update(";".join(words).encode())
     return digest.digest()
@@ -291,7 +297,9 @@ def start(trial: Trial) -> np.ndarray:
     return np.median(trial.observed[seen[:count], :3], axis=0)
 
 
-def told(commands: Commands, effects: Sequence[Effect], dt: float) -> np.ndarray:
+def told(
+    commands: Commands, effects: Sequence[Effect], dt: float, late: float = 0.0
+) -> np.ndarray:
     """Speeds told to both wheels at each physics step after effects, ``(S, 2)``.
 
     A step in which a command ends gets the mean of both by their time, unless an effect
@@ -301,9 +309,11 @@ def told(commands: Commands, effects: Sequence[Effect], dt: float) -> np.ndarray
         commands: wheel speeds [m/s] and how long each is held.
         effects: on commands and actuators, applied in order.
         dt: physics step [s].
+        late: by how much all comes late [s].
     """
     begins = np.concatenate([[0.0], np.cumsum(commands.durations)])
     count = int(np.ceil(begins[-1] / dt)) + 1 + round(AFTER / dt)
+    begins = begins + late
     at = np.arange(count) * dt
     index = np.searchsorted(begins, at + dt / 2, side="right") - 1
     index = np.where(index >= len(commands), -1, index)
