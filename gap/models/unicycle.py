@@ -9,12 +9,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from bns.gap.candidates.mjcf import EXCITE, LATE, RATIOS, OwnCandidate
+from bns.gap.candidates import unicycle_rows
 from bns.gap.core import segments
+from bns.gap.decomposition.model import DecomposableModel
+from bns.gap.decomposition.row import Row
 from bns.gap.models.base import Windows
-from bns.gap.models.mjcf import effects as own_effects
 from bns.gap.records import Candidate
-from bns.worlds.effects.base import ControlSignal, Effect
+from bns.worlds.effects.base import ControlSignal, Effect, PoseSignal
+from bns.worlds.effects.command.twist import TWIST
 from bns.worlds.physics import control
 from bns.worlds.trial import POSE_CHANNELS, Channel, Trial, body_displacement
 
@@ -22,11 +24,10 @@ STEP = 0.01  # [s] grid of the integration
 WINDOW = 0.5  # [s] between two poses that are compared
 LEAD = 1.0  # [s] of the first command before a trial, for what is late
 FASTEST, QUICKEST = 0.5, 2.0  # [m/s], [rad/s] limits of plans; assumed
-TOLD = ("forward_speed", "turning_rate")
-SLIGHT = (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
+LEAST = (5e-4, 5e-4, 2e-3)  # [m, m, rad] smallest believed deviations; assumed
 
 
-class UnicycleModel:
+class UnicycleModel(DecomposableModel):
     """Kinematics of a robot told forward speed and turning rate.
 
     Args:
@@ -48,35 +49,55 @@ class UnicycleModel:
         self.process = np.array(process, dtype=float)
         self.resolution = np.array(resolution, dtype=float)
         self.limits = {
-            TOLD[0]: (-FASTEST, FASTEST, "m/s"),
-            TOLD[1]: (-QUICKEST, QUICKEST, "rad/s"),
+            TWIST[0]: (-FASTEST, FASTEST, "m/s"),
+            TWIST[1]: (-QUICKEST, QUICKEST, "rad/s"),
         }
 
     dt = STEP
 
-    @staticmethod
-    def parse(text: str) -> Effect:
-        """An effect on this model, as a diagnosis writes it."""
-        return own_effects.parse(text)
-
     def candidates(self) -> tuple[Candidate, ...]:
-        """Gains, delay, lag, offset and dead zones, in a fixed order."""
-        made = [
-            _candidate("command_gain", TOLD[0], "1", 1.0, RATIOS[1], 1.6, SLIGHT),
-            _candidate("command_gain", TOLD[1], "1", 1.0, RATIOS[1], 1.6, SLIGHT),
-            _candidate("command_delay", "all", "s", 0.0, 0.0, 1.0, (*LATE, 1.0)),
-            _candidate("command_lag", "all", "s", 0.0, 0.0, 1.0, (*LATE, 1.0)),
+        """All explanations, in a fixed order."""
+        return unicycle_rows.candidates()
+
+    @property
+    def least(self) -> np.ndarray:
+        """Smallest believed standard deviation of each feature [m, m, rad]."""
+        return np.array(LEAST)
+
+    def rows(self, trials: Sequence[Trial]) -> tuple[Row, ...]:
+        """All numbers that may be off; the same whatever was told."""
+        del trials
+        return unicycle_rows.rows()
+
+    def effect(self, term: str, values: Mapping[str, float]) -> Effect:
+        """The effect of an explanation."""
+        (made,) = unicycle_rows.effects({term: values[term]})
+        return made
+
+    def paths(
+        self,
+        trials: Sequence[Trial],
+        sets: Sequence[Sequence[Mapping[str, float]]],
+        *,
+        fine: bool = True,
+    ) -> list[list[np.ndarray]]:
+        """See `DecomposableModel.paths`: poses, each ``(T, 3)``; there is one step."""
+        del fine
+        return [
+            [
+                _path(trial, unicycle_rows.effects(values))
+                for trial, values in zip(trials, row, strict=True)
+            ]
+            for row in sets
         ]
-        for channel, unit, size in ((TOLD[0], "m/s", 0.1), (TOLD[1], "rad/s", 0.3)):
-            grid = tuple(size * share for share in (0.03, 0.1, 0.3, 1.0))
-            both = tuple(sorted((*grid, *(-value for value in grid))))
-            made.append(
-                _candidate("command_offset", channel, unit, 0.0, -size, size, both)
-            )
-            made.append(
-                _candidate("command_dead_zone", channel, unit, 0.0, 0.0, size, grid)
-            )
-        return tuple(made)
+
+    def joint_windows(self, trial: Trial) -> Windows:
+        """Windows of `WINDOW` between seen samples, half overlapping."""
+        return segments.overlapping(trial, WINDOW)
+
+    def motion(self, features: np.ndarray) -> np.ndarray:
+        """Speed of each feature over a window."""
+        return np.abs(features) / WINDOW
 
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
@@ -110,21 +131,6 @@ class UnicycleModel:
         }
 
 
-def _candidate(effect, part, unit, nominal, low, high, grid) -> OwnCandidate:
-    return OwnCandidate(
-        name=f"{effect}[{part}]",
-        effect=effect,
-        parameter=own_effects.CLASSES[effect].parameters[0].name,
-        unit=unit,
-        nominal=nominal,
-        low=low,
-        high=high,
-        grid=tuple(grid),
-        fixed={"part": part},
-        excite=EXCITE[effect],
-    )
-
-
 def _path(trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
     """Poses at the trial's samples, from its first one that was seen."""
     counts = control.steps(trial.commands.durations, STEP)
@@ -135,8 +141,9 @@ def _path(trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
     command = np.repeat(np.arange(-1, len(counts)), [lead, *counts])
     times = np.arange(len(values)) * STEP
     for effect in effects:
-        signal = ControlSignal(times, values, command, TOLD, STEP)
-        values = effect.apply(signal, on, rng)
+        if effect.stage == "command":
+            signal = ControlSignal(times, values, command, TWIST, STEP)
+            values = effect.apply(signal, on, rng)
     speed, rate = values[lead:].T
     seen = trial.poses_world[np.isfinite(trial.poses_world).all(axis=1)]
     x, y, yaw = seen[0]
@@ -149,6 +156,10 @@ def _path(trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
             turned,
         ]
     )
-    at = trial.times - trial.times[trial.boundaries[0]]
     grid = np.arange(made.shape[1]) * STEP
-    return np.stack([np.interp(at, grid, axis) for axis in made], axis=1)
+    poses, always = made.T, np.ones(len(grid), bool)
+    for effect in effects:
+        if effect.stage == "tracking":
+            _, poses = effect.apply(PoseSignal(grid, poses, grid, poses), always, rng)
+    at = trial.times - trial.times[trial.boundaries[0]]
+    return np.stack([np.interp(at, grid, axis) for axis in poses.T], axis=1)

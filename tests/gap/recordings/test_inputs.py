@@ -11,6 +11,7 @@ from bns.gap.recordings import load_recordings
 from bns.gap.report import warnings
 from bns.worlds import registry
 from bns.worlds.data import dataset
+from bns.worlds.effects import registry as effects
 from bns.worlds.physics.wheeled_world import MujocoWorld
 from bns.worlds.trial import Channel, Commands, Trial
 
@@ -124,7 +125,7 @@ def driven(model, text, seed):
     told = Commands(values, np.full(10, 2.0), channels)
     times = np.arange(201) * 0.1
     blank = Trial(told, times, np.zeros((201, 3)), np.arange(0, 201, 20))
-    ((seen,),) = model.simulate([blank], [[model.parse(t) for t in text]])
+    ((seen,),) = model.simulate([blank], [[effects.parse(t) for t in text]])
     noise = rng.normal(0, [1e-3, 1e-3, 5e-3], seen.shape)
     return blank.replace(observed=seen + noise, robot="irobot_create")
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from bns import models
 from bns.worlds.effects.base import ControlSignal
+from bns.worlds.effects.command.twist import TWIST
 from bns.worlds.effects.parts import Part
 from bns.worlds.light import sensors
 from bns.worlds.light.field import Lamp, LightField
@@ -16,6 +17,7 @@ ROVER = (Path(__file__).parent / "rover.xml").read_text()
 ARM = (Path(__file__).parent / "arm.xml").read_text()
 STEPS, DT = 600, 0.005
 LEGGED = ("legged",)  # robots of effects that need legs
+OF_TWIST = {"turning_loss"}  # effects on a forward speed and a turning rate
 
 
 def frozen(array) -> np.ndarray:
@@ -66,6 +68,8 @@ def light() -> dict[str, np.ndarray]:
 
 def signal_of(signals, effect):
     """The signal of an effect's stage, for a robot that can have the effect."""
+    if effect.name in OF_TWIST:
+        return told(TWIST)
     found = signals[effect.stage]
     return found[effect.robots == LEGGED] if isinstance(found, dict) else found
 

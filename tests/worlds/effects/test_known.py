@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bns import models
-from bns.errors import BnsError
+from bns.errors import BnsError, UnknownNameError
 from bns.worlds.damage import Event
 from bns.worlds.effects import bodies, registry
 from bns.worlds.effects.base import ControlSignal, PoseSignal
@@ -343,3 +343,17 @@ class TestBodies:
         bodies.actuator(spec, "left").forcerange = [0, 0]
         with pytest.raises(BnsError, match="'left_wheel' has no force range"):
             registry.make("torque_limit", factor=0.5).edit(spec)
+
+
+def test_turning_costs_forward_speed_and_never_turns_it_round():
+    told = np.array([[0.2, 0.0], [0.2, 0.5], [0.2, -0.5], [-0.2, 1.0], [0.01, 1.0]])
+    channels = ("forward_speed", "turning_rate")
+    signal = ControlSignal(np.arange(5) * DT, told, np.zeros(5, int), channels, DT)
+    made = apply("turning_loss:loss=0.1", signal)
+    np.testing.assert_allclose(made[:, 0], [0.2, 0.15, 0.15, -0.1, 0.0])
+    np.testing.assert_array_equal(made[:, 1], told[:, 1])
+
+
+def test_turning_costs_nothing_of_wheels():
+    with pytest.raises(UnknownNameError, match=r"'forward_speed'.*left_speed"):
+        apply("turning_loss:loss=0.1", control([0.1]))

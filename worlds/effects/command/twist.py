@@ -1,0 +1,49 @@
+"""Commands of robots told a forward speed and a turning rate."""
+
+import numpy as np
+
+from bns.errors import UnknownNameError
+from bns.worlds.effects.base import CommandEffect, ControlSignal, strength
+
+TWIST = ("forward_speed", "turning_rate")
+"""names of the two channels"""
+
+
+class TurningLoss(CommandEffect):
+    """Forward speed is lost while the robot turns, whichever way.
+
+    Wheels scrub, and firmware that holds the faster wheel back slows both.
+    """
+
+    name = "turning_loss"
+    source = "seen of iRobot Creates (MRCLAM data sets); bounds assumed"
+    robots = ("own",)
+    memoryless = True
+    parameters = (
+        strength(
+            "loss",
+            "m",
+            (0.0, 0.5),
+            "forward speed lost over turning rate told",
+            example=0.05,
+        ),
+    )
+
+    def apply(
+        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        """The signal with a slower forward speed; it never changes its sign.
+
+        Raises:
+            UnknownNameError: the robot is not told a forward speed and a turning rate.
+        """
+        values = signal.values.copy()
+        if self.is_nominal:
+            return values
+        if missing := [name for name in TWIST if name not in signal.channels]:
+            raise UnknownNameError("command channel", missing[0], signal.channels)
+        speed, rate = (signal.channels.index(name) for name in TWIST)
+        told = values[:, speed]
+        left = np.maximum(np.abs(told) - self["loss"] * np.abs(values[:, rate]), 0.0)
+        values[active, speed] = (np.sign(told) * left)[active]
+        return values
