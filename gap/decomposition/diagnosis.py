@@ -70,11 +70,23 @@ class Decomposition:
         return self.recurs > rest.SURE
 
     @property
+    def broken(self) -> bool:
+        """Whether the rest is more than a sound robot may scatter."""
+        large = np.sqrt(max(self.after, 0.0) / self.moved) > BROKEN
+        return bool(large and self.after > LARGE)
+
+    @property
+    def unexplained(self) -> float:
+        """Share of the gap that is left and is not what differs between repeats."""
+        apart = 0.0 if self.broken else self.scatter
+        return max(self.after - apart, 0.0) / max(self.before, self.after, 1e-9)
+
+    @property
     def lasting(self) -> bool:
         """Whether the rest is more than scatter: it recurs, or it is far beyond what
         measuring scatters and what differs between repeats, or beyond what a sound
         robot may scatter (what happens at one place, or by chance)."""
-        if np.sqrt(max(self.after, 0.0) / self.moved) > BROKEN and self.after > LARGE:
+        if self.broken:
             return True
         if self.after <= self.scatter:
             return False
@@ -85,7 +97,7 @@ class Decomposition:
     @property
     def kind(self) -> str:
         """Kind of the verdict, one of `records.KINDS`."""
-        if self.lasting and self.left > MOST:
+        if self.lasting and self.unexplained > MOST:
             return "none of the library"
         if not self.point.support:
             return "no gap"
