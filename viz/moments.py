@@ -6,7 +6,7 @@ import numpy as np
 
 from bns.experiment.record import RunRecord
 from bns.tasks import registry as tasks
-from bns.viz import geometry, series, style, walk_view
+from bns.viz import geometry, rrd, style
 from bns.viz.blueprint import READINGS, TRIAL_TIMELINE
 from bns.viz.choices import Choice
 from bns.viz.paths import arcs, dashes, listed
@@ -50,7 +50,7 @@ def send(
         times, poses, qpos = samples(record, at, trials.get(choice.trial), model)
         if not len(times):
             continue  # nothing was seen of it
-        index = series.times(start + times)
+        index = rrd.times(start + times)
         geometry.send_poses(stream, model, index, qpos)
         done = _finish(record, at, times)
         foreseen = listed(record.predicted[at])
@@ -106,8 +106,8 @@ def samples(record, at, trial: Trial | None, model):
         qpos = np.asarray(trial.truth["qpos"])[keep]
         if qpos.shape[1] == model.nq:
             return times, poses, qpos
-    if walk_view.reports_servos(trial):
-        return times, poses, walk_view.qpos(model, poses, trial, keep)
+    if reports_servos(trial):
+        return times, poses, walking_qpos(model, poses, trial, keep)
     return times, poses, geometry.planar_qpos(model, poses)
 
 
@@ -182,7 +182,7 @@ def _wheels(stream, sent: np.ndarray, start: float) -> None:
     for column, wheel in enumerate(("left", "right")):
         values = np.append(sent[:, column], 0.0)
         stream.send_columns(
-            f"wheels/{wheel}", series.times(begin), rr.Scalars.columns(scalars=values)
+            f"wheels/{wheel}", rrd.times(begin), rr.Scalars.columns(scalars=values)
         )
         stream.log(
             f"wheels/{wheel}",
@@ -212,7 +212,7 @@ def _readings(stream, record: RunRecord, at: tuple[int, int], start: float) -> N
                 continue
             path = f"{READINGS}/{side}_{kind}"
             values = record.extra[array][at][:, column]
-            series.send(stream, path, ends, values)
+            rrd.send(stream, path, ends, values)
             stream.log(
                 path,
                 rr.SeriesLines(
@@ -236,7 +236,7 @@ def _states(stream, states, colours, end: float) -> None:
     )
     stream.send_columns(
         "moment",
-        series.times(np.array([*(time for time, _ in states), end])),
+        rrd.times(np.array([*(time for time, _ in states), end])),
         rr.StateChange.columns(state=[*names, ""]),
     )
 
@@ -288,3 +288,52 @@ def send_ends(stream, numbers, poses: np.ndarray, model) -> None:
         qpos = geometry.planar_qpos(model, np.stack([pose for _, pose in ends]))
         index = [rr.TimeColumn(TRIAL_TIMELINE, sequence=[n for n, _ in ends])]
         geometry.send_poses(stream, model, index, qpos)
+
+
+SUFFIX = "_position"
+"""of the channels that servos report"""
+
+
+def reports_servos(trial: Trial) -> bool:
+    """Whether the trial holds positions of servos."""
+    return any(channel.name.endswith(SUFFIX) for channel in trial.channels)
+
+
+def walking_qpos(
+    model, poses_world: np.ndarray, trial: Trial, rows: np.ndarray
+) -> np.ndarray:
+    """Configurations from tracked poses and servo positions.
+
+    An overhead tracker sees neither height nor tilt: the body is drawn level, with its
+    lowest foot on the floor.
+
+    Args:
+        model: a compiled `mujoco.MjModel`; its joints have the channels' names.
+        poses_world: ``(T, 3)`` [m, m, rad].
+        trial: with channels of servo positions.
+        rows: samples of the trial that the poses are of, ``(T,)``.
+
+    Returns:
+        ``(T, nq)``.
+    """
+    made = geometry.planar_qpos(model, poses_world)
+    for channel in trial.channels:
+        if channel.name.endswith(SUFFIX):
+            joint = model.joint(channel.name.removesuffix(SUFFIX))
+            made[:, joint.qposadr[0]] = trial.channel(channel.name)[rows]
+    made[:, geometry.free_joint(model) + 2] -= _lowest_foot(model, made)
+    return made
+
+
+def _lowest_foot(model, qpos: np.ndarray) -> np.ndarray:
+    """Height of the lowest foot site in each configuration, ``(T,)`` [m]."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    feet = [i for i in range(model.nsite) if model.site(i).name.endswith("_foot")]
+    lowest = np.zeros(len(qpos))
+    for at, configuration in enumerate(qpos):
+        data.qpos[:] = configuration
+        mujoco.mj_kinematics(model, data)
+        lowest[at] = data.site_xpos[feet, 2].min() if feet else 0.0
+    return lowest

@@ -8,7 +8,7 @@ import pytest
 
 from bns.learners.bns.learner import DIVERSITY, SNN_ERROR
 from bns.viz import facts, figures
-from bns.viz.figures import bands
+from bns.viz.figures import trials
 from bns.viz.figures.displacement import SHOWN, groups
 
 OVER_TRIALS = ("fitness", "solved", "waits")
@@ -64,7 +64,7 @@ def test_waits_end_at_the_share_that_made_it(record):
 
 
 def test_onsets_are_marked_once(record, undamaged):
-    assert bands.onsets({"a": record, "b": record, "c": undamaged}) == [20]
+    assert trials.onsets({"a": record, "b": record, "c": undamaged}) == [20]
 
 
 def test_displacement_groups_lie_around_the_damage(record):

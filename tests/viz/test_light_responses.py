@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bns.viz import figures
-from bns.viz.figures.light_responses import moving_mean, roamed
+from bns.viz.figures.light import moving_mean, roamed
 from bns.worlds.light import sensors
 from bns.worlds.light.field import LightField
 

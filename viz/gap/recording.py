@@ -8,7 +8,7 @@ import numpy as np
 
 from bns.gap.models.base import GapModel
 from bns.gap.records import Diagnosis
-from bns.viz import rrd, series, style
+from bns.viz import rrd, style
 from bns.viz.blueprint import BACKGROUND, LIVE_TIMELINE
 from bns.viz.gap import scene
 from bns.viz.gap.figures import CORRECTED, NOMINAL
@@ -99,7 +99,7 @@ def _residuals(stream, seen: View, number: int, start: float) -> None:
     for column, feature in enumerate(seen.problem.model.features):
         for name, values in shown.items():
             path = f"residuals/{feature.name}/{name}"
-            series.send(stream, path, at, values[:, column])
+            rrd.send(stream, path, at, values[:, column])
 
 
 def _observed(stream, seen: View, number: int, start: float) -> None:
@@ -112,7 +112,7 @@ def _observed(stream, seen: View, number: int, start: float) -> None:
         for column, channel in enumerate(trial.channels):
             fine = np.isfinite(values[:, column])
             path = f"observed/{channel.name}/{name}"
-            series.send(stream, path, at[fine], values[fine, column])
+            rrd.send(stream, path, at[fine], values[fine, column])
 
 
 def _features(seen: View) -> list[Channel]:

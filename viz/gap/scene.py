@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from bns.viz import geometry, scene, series, style
+from bns.viz import geometry, rrd, scene, style
 from bns.viz.blueprint import LIVE_TIMELINE
 from bns.viz.gap.figures import NOMINAL
 from bns.viz.gap.view import View
@@ -121,12 +121,12 @@ def send(stream, seen: View, number: int, start: float) -> None:
         lane = _lane(seen, name)
         qpos = geometry.planar_qpos(model, rows[fine] + lane)
         geometry.send_poses(
-            stream, model, series.times(at[fine]), qpos, root=f"world/{name}"
+            stream, model, rrd.times(at[fine]), qpos, root=f"world/{name}"
         )
         if name != "recorded":
             stream.send_columns(
                 f"world/paths/{name}",
-                series.times(at[:1]),
+                rrd.times(at[:1]),
                 rr.LineStrips3D.columns(
                     strips=[_lift(rows[fine] + lane)],
                     colors=[style.rgb(colour)],
@@ -137,7 +137,7 @@ def send(stream, seen: View, number: int, start: float) -> None:
             real = real[np.isfinite(real).all(axis=1)]
             stream.send_columns(
                 f"world/paths/recorded_beside_{name}",
-                series.times(at[:1]),
+                rrd.times(at[:1]),
                 rr.LineStrips3D.columns(
                     strips=[_lift(real + lane)], colors=[GREY], radii=[TRAIL / 2]
                 ),

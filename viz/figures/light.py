@@ -1,12 +1,110 @@
-"""What light sensors read by where the light is: figures 5.5 and 5.6."""
+"""Figures of light following: what sensors read, and where robots went from where."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from bns.viz import style
+from bns.experiment.record import RunRecord
+from bns.tasks.base import BOARD
+from bns.viz import scene, style
+from bns.viz.choices import choose, typical
+from bns.viz.paths import listed
 from bns.worlds.light.field import LightField
 from bns.worlds.light.sensors import LightSensors
+
+SIDES = ("left", "right")
+
+
+def readings(record: RunRecord, *, replicate: int | None = None):
+    """Readings of chosen trials of one replicate, a column each.
+
+    Args:
+        record: the batch, of light following.
+        replicate: which run; by default the typical one.
+    """
+    replicate = typical(record) if replicate is None else replicate
+    chosen = choose(record, replicate)
+    real = record.extra["readings"][replicate]
+    foreseen = np.full_like(real, np.nan)
+    if "readings_predicted" in record.extra:
+        foreseen = record.extra["readings_predicted"][replicate]
+    with style.plotting() as figure_class:
+        figure = figure_class(figsize=(7.0, 3.6), layout="constrained")
+        panels = figure.subplots(
+            len(SIDES), len(chosen), squeeze=False, sharex=True, sharey=True
+        )
+        for column, choice in enumerate(chosen):
+            sent = record.sent[replicate, choice.trial, :, 2]
+            times = np.concatenate([[0.0], np.cumsum(sent)])
+            for row, side in enumerate(SIDES):
+                axes = panels[row, column]
+                axes.plot(
+                    times,
+                    foreseen[choice.trial, :, row],
+                    color=style.BLACK,
+                    linewidth=1.0,
+                    ls=(0, (3, 2)),
+                    label="as the SNN foresaw it",
+                )
+                axes.plot(
+                    times,
+                    real[choice.trial, :, row],
+                    color=choice.colour,
+                    label="as the sensor read",
+                )
+                panels[row, 0].set_ylabel(f"{side} [counts]")
+            panels[-1, column].set_xlabel("time [s]")
+            title = f"trial {choice.trial}\n{choice.label}"
+            panels[0, column].set_title(title, color=choice.colour)
+        handles, labels = panels[0, -1].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+    return figure
+
+
+LAST = 12
+"""trials shown"""
+
+
+def starts(record: RunRecord, *, replicate: int | None = None):
+    """Where the robot went in the last trials, by start.
+
+    Args:
+        record: the batch, of light following.
+        replicate: which run; by default the typical one.
+    """
+    from matplotlib.patches import Circle
+
+    replicate = typical(record) if replicate is None else replicate
+    shown = range(max(0, record.trials - LAST), record.trials)
+    with style.plotting() as figure_class:
+        figure = figure_class(figsize=(7.0, 4.9), layout="constrained")
+        axes = figure.subplots()
+        shown_task = scene.picture(record.config)
+        for x, y in shown_task.objectives.values():
+            ring = {"fill": False, "color": style.YELLOW, "linewidth": 3.0}
+            axes.add_patch(Circle((x, y), shown_task.radius, **ring))
+            axes.plot(x, y, "*", color=style.YELLOW, markersize=14)
+        for number, trial in enumerate(shown):
+            poses = listed(record.poses[replicate, trial])
+            share = number / max(len(shown) - 1, 1)
+            colour = style.SKY if record["solved"][replicate, trial] else style.ORANGE
+            axes.plot(*poses[:, :2].T, color=colour, alpha=0.35 + 0.65 * share, lw=1.2)
+            axes.plot(*poses[0, :2], "o", color=style.BLACK, markersize=4)
+            if record["lamp_stops"][replicate, trial] > 0:
+                axes.plot(*poses[-1, :2], "x", color=style.BLACK, markersize=7)
+        half = np.array(BOARD)
+        axes.set_xlim(-half[0], half[0])
+        axes.set_ylim(-half[1], half[1])
+        axes.set_aspect("equal", "box")
+        axes.set_xlabel("x [m]")
+        axes.set_ylabel("y [m]")
+        solved = int(record["solved"][replicate, list(shown)].sum())
+        axes.set_title(
+            f"trials {shown[0]} to {shown[-1]}: {solved} of {len(shown)} circled the "
+            "lamp (blue)"
+        )
+    return figure
+
 
 READINGS = 18_000
 """taken from different angles and positions (thesis 5.2.1, figure 5.5)"""
