@@ -29,7 +29,7 @@ test: env
 lint: env
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/mypy --python-executable $(BIN)/python -p bns.worlds -p bns.models
+	$(BIN)/python .ci/check_types.py
 
 docs: env
 	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[docs]'

@@ -20,7 +20,7 @@ AXLE = 0.0874  # m, nominal
 
 def go(
     mover: Mover,
-    target: Sequence[float],
+    target: Sequence[float] | np.ndarray,
     *,
     speed: float = 0.10,
     lamps: np.ndarray | None = None,
@@ -95,7 +95,9 @@ def face(mover: Mover, heading: float, *, turned: float = FACED) -> Sighting:
     return seen
 
 
-def _approach(mover: Mover, target: Sequence[float], speed: float, begin: float):
+def _approach(
+    mover: Mover, target: Sequence[float] | np.ndarray, speed: float, begin: float
+) -> None:
     """Steer to the place until it is near, or was passed by."""
     best, back = np.inf, None
     while mover.clock.now() - begin < TIME:
@@ -148,12 +150,12 @@ def settled(mover: Mover) -> Sighting:
     return seen[-1]._replace(pose=pose)
 
 
-def _there(seen: Sighting, target: Sequence[float]) -> bool:
+def _there(seen: Sighting, target: Sequence[float] | np.ndarray) -> bool:
     turned = abs(_wrapped(target[2] - seen.pose[2]))
     return _away(seen, target) <= CLOSE and turned <= TURNED
 
 
-def _away(seen: Sighting, target: Sequence[float]) -> float:
+def _away(seen: Sighting, target: Sequence[float] | np.ndarray) -> float:
     return float(np.hypot(target[0] - seen.pose[0], target[1] - seen.pose[1]))
 
 

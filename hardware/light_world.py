@@ -10,6 +10,7 @@ from bns import seeding
 from bns.errors import BnsError
 from bns.hardware import homing, records
 from bns.hardware.limits import Limits
+from bns.hardware.motion import Mover
 from bns.hardware.rig import Rig, battery
 from bns.hardware.schedule import GRID
 from bns.hardware.steering import Rules, Steered, Steering
@@ -59,7 +60,7 @@ class HardwareLight(HardwareWorld):
         """Check the settings."""
         super().__post_init__(threads, rig)
         told = {} if self.supervisor is None else self.supervisor
-        self.supervisor = checks.one(Supervisor, "supervisor", told)
+        self._rules = self.supervisor = checks.one(Supervisor, "supervisor", told)
         self.field = LightField(checks.several(Lamp, "lamp", self.lights), self.ambient)
         self._places = self.field.positions[:, :2]
         if rig is not None:
@@ -97,7 +98,7 @@ class HardwareLight(HardwareWorld):
         cycle = bounded("cycle", cycle, 0.2, 60.0, "s")
         stages, seed = self._stages(cycles * cycle, trial, seeds)
         rng = seeding.generator(seed, "world", trial, "start")
-        edge = max(self.supervisor.edge, Limits.rim)
+        edge = max(self._rules.edge, Limits.rim)
         start = (
             light_starts.anywhere(rng, self.arena, self._places, edge=edge)
             if starts is None
@@ -106,7 +107,7 @@ class HardwareLight(HardwareWorld):
 
         def once(rig: Rig) -> Trial:
             volts = battery(rig.robot, rig.limits)
-            mover, keep = rig.mover(), self.supervisor.safety + KEEP
+            mover, keep = rig.mover(), self._rules.safety + KEEP
             stand = homing.go(mover, start, lamps=self._places, keep=keep)
             steering = self._steering(mover, stages, seed, trial, cycles, cycle)
             begin = rig.clock.now()
@@ -118,13 +119,19 @@ class HardwareLight(HardwareWorld):
         return [self._tried(once, trial)]
 
     def _steering(
-        self, mover, stages: Stages, seed: int, trial: int, cycles: int, cycle: float
+        self,
+        mover: Mover,
+        stages: Stages,
+        seed: int,
+        trial: int,
+        cycles: int,
+        cycle: float,
     ) -> Steering:
         channels = self.model.channels
         return Steering(
             mover,
             Rules(
-                self.supervisor,
+                self._rules,
                 self._places,
                 self.arena,
                 channels,

@@ -58,7 +58,7 @@ class Operator:
     space bar or Enter does the same.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.reason = ""
         self._before: dict[int, object] = {}
 

@@ -117,7 +117,11 @@ def fit(ways: np.ndarray, moved: np.ndarray) -> Wheels:
         left=left * WHEEL_DIAMETER,
         right=right * WHEEL_DIAMETER,
         axle=axle,
-        error=tuple(round(float(e), 7) for e in error),
+        error=(
+            round(float(error[0]), 7),
+            round(float(error[1]), 7),
+            round(float(error[2]), 7),
+        ),
     )
     off = max(abs(f - 1) for f in (*made.factors, made.axle / NOMINAL_AXLE))
     if not off <= OFF:

@@ -66,11 +66,11 @@ class RealRobot(ABC, Generic[RigT]):
 
     robot: str
     _: KW_ONLY
-    damage: Damage | Sequence = ()
+    damage: Damage | tuple = ()
     reality: Damage | Sequence = ()
     sample_dt: float = 0.1
     start: Sequence[float] = (0.0, 0.0, 0.0)
-    arena: Sequence[float] = (2.7, 1.8)
+    arena: tuple[float, float] = (2.7, 1.8)
     threads: InitVar[int] = 1
     port: str = ""
     camera: str = EMULATED
@@ -141,7 +141,9 @@ class RealRobot(ABC, Generic[RigT]):
     ) -> tuple[Stages, int]:
         """What holds in a trial, and its seed."""
         damages, (seed,) = shared(self.damage, seeds, 1)
-        return Stages.of(self.reality, damages[0], trial, duration), seed
+        return Stages.of(
+            active.as_damage(self.reality), damages[0], trial, duration
+        ), seed
 
     def connected(self) -> RigT:
         """The rig; opens it where that has not happened yet.

@@ -9,7 +9,11 @@ CORNERS = 8  # at most
 
 
 def around(
-    begin: Sequence[float], end: Sequence[float], lamps: np.ndarray, *, keep: float
+    begin: np.ndarray,
+    end: Sequence[float] | np.ndarray,
+    lamps: np.ndarray,
+    *,
+    keep: float,
 ) -> list[np.ndarray]:
     """Places to pass on the way from one place to another.
 

@@ -157,9 +157,16 @@ class Steering:
         else:
             done.handled.append(False)
 
+    @property
+    def _begun(self) -> float:
+        """When the trial began [s]."""
+        if self._origin is None:
+            raise RuntimeError("The trial has not begun.")
+        return self._origin
+
     def _called(self, moment: float) -> bool:
         """Tick until a moment of the trial; whether somebody has to step in."""
-        return not self.mover.until(self._origin + moment, self._fresh, self._judged)
+        return not self.mover.until(self._begun + moment, self._fresh, self._judged)
 
     def _judged(self, sighting: Sighting) -> bool:
         """Whether a robot at this place has to be stopped."""
@@ -180,9 +187,9 @@ class Steering:
         self._flush(end - 2 * APART)
         self._stands(stand, end - APART)
         done.handled.append(True)
-        lamp = None
-        if self._call.reason == "lamp":
-            lamp = self.rules.lamps[self._call.lamp]
+        lamp, call = None, self._call
+        if call is not None and call.reason == "lamp":
+            lamp = self.rules.lamps[call.lamp]
             done.stops += 1
             done.stopped = self.rules.supervisor.at_lamp == "stop"
         else:

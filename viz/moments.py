@@ -1,6 +1,7 @@
 """The chosen trials of a recording, laid one after another in time."""
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +12,10 @@ from bns.viz.blueprint import READINGS, TRIAL_TIMELINE
 from bns.viz.choices import Choice
 from bns.viz.paths import arcs, dashes, listed
 from bns.worlds.trial import Trial
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+
 
 GAP = 1.0
 """s of pause between two trials"""
@@ -26,12 +31,12 @@ _HEIGHT = 0.004
 
 
 def send(
-    stream,
+    stream: "RecordingStream",
     record: RunRecord,
     replicate: int,
     chosen: Sequence[Choice],
     trials: Mapping[int, Trial],
-    model,
+    model: Any,
 ) -> None:
     """Log robot, trails, wheel speeds and moments of the chosen trials.
 
@@ -78,12 +83,14 @@ def duration(record: RunRecord, replicate: int, chosen: Sequence[Choice]) -> flo
     return float(np.nansum(told)) + GAP * len(chosen)
 
 
-def _durations(record: RunRecord, at, count: int) -> np.ndarray:
+def _durations(record: RunRecord, at: tuple[int, int], count: int) -> np.ndarray:
     """How long each of the first `count` commands took [s]."""
     return tasks.of(record.config).durations(record, at)[:count]
 
 
-def samples(record, at, trial: Trial | None, model):
+def samples(
+    record: RunRecord, at: tuple[int, int], trial: Trial | None, model: Any
+) -> Any:
     """Times, planar poses and qpos of one trial.
 
     Args:
@@ -111,7 +118,7 @@ def samples(record, at, trial: Trial | None, model):
     return times, poses, geometry.planar_qpos(model, poses)
 
 
-def _sparse(record, at, model):
+def _sparse(record: RunRecord, at: tuple[int, int], model: Any) -> Any:
     poses = listed(record.poses[at])
     if not len(poses):
         return np.empty(0), poses, np.empty((0, model.nq))
@@ -140,7 +147,7 @@ def _lift(poses: np.ndarray) -> np.ndarray:
     return np.column_stack([poses[:, :2], np.full(len(poses), _HEIGHT)])
 
 
-def _finish(record: RunRecord, at, times: np.ndarray) -> int:
+def _finish(record: RunRecord, at: tuple[int, int], times: np.ndarray) -> int:
     """Sample at which the task was done; the last one if it was not."""
     poses = listed(record.poses[at])
     done = tasks.of(record.config).finish(poses)
@@ -150,7 +157,13 @@ def _finish(record: RunRecord, at, times: np.ndarray) -> int:
     return min(int(np.searchsorted(times, ends[done - 1])), len(times) - 1)
 
 
-def _trails(stream, choice: Choice, poses, done: int, predicted) -> None:
+def _trails(
+    stream: "RecordingStream",
+    choice: Choice,
+    poses: np.ndarray,
+    done: int,
+    predicted: np.ndarray,
+) -> None:
     """Real and foreseen trail; the real one is thin after the last objective."""
     import rerun as rr
 
@@ -173,7 +186,7 @@ def _trails(stream, choice: Choice, poses, done: int, predicted) -> None:
     )
 
 
-def _wheels(stream, sent: np.ndarray, start: float) -> None:
+def _wheels(stream: "RecordingStream", sent: np.ndarray, start: float) -> None:
     """Wheel speeds as sent, a step for each command and zero in the pause."""
     import rerun as rr
 
@@ -196,7 +209,9 @@ def _wheels(stream, sent: np.ndarray, start: float) -> None:
         )
 
 
-def _readings(stream, record: RunRecord, at: tuple[int, int], start: float) -> None:
+def _readings(
+    stream: "RecordingStream", record: RunRecord, at: tuple[int, int], start: float
+) -> None:
     """Send what the sensors read in a trial, and what the SNNs foresaw."""
     import rerun as rr
 
@@ -224,7 +239,7 @@ def _readings(stream, record: RunRecord, at: tuple[int, int], start: float) -> N
             )
 
 
-def _states(stream, states, colours, end: float) -> None:
+def _states(stream: "RecordingStream", states: Any, colours: Any, end: float) -> None:
     """The lane that says which trial is on."""
     import rerun as rr
 
@@ -241,7 +256,12 @@ def _states(stream, states, colours, end: float) -> None:
     )
 
 
-def send_paths(stream, numbers, real: np.ndarray, predicted: np.ndarray) -> None:
+def send_paths(
+    stream: "RecordingStream",
+    numbers: np.ndarray,
+    real: np.ndarray,
+    predicted: np.ndarray,
+) -> None:
     """Send real and foreseen path of each of N trials, on the timeline `trial`.
 
     Args:
@@ -271,7 +291,9 @@ def send_paths(stream, numbers, real: np.ndarray, predicted: np.ndarray) -> None
         )
 
 
-def send_ends(stream, numbers, poses: np.ndarray, model) -> None:
+def send_ends(
+    stream: "RecordingStream", numbers: np.ndarray, poses: np.ndarray, model: Any
+) -> None:
     """Send the robot where each trial left it, on the timeline `trial`.
 
     Args:
@@ -300,7 +322,7 @@ def reports_servos(trial: Trial) -> bool:
 
 
 def walking_qpos(
-    model, poses_world: np.ndarray, trial: Trial, rows: np.ndarray
+    model: Any, poses_world: np.ndarray, trial: Trial, rows: np.ndarray
 ) -> np.ndarray:
     """Configurations from tracked poses and servo positions.
 
@@ -325,7 +347,7 @@ def walking_qpos(
     return made
 
 
-def _lowest_foot(model, qpos: np.ndarray) -> np.ndarray:
+def _lowest_foot(model: Any, qpos: np.ndarray) -> np.ndarray:
     """Height of the lowest foot site in each configuration, ``(T,)`` [m]."""
     import mujoco
 

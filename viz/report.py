@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -92,7 +93,7 @@ def write(
     return Path(out_html)
 
 
-def _runs(sources) -> dict[str, RunRecord]:
+def _runs(sources: Any) -> dict[str, RunRecord]:
     if isinstance(sources, Mapping):
         return dict(sources)
     if isinstance(sources, str | Path | RunRecord):
@@ -198,7 +199,8 @@ def _shared_figures(runs: Mapping[str, RunRecord]) -> list[dict]:
         and figure.compared
         and all(_drawable(figure, record) for record in runs.values())
     ]
-    return [_entry(figure, runs) for figure in (*SHARED, *own)]
+    shown: list[Curves | str] = [*SHARED, *own]
+    return [_entry(figure, runs) for figure in shown]
 
 
 def _entry(figure: Curves | str, runs: Mapping[str, RunRecord]) -> dict:

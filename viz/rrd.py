@@ -4,12 +4,16 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bns.storage import files
 from bns.viz.blueprint import LIVE_TIMELINE
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+
 
 END = b"RRF2FOOT"  # with four bytes after it, the end of a whole recording
 
@@ -56,14 +60,16 @@ def _error(path: Path, reason: object) -> files.StorageError:
 AFTER = 1e-3  # [s] after the last value, where the viewer is told that there is none
 
 
-def times(seconds: np.ndarray):
+def times(seconds: np.ndarray) -> Any:
     """A column of times on the timeline of motion [s]."""
     import rerun as rr
 
     return [rr.TimeColumn(LIVE_TIMELINE, duration=np.atleast_1d(seconds))]
 
 
-def send(stream, path: str, seconds: np.ndarray, values: np.ndarray) -> None:
+def send(
+    stream: "RecordingStream", path: str, seconds: np.ndarray, values: np.ndarray
+) -> None:
     """Send one trial's part of a curve; no line leads from it to the next trial.
 
     Args:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
+from types import ModuleType
 
 import bns.adaptations
 from bns.errors import BnsError, UnknownNameError
@@ -63,7 +64,7 @@ def parse(text: str) -> Extra:
     return Extra(name, tuple(values.items()), module.resets)
 
 
-def _module(name: str):
+def _module(name: str) -> ModuleType:
     if name not in names():
         raise UnknownNameError("adaptation", name, names())
     return import_module(f"bns.adaptations.{name}")

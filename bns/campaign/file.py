@@ -127,7 +127,7 @@ def from_content(
     for key in content:
         if key not in TOP + TABLES:
             raise UnknownNameError("key of a campaign file", key, TOP + TABLES)
-    numbers = {
+    numbers: dict[str, Any] = {
         "replicates": _whole(content, "replicates", 30, BOUNDS["replicates"]),
         "seed": _whole(content, "seed", 0, BOUNDS["seed"]),
         "batch_runs": _whole(content, "batch_runs", 30, BOUNDS["replicates"]),

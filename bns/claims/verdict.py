@@ -143,9 +143,7 @@ def judge(
     return examine(cell, mine, other, looks)
 
 
-def examine(
-    cell: Cell, mine: Sequence[float], other: Sequence[float], looks: Design
-) -> Finding:
+def examine(cell: Cell, mine: np.ndarray, other: np.ndarray, looks: Design) -> Finding:
     """The finding of two samples of which more is better, at the look that stops.
 
     Args:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from bns.cli.fields import Positional
-from bns.cli.parse import dispatch
+from bns.cli.parse import Verbs, dispatch
 from bns.errors import BnsError, FormatError, UnknownNameError
 from bns.progress import working
 
@@ -66,7 +66,7 @@ class Score:
 def main(verb: str, argv: list[str]) -> int:
     """Run the verb; gives the exit code."""
     del verb
-    does = {"make": (Make, _make), "run": (Run, _run), "score": (Score, _score)}
+    does: Verbs = {"make": (Make, _make), "run": (Run, _run), "score": (Score, _score)}
     return dispatch("gap bench", argv, does, MANUAL)
 
 

@@ -1,7 +1,7 @@
 """`bns run`: train a preset, a TOML file, or go on with a run directory."""
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -184,7 +184,7 @@ def _locked(given: Arguments, out: Path, lock: "Lock") -> int:
 
 
 @contextmanager
-def until_interrupted() -> Iterator[object]:
+def until_interrupted() -> Iterator[Callable[[], bool]]:
     """Gives a question: was Ctrl-C pressed? Pressed twice, it stops at once."""
     pressed: list[int] = []
 

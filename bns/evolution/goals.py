@@ -132,7 +132,7 @@ class GoalBreeder(Breeder):
 
     def _mutate(self, children: Population, rates: Rates, coins: Coins) -> Population:
         mutated = super()._mutate(children, rates, coins)
-        if rates.repeat is None:
+        if rates.repeat is None or coins.repeat is None:
             return mutated
         genes = repetition.repeated(mutated.genes, coins.repeat, rates.repeat)
         return mutated._replace(genes=genes)

@@ -1,12 +1,11 @@
 """Bootstrap intervals, seeded: the same values give the same interval."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from bns import seeding
 from bns.errors import BnsError
 from bns.stats import CONFIDENCE, Interval
+from bns.stats.measures import Sample
 
 RESAMPLES = 2000
 
@@ -49,7 +48,7 @@ def median_band(
     return centre, low, high
 
 
-def median(values: Sequence[float], *, confidence: float = CONFIDENCE) -> Interval:
+def median(values: Sample, *, confidence: float = CONFIDENCE) -> Interval:
     """The median of values with its percentile bootstrap interval; see `median_band`.
 
     Raises:

@@ -8,20 +8,16 @@ below 0.05 says that the 90 % interval lies inside the margin. Ties make the err
 A12 smaller than this one: with many of them the test is careful.
 """
 
-from collections.abc import Sequence
-
 from scipy import special
 
 from bns.errors import BnsError
-from bns.stats.measures import a12_error, a12_value
+from bns.stats.measures import Sample, a12_error, a12_value
 
 MARGIN = 0.14
 """less than what Vargha and Delaney (2000) call a medium effect, an A12 of 0.64"""
 
 
-def equivalence(
-    a: Sequence[float], b: Sequence[float], *, margin: float = MARGIN
-) -> float:
+def equivalence(a: Sample, b: Sample, *, margin: float = MARGIN) -> float:
     """p of the larger of the two one-sided tests: small = alike.
 
     Args:

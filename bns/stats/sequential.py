@@ -13,11 +13,11 @@ stopped: the least of each look's p over its share. It is a p like any other, va
 wherever one stops, and may be adjusted by Holm's method with others.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 from bns.errors import BnsError
+from bns.stats.measures import Sample
 
 LOOKS = (10, 20, 30, 50, 100)
 """runs a side"""
@@ -57,7 +57,7 @@ class Design:
         """
         return tuple(n for n in self.looks if n <= runs) or (runs,)
 
-    def p(self, found: Sequence[float]) -> float:
+    def p(self, found: Sample) -> float:
         """The p of the sequence, from those of the looks made, in order."""
         spent = zip(found, self.shares, strict=False)
         return min(1.0, min(p / share for p, share in spent))

@@ -13,7 +13,7 @@ class Rest:
         since: time of the newest change [s].
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.since = 0.0
         self._units: dict[int, int] = {}
         self._pose = np.full(3, np.inf)

@@ -1,6 +1,6 @@
 """Figures of light following: what sensors read, and where robots went from where."""
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,10 +12,15 @@ from bns.viz.paths import listed
 from bns.worlds.light.field import LightField
 from bns.worlds.light.sensors import LightSensors
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
 SIDES = ("left", "right")
 
 
-def readings(record: RunRecord, *, replicate: int | None = None):
+def readings(record: RunRecord, *, replicate: int | None = None) -> "Figure":
     """Readings of chosen trials of one replicate, a column each.
 
     Args:
@@ -65,7 +70,7 @@ LAST = 12
 """trials shown"""
 
 
-def starts(record: RunRecord, *, replicate: int | None = None):
+def starts(record: RunRecord, *, replicate: int | None = None) -> "Figure":
     """Where the robot went in the last trials, by start.
 
     Args:
@@ -179,7 +184,9 @@ def moving_mean(angle: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.nda
     return near @ values / near.sum(axis=1, keepdims=True)
 
 
-def light_responses(sensors: LightSensors, field: LightField, *, seed: int = 0):
+def light_responses(
+    sensors: LightSensors, field: LightField, *, seed: int = 0
+) -> "Figure":
     """Readings over the angle to the lamp: means, one sensor, the virtual two.
 
     Args:
@@ -215,7 +222,7 @@ def light_responses(sensors: LightSensors, field: LightField, *, seed: int = 0):
     return figure
 
 
-def _means(axes, sensors: LightSensors, many: Roamed) -> None:
+def _means(axes: "Axes", sensors: LightSensors, many: Roamed) -> None:
     at = np.deg2rad(np.arange(-180, 181, 2))
     means = moving_mean(many.angle, many.counts, at)
     forward = np.flatnonzero(np.abs(sensors.heading) < np.pi / 2 + 0.01)

@@ -1,6 +1,7 @@
 """Figures over trials: what runs reach, how long they need, their own columns."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,11 +12,18 @@ from bns.tasks import Curve
 from bns.viz import facts, style
 from bns.viz.scene import picture
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
 SPREAD = (25, 75)
 """Percentiles between which the band lies."""
 
 
-def band(axes, values: np.ndarray, colour: str, label: str, *, mean: bool = False):
+def band(
+    axes: "Axes", values: np.ndarray, colour: str, label: str, *, mean: bool = False
+) -> None:
     """Median over replicates as a line, the middle half of them as a band.
 
     Args:
@@ -31,14 +39,16 @@ def band(axes, values: np.ndarray, colour: str, label: str, *, mean: bool = Fals
         return
     low, middle, high = np.nanpercentile(values, (SPREAD[0], 50, SPREAD[1]), axis=0)
     axes.fill_between(trial, low, high, color=colour, alpha=0.18, linewidth=0)
-    alone = {"marker": "o", "markersize": 4} if len(trial) == 1 else {}
+    alone: Any = {"marker": "o", "markersize": 4} if len(trial) == 1 else {}
     axes.plot(trial, middle, color=colour, label=label, **alone)
     if mean:
         average = np.nanmean(values, axis=0)
         axes.plot(trial, average, color=colour, linewidth=1.0, ls=":")
 
 
-def mark_damage(axes, runs: Mapping[str, RunRecord], *, text: bool = True) -> None:
+def mark_damage(
+    axes: "Axes", runs: Mapping[str, RunRecord], *, text: bool = True
+) -> None:
     """A dashed line where damage begins; one if all runs agree.
 
     Args:
@@ -72,7 +82,7 @@ def onsets(runs: Mapping[str, RunRecord]) -> list[int]:
     )
 
 
-def finish(axes, runs: Mapping[str, RunRecord], *, legend: bool = True) -> None:
+def finish(axes: "Axes", runs: Mapping[str, RunRecord], *, legend: bool = True) -> None:
     """Limits, label of the trial axis, legend where several runs are shown.
 
     Args:
@@ -83,18 +93,19 @@ def finish(axes, runs: Mapping[str, RunRecord], *, legend: bool = True) -> None:
     longest = max(record.trials for record in runs.values())
     axes.set_xlim(-0.5, max(longest - 0.5, 0.5))
     axes.set_xlabel("trial in the world")
-    axes.xaxis.get_major_locator().set_params(integer=True)
+    ticks: Any = axes.xaxis.get_major_locator()
+    ticks.set_params(integer=True)
     if legend and len(runs) > 1:
         axes.legend(loc="best")
 
 
-def coloured(runs: Mapping[str, RunRecord]):
+def coloured(runs: Mapping[str, RunRecord]) -> Iterator[Any]:
     """(label, record, colour) of each run."""
     for number, (label, record) in enumerate(runs.items()):
         yield label, record, style.CYCLE[number % len(style.CYCLE)]
 
 
-def fitness(runs: Mapping[str, RunRecord]):
+def fitness(runs: Mapping[str, RunRecord]) -> "Figure":
     """The task's curve (`Curve`) of the controllers tried, over trials.
 
     Line: median over replicates; band: their middle half; dotted: mean, where the axis
@@ -123,7 +134,7 @@ def fitness(runs: Mapping[str, RunRecord]):
     return figure
 
 
-def _mark(axes, value: float, text: str) -> None:
+def _mark(axes: "Axes", value: float, text: str) -> None:
     """A dotted line, and what it says."""
     axes.axhline(value, color=style.GREY, linewidth=0.8, ls=(0, (1, 3)))
     if text:
@@ -139,7 +150,7 @@ def _mark(axes, value: float, text: str) -> None:
         )
 
 
-def solved(runs: Mapping[str, RunRecord]):
+def solved(runs: Mapping[str, RunRecord]) -> "Figure":
     """Left: objectives reached (median, middle half). Right: share of runs solving."""
     shown = [picture(record.config) for record in runs.values()]
 
@@ -163,7 +174,7 @@ def solved(runs: Mapping[str, RunRecord]):
     return figure
 
 
-def waits(runs: Mapping[str, RunRecord]):
+def waits(runs: Mapping[str, RunRecord]) -> "Figure":
     """Share of runs that had solved (left) or recovered (right) after so many trials.
 
     A curve that ends below 100 % tells of runs that never did.
@@ -193,7 +204,9 @@ def waits(runs: Mapping[str, RunRecord]):
     return figure
 
 
-def _steps(axes, counts: np.ndarray, longest: int, colour: str, label: str) -> None:
+def _steps(
+    axes: "Axes", counts: np.ndarray, longest: int, colour: str, label: str
+) -> None:
     counts = counts[~np.isnan(counts)]
     finite = np.sort(counts[np.isfinite(counts)])
     x = np.concatenate([[0.0], finite, [longest]])
@@ -205,7 +218,7 @@ def _steps(axes, counts: np.ndarray, longest: int, colour: str, label: str) -> N
         axes.plot([median, median], [0, 50], color=colour, linewidth=0.9, ls=":")
 
 
-def curves(runs: Mapping[str, RunRecord], shown: Curves):
+def curves(runs: Mapping[str, RunRecord], shown: Curves) -> "Figure":
     """A panel for each column: median over replicates, and their middle half.
 
     Args:

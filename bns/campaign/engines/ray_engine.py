@@ -8,7 +8,7 @@ import os
 import socket
 import time
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -45,7 +45,7 @@ class RayEngine:
     ):
         self.address, self.workers, self.patience = address, workers, patience
 
-    def run(self, jobs: Sequence[Job], *, beat: Beat) -> Iterator[Outcome]:
+    def run(self, jobs: Sequence[Job], *, beat: Beat) -> Generator[Outcome, None, None]:
         """See `Engine.run`."""
         ray = self._start()
         try:
@@ -104,7 +104,7 @@ class _Session:
         self.task = ray.remote(num_cpus=1, max_retries=RETRIES)(_heard)
         self.going: dict[Any, tuple[Job, int, float]] = {}
 
-    def run(self, jobs: Sequence[Job], beat: Beat) -> Iterator[Outcome]:
+    def run(self, jobs: Sequence[Job], beat: Beat) -> Generator[Outcome, None, None]:
         """See `Engine.run`."""
         waiting = deque((job, 1) for job in jobs)
         while waiting or self.going:
