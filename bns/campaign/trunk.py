@@ -16,7 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bns.experiment.config import AdaptationConfig, RunConfig
+from bns.experiment.config import RunConfig
+from bns.learners.bns.config import AdaptationConfig
 from bns.storage import files
 from bns.worlds.damage import Damage
 from bns.worlds.world import World

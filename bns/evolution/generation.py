@@ -13,7 +13,7 @@ from torch import Tensor
 from bns.draws import Draws
 from bns.evolution import crossover, mutation, selection
 from bns.evolution.chromosome import Population
-from bns.experiment.config import EvolutionConfig
+from bns.learners.bns.config import EvolutionConfig
 
 
 class Genes(Protocol):

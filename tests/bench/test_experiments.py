@@ -7,9 +7,9 @@ import pytest
 
 from bench.learning import branching, experiments, forking, solving
 from bns.errors import BnsError
-from bns.experiment.config import AdaptationConfig, WorldConfig
-from bns.experiment.config_watch import WatchConfig
+from bns.experiment.config import WorldConfig
 from bns.experiment.run import train
+from bns.learners.bns.config import AdaptationConfig, WatchConfig
 from bns.storage.store import RunStore
 from tests.bns import light_fakes
 from tests.bns.contents import contents

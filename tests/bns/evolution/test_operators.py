@@ -14,7 +14,8 @@ from bns.evolution import crossover, diversity, mutation, repetition, selection
 from bns.evolution.chromosome import Encoding, Population
 from bns.evolution.generation import Breeder, Rates
 from bns.evolution.goals import TICK, GoalBreeder, Goals
-from bns.experiment.config import ControllerConfig, EvolutionConfig
+from bns.experiment.task_settings import ControllerConfig
+from bns.learners.bns.config import EvolutionConfig
 from bns.learners.bns.learner import Bns
 from tests.bns.walkers import small
 

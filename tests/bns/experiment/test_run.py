@@ -8,15 +8,10 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.experiment.config import (
-    AdaptationConfig,
-    EvolutionConfig,
-    RunConfig,
-    SnnConfig,
-    WorldConfig,
-)
+from bns.experiment.config import RunConfig, WorldConfig
 from bns.experiment.run import train, train_many
 from bns.experiment.world_factory import make_world
+from bns.learners.bns.config import AdaptationConfig, EvolutionConfig, SnnConfig
 from bns.storage import files
 from bns.storage.store import load
 from bns.worlds.trial import WHEEL_CHANNELS

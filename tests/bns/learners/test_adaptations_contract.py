@@ -6,8 +6,9 @@ import pytest
 
 from bns.adaptations import registry
 from bns.errors import BnsError, UnknownNameError
-from bns.experiment.config import AdaptationConfig, RunConfig
+from bns.experiment.config import RunConfig
 from bns.learners.bns.adaptation import Adaptations
+from bns.learners.bns.config import AdaptationConfig
 
 
 @pytest.mark.parametrize("name", registry.names())

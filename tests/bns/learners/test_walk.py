@@ -12,10 +12,10 @@ from bns.draws import Draws
 from bns.errors import BnsError
 from bns.evolution.chromosome import Population
 from bns.evolution.goals import TICK, Goals
-from bns.experiment.config_watch import WatchConfig
 from bns.experiment.run import train
 from bns.learners.bns import change_evidence as forgetting
 from bns.learners.bns import walking
+from bns.learners.bns.config import WatchConfig
 from bns.learners.bns.learner import Bns
 from bns.learners.bns.memory import PatternBuffer
 from bns.learners.bns.problem import should_compile

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bns.experiment.config import AdaptationConfig, SnnConfig, WorldConfig
-from bns.experiment.config_watch import WatchConfig
+from bns.experiment.config import WorldConfig
 from bns.learners.bns.change_detection import Detector, Ground, Misses, innovation
+from bns.learners.bns.config import AdaptationConfig, SnnConfig, WatchConfig
 from bns.learners.bns.forgetting import contradicted
 from bns.learners.bns.learner import Bns
 from bns.learners.bns.light.innovations import CHANNELS

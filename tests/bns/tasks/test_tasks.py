@@ -9,9 +9,10 @@ import torch
 
 from bns import presets, tasks
 from bns.errors import BnsError, UnknownNameError
-from bns.experiment.config import RunConfig, TaskConfig
+from bns.experiment.config import RunConfig
 from bns.experiment.loading import with_learner
 from bns.experiment.run import train
+from bns.experiment.task_settings import TaskConfig
 from bns.path import integrate
 from bns.tasks import navigation
 from bns.tasks.navigation import Route
