@@ -97,7 +97,7 @@ class AdaptationConfig:
     restart: bool = False
     """population, SNN and patterns all reset on damage"""
     extra: tuple[str, ...] = ()
-    """adaptations from bns/adaptations by name: population_reset_every:trials=10"""
+    """further adaptations by name: population_reset_every:trials=10"""
     mutation_rate_after: float = 0.0
     """mutation rate after damage; 0 = unchanged"""
     mutation_magnitude_after: float = 0.0

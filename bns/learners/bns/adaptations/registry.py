@@ -7,7 +7,6 @@ from functools import cache
 from importlib import import_module
 from types import ModuleType
 
-import bns.adaptations
 from bns.errors import BnsError, UnknownNameError
 
 PARTS = ("population", "simulator", "data")
@@ -22,7 +21,7 @@ class Extra:
     function: Callable[..., set[str]]
 
     def resets(self, trial: int, onset: int) -> set[str]:
-        """What a run resets before a trial; see `bns.adaptations`.
+        """What a run resets before a trial; see `bns.learners.bns.adaptations`.
 
         Raises:
             BnsError: the adaptation names something that cannot be reset.
@@ -37,7 +36,7 @@ class Extra:
 @cache
 def names() -> tuple[str, ...]:
     """The adaptations that exist, sorted."""
-    found = pkgutil.iter_modules(bns.adaptations.__path__)
+    found = pkgutil.iter_modules(adaptations.__path__)
     return tuple(sorted(item.name for item in found if item.name != "registry"))
 
 
@@ -67,7 +66,7 @@ def parse(text: str) -> Extra:
 def _module(name: str) -> ModuleType:
     if name not in names():
         raise UnknownNameError("adaptation", name, names())
-    return import_module(f"bns.adaptations.{name}")
+    return import_module(f"bns.learners.bns.adaptations.{name}")
 
 
 def _number(text: str, value: str) -> float:
