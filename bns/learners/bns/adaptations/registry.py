@@ -8,6 +8,7 @@ from importlib import import_module
 from types import ModuleType
 
 from bns.errors import BnsError, UnknownNameError
+from bns.learners.bns import adaptations
 
 PARTS = ("population", "simulator", "data")
 
