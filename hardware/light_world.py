@@ -106,6 +106,7 @@ class HardwareLight(HardwareWorld):
         )
 
         def once(rig: Rig) -> Trial:
+            """The trial, on a connected rig."""
             volts = battery(rig.robot, rig.limits)
             mover, keep = rig.mover(), self._rules.safety + KEEP
             stand = homing.go(mover, start, lamps=self._places, keep=keep)

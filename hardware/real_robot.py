@@ -122,6 +122,7 @@ class RealRobot(ABC, Generic[RigT]):
         stages, seed = self._stages(given.duration, trial, seeds)
 
         def once(rig: RigT) -> Trial:
+            """The trial, on a connected rig."""
             return self._once(rig, given, stages, trial, seed)
 
         return [self._tried(once, trial)]

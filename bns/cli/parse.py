@@ -121,6 +121,7 @@ def manual(
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
+        """Say in one line what is wrong; the exit code is 2."""
         said = message.removeprefix("argument ").rstrip(".")
         required = "the following arguments are required: "
         if said.startswith(required):

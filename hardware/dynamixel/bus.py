@@ -358,6 +358,7 @@ def _port(sdk: Any, name: str, latency: float) -> Any:
         came = 0  # bytes of an answer and of what else came
 
         def readPort(self, length: int) -> bytes:
+            """Up to so many bytes, see `PortHandler.readPort`."""
             # the SDK looks at the time in a silent moment only; late answers are good
             if self.came > BABBLE and self.isPacketTimeout():
                 return b""
