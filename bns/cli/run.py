@@ -145,9 +145,9 @@ def source(text: str) -> tuple[RunConfig, str]:
 def execute(given: Arguments) -> int:
     """Train, draw, and say what happened."""
     if given.config.world.name == "hardware":
-        from bns.cli import hardware_run
+        from bns.cli.hardware import run
 
-        return hardware_run.execute(given)
+        return run.execute(given)
     from bns.storage.lock import Lock
 
     out = Path(given.out)

@@ -23,8 +23,8 @@ from bns.hardware.faults import FaultLog
 from bns.hardware.khepera.driver import Guard
 from bns.hardware.line import INSTALL, check_port, claim
 from bns.hardware.openers import Openers
-from bns.hardware.stop_order import insist, phantomx
-from bns.hardware.watchdog import LARGEST, send
+from bns.hardware.safety.stop_order import insist, phantomx
+from bns.hardware.safety.watchdog import LARGEST, send
 from bns.worlds.physics.legged_flags import OVERLOAD_TIME, SATURATED, STALLED
 
 TRIES = 4

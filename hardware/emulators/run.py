@@ -14,7 +14,7 @@ from bns.hardware.emulators.khepera_device import KheperaDevice
 from bns.hardware.emulators.mishaps import Mishaps, Restarts
 from bns.hardware.emulators.pty_host import PtyHost
 from bns.hardware.khepera import protocol
-from bns.hardware.priority import urgent
+from bns.hardware.safety.priority import urgent
 from bns.worlds.light.field import Lamp
 
 

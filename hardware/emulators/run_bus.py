@@ -13,7 +13,7 @@ from bns.hardware.emulators.hexapod_body import HexapodBody
 from bns.hardware.emulators.pty_host import PtyHost
 from bns.hardware.emulators.run import Diary, serve
 from bns.hardware.emulators.servo_bank import ServoBank
-from bns.hardware.priority import urgent
+from bns.hardware.safety.priority import urgent
 
 
 def phantomx(

@@ -11,7 +11,7 @@ from bns.hardware.faults import FaultLog
 from bns.hardware.khepera import protocol
 from bns.hardware.khepera.port_diagnosis import port_error
 from bns.hardware.line import Line
-from bns.hardware.stop_order import insist, khepera3
+from bns.hardware.safety.stop_order import insist, khepera3
 from bns.models.khepera3.units import Firmware, firmware
 
 LARGEST = 43_000  # speed units, firmware < 3, regulated (manual 2.2, p. 14)
@@ -28,7 +28,7 @@ STOPPING = 1.0  # s for the robot to acknowledge a stop
 
 
 class Guard(Protocol):
-    """What has to stand behind a moving robot, see `bns.hardware.watchdog`."""
+    """What has to stand behind a moving robot, see `bns.hardware.safety.watchdog`."""
 
     def feed(self, *, moving: bool) -> None:
         """Say that the process is alive; raises if the guard has fired."""

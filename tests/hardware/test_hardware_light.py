@@ -10,10 +10,10 @@ from bns.errors import BnsError
 
 pytest.importorskip("cv2")
 
-from bns.hardware import route
+from bns.hardware.driving import route
 from bns.hardware.emulators import virtual
 from bns.hardware.errors import SafetyStop
-from bns.hardware.light_world import HardwareLight
+from bns.hardware.worlds.light import HardwareLight
 from bns.worlds.light import sensors as light_sensors
 from bns.worlds.light.field import Lamp
 

@@ -11,7 +11,7 @@ pytest.importorskip("cv2")
 
 from bns.hardware.emulators import virtual
 from bns.hardware.errors import SafetyStop
-from bns.hardware.world import HardwareWorld
+from bns.hardware.worlds.wheeled import HardwareWorld
 
 AHEAD = Commands([[0.1, 0.1], [0.06, -0.06]], [1.0, 0.8])
 

@@ -1,6 +1,6 @@
 """The watchdog: a process of its own that stops the robot when nobody feeds it.
 
-    python -m bns.hardware.watchdog --fd N --port DEVICE --baud B --stop KIND
+    python -m bns.hardware.safety.watchdog --fd N --port DEVICE --baud B --stop KIND
         --silence SECONDS --patience SECONDS
 
 It holds the open port (`fd`) as well as the process that drives. Bytes on its standard
@@ -8,9 +8,9 @@ input feed it: `m` the robot moves (another byte has to come within the silence)
 stands, `q` all is done. Each time it is fed it answers with the line `BEAT`, by which
 the driving process knows that it is watched. Silence while moving, or the end of the
 input at any time (the driving process is gone, however it died), makes it send the stop
-order until the robot has acknowledged it, see `bns.hardware.stop_order`; where the line
-is dead it opens the port anew, for as long as its patience lasts. It says what it does
-in lines on its standard output.
+order until the robot has acknowledged it, see `bns.hardware.safety.stop_order`; where
+the line is dead it opens the port anew, for as long as its patience lasts. It says what
+it does in lines on its standard output.
 
 Little but the standard library is imported, and Ctrl-C and hang-ups are ignored, so it
 starts fast and outlives the terminal. All times are monotonic.
@@ -26,8 +26,8 @@ import termios
 import time
 import tty
 
-from bns.hardware.priority import urgent
-from bns.hardware.stop_order import KINDS, StopOrder, insist, order_for
+from bns.hardware.safety.priority import urgent
+from bns.hardware.safety.stop_order import KINDS, StopOrder, insist, order_for
 
 BEAT = "."
 SPEEDS = {115200: termios.B115200, 1000000: termios.B1000000, 57600: termios.B57600}
@@ -165,7 +165,7 @@ def _write(text: str) -> None:
 
 
 def _arguments(argv: list[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="bns.hardware.watchdog")
+    parser = argparse.ArgumentParser(prog="bns.hardware.safety.watchdog")
     parser.add_argument("--fd", type=int, required=True)
     parser.add_argument("--port", required=True)
     parser.add_argument("--baud", type=int, required=True)

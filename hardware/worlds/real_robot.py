@@ -9,8 +9,8 @@ from bns import models
 from bns.errors import BnsError
 from bns.hardware.errors import Void
 from bns.hardware.faults import FaultLog
-from bns.hardware.limits import Operator
 from bns.hardware.rig import EMULATED
+from bns.hardware.safety.limits import Operator
 from bns.worlds import active
 from bns.worlds.active import Stages
 from bns.worlds.checks import bounded, checked_start, shared

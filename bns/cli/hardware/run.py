@@ -18,7 +18,7 @@ def execute(given: Any) -> int:
         given: what `bns run` was told; one replicate is run, whatever the preset says.
     """
     from bns.hardware.line import check_port
-    from bns.hardware.priority import urgent
+    from bns.hardware.safety.priority import urgent
     from bns.storage.lock import Lock
 
     check_port(given.port)
@@ -78,14 +78,14 @@ def _world(given: Any, config: Any) -> Any:
         **task.surroundings(),
     }
     if config.world.robot == "phantomx":
-        from bns.hardware.hexapod_world import HardwareHexapod
+        from bns.hardware.worlds.hexapod import HardwareHexapod
 
         return HardwareHexapod(servos=given.servos, **settings)
     if task.closed_loop:
-        from bns.hardware.light_world import HardwareLight
+        from bns.hardware.worlds.light import HardwareLight
 
         return HardwareLight(config.world.robot, wheels=given.wheels, **settings)
-    from bns.hardware.world import HardwareWorld
+    from bns.hardware.worlds.wheeled import HardwareWorld
 
     return HardwareWorld(config.world.robot, wheels=given.wheels, **settings)
 

@@ -5,15 +5,15 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from bns.hardware.clock import Clock
+from bns.hardware.driving.wheels import Following, Wheels
 from bns.hardware.errors import LinkError, Void
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera.driver import Drive, Khepera3
-from bns.hardware.limits import Limits, Operator
-from bns.hardware.motion_check import MotionCheck
-from bns.hardware.safety_monitor import SafetyMonitor
+from bns.hardware.safety.limits import Limits, Operator
+from bns.hardware.safety.monitor import SafetyMonitor
+from bns.hardware.safety.motion_check import MotionCheck
 from bns.hardware.tracking.eyes import Eyes
 from bns.hardware.tracking.tracker import Sighting
-from bns.hardware.wheels import Following, Wheels
 
 TICK = 0.02  # s between two looks at everything
 ASTRAY = 0.018  # m that a wrong or mistimed set point may lead a wheel astray

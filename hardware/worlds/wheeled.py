@@ -4,12 +4,13 @@ from dataclasses import KW_ONLY, dataclass
 from typing import ClassVar
 
 from bns.errors import BnsError
-from bns.hardware import homing, records, schedule
-from bns.hardware.limits import Limits
-from bns.hardware.motion import Performed
-from bns.hardware.real_robot import RealRobot
+from bns.hardware.driving import homing, schedule
+from bns.hardware.driving.motion import Performed
 from bns.hardware.rig import Rig, battery, connect
+from bns.hardware.safety.limits import Limits
 from bns.hardware.tracking.tracker import Sighting
+from bns.hardware.worlds import records
+from bns.hardware.worlds.real_robot import RealRobot
 from bns.worlds import active
 from bns.worlds.active import Stages
 from bns.worlds.damage import Damage

@@ -9,7 +9,7 @@ import time
 
 from bns.errors import BnsError
 from bns.hardware.errors import SafetyStop, Void
-from bns.hardware.watchdog import BEAT
+from bns.hardware.safety.watchdog import BEAT
 
 SILENCE = 0.14  # s without food while the robot moves, after which it is stopped
 ASLEEP = 0.10  # s without a beat after food, after which the watchdog counts as asleep
@@ -19,7 +19,7 @@ PATIENCE = 60.0  # s for which it goes on trying to stop a robot on a dead line
 
 
 class WatchdogClient:
-    """A watchdog process behind a robot; see `bns.hardware.watchdog`.
+    """A watchdog process behind a robot; see `bns.hardware.safety.watchdog`.
 
     Each watches the other: the watchdog stops the robot where it is not fed, and
     feeding raises where the watchdog does not answer.
@@ -57,7 +57,7 @@ class WatchdogClient:
         self._part = b""
         self._reader, out = os.pipe()
         inside, self._writer = os.pipe()
-        command = [sys.executable, "-m", "bns.hardware.watchdog"]
+        command = [sys.executable, "-m", "bns.hardware.safety.watchdog"]
         command += ["--fd", str(fd), "--port", port, "--baud", str(baud)]
         command += ["--stop", kind, "--servo", str(servo)]
         command += ["--silence", str(silence), "--patience", str(patience)]

@@ -6,15 +6,15 @@ from bns.cli.parse import HELP, HELP_ALL
 from bns.errors import UnknownNameError
 
 VERBS = {
-    "describe": ("gap_describe", "write the description of a robot of your own"),
-    "check": ("gap_diagnose", "is the recording sound? repairs and faults, one a line"),
-    "diagnose": ("gap_diagnose", "is there a gap, where, which effect, how far closed"),
-    "plan": ("gap_after", "the next command, which separates what is still tied"),
-    "edit": ("gap_after", "does the model stay right when an effect is taken away?"),
-    "apply": ("gap_after", "keep the corrected world: bns run PRESET --world NAME"),
-    "bench": ("gap_bench", "the withheld-effect test: make, run, score"),
+    "describe": ("describe", "write the description of a robot of your own"),
+    "check": ("diagnose", "is the recording sound? repairs and faults, one a line"),
+    "diagnose": ("diagnose", "is there a gap, where, which effect, how far closed"),
+    "plan": ("after", "the next command, which separates what is still tied"),
+    "edit": ("after", "does the model stay right when an effect is taken away?"),
+    "apply": ("after", "keep the corrected world: bns run PRESET --world NAME"),
+    "bench": ("bench", "the withheld-effect test: make, run, score"),
 }
-"""verb -> module of this package, and what it does in one line"""
+"""verb -> module beside this, and what it does in one line"""
 
 
 def main(verb: str, argv: list[str]) -> int:
@@ -34,7 +34,7 @@ def main(verb: str, argv: list[str]) -> int:
         raise SystemExit(0)
     if argv[0] not in VERBS:
         raise UnknownNameError("verb of `bns gap`", argv[0], VERBS)
-    module = import_module(f"bns.cli.{VERBS[argv[0]][0]}")
+    module = import_module(f"bns.cli.gap.{VERBS[argv[0]][0]}")
     return module.main(argv[0], argv[1:])
 
 

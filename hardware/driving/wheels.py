@@ -16,7 +16,7 @@ import numpy as np
 from bns.hardware.khepera.driver import Drive
 
 if TYPE_CHECKING:
-    from bns.hardware.motion import Mover
+    from bns.hardware.driving.motion import Mover
 
 CHECK = 0.12  # s between two looks
 ROOM = 0.06  # s before the next set point in which nothing is asked

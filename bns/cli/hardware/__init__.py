@@ -135,7 +135,7 @@ class Record(Connection):
 
 def main(verb: str, argv: list[str]) -> int:
     """Run a verb of the hardware mode; gives the exit code."""
-    from bns.cli import hardware_session as session
+    from bns.cli.hardware import session
 
     does: dict[str, tuple[type, Callable[[Any], int]]] = {
         "emulate": (Emulate, _emulate),
@@ -152,7 +152,7 @@ def _emulate(given: Emulate) -> int:
             raise BnsError(f"--{name} = {getattr(given, name)}: give 0 to 0.5.")
     lights = _lamps(given)
     print(f"{given.robot} on {given.port}; Ctrl-C ends it.", flush=True)
-    from bns.hardware.priority import urgent
+    from bns.hardware.safety.priority import urgent
 
     urgent()
     x, y, yaw = given.start

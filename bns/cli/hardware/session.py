@@ -74,7 +74,7 @@ def _servos(given: Any, out: Path) -> Iterator[str]:
 
 
 def _wheels(given: Any, out: Path) -> Iterator[str]:
-    from bns.hardware import odometry
+    from bns.hardware.driving import odometry
 
     if given.robot != "khepera3":
         raise BnsError("A hexapod has no wheels: give --what servos.")
@@ -147,7 +147,7 @@ def _recorded(given: Any) -> tuple[Any, Callable[[int], Any]]:
     after the other, so that no sample between is of one moment.
     """
     from bns.gap.planning import command_file
-    from bns.hardware import excitation
+    from bns.hardware.driving import excitation
 
     shared: dict[str, Any] = {
         "port": given.port,
@@ -156,7 +156,7 @@ def _recorded(given: Any) -> tuple[Any, Callable[[int], Any]]:
         "damage": given.damage,
     }
     if given.robot == "phantomx":
-        from bns.hardware.hexapod_world import HardwareHexapod
+        from bns.hardware.worlds.hexapod import HardwareHexapod
 
         if given.plan:
             raise BnsError("--plan: plans are for wheeled robots; leave it out.")
@@ -164,7 +164,7 @@ def _recorded(given: Any) -> tuple[Any, Callable[[int], Any]]:
         return world, lambda number: excitation.steps(
             given.commands, seed=given.seed, number=number // 2
         )
-    from bns.hardware.world import HardwareWorld
+    from bns.hardware.worlds.wheeled import HardwareWorld
 
     planned = command_file.read(given.plan) if given.plan else None
     wheeled = HardwareWorld(

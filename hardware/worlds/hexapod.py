@@ -6,15 +6,15 @@ from dataclasses import KW_ONLY, dataclass
 import numpy as np
 
 from bns.errors import BnsError
-from bns.hardware import walked
 from bns.hardware.dynamixel import home
 from bns.hardware.dynamixel import rig as rigs
 from bns.hardware.dynamixel.bus import Overload
 from bns.hardware.dynamixel.rig import HexapodRig
 from bns.hardware.dynamixel.walker import SPEED
 from bns.hardware.errors import Void
-from bns.hardware.limits import Limits
-from bns.hardware.real_robot import RealRobot
+from bns.hardware.safety.limits import Limits
+from bns.hardware.worlds import walked
+from bns.hardware.worlds.real_robot import RealRobot
 from bns.worlds import active
 from bns.worlds.active import Stages
 from bns.worlds.damage import Damage

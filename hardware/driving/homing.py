@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from bns.errors import BnsError
-from bns.hardware import route
-from bns.hardware.motion import TICK, Mover
+from bns.hardware.driving import route
+from bns.hardware.driving.motion import TICK, Mover
 from bns.hardware.tracking.tracker import Sighting
 
 CLOSE = 0.008  # m from the start that will do

@@ -9,8 +9,8 @@ import msgspec
 import numpy as np
 
 from bns.errors import BnsError, FormatError
-from bns.hardware import homing
-from bns.hardware.motion import Mover, Point
+from bns.hardware.driving import homing
+from bns.hardware.driving.motion import Mover, Point
 from bns.models.khepera3.units import WHEEL_DIAMETER
 from bns.storage import files, reading, seal
 from bns.storage.numbers import Least, Positive

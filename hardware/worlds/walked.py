@@ -5,7 +5,7 @@ import numpy as np
 from bns.errors import BnsError
 from bns.hardware.dynamixel.walker import Walked
 from bns.hardware.errors import Void
-from bns.hardware.records import GAP, interpolated
+from bns.hardware.worlds.records import GAP, interpolated
 from bns.worlds.trial import Channel, Commands, Outcome, Trial
 
 LATE = 0.25  # s by which a frame may be late before the trial is void

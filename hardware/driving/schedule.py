@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bns.hardware.motion import Point
+from bns.hardware.driving.motion import Point
 from bns.worlds.active import Stages
 from bns.worlds.physics import control
 from bns.worlds.trial import Commands

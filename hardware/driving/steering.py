@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bns.hardware import homing, schedule
-from bns.hardware.motion import Mover, Performed
+from bns.hardware.driving import homing, schedule
+from bns.hardware.driving.motion import Mover, Performed
 from bns.hardware.tracking.tracker import Sighting
 from bns.worlds import closed_loop
 from bns.worlds.closed_loop import Policy

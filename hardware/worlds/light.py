@@ -8,13 +8,14 @@ import numpy as np
 
 from bns import seeding
 from bns.errors import BnsError
-from bns.hardware import homing, records
-from bns.hardware.limits import Limits
-from bns.hardware.motion import Mover
+from bns.hardware.driving import homing
+from bns.hardware.driving.motion import Mover
+from bns.hardware.driving.schedule import GRID
+from bns.hardware.driving.steering import Rules, Steered, Steering
 from bns.hardware.rig import Rig, battery
-from bns.hardware.schedule import GRID
-from bns.hardware.steering import Rules, Steered, Steering
-from bns.hardware.world import HardwareWorld
+from bns.hardware.safety.limits import Limits
+from bns.hardware.worlds import records
+from bns.hardware.worlds.wheeled import HardwareWorld
 from bns.worlds import checks
 from bns.worlds.active import Stages
 from bns.worlds.checks import bounded
