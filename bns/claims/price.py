@@ -29,7 +29,7 @@ from bns.claims.published import Stale
 from bns.claims.report import Judged
 from bns.claims.verdict import Finding
 from bns.experiment.config import RunConfig
-from bns.stats.equivalence import of_share
+from bns.stats.designs import of_share
 from bns.stats.measures import a12_error
 from bns.tasks import registry as tasks
 

@@ -12,7 +12,7 @@ from bns.claims.held import Held
 from bns.claims.published import Library, Stale
 from bns.claims.verdict import Finding
 from bns.errors import BnsError
-from bns.stats.sequential import Design, up_to
+from bns.stats.designs import Design, up_to
 
 NOT_RUN, NOT_TESTED, STALE = "not run", "not tested", "stale"
 VERDICTS = (

@@ -19,7 +19,7 @@ from bns.claims import report, sides
 from bns.claims.claim import Cell
 from bns.claims.report import Judged
 from bns.experiment import versions
-from bns.stats.sequential import LOOKS
+from bns.stats.designs import LOOKS
 
 MOST = 50  # runs of a batch
 SEED = 0

@@ -53,7 +53,7 @@ class Rates(NamedTuple):
         chicken: probability of a fresh second parent, ``(R,)``; None = that of the
             configuration.
         repeat: probability that a walker's child repeats its commands, ``(R,)``, see
-            `bns.evolution.repetition`; None = none does.
+            `bns.evolution.goals`; None = none does.
     """
 
     rate: Tensor

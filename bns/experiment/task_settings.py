@@ -157,7 +157,7 @@ class WalkConfig:
     unit silent)"""
     repeat: float = 0.0
     """chance that a command of a child is copied to another place, and that its
-    commands go round from some place on (own; bns/evolution/repetition.py)"""
+    commands go round from some place on (own; bns/evolution/goals.py)"""
     repeat_after: float = 0.0
     """the same once damage is known; 0 = unchanged"""
     fitness: Literal["repaired", "printed"] = "repaired"

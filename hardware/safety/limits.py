@@ -10,7 +10,7 @@ from types import FrameType
 
 from bns.hardware.errors import SafetyStop
 from bns.hardware.tracking.tracker import Sighting
-from bns.worlds import alarm
+from bns.worlds import world
 
 SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 
@@ -85,8 +85,8 @@ class Operator:
         Raises:
             SafetyStop: somebody does.
         """
-        if alarm.reason():
-            raise SafetyStop(alarm.reason(), "nothing is lost up to the last trial")
+        if world.reason():
+            raise SafetyStop(world.reason(), "nothing is lost up to the last trial")
         if not self.reason and _key():
             self.reason = "the operator said so (key)"
         if self.reason:

@@ -23,7 +23,7 @@ from bns.worlds.closed_loop import CYCLE, CYCLES, Policy
 from bns.worlds.damage import Damage
 from bns.worlds.effects.base import OpticsEffect
 from bns.worlds.light import sensors
-from bns.worlds.light import starts as light_starts
+from bns.worlds.light import world as light_starts
 from bns.worlds.light.field import Lamp, LightField
 from bns.worlds.light.sensing import Changes
 from bns.worlds.light.supervisor import Supervisor

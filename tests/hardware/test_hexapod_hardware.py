@@ -12,7 +12,7 @@ from bns.hardware.dynamixel import joints, zeros
 from bns.hardware.dynamixel.walker import SPEED, Walked
 from bns.hardware.emulators.hexapod_body import HexapodBody
 from bns.hardware.emulators.pty_host import PtyHost
-from bns.hardware.emulators.run_bus import phantomx
+from bns.hardware.emulators.run import phantomx
 from bns.hardware.emulators.servo_bank import ServoBank
 from bns.hardware.errors import Void
 from bns.hardware.tracking.tracker import Sighting

@@ -38,10 +38,9 @@ MAY_IMPORT = {
 }
 PROTOCOL = {
     "bns.worlds",
-    "bns.worlds.alarm",
+    "bns.worlds.world",
     "bns.worlds.counted",
     "bns.worlds.trial",
-    "bns.worlds.world",
     "bns.worlds.damage",
     "bns.worlds.data.dataset",
 }

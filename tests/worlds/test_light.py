@@ -11,9 +11,10 @@ from bns.errors import BnsError, UnknownNameError
 from bns.models import render
 from bns.worlds import registry
 from bns.worlds.light import law as light_law
-from bns.worlds.light import scene, sensors, sight
+from bns.worlds.light import sensors, sight
 from bns.worlds.light.field import Lamp, LightField
 from bns.worlds.objects import Post, RayScreen
+from bns.worlds.stepwise import look
 
 SENSORS = sensors.of("khepera3")
 BACK = SENSORS.names.index("ir_back")
@@ -260,7 +261,7 @@ def spec():
     """Two lamps and a post."""
     lights = [{}, {"x": 0.7, "y": -0.4, "height": 0.1}]
     posts = [{"x": -0.5, "y": 0.3}]
-    return scene.spec(registry.make("light", lights=lights, posts=posts))
+    return look.spec(registry.make("light", lights=lights, posts=posts))
 
 
 def test_lamps_are_where_the_light_is(spec):
@@ -288,6 +289,6 @@ def test_no_boundary_where_nobody_watches():
     from bns.worlds.light.supervisor import Supervisor
 
     world = registry.make("light", supervisor=Supervisor(safety=0))
-    names = [geom.name for geom in scene.spec(world).geoms]
+    names = [geom.name for geom in look.spec(world).geoms]
     assert "bulb_0" in names
     assert not any(name.startswith("boundary") for name in names)

@@ -171,7 +171,7 @@ def _emulate(given: Emulate) -> int:
         shared["battery"] = given.battery
     if given.robot == "phantomx":
         from bns.hardware.dynamixel.joints import FILE
-        from bns.hardware.emulators.run_bus import phantomx
+        from bns.hardware.emulators.run import phantomx
 
         phantomx(
             given.port,

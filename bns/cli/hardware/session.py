@@ -17,7 +17,7 @@ AT_REST = 60.0  # s between samples: none but those at which commands begin and 
 def check(given: Any) -> int:
     """`bns hardware check`."""
     if given.robot == "phantomx":
-        from bns.hardware.dynamixel.check import report
+        from bns.hardware.dynamixel.zeros import report
 
         for line in report(given.port, given.servos):
             print(line, flush=True)

@@ -318,7 +318,7 @@ def test_ray_that_is_not_there_and_addresses_that_are_none(monkeypatch):
 
 
 def test_a_batch_hangs_only_once_it_has_started_and_said_nothing_new():
-    from bns.campaign.engines.pulse import Pulse, Watch
+    from bns.campaign.engines.ray_engine import Pulse, Watch
 
     now, pulse = [0.0], Pulse()
     watch = Watch(10.0, clock=lambda: now[0])

@@ -10,10 +10,10 @@ import torch
 from bns import models
 from bns.draws import Draws
 from bns.errors import UnknownNameError
-from bns.evolution import crossover, diversity, mutation, repetition, selection
+from bns.evolution import crossover, diversity, mutation, selection
 from bns.evolution.chromosome import Encoding, Population
 from bns.evolution.generation import Breeder, Rates
-from bns.evolution.goals import TICK, GoalBreeder, Goals
+from bns.evolution.goals import COINS, TICK, GoalBreeder, Goals, repeated
 from bns.experiment.task_settings import ControllerConfig
 from bns.learners.bns.config import EvolutionConfig
 from bns.learners.bns.learner import Bns
@@ -273,9 +273,7 @@ class TestRepetition:
     @staticmethod
     def child(*coins, chance=0.5):
         genes = torch.arange(8.0).view(1, 1, 8, 1).expand(1, 1, 8, 2)
-        told = repetition.repeated(
-            genes, torch.tensor([[coins]]), torch.tensor([chance])
-        )
+        told = repeated(genes, torch.tensor([[coins]]), torch.tensor([chance]))
         assert (told[..., 0] == told[..., 1]).all()
         return told[0, 0, :, 0].tolist()
 
@@ -293,10 +291,10 @@ class TestRepetition:
     def test_none_without_a_chance_and_no_more_often_than_that(self):
         draws = Draws(2)
         genes = draws.uniform(1, 4000, 8, 3)
-        coins = draws.uniform(1, 4000, repetition.COINS)
+        coins = draws.uniform(1, 4000, COINS)
         never, seldom = torch.tensor([0.0]), torch.tensor([0.1])
-        assert torch.equal(repetition.repeated(genes, coins, never), genes)
-        changed = (repetition.repeated(genes, coins, seldom) != genes).any(-1).any(-1)
+        assert torch.equal(repeated(genes, coins, never), genes)
+        changed = (repeated(genes, coins, seldom) != genes).any(-1).any(-1)
         # of the copies one in eight finds its own place
         assert changed.float().mean() == pytest.approx(1 - 0.9125 * 0.9, abs=0.02)
 

@@ -10,11 +10,10 @@ from bns import stats
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
-from bns.stats import bootstrap
+from bns.stats import resampling
 from bns.stats.compare import compare
-from bns.stats.equivalence import MARGIN, equivalence, of_share
-from bns.stats.power import power, runs_needed
-from bns.stats.sequential import Design, up_to
+from bns.stats.designs import MARGIN, Design, equivalence, of_share, up_to
+from bns.stats.resampling import power
 
 # |U - 450| and p as the dissertation prints it, thirty runs against thirty: tables
 # 5.3, 5.5, 5.6, 5.7, 5.10, 5.18, 6.2, 6.3b, 6.6, 7.6b, 7.7b.
@@ -289,12 +288,6 @@ def test_power_of_nothing_is_the_level_and_of_everything_is_one():
     assert power(0.9, 2, 2) < 0.05  # two runs a side find nothing
 
 
-def test_runs_needed_is_the_least_that_suffices():
-    need = int(runs_needed(0.65))
-    assert power(0.65, need, need) >= 0.8 > power(0.65, need - 1, need - 1)
-    assert runs_needed(0.5) == np.inf
-
-
 @pytest.mark.parametrize(("a12", "runs"), [(1.2, 30), (0.5, 0)])
 def test_power_of_what_is_none(a12, runs):
     with pytest.raises(BnsError, match="has no power"):
@@ -302,23 +295,23 @@ def test_power_of_what_is_none(a12, runs):
 
 
 def test_bootstrap_median_by_hand():
-    assert bootstrap.median([4.0]) == (4.0, 4.0, 4.0)
-    assert bootstrap.median([1.0, 3.0]).value == 2.0
-    never = bootstrap.median([1.0, 2.0, np.inf])
+    assert resampling.median([4.0]) == (4.0, 4.0, 4.0)
+    assert resampling.median([1.0, 3.0]).value == 2.0
+    never = resampling.median([1.0, 2.0, np.inf])
     assert (never.value, never.low, never.high) == (2.0, 1.0, np.inf)
     values = np.random.default_rng(0).normal(size=30)
-    assert bootstrap.median(values) == bootstrap.median(values)
+    assert resampling.median(values) == resampling.median(values)
 
 
 def test_bootstrap_median_covers_at_its_nominal_rate():
     draws = np.random.default_rng(7).exponential(size=(30, 3000))
-    _, low, high = bootstrap.median_band(draws)
+    _, low, high = resampling.median_band(draws)
     assert 0.92 <= np.mean((low <= np.log(2)) & (np.log(2) <= high)) <= 0.96
 
 
 def test_bootstrap_of_a_curve_is_that_of_its_columns():
     curve = np.random.default_rng(2).normal(np.array([0, 5, 10]), size=(20, 3))
-    middle, low, high = bootstrap.median_band(curve)
+    middle, low, high = resampling.median_band(curve)
     np.testing.assert_allclose(middle, np.median(curve, axis=0))
     assert (low < middle).all() and (middle < high).all()
 
@@ -326,4 +319,4 @@ def test_bootstrap_of_a_curve_is_that_of_its_columns():
 @pytest.mark.parametrize("values", [np.zeros((0, 2)), [[np.nan]], [1.0]])
 def test_bootstrap_of_what_is_none(values):
     with pytest.raises(BnsError, match="no median"):
-        bootstrap.median_band(np.array(values))
+        resampling.median_band(np.array(values))

@@ -1,23 +1,49 @@
-"""Looks at runs while they come, with the level spent over the looks.
-
-A comparison is looked at after 10, 20, 30, 50 and 100 runs a side and may stop at each.
-The level is spent in proportion to the runs that each look adds: a tenth of it at 10,
-20 and 30 runs, a fifth at 50, half at 100. What is spent adds up to the level, so by
-the union bound the chance to find a difference where there is none stays below it,
-however the looks hang together: with ties, with runs that never get there, with pairs.
-(O'Brien and Fleming's or Pocock's boundaries for joint normal looks spend a little less
-at the end; they hold for large samples without ties.)
-
-The p of the whole sequence is the smallest level at which any look made would have
-stopped: the least of each look's p over its share. It is a p like any other, valid
-wherever one stops, and may be adjusted by Holm's method with others.
-"""
+"""Designs of comparisons: no difference shown, and looks that share one level."""
 
 from dataclasses import dataclass
 from itertools import pairwise
 
+from scipy import special
+
 from bns.errors import BnsError
-from bns.stats.measures import Sample
+from bns.stats.measures import Sample, a12_error, a12_value
+
+MARGIN = 0.14
+"""less than what Vargha and Delaney (2000) call a medium effect, an A12 of 0.64"""
+
+
+def equivalence(a: Sample, b: Sample, *, margin: float = MARGIN) -> float:
+    """p of the larger of the two one-sided tests: small = alike.
+
+    Args:
+        a: values of one side; infinite ones rank as ties at the end.
+        b: values of the other.
+        margin: of A12 about one half, inside which sides count as alike.
+
+    Raises:
+        BnsError: a sample is empty or holds NaN, or a margin outside 0 to 0.5.
+    """
+    if not 0 < margin < 0.5:
+        raise BnsError(
+            f"A margin of {margin} is not allowed: give one between 0 and 0.5."
+        )
+    return of_share(a12_value(a, b), len(a), len(b), margin=margin)
+
+
+def of_share(share: float, n_a: int, n_b: int, *, margin: float = MARGIN) -> float:
+    """p of `equivalence` for a known A12.
+
+    Args:
+        share: the A12.
+        n_a: runs on one side.
+        n_b: runs on the other.
+        margin: of A12 about one half.
+    """
+    low, high = 0.5 - margin, 0.5 + margin
+    above = (share - low) / a12_error(low, n_a, n_b)
+    below = (high - share) / a12_error(high, n_a, n_b)
+    return float(special.ndtr(-min(above, below)))
+
 
 LOOKS = (10, 20, 30, 50, 100)
 """runs a side"""
