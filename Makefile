@@ -1,6 +1,6 @@
 # make demo   train BNS against a damaged robot, leave runs/demo/ with a report
 # make test   run the test suite
-# make lint   formatting and lint checks
+# make lint   formatting, lint and types
 # make docs   build the documentation's site, with the reference, into site/
 # make clean  remove the environment and build leftovers (never runs/)
 #
@@ -29,7 +29,7 @@ test: env
 lint: env
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/mypy --python-executable $(BIN)/python -p bns.worlds -p bns.models
+	$(BIN)/python .ci/check_types.py
 
 docs: env
 	$(BIN)/python -m pip install --quiet -c constraints.txt -e '.[docs]'

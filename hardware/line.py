@@ -8,7 +8,7 @@ from typing import Any, Protocol
 from bns.errors import BnsError, MissingDependencyError
 from bns.hardware.errors import LinkError
 from bns.hardware.openers import Openers
-from bns.hardware.watchdog import LARGEST, send
+from bns.hardware.safety.watchdog import LARGEST, send
 
 INSTALL = 'pip install "bns-testbed[hardware]"'
 

@@ -105,8 +105,8 @@ def _diagnosis() -> Any:
 
 
 def _calibrations(home: Path) -> None:
+    from bns.hardware.driving.odometry import Wheels
     from bns.hardware.dynamixel import joints
-    from bns.hardware.odometry import Wheels
     from bns.hardware.tracking.camera import Camera
     from bns.worlds.corrected import Corrected, _table
 
@@ -238,8 +238,8 @@ def _made() -> Iterator[Reader]:
     from bns.campaign.store import CampaignStore
     from bns.gap import store as gap_store
     from bns.gap.bench.benchmark_io import read_answers
+    from bns.hardware.driving.odometry import Wheels
     from bns.hardware.dynamixel import joints
-    from bns.hardware.odometry import Wheels
     from bns.hardware.tracking.camera import Camera
     from bns.storage import reading
     from bns.worlds.static_snn.nets import StaticNets

@@ -112,6 +112,7 @@ def write(directory: Path, parts: Sequence[Part]) -> None:
     options: dict[str, Any] = {"compression": "zstd", "write_page_checksum": True}
 
     def write(path: Path) -> None:
+        """Write all batches into a file."""
         with pq.ParquetWriter(path, schema, **options) as writer:
             for table in tables:
                 writer.write_table(

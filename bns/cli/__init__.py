@@ -14,6 +14,8 @@ VERBS = {
     "campaign": ("campaign", "many configurations: run them, tables, pictures"),
     "claims": ("claims", "the dissertation's claims: list, run, judge"),
     "presets": ("lists", "list the presets"),
+    "learners": ("lists", "list the learners"),
+    "tasks": ("lists", "list the tasks"),
     "worlds": ("lists", "list the worlds"),
     "robots": ("lists", "list the robot models"),
     "models": ("models", "make, check, open or draw a robot model"),
@@ -30,7 +32,16 @@ VERBS = {
 GROUPS = {
     "Learn": ("run", "report", "compare", "view"),
     "Many runs": ("campaign", "claims"),
-    "What there is": ("presets", "worlds", "robots", "effects", "models", "examples"),
+    "What there is": (
+        "presets",
+        "learners",
+        "tasks",
+        "worlds",
+        "robots",
+        "effects",
+        "models",
+        "examples",
+    ),
     "Real robots": ("gap", "hardware"),
     "This machine": ("doctor", "completion", "schema"),
 }

@@ -1,7 +1,7 @@
 """`bns run`: train a preset, a TOML file, or go on with a run directory."""
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -145,9 +145,9 @@ def source(text: str) -> tuple[RunConfig, str]:
 def execute(given: Arguments) -> int:
     """Train, draw, and say what happened."""
     if given.config.world.name == "hardware":
-        from bns.cli import hardware_run
+        from bns.cli.hardware import run
 
-        return hardware_run.execute(given)
+        return run.execute(given)
     from bns.storage.lock import Lock
 
     out = Path(given.out)
@@ -184,7 +184,7 @@ def _locked(given: Arguments, out: Path, lock: "Lock") -> int:
 
 
 @contextmanager
-def until_interrupted() -> Iterator[object]:
+def until_interrupted() -> Iterator[Callable[[], bool]]:
     """Gives a question: was Ctrl-C pressed? Pressed twice, it stops at once."""
     pressed: list[int] = []
 

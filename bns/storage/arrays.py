@@ -8,6 +8,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -42,7 +43,8 @@ def write_npz(
     if objects:
         raise TypeError(f"arrays of Python objects cannot be stored: {objects}")
     buffer = io.BytesIO()
-    (np.savez_compressed if compressed else np.savez)(buffer, **arrays)
+    save: Any = np.savez_compressed if compressed else np.savez
+    save(buffer, **arrays)
     files.write_bytes(path, buffer.getvalue())
 
 

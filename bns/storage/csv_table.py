@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -51,7 +52,7 @@ def read(
     return {name: _column(table.column(name), name, path) for name in chosen}
 
 
-def _column(column, name: str, path: Path | str) -> np.ndarray:
+def _column(column: Any, name: str, path: Path | str) -> np.ndarray:
     from pyarrow import types
 
     kind = column.type

@@ -154,10 +154,15 @@ def test_a_setting_is_read_as_it_is_written(monkeypatch, words, values):
     assert given[0].preset == "demo"
 
 
-@pytest.mark.parametrize("verb", ["presets", "worlds", "robots", "effects"])
+LISTS = ["presets", "learners", "tasks", "worlds", "robots", "effects"]
+
+
+@pytest.mark.parametrize("verb", LISTS)
 def test_lists_name_what_exists(capsys, verb):
     known = {
         "presets": "khepera-simple",
+        "learners": "cma",
+        "tasks": "infinity",
         "worlds": "static-snn",
         "robots": "khepera3",
         "effects": "wheel_gain",
