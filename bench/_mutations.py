@@ -225,11 +225,21 @@ def columns(data: bytes, rng: Rng) -> bytes:
     elif way == 1:
         table = table.append_column(name, column)
     elif way == 2:
-        table = table.set_column(at, name, column.cast("string"))
+        table = table.set_column(at, name, pa.array(map(str, column.to_pylist())))
     elif way == 3:
         table = table.slice(0, max(0, table.num_rows - 1))
     elif way == 4:
         table = table.set_column(at, name, pa.nulls(table.num_rows, column.type))
+    elif table.num_rows and pa.types.is_nested(column.type):
+        rows = column.to_pylist()
+        row = rows[int(rng.integers(len(rows)))]
+        if row:
+            row[int(rng.integers(len(row)))] = [np.nan, 1e308, None, 1e30][
+                int(rng.integers(4))
+            ]
+        if way == 6 and row is not None:
+            row.append(1.0)
+        table = table.set_column(at, name, pa.array(rows, column.type))
     elif table.num_rows and str(column.type) != "string":
         values = column.to_numpy().copy()
         odd = {5: np.nan, 6: 1e308}[way] if values.dtype.kind == "f" else -5

@@ -65,6 +65,20 @@ def make(home: Path) -> None:
     _robots(home)
     _logs(home)
     _recordings(home)
+    _tables(home)
+
+
+def _tables(home: Path) -> None:
+    from bench import _foreign_logs as logs
+
+    logs.pace(home / "pace.pt")
+    logs.sage(home / "sage")
+    events = "timestamp,event\n1000000000.0,MOTION_START\n"
+    (home / "sage" / "event.csv").write_text(events)
+    logs.lerobot(home / "lerobot")
+    logs.mcap(home / "ros2.mcap")
+    with gzip.open(home / "own.csv.gz", "wb") as out:
+        out.write((home / "own.csv").read_bytes())
 
 
 def _parts(home: Path) -> None:
@@ -201,7 +215,7 @@ def _recordings(home: Path) -> None:
 
 def readers() -> list[Reader]:
     """All of them."""
-    return [*_stored(), *_made(), *_given(), *_recorded()]
+    return [*_stored(), *_made(), *_given(), *_recorded(), *_tabled()]
 
 
 def _stored() -> Iterator[Reader]:
@@ -375,6 +389,27 @@ def _recorded() -> Iterator[Reader]:
         yield Reader(name, file, read, sane)
 
 
+def _tabled() -> Iterator[Reader]:
+    from bns.gap.describe import describe
+    from bns.gap.importers import tables
+
+    data = "lerobot/data/chunk-000/episode_000000.parquet"
+    for name, file, log in (
+        ("PACE log", "pace.pt", "pace.pt"),
+        ("SAGE commands", "sage/control.csv", "sage"),
+        ("SAGE states", "sage/state_motor.csv", "sage"),
+        ("SAGE joints", "sage/joint_list.txt", "sage"),
+        ("SAGE events", "sage/event.csv", "sage"),
+        ("LeRobot info", "lerobot/meta/info.json", "lerobot"),
+        ("LeRobot frames", data, "lerobot"),
+        ("ROS 2 log", "ros2.mcap", "ros2.mcap"),
+        ("packed CSV", "own.csv.gz", "own.csv.gz"),
+    ):
+        yield Reader(name, file, lambda h, log=log: tables.read(h / log), table)
+    arm = ROOT / "examples" / "arm" / "arm.xml"
+    yield Reader("described log", "own.csv", lambda h: describe(arm, h / "own.csv"))
+
+
 ROOT_MAP = {
     "time": "t", "x": "px", "y": "py", "yaw": "heading", "left_speed": "vl",
     "right_speed": "vr",
@@ -454,6 +489,18 @@ def trials(found: Any) -> str:
         held = np.diff(trial.times[trial.boundaries])
         if (np.abs(held - trial.commands.durations) > 1 + 0.5 * held + held).any():
             return "times unlike durations"
+    return ""
+
+
+def table(found: Any) -> str:
+    """A log of columns of numbers that can be."""
+    rows = {column.values.shape for column in found.columns}
+    if len(rows) != 1 or not min(rows) or len({*found.names}) < len(found.names):
+        return f"columns {found.names} of {rows}"
+    for column in found.columns:
+        most = 1e9 if column.role else 1e20
+        if not (np.nan_to_num(np.abs(column.values), nan=0.0) <= most).all():
+            return f"{column.name} holds {np.nanmax(np.abs(column.values))}"
     return ""
 
 
