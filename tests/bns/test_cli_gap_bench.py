@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from bns.__main__ import main
+from bns.__main__ import WRONG_INPUT, main
+from bns.storage.lock import Lock
 from bns.worlds.data import dataset
 
 ARM = str(Path(__file__).parents[2] / "examples" / "arm" / "arm.toml")
@@ -44,6 +45,19 @@ def test_effects_are_hidden_in_a_robot_of_ones_own(tmp_path):
         assert len(answer["names"]) == len(answer["sizes"]) == count
         named = zip(answer["names"], answer["aliases"], strict=True)
         assert all(name in accepted for name, accepted in named)
+
+
+def test_one_process_at_a_time_writes_what_is_said(made, tmp_path, capsys):
+    asked = [str(made / "cases"), "--said", str(tmp_path / "said.jsonl")]
+    with Lock(tmp_path):
+        assert main(["gap", "bench", "run", *asked, "--model", ARM]) == WRONG_INPUT
+    assert "is being written by another process" in capsys.readouterr().err
+    assert not (tmp_path / "said.jsonl").exists()
+    again = ["--answers", str(tmp_path / "a.json"), "--count", "1", "--model", ARM]
+    with Lock(made / "cases"):
+        words = ["gap", "bench", "make", str(made / "cases"), *again]
+        assert main(words) == WRONG_INPUT
+    assert not (tmp_path / "a.json").exists()
 
 
 def said(kind, named=()):
