@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from bench._foreign_logs import GOALS, JOINTS, SEEN, TIMES, lerobot, mcap, pace, sage
+from bench.storage.foreign_logs import (
+    GOALS,
+    JOINTS,
+    SEEN,
+    TIMES,
+    lerobot,
+    mcap,
+    pace,
+    sage,
+)
 from bns.errors import FormatError
 from bns.gap.importers import tables
 
