@@ -9,6 +9,7 @@
 hardware`, take it as `--setup FILE`. What they are told beside it goes before.
 """
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -87,24 +88,27 @@ def write(path: Path | str, setup: Setup, said: dict[str, str]) -> None:
     files.write_text(Path(path), "\n".join(lines) + "\n")
 
 
-def filled(given: Any, plain: Any) -> Any:
+def filled(given: Any, robot: str = "") -> Any:
     """Arguments of the command line, what was not given taken from `--setup`.
 
     Args:
         given: a dataclass with the attributes of `Setup` and `setup`, the file.
-        plain: the same where nothing was given.
+        robot: that it has to be of; "" = any.
 
     Raises:
-        FormatError, BnsError: as `read`.
+        FormatError: as `read`.
+        BnsError: as `read`; the file is of another robot.
     """
-    from dataclasses import replace
-
     if not given.setup:
         return given
-    held = msgspec.structs.asdict(read(given.setup))
+    found, plain = read(given.setup), Setup()
+    if robot and found.robot != robot:
+        raise BnsError(
+            f"{given.setup} is of {found.robot}, this needs {robot}: give another file."
+        )
     changed = {
         key: value
-        for key, value in held.items()
+        for key, value in msgspec.structs.asdict(found).items()
         if hasattr(given, key) and getattr(given, key) == getattr(plain, key)
     }
     return replace(given, **changed)
