@@ -191,6 +191,11 @@ def _explained(port: str, error: BaseException) -> BnsError:
 
 
 def pyserial() -> Any:
+    """The module of pyserial.
+
+    Raises:
+        MissingDependencyError: it is not installed.
+    """
     try:
         import serial
     except ImportError as error:

@@ -9,11 +9,16 @@ import inspect
 import re
 from typing import Any
 
+from bns.storage.numbers import BEYOND
+
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 Schema = dict[str, Any]
 
 TEXT: Schema = {"type": "string"}
 TRUTH: Schema = {"type": "boolean"}
+NUMBER: Schema = {"type": "number", "minimum": -BEYOND, "maximum": BEYOND}
+LEAST: Schema = {"type": "number", "minimum": 0, "maximum": BEYOND}
+POSITIVE: Schema = {"type": "number", "exclusiveMinimum": 0, "maximum": BEYOND}
 
 
 def robot() -> Schema:
@@ -88,54 +93,16 @@ def hardware() -> Schema:
 
 def model() -> Schema:
     """Schema of the description of a model of one's own, for `bns gap --model`."""
-    from bns.gap.models.mjcf import config
-    from bns.storage.numbers import BEYOND
-
-    number = {"type": "number", "minimum": -BEYOND, "maximum": BEYOND}
-    positive = {"type": "number", "exclusiveMinimum": 0, "maximum": BEYOND}
+    bound = _object({"low": NUMBER, "high": NUMBER, "slack": NUMBER})
     names = {"anyOf": [TEXT, {"type": "array", "items": TEXT}]}
-    told = _object(
-        {
-            "actuator": TEXT | _said("of the MJCF; one without a name by its joint's"),
-            "unit": TEXT,
-            "low": number | _said("smallest command"),
-            "high": number | _said("largest command"),
-            "kp": positive | _said("gain of a position loop that the MJCF lacks"),
-            "kd": {"type": "number", "minimum": 0} | _said("its damping"),
-            "torque": {"type": "number", "minimum": 0} | _said("its largest torque"),
-        },
-        ["actuator", "unit", "low", "high"],
-    )
-    parts = {name: TEXT | _said(f"name of the {name}") for name in config.QUANTITIES}
-    parts["speed"] = TEXT | _said("name of the joint whose speed it is")
-    seen = _object(
-        {
-            **parts,
-            "axis": {"enum": list(config.AXES)} | _said("of a site or body"),
-            "unit": TEXT,
-            "noise": positive | _said("standard deviation of its measurement"),
-            "scatter": {"type": "number", "minimum": 0}
-            | _said("of what the robot scatters itself, per square root of a second"),
-        },
-        ["unit", "noise"],
-    ) | {"oneOf": [{"required": [name]} for name in config.QUANTITIES]}
-    start = {
-        "keyframe": TEXT | _said("pose at the start of each trial; else the model's"),
-        "recorded": TRUTH | _said("joints start where they were recorded"),
-        "settle": {"type": "number", "minimum": 0, "maximum": 60}
-        | _said("how long it stands at rest before a trial [s]"),
-        "cut": {"type": "number", "minimum": 0}
-        | _said("length of pieces of long recordings [s]; needs recorded"),
-    }
-    bound = _object({"low": number, "high": number, "slack": number})
     top = {
         "name": TEXT | _said("of the robot; recordings carry it"),
         "model": TEXT | _said("its MJCF file, from here"),
         "window": {"type": "number", "minimum": 1e-3, "maximum": 60}
         | _said("between two samples that are compared [s]"),
-        "commands": _named(told, "what the robot is told, by channel"),
-        "observed": _named(seen, "what is seen of it, by channel"),
-        "start": _object(start),
+        "commands": _named(_commanded(), "what the robot is told, by channel"),
+        "observed": _named(_observed(), "what is seen of it, by channel"),
+        "start": _start(),
         "effects": _named(names, "parts by effect; without this all that make sense"),
         "bounds": _named(bound, "by effect"),
         "log": _named(_source(), "columns of the log, by channel"),
@@ -143,6 +110,51 @@ def model() -> Schema:
     needed = ["name", "model", "commands", "observed"]
     title = "A robot of one's own for bns gap"
     return {"$schema": DIALECT, "title": title, **_object(top, needed)}
+
+
+def _commanded() -> Schema:
+    return _object(
+        {
+            "actuator": TEXT | _said("of the MJCF; one without a name by its joint's"),
+            "unit": TEXT,
+            "low": NUMBER | _said("smallest command"),
+            "high": NUMBER | _said("largest command"),
+            "kp": POSITIVE | _said("gain of a position loop that the MJCF lacks"),
+            "kd": LEAST | _said("its damping"),
+            "torque": LEAST | _said("its largest torque"),
+        },
+        ["actuator", "unit", "low", "high"],
+    )
+
+
+def _observed() -> Schema:
+    from bns.gap.models.mjcf import config
+
+    parts = {name: TEXT | _said(f"name of the {name}") for name in config.QUANTITIES}
+    parts["speed"] = TEXT | _said("name of the joint whose speed it is")
+    scatter = "of what the robot scatters itself, per square root of a second"
+    known = {
+        **parts,
+        "axis": {"enum": list(config.AXES)} | _said("of a site or body"),
+        "unit": TEXT,
+        "noise": POSITIVE | _said("standard deviation of its measurement"),
+        "scatter": LEAST | _said(scatter),
+    }
+    one = {"oneOf": [{"required": [name]} for name in config.QUANTITIES]}
+    return _object(known, ["unit", "noise"]) | one
+
+
+def _start() -> Schema:
+    settle = "how long it stands at rest before a trial [s]"
+    cut = "length of pieces of long recordings [s]; needs recorded"
+    return _object(
+        {
+            "keyframe": TEXT | _said("pose at the start of a trial; else the model's"),
+            "recorded": TRUTH | _said("joints start where they were recorded"),
+            "settle": LEAST | {"maximum": 60} | _said(settle),
+            "cut": LEAST | _said(cut),
+        }
+    )
 
 
 def columns() -> Schema:

@@ -121,7 +121,11 @@ def _questions() -> Iterator[Question]:
         _no_camera,
         lambda found: "0" if found["port"].startswith("/dev/") else "emulated",
     )
-    real = lambda found: found["camera"] != "emulated"  # noqa: E731
+    yield from _calibrated()
+
+
+def _calibrated() -> Iterator[Question]:
+    """What is asked about files that a calibration made."""
     yield Question(
         "calibration",
         "Its calibration?",
@@ -129,7 +133,7 @@ def _questions() -> Iterator[Question]:
         "makes. Without it poses cannot be told; none = not made yet.",
         _no_file,
         lambda found: "camera.json" if Path("camera.json").is_file() else "",
-        real,
+        lambda found: found["camera"] != "emulated",
     )
     for robot, key, what in (
         ("khepera3", "wheels", "wheels (diameters and axle)"),
@@ -243,6 +247,11 @@ def rehearse(given: Any) -> int:
 @contextmanager
 def emulated(robot: str, effects: tuple[str, ...], seed: int) -> Iterator[str]:
     """An emulated robot in a process of its own; gives its port.
+
+    Args:
+        robot: which one.
+        effects: what is wrong with its body.
+        seed: of what is random.
 
     Raises:
         BnsError: it did not start.
