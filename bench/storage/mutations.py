@@ -210,15 +210,16 @@ def columns(data: bytes, rng: Rng) -> bytes:
 
     try:
         table = pq.read_table(pa.BufferReader(data))
+        names = table.column_names  # fails where they are not UTF-8
     except Exception:  # it is damaged already
         return data
     metadata = dict(table.schema.metadata or {})
     if rng.random() < 0.9:
         metadata.pop(b"sha256", None)
-    if not table.num_columns or len(set(table.column_names)) < table.num_columns:
+    if not table.num_columns or len(set(names)) < table.num_columns:
         return data
     at = int(rng.integers(table.num_columns))
-    name, column = table.column_names[at], table.column(at)
+    name, column = names[at], table.column(at)
     way = int(rng.integers(7))
     if way == 0:
         table = table.remove_column(at)
