@@ -84,7 +84,7 @@ class Compact:
             raise parquet.unreadable(error, name) from error
         said = head.get(DIGEST)
         if said is None:
-            seal.unsealed(name)
+            seal.unsealed(self.path)
         elif said != parquet.digest(table):
             raise seal.damaged(name)
         return from_table(head, table, name)

@@ -11,6 +11,7 @@ VERBS = {
     "report": ("report", "write one self-contained HTML report on runs"),
     "compare": ("compare", "medians, intervals, p values and effect sizes of runs"),
     "view": ("view", "open a run's recording, or make a picture of it"),
+    "export": ("export", "write trials as a LeRobotDataset or a Parquet table"),
     "campaign": ("campaign", "many configurations: run them, tables, pictures"),
     "claims": ("claims", "the dissertation's claims: list, run, judge"),
     "presets": ("lists", "list the presets"),
@@ -30,7 +31,7 @@ VERBS = {
 """verb -> module of this package, and what it does in one line"""
 
 GROUPS = {
-    "Learn": ("run", "report", "compare", "view"),
+    "Learn": ("run", "report", "compare", "view", "export"),
     "Many runs": ("campaign", "claims"),
     "What there is": (
         "presets",

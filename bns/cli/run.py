@@ -40,6 +40,9 @@ class Arguments:
     """save: write recording.rrd; live: stream to a viewer as well; off: neither"""
     report: bool = True
     """write report.html at the end"""
+    setup: Rare[str] = ""
+    """file that `bns hardware setup` wrote, for --world hardware; what is given here
+    goes before it"""
     port: Rare[str] = ""
     """device of a real or emulated robot, for --world hardware"""
     camera: Rare[str] = "emulated"

@@ -17,7 +17,7 @@ class TaskConfig:
 
     name: str = "simple"
     """simple: A,B,C,D,A; infinity: A,B,E,D,C,E,A; light: drive to a lamp; walk: get
-    far on legs; a file in bns/tasks adds one. What follows is of navigation"""
+    far on legs; other packages add theirs. What follows is of navigation"""
     corner_x: float = 0.30
     """objectives A-D at (+-corner_x, +-corner_y) from the centre E [m] (silent)"""
     corner_y: float = 0.30

@@ -16,13 +16,14 @@ from bns.errors import FormatError
 from bns.storage import files, reading
 
 KINDS = "biufUS"  # of NumPy's types: truth values, numbers, text
-_DAMAGE = (
+DAMAGE = (
     *reading.UNREADABLE,
     zipfile.BadZipFile,
     zlib.error,
     lzma.LZMAError,
     tokenize.TokenError,
 )
+"""what archives and the arrays in them raise where they are damaged"""
 
 
 def write_npz(
@@ -76,7 +77,7 @@ def read_npz(path: Path | str, *, most: int = reading.DATA) -> dict[str, np.ndar
                 }
         except FormatError:
             raise
-        except _DAMAGE as error:
+        except DAMAGE as error:
             raise FormatError(f"{path} cannot be read as NPZ: {error}.") from error
 
 

@@ -1,4 +1,4 @@
-"""`bns hardware`: rehearse with an emulated robot, check, calibrate, record."""
+"""`bns hardware`: rehearse with an emulated robot, set up, check, calibrate, record."""
 
 import math
 from collections.abc import Callable
@@ -12,14 +12,17 @@ from bns.errors import BnsError
 if TYPE_CHECKING:
     from bns.worlds.light.field import Lamp
 
-MANUAL = """usage: bns hardware {emulate,check,calibrate,record} [...]
+MANUAL = """usage: bns hardware {rehearse,setup,find-port,...} [...]
 
+  rehearse   all of it on a virtual robot: emulate, check, record, diagnose
+  setup      asks for port, camera and calibrations, and writes them to a file
+  find-port  which serial port is the robot's
   emulate    a virtual robot on a serial port, with a camera above it
   check      battery, firmware, sensors, link, camera, tag; moves with --move
   calibrate  camera (lens, place, height of the tag), wheels, servo zeros
   record     drive safe commands and write a dataset for `bns gap`
 
-`bns run PRESET --world hardware --port DEVICE --camera N` learns on the robot.
+`bns run PRESET --world hardware --setup hardware.toml` learns on the robot.
 `bns hardware VERB --help` is the manual of a verb."""
 
 Robot = Literal["khepera3", "phantomx"]
@@ -70,9 +73,53 @@ class Emulate:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Rehearse:
+    """All of it on a virtual robot with a fault: emulate, check, record, diagnose.
+    Takes some minutes; the recording and the diagnosis stay in --out.
+    """
+
+    robot: Positional[Robot] = "khepera3"
+    """which one"""
+    effects: tuple[str, ...] = ()
+    """what is wrong with its body, see `bns effects`; default: a weak wheel or servo"""
+    sound: bool = False
+    """nothing is wrong with it"""
+    trials: int = 6
+    """trials of the recording"""
+    commands: int = 8
+    """commands of a trial"""
+    out: str = "rehearsal"
+    """directory to write"""
+    seed: int = 0
+    """of what is random"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup:
+    """Ask how the robot is reached, say what each answer means, and write the file
+    that --setup takes. Answers may come from a pipe, a line each.
+    """
+
+    out: str = "hardware.toml"
+    """file to write"""
+    force: bool = False
+    """replace it if it is there"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FindPort:
+    """List the serial ports, and find the robot's: pull its cable out when asked."""
+
+    ask: bool = False
+    """ask each port who it is instead; other devices get some bytes, too"""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Connection:
     """How to reach the robot and the camera."""
 
+    setup: str = ""
+    """file that `bns hardware setup` wrote; what is given here goes before it"""
     port: str = ""
     """the robot's device, e.g. /dev/rfcomm0"""
     robot: Robot = "khepera3"
@@ -136,12 +183,21 @@ class Record(Connection):
 def main(verb: str, argv: list[str]) -> int:
     """Run a verb of the hardware mode; gives the exit code."""
     from bns.cli.hardware import session
+    from bns.cli.hardware import setup as hardware_setup
+
+    def connected(act: Callable[[Any], int]) -> Callable[[Any], int]:
+        from bns.hardware.setup_file import filled
+
+        return lambda given: act(filled(given))
 
     does: dict[str, tuple[type, Callable[[Any], int]]] = {
+        "rehearse": (Rehearse, hardware_setup.rehearse),
+        "setup": (Setup, hardware_setup.setup),
+        "find-port": (FindPort, hardware_setup.find_port),
         "emulate": (Emulate, _emulate),
-        "check": (Check, session.check),
-        "calibrate": (Calibrate, session.calibrate),
-        "record": (Record, session.record),
+        "check": (Check, connected(session.check)),
+        "calibrate": (Calibrate, connected(session.calibrate)),
+        "record": (Record, connected(session.record)),
     }
     return dispatch(verb, argv, does, MANUAL)
 

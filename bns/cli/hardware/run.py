@@ -19,8 +19,10 @@ def execute(given: Any) -> int:
     """
     from bns.hardware.line import check_port
     from bns.hardware.safety.priority import urgent
+    from bns.hardware.setup_file import filled
     from bns.storage.lock import Lock
 
+    given = filled(given, given.config.world.robot)
     check_port(given.port)
     urgent()
     with Lock(given.out) as lock:

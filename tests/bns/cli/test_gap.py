@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bns.__main__ import main
+from bns.__main__ import WRONG_INPUT, main
+from bns.storage.lock import Lock
 from bns.worlds import registry
 from bns.worlds.data import dataset
 from bns.worlds.trial import Commands
@@ -85,6 +86,19 @@ def test_cases_hold_no_answers(made):
     (hidden,) = known["case_001000"]["effects"]
     listed = Path(ARM).read_text().partition("[effects]")[2]
     assert hidden.partition(":")[0] not in listed
+
+
+def test_one_process_at_a_time_writes_what_is_said(made, tmp_path, capsys):
+    asked = [str(made / "cases"), "--said", str(tmp_path / "said.jsonl")]
+    with Lock(tmp_path):
+        assert main(["gap", "bench", "run", *asked, "--model", ARM]) == WRONG_INPUT
+    assert "is being written by another process" in capsys.readouterr().err
+    assert not (tmp_path / "said.jsonl").exists()
+    again = ["--answers", str(tmp_path / "a.json"), "--count", "1", "--model", ARM]
+    with Lock(made / "cases"):
+        words = ["gap", "bench", "make", str(made / "cases"), *again]
+        assert main(words) == WRONG_INPUT
+    assert not (tmp_path / "a.json").exists()
 
 
 def test_effects_are_hidden_in_a_robot_of_ones_own(tmp_path):
