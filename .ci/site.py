@@ -43,6 +43,7 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
     source = ROOT / BORROWED.get(name, f"docs/{name}")
 
     def led(found: re.Match[str]) -> str:
+        """A link of the page, as the site has it."""
         target = (source.parent / found[2]).resolve()
         if not target.is_relative_to(ROOT) or not target.exists():
             return found[0]

@@ -8,6 +8,7 @@ import argparse
 from dataclasses import replace
 
 from bns import presets, stats, train
+from bns.worlds.trial import Trial
 
 parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
 parser.add_argument("--quick", action="store_true", help="three trials")
@@ -26,7 +27,7 @@ if quick:
     )
 
 
-def tell(trial, step, trials):
+def tell(trial: int, step: object, trials: list[Trial]) -> None:
     """Called after every trial, with what each replicate did in the world."""
     lengths = [len(done.commands) for done in trials]
     print(f"trial {trial + 1:3d}: lists of {min(lengths)} to {max(lengths)} commands")

@@ -12,29 +12,28 @@ import numpy as np
 
 from bns.worlds import registry
 from bns.worlds.damage import Damage, Event
-from bns.worlds.effects.base import CommandEffect, Parameter
+from bns.worlds.effects.base import CommandEffect, ControlSignal, strength
 from bns.worlds.trial import Commands
 
 
 class LooseWheel(CommandEffect):
-    """The left wheel slips on its axle, more in the first moment of every command."""
+    """The left wheel slips at the start of every command."""
 
     name = "loose_wheel"
-    doc = "the left wheel slips at the start of every command"
     source = "assumed"
     parameters = (
-        Parameter(
+        strength(
             "slip",
-            unit="s",
-            nominal=0.0,
-            low=0.0,
-            high=2.0,
-            doc="time constant of the slip; bounds assumed",
+            "s",
+            (0.0, 2.0),
+            "time constant of the slip; bounds assumed",
             example=0.3,
         ),
     )
 
-    def apply(self, signal, active, rng):
+    def apply(
+        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
         """Let the speed of the left wheel come up slowly in each command."""
         values = signal.values.copy()
         if self["slip"] == 0.0:  # nominal: change nothing, bit for bit

@@ -18,7 +18,10 @@ from bns.gap.models.mjcf.model import OwnModel
 
 parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
 parser.add_argument("--quick", action="store_true", help="one hidden effect only")
-hidden = ("joint_damping:part=elbow,added=0.06", "command_delay:part=all,delay=0.04")
+hidden: tuple[str, ...] = (
+    "joint_damping:part=elbow,added=0.06",
+    "command_delay:part=all,delay=0.04",
+)
 if parser.parse_args().quick:
     hidden = hidden[:1]
 

@@ -114,6 +114,9 @@ def _clock(work: Work) -> None:
         unit if unit in FACTORS["s"] else guesses.time_unit(work.table[clock][longest])
     )
     work.times = work.table[clock] * FACTORS["s"][unit]
+    if not np.isfinite(work.times).all():
+        row = int(np.argmin(np.isfinite(work.times)))
+        raise FormatError(f"{work.log}: the time in {clock!r} is missing in row {row}.")
     steps = np.diff(work.times[longest])
     rate = 1 / max(float(np.median(steps[steps > 0])), 1e-9) if (steps > 0).any() else 0
     if rate <= 0 or (steps < 0).any():

@@ -5,8 +5,8 @@ from statistics import median
 
 import numpy as np
 
-from bns.hardware import homing
-from bns.hardware.motion import Point
+from bns.hardware.driving import homing
+from bns.hardware.driving.motion import Point
 from bns.hardware.rig import Rig, battery
 
 ENOUGH = 12.0  # pictures a second, so that one that is late stops no robot

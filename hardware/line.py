@@ -8,7 +8,7 @@ from typing import Any, Protocol
 from bns.errors import BnsError, MissingDependencyError
 from bns.hardware.errors import LinkError
 from bns.hardware.openers import Openers
-from bns.hardware.watchdog import LARGEST, send
+from bns.hardware.safety.watchdog import LARGEST, send
 
 INSTALL = 'pip install "bns-testbed[hardware]"'
 
@@ -67,7 +67,7 @@ class SerialLine:
 
     def __init__(self, port: str, baud: int = 115200):
         self.port, self.baud = port, baud
-        serial = _pyserial()
+        serial = pyserial()
         check_port(port)
         try:
             self._serial = serial.Serial(
@@ -190,7 +190,12 @@ def _explained(port: str, error: BaseException) -> BnsError:
     return BnsError(f"Port {port} cannot be opened: {error}.")
 
 
-def _pyserial() -> Any:
+def pyserial() -> Any:
+    """The module of pyserial.
+
+    Raises:
+        MissingDependencyError: it is not installed.
+    """
     try:
         import serial
     except ImportError as error:

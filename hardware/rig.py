@@ -5,17 +5,17 @@ from pathlib import Path
 
 from bns.errors import BnsError
 from bns.hardware.clock import Clock, RealClock
+from bns.hardware.driving.motion import Mover
+from bns.hardware.driving.odometry import Wheels
+from bns.hardware.driving.wheels import Following
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera import protocol
 from bns.hardware.khepera.driver import Khepera3
-from bns.hardware.limits import Limits, Operator
 from bns.hardware.line import Line, SerialLine, check_port
-from bns.hardware.motion import Mover
-from bns.hardware.odometry import Wheels
-from bns.hardware.priority import urgent
+from bns.hardware.safety.limits import Limits, Operator
+from bns.hardware.safety.priority import urgent
+from bns.hardware.safety.watchdog_client import WatchdogClient
 from bns.hardware.tracking.eyes import Eyes
-from bns.hardware.watchdog_client import WatchdogClient
-from bns.hardware.wheels import Following
 
 EMULATED = "emulated"
 SIZE = (1280, 720)  # px of the emulated camera

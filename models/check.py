@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bns.errors import BnsError
-from bns.models import drive, edits, legs, light_sites, numbers, servo_numbers
+from bns.models import edits, legs, light_sites, numbers, servo_numbers
 from bns.models.robot_model import RobotModel
 
 KINDS = ("wheeled", "legged", "servo")
@@ -175,7 +175,7 @@ def _numbers(robot: RobotModel, model: Any) -> list[str]:
 def _rests(robot: RobotModel, model: Any) -> list[str]:
     home = model.key("home")
     still = np.tile(home.ctrl, (round(1.0 / model.opt.timestep), 1))
-    seen, _ = drive.controlled(model, still)
+    seen, _ = controlled(model, still)
     way = float(np.abs(seen[-1, :3] - home.qpos[:3]).max())
     turn = float(np.abs(seen[-1, 3:] - home.qpos[3:]).max(initial=0))
     faults = []
@@ -187,7 +187,7 @@ def _rests(robot: RobotModel, model: Any) -> list[str]:
 
 
 def _drives(robot: RobotModel, model: Any) -> list[str]:
-    seen, data = drive.controlled(model, drive.smooth(model, 2.0, seed=1))
+    seen, data = controlled(model, smooth(model, 2.0, seed=1))
     if not np.isfinite(seen).all():
         return ["random commands make it diverge"]
     faults = []
@@ -199,22 +199,22 @@ def _drives(robot: RobotModel, model: Any) -> list[str]:
 
 
 def _repeats(robot: RobotModel, model: Any) -> list[str]:
-    controls = drive.smooth(model, 0.5, seed=2)
+    controls = smooth(model, 0.5, seed=2)
     again = edits.load(robot, scene=True, visuals=True, options={}).compile()
-    first, _ = drive.controlled(model, controls)
-    second, _ = drive.controlled(again, controls)
+    first, _ = controlled(model, controls)
+    second, _ = controlled(again, controls)
     same = first.tobytes() == second.tobytes()
     return [] if same else ["the same commands gave another motion"]
 
 
 def _bare(robot: RobotModel, model: Any) -> list[str]:
-    controls = drive.smooth(model, 0.5, seed=3)
+    controls = smooth(model, 0.5, seed=3)
     try:
         bare = edits.load(robot, scene=True, visuals=False, options={}).compile()
     except ValueError as error:
         return [f"without what only shows it does not compile: {error}"]
-    shown, _ = drive.controlled(model, controls)
-    hidden, _ = drive.controlled(bare, controls)
+    shown, _ = controlled(model, controls)
+    hidden, _ = controlled(bare, controls)
     same = shown.tobytes() == hidden.tobytes()
     return [] if same else ["geoms without contact have mass: give them mass 0"]
 
@@ -226,10 +226,10 @@ def _touches(robot: RobotModel, model: Any) -> list[str]:
         return ["a servo on a stand touches the floor"] if met else []
     pairs = zip(model.pair_geom1, model.pair_geom2, strict=True)
     own = {frozenset(pair) for pair in pairs}
-    _, data = drive.controlled(model, model.key("home").ctrl[None])
+    _, data = controlled(model, model.key("home").ctrl[None])
     if not data.ncon:
         return ["it does not touch the floor"]
-    _, data = drive.controlled(model, drive.smooth(model, 0.5, seed=4))
+    _, data = controlled(model, smooth(model, 0.5, seed=4))
     return [
         f"{model.geom(a).name} touches {model.geom(b).name}"
         for a, b in (contact.geom for contact in data.contact)
@@ -242,10 +242,10 @@ def _speeds(robot: RobotModel, model: Any) -> list[str]:
     if robot.kind != "wheeled":
         return []
     faults = []
-    told, found = drive.straight(robot, model)
+    told, found = straight(robot, model)
     if not abs(found / told - 1) <= SPEED_TOLERANCE:
         faults.append(f"told {told:.3f} m/s straight on, it goes {found:.3f} m/s")
-    told, found = drive.spin(robot, model)
+    told, found = spin(robot, model)
     if not abs(found / told - 1) <= SPEED_TOLERANCE:
         faults.append(
             f"told to spin by {told:.3f} rad/s (left), it spins by {found:.3f} rad/s"
@@ -268,3 +268,91 @@ POINTS: dict[str, Callable[[RobotModel, Any], list[str]]] = {
     "a wheeled robot has the speed and the spin that it is told": _speeds,
 }
 _NEEDED = (_names, _base, _controls)
+
+
+SHARE = 0.4
+"""of the largest command at which speed and spin are looked at; assumed"""
+RAMP, STEADY = 2.0, 1.0
+"""s; until the motion is taken as steady, and how long it is looked at; assumed"""
+
+
+def smooth(model: Any, seconds: float, seed: int) -> np.ndarray:
+    """Random controls over the whole range without jumps, shape ``(S, nu)``.
+
+    Args:
+        model: a `mujoco.MjModel`; its control ranges and time step count.
+        seconds: duration.
+        seed: of rates and phases.
+    """
+    rng = np.random.default_rng(seed)
+    steps = round(seconds / model.opt.timestep)
+    times = np.arange(steps) * model.opt.timestep
+    rates, phases = rng.uniform(0.2, 2.0, model.nu), rng.uniform(0, 2, model.nu)
+    low, high = model.actuator_ctrlrange.T
+    wave = np.sin(2 * np.pi * (np.outer(times, rates) + phases))
+    return (low + high) / 2 + wave * (high - low) / 2
+
+
+def controlled(model: Any, controls: np.ndarray) -> tuple[np.ndarray, Any]:
+    """Drive a compiled model from its `home`.
+
+    Args:
+        model: a `mujoco.MjModel`.
+        controls: one row a physics step, shape ``(S, nu)``.
+
+    Returns:
+        Configurations after each step, shape ``(S, nq)``, and the `mujoco.MjData`.
+    """
+    import mujoco
+
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    seen = np.empty((len(controls), model.nq))
+    for step, control in enumerate(controls):
+        data.ctrl[:] = control
+        mujoco.mj_step(model, data)
+        seen[step] = data.qpos
+    return seen, data
+
+
+def straight(robot: RobotModel, model: Any) -> tuple[float, float]:
+    """Speed forwards that a wheeled robot is told, and the one it keeps [m/s]."""
+    told = SHARE * float(robot.limits.min())
+    places, yaws, seconds = _steady(robot, model, left=told, right=told)
+    ahead = (places[-1] - places[0]) @ (np.cos(yaws[0]), np.sin(yaws[0]))
+    return told, float(ahead) / seconds
+
+
+def spin(robot: RobotModel, model: Any) -> tuple[float, float]:
+    """Rate at which it is told to spin, left positive, and the one it keeps [rad/s]."""
+    speed = SHARE * float(robot.limits.min())
+    _, yaws, seconds = _steady(robot, model, left=-speed, right=speed)
+    left, right = (_place(model, robot.wheels[side].body) for side in ("left", "right"))
+    axle = float(np.linalg.norm(left - right))
+    return 2 * speed / axle, float(yaws[-1] - yaws[0]) / seconds
+
+
+def _steady(
+    robot: RobotModel, model: Any, **told: float
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Places [m] and yaws [rad] over the steady part, and how long that lasts [s]."""
+    ramp, steady = (round(time / model.opt.timestep) for time in (RAMP, STEADY))
+    controls = np.zeros((ramp + steady, model.nu))
+    for side, speed in told.items():
+        at = model.actuator(robot.wheels[side].actuator).id
+        controls[:, at] = speed * robot.ctrl_per_command
+    seen, _ = controlled(model, controls)
+    at = int(model.joint(robot.base_joint).qposadr[0])
+    w, i, j, k = seen[ramp - 1 :, at + 3 : at + 7].T
+    yaws = np.unwrap(np.arctan2(2 * (w * k + i * j), 1 - 2 * (j * j + k * k)))
+    return seen[ramp - 1 :, at : at + 2], yaws, steady * model.opt.timestep
+
+
+def _place(model: Any, body: str) -> np.ndarray:
+    """Where a body is at `home` [m]."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    mujoco.mj_kinematics(model, data)
+    return data.body(body).xpos.copy()

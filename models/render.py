@@ -137,6 +137,7 @@ def film(
     with _opengl(model, size) as opengl:
 
         def draw(qpos: np.ndarray, *, discs: Any = (), trail: Any = None) -> np.ndarray:
+            """The picture of a configuration, ``(H, W, 3)`` uint8."""
             data.qpos[:] = qpos
             mujoco.mj_forward(model, data)
             every = mujoco.mjtCatBit.mjCAT_ALL

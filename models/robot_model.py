@@ -15,8 +15,8 @@ from bns.storage.numbers import Finite, Name, Positive
 FACTS = "robot.toml"
 
 
-class ChannelName(NamedTuple):
-    """A commanded quantity and its unit."""
+class Channel(NamedTuple):
+    """One measured or commanded quantity."""
 
     name: str
     unit: str
@@ -153,9 +153,9 @@ class RobotModel:
     servo: str = ""
 
     @property
-    def channels(self) -> tuple[ChannelName, ...]:
+    def channels(self) -> tuple[Channel, ...]:
         """Names and units of the commands."""
-        return tuple(ChannelName(c.name, c.unit) for c in self.commands)
+        return tuple(Channel(c.name, c.unit) for c in self.commands)
 
     @property
     def ranges(self) -> np.ndarray:

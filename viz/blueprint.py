@@ -1,6 +1,7 @@
 """The layout under which a recording opens."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from bns.tasks import Picture
 
@@ -28,7 +29,7 @@ def blueprint(
     follow: bool = False,
     readings: bool = False,
     charts: Sequence[tuple[str, str]] = (),
-):
+) -> Any:
     """The layout: the world on the left, learning on the right.
 
     The camera looks from the front (negative y) down on a board of the given size.
@@ -74,7 +75,7 @@ def blueprint(
     )
 
 
-def _left(rrb, world, seconds: float, seen: list):
+def _left(rrb: Any, world: Any, seconds: float, seen: list) -> Any:
     """The world, which trial is on, and what is `seen` over time besides."""
     return rrb.Vertical(
         world,
@@ -86,7 +87,7 @@ def _left(rrb, world, seconds: float, seen: list):
     )
 
 
-def _wheels(rrb, seconds: float):
+def _wheels(rrb: Any, seconds: float) -> Any:
     return rrb.TimeSeriesView(
         origin="/wheels",
         name="Wheel speeds as sent [m/s]",
@@ -95,12 +96,12 @@ def _wheels(rrb, seconds: float):
     )
 
 
-def _bars(rrb, path: str, name: str):
+def _bars(rrb: Any, path: str, name: str) -> Any:
     hidden = rrb.PlotLegend(visible=False)
     return rrb.BarChartView(origin=path, name=name, plot_legend=hidden)
 
 
-def _readings(rrb, seconds: float):
+def _readings(rrb: Any, seconds: float) -> Any:
     return rrb.TimeSeriesView(
         origin=f"/{READINGS}",
         name="Light sensors [counts]; smaller is brighter; thin: as the SNNs foresaw",
@@ -109,7 +110,7 @@ def _readings(rrb, seconds: float):
     )
 
 
-def _axis(rrb, seconds: float):
+def _axis(rrb: Any, seconds: float) -> Any:
     """The time axis over all that is shown, or None where that is not known."""
     if seconds <= 0:
         return None
@@ -120,7 +121,7 @@ def _axis(rrb, seconds: float):
     return rrb.TimeAxis(view_range=span)
 
 
-def _world(rrb, half_width: float, half_depth: float):
+def _world(rrb: Any, half_width: float, half_depth: float) -> Any:
     """The 3D view with its camera."""
     away = max(half_width, 1.4 * half_depth)
     return rrb.Spatial3DView(
@@ -136,7 +137,7 @@ def _world(rrb, half_width: float, half_depth: float):
     )
 
 
-def _curve(rrb, path: str, name: str):
+def _curve(rrb: Any, path: str, name: str) -> Any:
     return rrb.TimeSeriesView(
         origin=path, name=name, plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop)
     )

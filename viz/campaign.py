@@ -1,16 +1,23 @@
 """Pictures of a campaign: recovery curves, and how a measure depends on settings."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bns.campaign.results import Results
 from bns.campaign.settings import shortened, text
 from bns.errors import BnsError
-from bns.stats import bootstrap
+from bns.stats import resampling
 from bns.stats.compare import MEASURES, values
 from bns.storage import files
 from bns.viz import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 MOST_CURVES = 7
 """curves in one picture; more cannot be told apart"""
@@ -41,7 +48,7 @@ def write(found: Results, folder: Path, measure: str) -> list[Path]:
     return made
 
 
-def curves(found: Results):
+def curves(found: Results) -> "Figure | None":
     """Cost of the population's best over trials: median and 95 % bootstrap interval.
 
     None without runs. Of many members the first ones are drawn.
@@ -55,7 +62,7 @@ def curves(found: Results):
         figure = figure_class(figsize=(style.WIDE.width, height), layout="constrained")
         axes = figure.subplots()
         for (member, record), colour in zip(shown, style.CYCLE, strict=False):
-            middle, low, high = bootstrap.median_band(record["fitness_best"])
+            middle, low, high = resampling.median_band(record["fitness_best"])
             trial = np.arange(len(middle))
             axes.fill_between(trial, low, high, color=colour, alpha=0.18, linewidth=0)
             said = f"{member.label} ({record.replicates} runs)"
@@ -76,7 +83,7 @@ def curves(found: Results):
     return figure
 
 
-def sensitivity(found: Results, measure: str):
+def sensitivity(found: Results, measure: str) -> "Figure | None":
     """A panel per setting that is varied: the measure of every member over its values.
 
     Dots: medians of members. Line: median of all runs with that value, with its 95 %
@@ -115,12 +122,17 @@ def sensitivity(found: Results, measure: str):
     return figure
 
 
-def _varied(rows: list[tuple[dict, np.ndarray]]) -> list[str]:
+def _varied(rows: list[tuple[Mapping[str, Any], np.ndarray]]) -> list[str]:
     names = dict.fromkeys(name for varied, _ in rows for name in varied)
     return [n for n in names if len({text(v.get(n, "")) for v, _ in rows}) > 1]
 
 
-def _panel(axes, name: str, rows: list[tuple[dict, np.ndarray]], sampled: bool) -> None:
+def _panel(
+    axes: "Axes",
+    name: str,
+    rows: list[tuple[Mapping[str, Any], np.ndarray]],
+    sampled: bool,
+) -> None:
     pairs = [(varied[name], sample) for varied, sample in rows if name in varied]
     number = all(type(value) in (int, float) for value, _ in pairs)
     if number and sampled:
@@ -131,7 +143,7 @@ def _panel(axes, name: str, rows: list[tuple[dict, np.ndarray]], sampled: bool) 
             distinct.sort(key=float)
         places = [distinct.index(text(value)) for value, _ in pairs]
         ticks = [word if len(word) <= 14 else f"{word[:13]}…" for word in distinct]
-        tilt = {"rotation": 20, "ha": "right"} if max(map(len, ticks)) > 6 else {}
+        tilt: Any = {"rotation": 20, "ha": "right"} if max(map(len, ticks)) > 6 else {}
         axes.set_xticks(range(len(distinct)), ticks, **tilt)
         _line(axes, places, pairs)
     finite = [(x, np.median(s)) for x, (_, s) in zip(places, pairs, strict=True)]
@@ -140,10 +152,12 @@ def _panel(axes, name: str, rows: list[tuple[dict, np.ndarray]], sampled: bool) 
         axes.plot(*zip(*finite, strict=True), "o", color=style.BLUE, ms=4, alpha=0.6)
 
 
-def _line(axes, places: list[float], pairs: list[tuple[object, np.ndarray]]) -> None:
+def _line(
+    axes: "Axes", places: list[float], pairs: list[tuple[object, np.ndarray]]
+) -> None:
     for place in sorted(set(places)):
         at = [s for x, (_, s) in zip(places, pairs, strict=True) if x == place]
-        middle, low, high = bootstrap.median(np.concatenate(at))
+        middle, low, high = resampling.median(np.concatenate(at))
         if np.isfinite(middle):
             axes.plot([place - 0.18, place + 0.18], [middle] * 2, color=style.BLACK)
             high = min(high, 10 * middle) if np.isinf(high) else high

@@ -1,6 +1,7 @@
 """Figures over trials in a recording: bars that are always seen, curves on `trial`."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,6 +11,10 @@ from bns.tasks import registry as tasks
 from bns.viz import style
 from bns.viz.blueprint import TRIAL_TIMELINE
 from bns.viz.choices import Choice
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+
 
 MILLIMETRES = 1000.0
 DEGREES = 180.0 / np.pi
@@ -44,7 +49,12 @@ _CURVES = {
 """Entity: column, factor to the unit shown, colour, name."""
 
 
-def log_bars(stream, record: RunRecord, replicate: int, chosen: Sequence[Choice]):
+def log_bars(
+    stream: "RecordingStream",
+    record: RunRecord,
+    replicate: int,
+    chosen: Sequence[Choice],
+) -> None:
     """Log one bar a trial for fitness, diversity and SNN error, as statics.
 
     A chart over trials could not be seen while the time line counts seconds; bars
@@ -95,7 +105,9 @@ def _bar_values(
     return np.log10(np.maximum(values, 1.0)) if shown.curve.log else values
 
 
-def _groups(record: RunRecord, replicate: int, chosen: Sequence[Choice]):
+def _groups(
+    record: RunRecord, replicate: int, chosen: Sequence[Choice]
+) -> Iterator[Any]:
     """(name, colour, which trials) of each series of bars."""
     number = np.arange(record.trials)
     shown = np.isin(number, [choice.trial for choice in chosen])
@@ -108,7 +120,7 @@ def _groups(record: RunRecord, replicate: int, chosen: Sequence[Choice]):
         yield f"trial_{choice.trial}", choice.colour, number == choice.trial
 
 
-def log_curve_styles(stream) -> None:
+def log_curve_styles(stream: "RecordingStream") -> None:
     """Log names and colours of the curves that `send_curves` sends."""
     import rerun as rr
 
@@ -120,7 +132,9 @@ def log_curve_styles(stream) -> None:
         )
 
 
-def send_curves(stream, numbers: np.ndarray, columns: Mapping[str, np.ndarray]):
+def send_curves(
+    stream: "RecordingStream", numbers: np.ndarray, columns: Mapping[str, np.ndarray]
+) -> None:
     """Send figures over trials as curves on the timeline `trial`.
 
     Args:

@@ -38,7 +38,7 @@ def choose(record: RunRecord, replicate: int) -> tuple[Choice, ...]:
         found = _without_damage(record, replicate)
     else:
         found = _with_damage(record, replicate, onset)
-    kept = {}
+    kept: dict[int, Choice] = {}
     for choice in found:
         kept.setdefault(choice.trial, choice)
     return tuple(kept.values())

@@ -2,11 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bns.claims.claim import INVESTIGATIONS
 from bns.claims.report import NOT_RUN, NOT_TESTED, STALE, Judged, counts
 from bns.storage import files
 from bns.viz import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 
 COLOURS = {
     "holds": style.GREEN,
@@ -20,7 +26,7 @@ COLOURS = {
 BAR, GAP = 0.34, 0.42
 
 
-def figure(worlds: Mapping[str, Sequence[Judged]]):
+def figure(worlds: Mapping[str, Sequence[Judged]]) -> "Figure":
     """A bar for each investigation and world, a colour for each verdict.
 
     Args:
@@ -59,7 +65,7 @@ def write(worlds: Mapping[str, Sequence[Judged]], path: Path) -> None:
     files.replace(path, lambda part: figure(worlds).savefig(part, format="png"))
 
 
-def _bar(axes, place: float, found: Mapping[str, int]) -> None:
+def _bar(axes: "Axes", place: float, found: Mapping[str, int]) -> None:
     left = 0
     for name, count in found.items():
         if not count:

@@ -1,6 +1,7 @@
 """Several batches side by side: key figures, tests against the first, settings."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -86,7 +87,7 @@ def _show_p(p: float) -> str:
 
 
 def _flat(tree: Mapping, prefix: str = "") -> dict:
-    found = {}
+    found: dict[str, Any] = {}
     for key, value in tree.items():
         if isinstance(value, Mapping):
             found |= _flat(value, f"{prefix}{key}.")

@@ -129,7 +129,7 @@ def _doc(text: str) -> str:
 
 def _recovering(facts: Facts) -> str:
     if facts.recovered == 0:
-        left = facts.trials - facts.onset
+        left = facts.trials - (facts.onset or 0)
         return f"None recovered within the {left} trials that were left."
     text = f"{facts.recovered} of {facts.runs} recovered"
     if facts.to_recover and math.isfinite(facts.to_recover.value):

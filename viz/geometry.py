@@ -8,8 +8,13 @@ one gets an edge here.
 """
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+
 
 VISIBLE_GROUPS = (0, 1, 2)
 """Geom groups that MuJoCo's own viewer shows by default."""
@@ -24,7 +29,7 @@ _SHEET = 0.002
 """m; half the thickness at which a plane is drawn, below its surface"""
 
 
-def entity(model, body: int, root: str) -> str:
+def entity(model: Any, body: int, root: str) -> str:
     """Entity path of a body: ``root/name``.
 
     Args:
@@ -36,7 +41,7 @@ def entity(model, body: int, root: str) -> str:
     return f"{root}/{name.replace('/', '_')}"
 
 
-def log_static(stream, model, root: str = "world") -> None:
+def log_static(stream: "RecordingStream", model: Any, root: str = "world") -> None:
     """Log the shapes of every body; poses come with `send_poses`.
 
     Args:
@@ -50,7 +55,7 @@ def log_static(stream, model, root: str = "world") -> None:
             stream.log(entity(model, body, root), *parts, static=True)
 
 
-def body_poses(model, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def body_poses(model: Any, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """World pose of every body for every configuration.
 
     Args:
@@ -72,7 +77,7 @@ def body_poses(model, qpos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return positions, quaternions
 
 
-def planar_qpos(model, poses_world: np.ndarray) -> np.ndarray:
+def planar_qpos(model: Any, poses_world: np.ndarray) -> np.ndarray:
     """Configurations of a robot on a free joint that stands at planar poses.
 
     Height, tilt and all other joints are those of the first keyframe (or of the
@@ -95,7 +100,14 @@ def planar_qpos(model, poses_world: np.ndarray) -> np.ndarray:
     return qpos
 
 
-def send_poses(stream, model, times: Sequence, qpos, *, root: str = "world") -> None:
+def send_poses(
+    stream: "RecordingStream",
+    model: Any,
+    times: Sequence,
+    qpos: np.ndarray,
+    *,
+    root: str = "world",
+) -> None:
     """Log the poses of all moving bodies as columns.
 
     Args:
@@ -127,7 +139,7 @@ def xyzw(quaternion: np.ndarray) -> np.ndarray:
     return np.roll(quaternion, -1, axis=-1)
 
 
-def free_joint(model) -> int:
+def free_joint(model: Any) -> int:
     """Where the first free joint begins in `qpos`; 0 without one."""
     import mujoco
 
@@ -135,7 +147,7 @@ def free_joint(model) -> int:
     return int(model.jnt_qposadr[free[0]]) if len(free) else 0
 
 
-def _shapes(model, body: int) -> list:
+def _shapes(model: Any, body: int) -> list:
     """The archetypes that show one body's geoms."""
     import mujoco
 
@@ -163,7 +175,7 @@ def _shapes(model, body: int) -> list:
     return [maker(model, members) for maker, members in grouped.items()]
 
 
-def _colour(model, geom: int) -> np.ndarray:
+def _colour(model: Any, geom: int) -> np.ndarray:
     """RGBA bytes of a geom: its own, or its material's."""
     material = model.geom_matid[geom]
     rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
@@ -173,7 +185,7 @@ def _colour(model, geom: int) -> np.ndarray:
     return np.round(np.clip(rgba, 0, 1) * 255).astype(int)
 
 
-def _placed(model, geoms: list[int]) -> dict:
+def _placed(model: Any, geoms: list[int]) -> dict:
     """Pose and colour of geoms in their body, as archetype arguments."""
     import rerun as rr
 
@@ -184,7 +196,7 @@ def _placed(model, geoms: list[int]) -> dict:
     }
 
 
-def _boxes(model, geoms: list[int]):
+def _boxes(model: Any, geoms: list[int]) -> Any:
     """Boxes, and planes as thin boxes under their surface."""
     import mujoco
     import rerun as rr
@@ -198,7 +210,7 @@ def _boxes(model, geoms: list[int]):
     return rr.Boxes3D(centers=centres, half_sizes=sizes, **_placed(model, geoms))
 
 
-def _cylinders(model, geoms: list[int]):
+def _cylinders(model: Any, geoms: list[int]) -> Any:
     import rerun as rr
 
     return rr.Cylinders3D(
@@ -209,7 +221,7 @@ def _cylinders(model, geoms: list[int]):
     )
 
 
-def _capsules(model, geoms: list[int]):
+def _capsules(model: Any, geoms: list[int]) -> Any:
     import rerun as rr
 
     half = model.geom_size[geoms, 1]
@@ -222,7 +234,7 @@ def _capsules(model, geoms: list[int]):
     )
 
 
-def _ellipsoids(model, geoms: list[int]):
+def _ellipsoids(model: Any, geoms: list[int]) -> Any:
     """Spheres and ellipsoids."""
     import mujoco
     import rerun as rr
@@ -235,7 +247,7 @@ def _ellipsoids(model, geoms: list[int]):
     )
 
 
-def _meshes(model, geoms: list[int]):
+def _meshes(model: Any, geoms: list[int]) -> Any:
     """All meshes of a body as one, coloured by vertex."""
     import rerun as rr
 
@@ -256,7 +268,7 @@ def _meshes(model, geoms: list[int]):
     )
 
 
-def _rotation(model, geom: int) -> np.ndarray:
+def _rotation(model: Any, geom: int) -> np.ndarray:
     import mujoco
 
     matrix = np.empty(9)
@@ -264,5 +276,5 @@ def _rotation(model, geom: int) -> np.ndarray:
     return matrix.reshape(3, 3)
 
 
-def _axis_z(model, geom: int) -> np.ndarray:
+def _axis_z(model: Any, geom: int) -> np.ndarray:
     return _rotation(model, geom)[:, 2]

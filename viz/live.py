@@ -53,7 +53,7 @@ class Stream:
 
     def __init__(
         self, config: RunConfig, *, replicate: int = 0, url: str | None = None
-    ):
+    ) -> None:
         self._config, self._replicate = config, replicate
         self._stream = self._model = None
         self.failed = False
@@ -90,6 +90,8 @@ class Stream:
             step.arrays[name][at : at + 1] for name in ("poses", "predicted")
         )
         numbers = np.array([number])
+        if self._stream is None:
+            return
         charts.send_curves(self._stream, numbers, columns)
         moments.send_paths(self._stream, numbers, real, predicted)
         moments.send_ends(self._stream, numbers, real, self._model)

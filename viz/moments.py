@@ -1,16 +1,21 @@
 """The chosen trials of a recording, laid one after another in time."""
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bns.experiment.record import RunRecord
 from bns.tasks import registry as tasks
-from bns.viz import geometry, series, style, walk_view
+from bns.viz import geometry, rrd, style
 from bns.viz.blueprint import READINGS, TRIAL_TIMELINE
 from bns.viz.choices import Choice
 from bns.viz.paths import arcs, dashes, listed
 from bns.worlds.trial import Trial
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+
 
 GAP = 1.0
 """s of pause between two trials"""
@@ -26,12 +31,12 @@ _HEIGHT = 0.004
 
 
 def send(
-    stream,
+    stream: "RecordingStream",
     record: RunRecord,
     replicate: int,
     chosen: Sequence[Choice],
     trials: Mapping[int, Trial],
-    model,
+    model: Any,
 ) -> None:
     """Log robot, trails, wheel speeds and moments of the chosen trials.
 
@@ -50,7 +55,7 @@ def send(
         times, poses, qpos = samples(record, at, trials.get(choice.trial), model)
         if not len(times):
             continue  # nothing was seen of it
-        index = series.times(start + times)
+        index = rrd.times(start + times)
         geometry.send_poses(stream, model, index, qpos)
         done = _finish(record, at, times)
         foreseen = listed(record.predicted[at])
@@ -78,12 +83,14 @@ def duration(record: RunRecord, replicate: int, chosen: Sequence[Choice]) -> flo
     return float(np.nansum(told)) + GAP * len(chosen)
 
 
-def _durations(record: RunRecord, at, count: int) -> np.ndarray:
+def _durations(record: RunRecord, at: tuple[int, int], count: int) -> np.ndarray:
     """How long each of the first `count` commands took [s]."""
     return tasks.of(record.config).durations(record, at)[:count]
 
 
-def samples(record, at, trial: Trial | None, model):
+def samples(
+    record: RunRecord, at: tuple[int, int], trial: Trial | None, model: Any
+) -> Any:
     """Times, planar poses and qpos of one trial.
 
     Args:
@@ -106,12 +113,12 @@ def samples(record, at, trial: Trial | None, model):
         qpos = np.asarray(trial.truth["qpos"])[keep]
         if qpos.shape[1] == model.nq:
             return times, poses, qpos
-    if walk_view.reports_servos(trial):
-        return times, poses, walk_view.qpos(model, poses, trial, keep)
+    if reports_servos(trial):
+        return times, poses, walking_qpos(model, poses, trial, keep)
     return times, poses, geometry.planar_qpos(model, poses)
 
 
-def _sparse(record, at, model):
+def _sparse(record: RunRecord, at: tuple[int, int], model: Any) -> Any:
     poses = listed(record.poses[at])
     if not len(poses):
         return np.empty(0), poses, np.empty((0, model.nq))
@@ -140,7 +147,7 @@ def _lift(poses: np.ndarray) -> np.ndarray:
     return np.column_stack([poses[:, :2], np.full(len(poses), _HEIGHT)])
 
 
-def _finish(record: RunRecord, at, times: np.ndarray) -> int:
+def _finish(record: RunRecord, at: tuple[int, int], times: np.ndarray) -> int:
     """Sample at which the task was done; the last one if it was not."""
     poses = listed(record.poses[at])
     done = tasks.of(record.config).finish(poses)
@@ -150,7 +157,13 @@ def _finish(record: RunRecord, at, times: np.ndarray) -> int:
     return min(int(np.searchsorted(times, ends[done - 1])), len(times) - 1)
 
 
-def _trails(stream, choice: Choice, poses, done: int, predicted) -> None:
+def _trails(
+    stream: "RecordingStream",
+    choice: Choice,
+    poses: np.ndarray,
+    done: int,
+    predicted: np.ndarray,
+) -> None:
     """Real and foreseen trail; the real one is thin after the last objective."""
     import rerun as rr
 
@@ -173,7 +186,7 @@ def _trails(stream, choice: Choice, poses, done: int, predicted) -> None:
     )
 
 
-def _wheels(stream, sent: np.ndarray, start: float) -> None:
+def _wheels(stream: "RecordingStream", sent: np.ndarray, start: float) -> None:
     """Wheel speeds as sent, a step for each command and zero in the pause."""
     import rerun as rr
 
@@ -182,7 +195,7 @@ def _wheels(stream, sent: np.ndarray, start: float) -> None:
     for column, wheel in enumerate(("left", "right")):
         values = np.append(sent[:, column], 0.0)
         stream.send_columns(
-            f"wheels/{wheel}", series.times(begin), rr.Scalars.columns(scalars=values)
+            f"wheels/{wheel}", rrd.times(begin), rr.Scalars.columns(scalars=values)
         )
         stream.log(
             f"wheels/{wheel}",
@@ -196,7 +209,9 @@ def _wheels(stream, sent: np.ndarray, start: float) -> None:
         )
 
 
-def _readings(stream, record: RunRecord, at: tuple[int, int], start: float) -> None:
+def _readings(
+    stream: "RecordingStream", record: RunRecord, at: tuple[int, int], start: float
+) -> None:
     """Send what the sensors read in a trial, and what the SNNs foresaw."""
     import rerun as rr
 
@@ -212,7 +227,7 @@ def _readings(stream, record: RunRecord, at: tuple[int, int], start: float) -> N
                 continue
             path = f"{READINGS}/{side}_{kind}"
             values = record.extra[array][at][:, column]
-            series.send(stream, path, ends, values)
+            rrd.send(stream, path, ends, values)
             stream.log(
                 path,
                 rr.SeriesLines(
@@ -224,7 +239,7 @@ def _readings(stream, record: RunRecord, at: tuple[int, int], start: float) -> N
             )
 
 
-def _states(stream, states, colours, end: float) -> None:
+def _states(stream: "RecordingStream", states: Any, colours: Any, end: float) -> None:
     """The lane that says which trial is on."""
     import rerun as rr
 
@@ -236,12 +251,17 @@ def _states(stream, states, colours, end: float) -> None:
     )
     stream.send_columns(
         "moment",
-        series.times(np.array([*(time for time, _ in states), end])),
+        rrd.times(np.array([*(time for time, _ in states), end])),
         rr.StateChange.columns(state=[*names, ""]),
     )
 
 
-def send_paths(stream, numbers, real: np.ndarray, predicted: np.ndarray) -> None:
+def send_paths(
+    stream: "RecordingStream",
+    numbers: np.ndarray,
+    real: np.ndarray,
+    predicted: np.ndarray,
+) -> None:
     """Send real and foreseen path of each of N trials, on the timeline `trial`.
 
     Args:
@@ -271,7 +291,9 @@ def send_paths(stream, numbers, real: np.ndarray, predicted: np.ndarray) -> None
         )
 
 
-def send_ends(stream, numbers, poses: np.ndarray, model) -> None:
+def send_ends(
+    stream: "RecordingStream", numbers: np.ndarray, poses: np.ndarray, model: Any
+) -> None:
     """Send the robot where each trial left it, on the timeline `trial`.
 
     Args:
@@ -288,3 +310,52 @@ def send_ends(stream, numbers, poses: np.ndarray, model) -> None:
         qpos = geometry.planar_qpos(model, np.stack([pose for _, pose in ends]))
         index = [rr.TimeColumn(TRIAL_TIMELINE, sequence=[n for n, _ in ends])]
         geometry.send_poses(stream, model, index, qpos)
+
+
+SUFFIX = "_position"
+"""of the channels that servos report"""
+
+
+def reports_servos(trial: Trial) -> bool:
+    """Whether the trial holds positions of servos."""
+    return any(channel.name.endswith(SUFFIX) for channel in trial.channels)
+
+
+def walking_qpos(
+    model: Any, poses_world: np.ndarray, trial: Trial, rows: np.ndarray
+) -> np.ndarray:
+    """Configurations from tracked poses and servo positions.
+
+    An overhead tracker sees neither height nor tilt: the body is drawn level, with its
+    lowest foot on the floor.
+
+    Args:
+        model: a compiled `mujoco.MjModel`; its joints have the channels' names.
+        poses_world: ``(T, 3)`` [m, m, rad].
+        trial: with channels of servo positions.
+        rows: samples of the trial that the poses are of, ``(T,)``.
+
+    Returns:
+        ``(T, nq)``.
+    """
+    made = geometry.planar_qpos(model, poses_world)
+    for channel in trial.channels:
+        if channel.name.endswith(SUFFIX):
+            joint = model.joint(channel.name.removesuffix(SUFFIX))
+            made[:, joint.qposadr[0]] = trial.channel(channel.name)[rows]
+    made[:, geometry.free_joint(model) + 2] -= _lowest_foot(model, made)
+    return made
+
+
+def _lowest_foot(model: Any, qpos: np.ndarray) -> np.ndarray:
+    """Height of the lowest foot site in each configuration, ``(T,)`` [m]."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    feet = [i for i in range(model.nsite) if model.site(i).name.endswith("_foot")]
+    lowest = np.zeros(len(qpos))
+    for at, configuration in enumerate(qpos):
+        data.qpos[:] = configuration
+        mujoco.mj_kinematics(model, data)
+        lowest[at] = data.site_xpos[feet, 2].min() if feet else 0.0
+    return lowest

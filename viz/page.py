@@ -91,8 +91,9 @@ def _stack(figure: Any) -> None:
     ratio /= max(beside[0].get_position().width * width, 0.1)
     tall = NARROW * min(ratio, 1.0) * 0.85 + 0.7
     figure.set_size_inches(NARROW, tall * len(beside))
-    for axes, place in zip(beside, GridSpec(len(beside), 1, figure), strict=True):
-        axes.set_subplotspec(place)
+    grid = GridSpec(len(beside), 1, figure)
+    for number, axes in enumerate(beside):
+        axes.set_subplotspec(grid[number])
         axes.tick_params(labelleft=True, labelbottom=True)
         axes.set_ylabel(axes.get_ylabel() or beside[0].get_ylabel())
     for legend in list(figure.legends):

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryFile
+from typing import Any
 
 from bns.errors import BnsError, FormatError, MissingDependencyError
 from bns.storage import files
@@ -64,7 +65,7 @@ def save(
     return reports
 
 
-def _photograph(shown, png: Path) -> None:
+def _photograph(shown: Any, png: Path) -> None:
     """Have the viewer write a picture, all of it.
 
     Raises:
@@ -117,7 +118,7 @@ def _vulkan() -> bool:
     return any(any(Path(place).glob("*.json")) for place in _ICD)
 
 
-def _go(viewer, trial: int | None, at: float) -> None:
+def _go(viewer: Any, trial: int | None, at: float) -> None:
     if trial is None:
         viewer.set_time(LIVE_TIMELINE, duration=at, play_state="paused")
     else:
@@ -138,7 +139,7 @@ def viewer() -> Iterator:
     from rerun.experimental import ViewerClient
 
     port = free_port()
-    command = [executable(), "--headless", "--bind", LOOPBACK, "--port", str(port)]
+    command = [str(executable()), "--headless", "--bind", LOOPBACK, "--port", str(port)]
     environment = os.environ | {"RERUN_ANALYTICS": "0"}
     with TemporaryFile() as said:
         process = subprocess.Popen(
@@ -175,7 +176,7 @@ def wait(process: subprocess.Popen, port: int) -> None:
     raise TimeoutError(f"it did not start within {_START:g} s")
 
 
-def _explain(error: Exception, said) -> BnsError:
+def _explain(error: Exception, said: Any) -> BnsError:
     """What failed, as an error of ours."""
     said.seek(0)
     if b"panicked at" in said.read():

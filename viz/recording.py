@@ -7,6 +7,7 @@ next. Everything is written in columns on explicit streams.
 from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +27,7 @@ def write(
     *,
     replicate: int | None = None,
     choices: Sequence[Choice] | None = None,
-    model=None,
+    model: Any = None,
 ) -> Path:
     """Write the recording of one replicate.
 
@@ -81,7 +82,7 @@ def write(
     return Path(path)
 
 
-def open_stream(config: RunConfig, replicate: int):
+def open_stream(config: RunConfig, replicate: int) -> Any:
     """A named stream without wall-clock timelines or a start time of its own.
 
     The same configuration and replicate are the same recording to the viewer.
@@ -96,7 +97,7 @@ def open_stream(config: RunConfig, replicate: int):
     return stream
 
 
-def _by_number(trials) -> Mapping[int, Trial]:
+def _by_number(trials: Any) -> Mapping[int, Trial]:
     return trials if isinstance(trials, Mapping) else dict(enumerate(trials))
 
 
@@ -114,7 +115,7 @@ def _properties(record: RunRecord, replicate: int) -> dict:
     }
 
 
-def _about(record: RunRecord, replicate: int, chosen: Sequence[Choice]):
+def _about(record: RunRecord, replicate: int, chosen: Sequence[Choice]) -> Any:
     import rerun as rr
 
     shown = scene.picture(record.config)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,8 +14,55 @@ from bns.learners.base import Curves
 from bns.storage import files
 from bns.tasks import registry as tasks
 from bns.viz import comparison, facts, figures, scene
-from bns.viz.captions import BAND, CAPTIONS, TITLES
 from bns.viz.page import picture, portrait, render
+
+BAND = (
+    "The line is the median over runs, the band holds the middle half of them; "
+    "the dashed orange line marks the onset of damage."
+)
+
+CAPTIONS = {
+    "path": (
+        "One run, chosen as the typical one. Solid: where the robot went. Dashed: "
+        "where its simulator network (SNN) had said it would go. Discs are the "
+        "objectives, reached in the order {order}; within their radius counts as "
+        "reached; what follows the last one is faint. Paths are cut at the board's "
+        "edge. Where solid and dashed part, the SNN is wrong about the robot."
+    ),
+    "fitness": (
+        "Cost of the controller tried in each trial, lower is better, on a "
+        "logarithmic axis: each objective missed costs {penalty:g}, so the curve "
+        "falls in steps as more objectives are reached. The dotted line is the mean, "
+        "which a few failing runs dominate. {band}"
+    ),
+    "solved": (
+        "Left: objectives reached in order, of {goals}. Right: share of runs whose "
+        "trial reached them all. {band}"
+    ),
+    "waits": (
+        "Share of runs that had solved the task before the damage (left), and, "
+        "counted from the first damaged trial, that had solved it again (right). A "
+        "curve that ends below 100 % tells of runs that never did. The dotted line "
+        "drops from the median."
+    ),
+    "displacement": (
+        "Each dot is one command: the motion the SNN foresaw against the motion that "
+        "came. On the diagonal the SNN is right; a cloud off the diagonal shows what "
+        "the damage changed, and the dots of the last trials whether it was learned. "
+        "Dots beyond the frame are drawn at its edge."
+    ),
+}
+
+TITLES = {
+    "readings": "What the light sensors read",
+    "starts": "Paths by start",
+    "path": "Where the robot went",
+    "fitness": "Fitness",
+    "solved": "Objectives reached",
+    "waits": "Trials needed",
+    "displacement": "Foreseen against real motion",
+}
+
 
 SHARED = ("fitness", "solved", "waits")
 """Figures of all tasks and learners; several batches can be laid over one another."""
@@ -45,7 +93,7 @@ def write(
     return Path(out_html)
 
 
-def _runs(sources) -> dict[str, RunRecord]:
+def _runs(sources: Any) -> dict[str, RunRecord]:
     if isinstance(sources, Mapping):
         return dict(sources)
     if isinstance(sources, str | Path | RunRecord):
@@ -151,7 +199,8 @@ def _shared_figures(runs: Mapping[str, RunRecord]) -> list[dict]:
         and figure.compared
         and all(_drawable(figure, record) for record in runs.values())
     ]
-    return [_entry(figure, runs) for figure in (*SHARED, *own)]
+    shown: list[Curves | str] = [*SHARED, *own]
+    return [_entry(figure, runs) for figure in shown]
 
 
 def _entry(figure: Curves | str, runs: Mapping[str, RunRecord]) -> dict:

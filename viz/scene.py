@@ -1,11 +1,17 @@
 """What stands still in a recording: the floor, the robot's shapes, the objectives."""
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from bns.experiment.config import RunConfig
 from bns.tasks import Picture
 from bns.tasks import registry as tasks
 from bns.viz import geometry, style
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+
 
 _DISC = 0.001
 """m; height of an objective's disc"""
@@ -17,7 +23,7 @@ _POST = 0.006
 """m; radius of the post it stands on, drawn only"""
 
 
-def compiled(robot: str):
+def compiled(robot: str) -> Any:
     """The compiled scene of a robot: floor, light, robot; no objectives."""
     from bns import models
 
@@ -29,7 +35,7 @@ def picture(config: RunConfig) -> Picture:
     return tasks.of(config).picture
 
 
-def log_static(stream, config: RunConfig, model) -> None:
+def log_static(stream: "RecordingStream", config: RunConfig, model: Any) -> None:
     """Log coordinates, shapes and objectives.
 
     Args:
@@ -71,7 +77,7 @@ def log_static(stream, config: RunConfig, model) -> None:
     )
 
 
-def _log_lamps(stream, shown: Picture) -> None:
+def _log_lamps(stream: "RecordingStream", shown: Picture) -> None:
     """Log the lamps, and the safety boundary around each on the floor."""
     import rerun as rr
 

@@ -5,9 +5,10 @@ kinds of colour blindness; lightness differs too, so that they survive grey prin
 """
 
 import io
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 BLACK = "#222222"
 GREY = "#7a7a7a"
@@ -28,7 +29,7 @@ BEFORE, DAMAGED, AFTER = BLUE, VERMILION, GREEN
 DAMAGE = VERMILION
 """Colour of the mark at which damage begins."""
 
-_RC = {
+_RC: Any = {
     "font.family": ["DejaVu Sans"],
     "font.size": 9.5,
     "axes.titlesize": 10.5,
@@ -67,7 +68,7 @@ SQUARE = Size(7.0, 4.4)
 
 
 @contextmanager
-def plotting():
+def plotting() -> Iterator[Any]:
     """Matplotlib without a display, in the common style; yields `Figure`.
 
     Figures are made from the class, never through pyplot, so that nothing is kept
@@ -80,7 +81,7 @@ def plotting():
 
 
 @cache
-def _figure_class():
+def _figure_class() -> Any:
     """Matplotlib's figure, which a notebook shows where it is a cell's last value."""
     from matplotlib.figure import Figure
 
@@ -95,4 +96,4 @@ def _figure_class():
 
 def rgb(colour: str) -> tuple[int, int, int]:
     """The three bytes of ``#rrggbb``."""
-    return tuple(int(colour[at : at + 2], 16) for at in (1, 3, 5))
+    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)

@@ -148,6 +148,7 @@ def factory(world: Corrected, make: Callable[..., Any]) -> Callable[..., Any]:
     """
 
     def made(**settings: Any) -> Any:
+        """The world, with settings of its own."""
         robot = settings.pop("robot", world.robot)
         if robot != world.robot:
             raise BnsError(

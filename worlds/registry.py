@@ -24,7 +24,7 @@ from bns.worlds.world import World
 
 GROUP = "bns.worlds"
 _BUILT_IN = {
-    "hardware": "bns.hardware.world:HardwareWorld",
+    "hardware": "bns.hardware.worlds.wheeled:HardwareWorld",
     "hexapod": "bns.worlds.physics.legged_world:HexapodWorld",
     "mujoco": "bns.worlds.physics.wheeled_world:MujocoWorld",
     "light": "bns.worlds.light.world:LightWorld",

@@ -13,15 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bns.errors import BnsError
+from bns.models.robot_model import Channel as Channel
 
 POSE = ("x", "y", "yaw")
-
-
-class Channel(NamedTuple):
-    """One measured or commanded quantity."""
-
-    name: str
-    unit: str
 
 
 POSE_CHANNELS = (Channel("x", "m"), Channel("y", "m"), Channel("yaw", "rad"))

@@ -38,3 +38,25 @@ class World(Protocol):
             N trials, in order. A diverged one is flagged, never raised.
         """
         ...
+
+
+_reasons: list[str] = []
+
+
+def ring(reason: str) -> None:
+    """Raise the alarm.
+
+    Args:
+        reason: what happened, in a few words.
+    """
+    _reasons.append(reason)
+
+
+def reason() -> str:
+    """Why the alarm was raised; empty while it was not."""
+    return _reasons[0] if _reasons else ""
+
+
+def clear() -> None:
+    """End the alarm."""
+    _reasons.clear()

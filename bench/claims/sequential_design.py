@@ -15,7 +15,7 @@ from bench.result import Result, bench
 from bns import seeding
 from bns.claims import verdict
 from bns.claims.claim import Cell
-from bns.stats.equivalence import MARGIN
+from bns.stats.designs import MARGIN
 
 MANY, FEW = 4000, 200
 LARGE = 0.71  # a large effect, after Vargha and Delaney

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 HEAD = """
 import sys, threading
-from bns.hardware.priority import urgent
+from bns.hardware.safety.priority import urgent
 urgent()
 from bns.worlds import alarm
 from bns.worlds.trial import Channel, Commands
@@ -27,7 +27,7 @@ def begin(world, look):
     return rig
 """
 KHEPERA = """
-from bns.hardware.world import HardwareWorld
+from bns.hardware.worlds.wheeled import HardwareWorld
 world = HardwareWorld(port=sys.argv[1])
 begin(world, lambda rig: rig.mover())
 try:
@@ -37,7 +37,7 @@ finally:
 """
 HEXAPOD = """
 import numpy as np
-from bns.hardware.hexapod_world import HardwareHexapod
+from bns.hardware.worlds.hexapod import HardwareHexapod
 world = HardwareHexapod(port=sys.argv[1])
 walker = begin(world, lambda rig: rig.walker).walker
 perform = walker.perform

@@ -55,9 +55,9 @@ def hardware_fault_storm(quick: bool) -> Result:
 
 def _part(number: int, minutes: float) -> dict:
     """A session of some virtual minutes."""
+    from bns.hardware.driving.excitation import commands
     from bns.hardware.emulators import virtual
-    from bns.hardware.excitation import commands
-    from bns.hardware.world import HardwareWorld
+    from bns.hardware.worlds.wheeled import HardwareWorld
 
     rig = virtual.rig(lost=LOST, corrupted=CORRUPTED, mute=MUTE, seed=11 + number)
     world = HardwareWorld(rig=rig)

@@ -51,9 +51,9 @@ def _rehearsed(effects: Sequence[str], count: int):
     """Diagnosis, world and trials of an emulated robot that was recorded."""
     from bns.gap.diagnose import diagnose
     from bns.gap.models.wheeled import WheeledModel
+    from bns.hardware.driving.excitation import START, commands
     from bns.hardware.emulators import virtual
-    from bns.hardware.excitation import START, commands
-    from bns.hardware.world import HardwareWorld
+    from bns.hardware.worlds.wheeled import HardwareWorld
 
     rig = virtual.rig(effects, rate=RATE, seed=2)
     world = HardwareWorld(rig=rig, sample_dt=0.05, start=START, recording=True)

@@ -66,7 +66,7 @@ def protocol_fuzz(quick: bool) -> Result:
     crashes, hangs, answered, refused = [], 0, 0, 0
     slowest = 0.0
     for number in range(count):
-        robot.units = firmware(2)
+        robot._firmware = firmware(2)
         begin = clock.now()
         try:
             calls[number % len(calls)]()

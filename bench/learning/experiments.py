@@ -16,8 +16,9 @@ from typing import Any
 
 from bench.versions import ROOT
 from bns import presets
-from bns.experiment.config import AdaptationConfig, RunConfig, WorldConfig
+from bns.experiment.config import RunConfig, WorldConfig
 from bns.experiment.record import RunRecord
+from bns.learners.bns.config import AdaptationConfig
 from bns.tasks import registry as tasks
 
 RUNS = ROOT / "runs" / "bench"

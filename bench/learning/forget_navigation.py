@@ -12,8 +12,8 @@ from bench.learning import experiments, solving
 from bench.result import Result, bench
 from bns import stats
 from bns.experiment.config import RunConfig
-from bns.experiment.config_watch import WatchConfig
 from bns.experiment.record import RunRecord
+from bns.learners.bns.config import WatchConfig
 
 LIMIT = 70  # trials, as in `recover-window`
 SOON = 2  # trials from the damage on

@@ -13,8 +13,9 @@ from pathlib import Path
 from shutil import copytree, rmtree
 
 from bench.learning import experiments
-from bns.experiment.config import AdaptationConfig, RunConfig
+from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
+from bns.learners.bns.config import AdaptationConfig
 
 ON_DAMAGE = (
     "population_reset",

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 from bench.learning import experiments, forking
 from bns import presets
-from bns.experiment.config import AdaptationConfig, RunConfig, WorldConfig
-from bns.experiment.config_watch import WatchConfig
+from bns.experiment.config import RunConfig, WorldConfig
+from bns.learners.bns.config import AdaptationConfig, WatchConfig
 
 ONSET = 20  # trial of the damage (dissertation, section 6.3.2)
 AFTER = 20  # trials from the damage on

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from bench.result import Result, bench
-from bench.storage.readers import fingerprint, make, readers
+from bench.storage.readers import fingerprint, readers
+from bench.storage.sample_files import make
 from bns import seeding
 from bns.errors import BnsError
 

@@ -131,17 +131,17 @@ def _recording(path: Path) -> None:
 
 def _diagnosed(drives: Path, out: Path) -> None:
     """As `bns gap diagnose` does, its report included; finished ones are left alone."""
-    from bns.cli import gap_diagnose
+    from bns.cli.gap import diagnose
     from bns.gap.store import FILE
 
     place = out / "gap"
     if (place / FILE).exists() and not (place / "request.json").exists():
         return
-    given = gap_diagnose.Diagnose(
+    given = diagnose.Diagnose(
         data=(str(drives),), out=str(place), rerun=False, most=1, threads=1
     )
     with redirect_stdout(io.StringIO()):
-        gap_diagnose._diagnose(given)
+        diagnose._diagnose(given)
 
 
 def _content(place: Path) -> dict[str, bytes]:

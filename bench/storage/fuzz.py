@@ -9,11 +9,12 @@ from pathlib import Path
 
 from bench.result import Result, bench
 from bench.runner import RESULTS
-from bench.storage.readers import make, readers
+from bench.storage.readers import readers
 from bench.storage.reading import Found, attempt, quiet
+from bench.storage.sample_files import make
 
 INPUTS, QUICK = 1_000_000, 4000
-BLOCK = 200  # seeds of every reader in a process of its own, which may die
+BLOCK = 50  # seeds of every reader in a process of its own, which may die
 MEMORY = 10 << 30  # [bytes] of address space of such a process
 PROCESSES = 1
 BAD = ("tracebacks", "hangs", "wrong acceptances", "messages", "crashes")

@@ -210,26 +210,37 @@ def columns(data: bytes, rng: Rng) -> bytes:
 
     try:
         table = pq.read_table(pa.BufferReader(data))
+        names = table.column_names  # fails where they are not UTF-8
     except Exception:  # it is damaged already
         return data
     metadata = dict(table.schema.metadata or {})
     if rng.random() < 0.9:
         metadata.pop(b"sha256", None)
-    if not table.num_columns or len(set(table.column_names)) < table.num_columns:
+    if not table.num_columns or len(set(names)) < table.num_columns:
         return data
     at = int(rng.integers(table.num_columns))
-    name, column = table.column_names[at], table.column(at)
+    name, column = names[at], table.column(at)
     way = int(rng.integers(7))
     if way == 0:
         table = table.remove_column(at)
     elif way == 1:
         table = table.append_column(name, column)
     elif way == 2:
-        table = table.set_column(at, name, column.cast("string"))
+        table = table.set_column(at, name, pa.array(map(str, column.to_pylist())))
     elif way == 3:
         table = table.slice(0, max(0, table.num_rows - 1))
     elif way == 4:
         table = table.set_column(at, name, pa.nulls(table.num_rows, column.type))
+    elif table.num_rows and pa.types.is_nested(column.type):
+        rows = column.to_pylist()
+        row = rows[int(rng.integers(len(rows)))]
+        if row:
+            row[int(rng.integers(len(row)))] = [np.nan, 1e308, None, 1e30][
+                int(rng.integers(4))
+            ]
+        if way == 6 and row is not None:
+            row.append(1.0)
+        table = table.set_column(at, name, pa.array(rows, column.type))
     elif table.num_rows and str(column.type) != "string":
         values = column.to_numpy().copy()
         odd = {5: np.nan, 6: 1e308}[way] if values.dtype.kind == "f" else -5

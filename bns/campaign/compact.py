@@ -84,7 +84,7 @@ class Compact:
             raise parquet.unreadable(error, name) from error
         said = head.get(DIGEST)
         if said is None:
-            seal.unsealed(name)
+            seal.unsealed(self.path)
         elif said != parquet.digest(table):
             raise seal.damaged(name)
         return from_table(head, table, name)
@@ -112,6 +112,7 @@ def write(directory: Path, parts: Sequence[Part]) -> None:
     options: dict[str, Any] = {"compression": "zstd", "write_page_checksum": True}
 
     def write(path: Path) -> None:
+        """Write all batches into a file."""
         with pq.ParquetWriter(path, schema, **options) as writer:
             for table in tables:
                 writer.write_table(

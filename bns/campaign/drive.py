@@ -4,6 +4,7 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from bns.campaign.engines.base import Engine
 from bns.campaign.file import Campaign
@@ -147,7 +148,7 @@ def _work(
     done: dict[str, int],
     progress: bool,
     stop: Callable[[], bool],
-) -> dict[str, object]:
+) -> dict[str, Any]:
     trials = {member.identity: member.config.trials for member in campaign.members}
     behind = sum(trials[i] * count for i, count in done.items() if i in trials)
     shown = Progress(campaign.name, jobs, behind, enabled=progress)

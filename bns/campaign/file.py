@@ -32,8 +32,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from bns.campaign import sample, settings
+import numpy as np
+
+from bns import seeding
+from bns.campaign import settings
 from bns.campaign.identity import identity
+from bns.campaign.settings import known
 from bns.errors import BnsError, UnknownNameError
 from bns.experiment.config import RunConfig
 from bns.experiment.validate import BOUNDS
@@ -127,7 +131,7 @@ def from_content(
     for key in content:
         if key not in TOP + TABLES:
             raise UnknownNameError("key of a campaign file", key, TOP + TABLES)
-    numbers = {
+    numbers: dict[str, Any] = {
         "replicates": _whole(content, "replicates", 30, BOUNDS["replicates"]),
         "seed": _whole(content, "seed", 0, BOUNDS["seed"]),
         "batch_runs": _whole(content, "batch_runs", 30, BOUNDS["replicates"]),
@@ -212,7 +216,7 @@ def _sample(content: Mapping[str, Any]) -> list[dict[str, Any]]:
     count, seed = table.pop("count", 0), table.pop("seed", 0)
     if type(seed) is not int or seed < 0:
         raise BnsError(f"[sample]: seed = {seed!r}: give a whole number from 0 on.")
-    return sample.draw(settings.flatten(table, "[sample]"), count, seed, "[sample]")
+    return draw(settings.flatten(table, "[sample]"), count, seed, "[sample]")
 
 
 def _check_size(
@@ -251,3 +255,73 @@ def _whole(content: Mapping[str, Any], key: str, default: int, bound: Any) -> in
             f"{bound.low:g} to {bound.high:g}."
         )
     return value
+
+
+KEYS = ("low", "high", "scale")
+SCALES = ("linear", "log")
+
+
+def draw(
+    ranges: Mapping[str, Any], count: int, seed: int, where: str
+) -> list[dict[str, Any]]:
+    """`count` independent samples of the settings.
+
+    Args:
+        ranges: setting -> list of values, or a table with `low`, `high` and `scale`
+            ("linear", "log"); whole-numbered settings give whole numbers.
+        count: samples.
+        seed: each setting has a stream of its own, so that adding one moves no other,
+            and more samples keep the first ones.
+        where: the table's name, for messages.
+
+    Raises:
+        BnsError: a range that is none.
+    """
+    if type(count) is not int or count < 1:
+        raise BnsError(f"{where}: count = {count!r} is not allowed: give 1 or more.")
+    if not ranges:
+        raise BnsError(f"{where} varies nothing: give at least one setting.")
+    columns = {}
+    for name, spec in ranges.items():
+        rng = seeding.generator(seed, "sample", name)
+        columns[name] = [_one(name, spec, rng, where) for _ in range(count)]
+    rows = zip(*columns.values(), strict=True)
+    return [dict(zip(columns, row, strict=True)) for row in rows]
+
+
+def _one(name: str, spec: Any, rng: np.random.Generator, where: str) -> Any:
+    if isinstance(spec, list):
+        if not spec:
+            raise BnsError(f"{where}: {name} has no values: give at least one.")
+        return spec[int(rng.integers(len(spec)))]
+    if not isinstance(spec, Mapping) or not {"low", "high"} <= set(spec):
+        raise BnsError(
+            f"{where}: {name} = {spec!r} is no range: give a list of values or "
+            "{ low = 0.05, high = 0.3, scale = 'log' }."
+        )
+    for key in spec:
+        if key not in KEYS:
+            raise UnknownNameError(f"key of {where}.{name}", key, KEYS)
+    return _between(name, spec, rng, where)
+
+
+def _between(
+    name: str, spec: Mapping[str, Any], rng: np.random.Generator, where: str
+) -> Any:
+    low, high, scale = spec["low"], spec["high"], spec.get("scale", "linear")
+    if scale not in SCALES:
+        raise UnknownNameError(f"scale of {name}", str(scale), SCALES)
+    numbers = all(type(x) in (int, float) and math.isfinite(x) for x in (low, high))
+    if not numbers or low > high or (scale == "log" and low <= 0):
+        raise BnsError(
+            f"{where}: {name} from {low!r} to {high!r} is no range: low must be a "
+            "number below high, and above 0 on a log scale."
+        )
+    default = known()[name]
+    if type(default) not in (int, float):
+        raise BnsError(f"{where}: {name} is no number: give a list of values.")
+    if scale == "log":
+        value = math.exp(rng.uniform(math.log(low), math.log(high)))
+    else:
+        value = rng.uniform(low, high)
+    return round(value) if type(default) is int else float(f"{value:.6g}")

@@ -15,8 +15,9 @@ from hashlib import sha256
 from typing import Any
 
 from bns import seeding
-from bns.experiment.config import BNS_SECTIONS, AdaptationConfig, RunConfig, WorldConfig
+from bns.experiment.config import RunConfig, WorldConfig
 from bns.experiment.validate import leaves
+from bns.learners.bns.config import BNS_SECTIONS, AdaptationConfig
 from bns.tasks import registry as tasks
 
 TASK_SECTIONS = ("light", "walk")

@@ -91,7 +91,7 @@ def joined(blocks: list[Block]) -> RunRecord:
 
 def status(found: Results) -> dict[str, Any]:
     """How far the campaign is: runs by member, batches that failed."""
-    rows = [
+    rows: list[dict[str, Any]] = [
         {
             "member": member.label,
             "identity": member.identity,

@@ -16,7 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bns.experiment.config import AdaptationConfig, RunConfig
+from bns.experiment.config import RunConfig
+from bns.learners.bns.config import AdaptationConfig
 from bns.storage import files
 from bns.worlds.damage import Damage
 from bns.worlds.world import World
@@ -126,10 +127,11 @@ def write(path: Path, trunk: Trunk) -> None:
         StorageError: no space, or no permission.
     """
     head = json.dumps({"seed": trunk.seed, "mode": trunk.mode}).encode()
-    arrays = {f"column.{name}": value for name, value in trunk.columns.items()}
+    arrays = {"head": np.frombuffer(head, np.uint8)}
+    arrays |= {f"column.{name}": value for name, value in trunk.columns.items()}
     arrays |= {f"state.{name}": value for name, value in trunk.state.items()}
     sink = io.BytesIO()
-    np.savez(sink, head=np.frombuffer(head, np.uint8), **arrays)
+    np.savez(sink, **arrays)  # type: ignore[arg-type]  # its stub has a flag, too
     files.make_directory(path.parent)
     files.write_bytes(path, sink.getvalue())
 

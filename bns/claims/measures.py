@@ -74,6 +74,7 @@ def _over(column: str, first: Callable[[RunRecord], int], count: int) -> Values:
     """Mean of a column over `count` trials from `first` on."""
 
     def values(record: RunRecord) -> np.ndarray:
+        """The measure of each run, ``(R,)``."""
         start = first(record)
         found = record[column][:, max(0, start) : max(0, start + count)]
         if found.shape[1] == 0 or (start != 0 and _onset(record) < 0):
@@ -100,6 +101,7 @@ def _within(limit: int) -> Values:
     """Trials to recover, infinite beyond a limit that all records share."""
 
     def values(record: RunRecord) -> np.ndarray:
+        """The measure of each run, ``(R,)``."""
         found = stats.trials_to_recover(record)
         return np.where(found > limit, np.inf, found)
 
@@ -110,6 +112,7 @@ def _dip(every: int) -> Values:
     """Rise of the cost over resets that come every so many trials."""
 
     def values(record: RunRecord) -> np.ndarray:
+        """The measure of each run, ``(R,)``."""
         resets = np.arange(every, record.trials, every)
         cost = record[COST]
         return (cost[:, resets] - cost[:, resets - 1]).mean(axis=1)
@@ -142,6 +145,7 @@ def _regained(share: float, before: Callable[..., np.ndarray]) -> Values:
     """Trials from the damage until the robot gets a share as far as before it."""
 
     def values(record: RunRecord) -> np.ndarray:
+        """The measure of each run, ``(R,)``."""
         start, ways = _onset(record), record["distance"]
         enough = share * before(ways[:, :start], axis=1)
         there = ways[:, start:] >= enough[:, None]

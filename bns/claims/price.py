@@ -14,6 +14,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 from scipy import special
@@ -28,7 +29,7 @@ from bns.claims.published import Stale
 from bns.claims.report import Judged
 from bns.claims.verdict import Finding
 from bns.experiment.config import RunConfig
-from bns.stats.equivalence import of_share
+from bns.stats.designs import of_share
 from bns.stats.measures import a12_error
 from bns.tasks import registry as tasks
 
@@ -119,7 +120,7 @@ def planned(claims: Iterable[Claim], *, world: str) -> Price:
         claims: to be tested.
         world: where.
     """
-    wanted = {}
+    wanted: dict[str, tuple[Member, int]] = {}
     for claim in claims:
         for cell in claim.cells:
             before = published.finding(claim, cell, world=world)
@@ -156,7 +157,15 @@ def _share(before: Finding | Stale | None, cell: Cell) -> float | None:
     return before.share if isinstance(before, Stale) else implied(cell)
 
 
-def _want(found, claim, cell, world, runs, *, counts: bool = False) -> None:
+def _want(
+    found: dict[str, Any],
+    claim: Claim,
+    cell: Cell,
+    world: str,
+    runs: int,
+    *,
+    counts: bool = False,
+) -> None:
     """Note the runs that the sides of a comparison need, or have."""
     letter = claim.investigation
     if sides.missing(letter, cell, world=world):

@@ -216,7 +216,7 @@ def write(
 
 def _block(name: str, lines: Iterable[str], brackets: str) -> str:
     inside = ",\n".join(lines)
-    opened, closed = brackets
+    opened, closed = brackets[0], brackets[1]
     return (
         f'"{name}": {opened}\n{inside}\n{closed}'
         if inside

@@ -12,7 +12,7 @@ from bns.claims.held import Held
 from bns.claims.published import Library, Stale
 from bns.claims.verdict import Finding
 from bns.errors import BnsError
-from bns.stats.sequential import Design, up_to
+from bns.stats.designs import Design, up_to
 
 NOT_RUN, NOT_TESTED, STALE = "not run", "not tested", "stale"
 VERDICTS = (
@@ -132,7 +132,7 @@ def identities(members: Iterable[Member]) -> dict[str, tuple[str, Sequence[str]]
     Args:
         members: as `bns.claims.sides.member` gives them.
     """
-    found = {}
+    found: dict[str, tuple[str, Sequence[str]]] = {}
     for member in members:
         ignored = tuple(content(member.label[0])["ignored"])
         settings = provenance.resolved(member.config, ignored)
@@ -267,7 +267,7 @@ HEAD = ("comparison", "p (diss.)", "runs", "p", "p (Holm)", "share", "verdict")
 
 def cells(row: Judged) -> list[tuple[str, ...]]:
     """A row of texts for each finding of a claim, then for each stale one."""
-    return [
+    current: list[tuple[str, ...]] = [
         (
             finding.cell.text,
             finding.cell.p,
@@ -279,7 +279,8 @@ def cells(row: Judged) -> list[tuple[str, ...]]:
             finding.verdict,
         )
         for finding in row.findings
-    ] + [
+    ]
+    return current + [
         (
             stale.text,
             "",

@@ -19,7 +19,7 @@ from bns.claims import report, sides
 from bns.claims.claim import Cell
 from bns.claims.report import Judged
 from bns.experiment import versions
-from bns.stats.sequential import LOOKS
+from bns.stats.designs import LOOKS
 
 MOST = 50  # runs of a batch
 SEED = 0
@@ -104,9 +104,9 @@ def jobs(wanted: Sequence[Due], done: Mapping[str, int], store: Path) -> list[Jo
         for start, count in blocks(runs[name], done.get(name, 0))
     ]
     shared: dict[str, Job] = {}
-    for each in made:
-        if each.trunk and not Path(each.trunk).exists():
-            shared.setdefault(each.trunk, each)
+    for batch in made:
+        if batch.trunk and not Path(batch.trunk).exists():
+            shared.setdefault(batch.trunk, batch)
     many = {path: sum(other.trunk == path for other in made) for path in shared}
     growing = [
         replace(each, key=f"{Path(path).stem}", grows=True)

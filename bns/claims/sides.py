@@ -12,7 +12,8 @@ from bns.campaign.settings import flatten, with_settings
 from bns.claims import provenance
 from bns.claims.claim import Cell, claims, content
 from bns.errors import BnsError, UnknownNameError
-from bns.experiment.config import EvolutionConfig, RunConfig
+from bns.experiment.config import RunConfig
+from bns.learners.bns.config import EvolutionConfig
 from bns.worlds.damage import Damage
 
 QUICK_TRIALS, QUICK_DIVISOR = 12, 5

@@ -48,9 +48,8 @@ from bns.claims.claim import Cell
 from bns.claims.provenance import Made
 from bns.experiment.record import RunRecord
 from bns.stats import Interval
-from bns.stats.equivalence import equivalence
-from bns.stats.power import power
-from bns.stats.sequential import Design, up_to
+from bns.stats.designs import Design, equivalence, up_to
+from bns.stats.resampling import power
 
 LEVEL = 0.05
 ALIKE = 0.04
@@ -143,9 +142,7 @@ def judge(
     return examine(cell, mine, other, looks)
 
 
-def examine(
-    cell: Cell, mine: Sequence[float], other: Sequence[float], looks: Design
-) -> Finding:
+def examine(cell: Cell, mine: np.ndarray, other: np.ndarray, looks: Design) -> Finding:
     """The finding of two samples of which more is better, at the look that stops.
 
     Args:

@@ -11,9 +11,12 @@ VERBS = {
     "report": ("report", "write one self-contained HTML report on runs"),
     "compare": ("compare", "medians, intervals, p values and effect sizes of runs"),
     "view": ("view", "open a run's recording, or make a picture of it"),
+    "export": ("export", "write trials as a LeRobotDataset or a Parquet table"),
     "campaign": ("campaign", "many configurations: run them, tables, pictures"),
     "claims": ("claims", "the dissertation's claims: list, run, judge"),
     "presets": ("lists", "list the presets"),
+    "learners": ("lists", "list the learners"),
+    "tasks": ("lists", "list the tasks"),
     "worlds": ("lists", "list the worlds"),
     "robots": ("lists", "list the robot models"),
     "models": ("models", "make, check, open or draw a robot model"),
@@ -28,9 +31,18 @@ VERBS = {
 """verb -> module of this package, and what it does in one line"""
 
 GROUPS = {
-    "Learn": ("run", "report", "compare", "view"),
+    "Learn": ("run", "report", "compare", "view", "export"),
     "Many runs": ("campaign", "claims"),
-    "What there is": ("presets", "worlds", "robots", "effects", "models", "examples"),
+    "What there is": (
+        "presets",
+        "learners",
+        "tasks",
+        "worlds",
+        "robots",
+        "effects",
+        "models",
+        "examples",
+    ),
     "Real robots": ("gap", "hardware"),
     "This machine": ("doctor", "completion", "schema"),
 }

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from bns.cli.fields import Positional
-from bns.cli.parse import dispatch
+from bns.cli.parse import Verbs, dispatch
 from bns.cli.tables import show
 from bns.errors import BnsError
 
@@ -103,7 +103,7 @@ class Plot:
 
 def main(verb: str, argv: list[str]) -> int:
     """Run a verb of campaigns; gives the exit code."""
-    does = {
+    does: Verbs = {
         "run": (Run, _run),
         "merge": (Merge, _merge),
         "status": (Status, _status),

@@ -1,12 +1,14 @@
 """`bns claims`: the dissertation's claims, run and judged."""
 
 import time
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from bns.claims.price import Price
 from bns.cli.fields import Positional
-from bns.cli.parse import dispatch
+from bns.cli.parse import Verbs, dispatch
 from bns.cli.tables import show
 from bns.errors import BnsError
 
@@ -127,7 +129,7 @@ class Table:
 
 def main(verb: str, argv: list[str]) -> int:
     """Run a verb of claims; gives the exit code."""
-    does = {
+    does: Verbs = {
         "list": (List, _list),
         "plan": (Plan, _plan),
         "run": (Run, _run),
@@ -176,11 +178,11 @@ def _plan(given: Plan) -> int:
     return 0
 
 
-def _costs(price) -> list:
+def _costs(price: Price) -> list:
     return [price.sides, price.runs, f"{price.hours:.1f}", f"{price.apart:.1f}"]
 
 
-def _some(names) -> str:
+def _some(names: Collection[str]) -> str:
     return ", ".join([*names][:3]) + (", ..." if len(names) > 3 else "")
 
 

@@ -1,4 +1,4 @@
-"""`bns presets`, `worlds`, `robots`, `effects`: what exists."""
+"""`bns presets`, `learners`, `tasks`, `worlds`, `robots`, `effects`: what exists."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -58,6 +58,25 @@ def presets() -> Rows:
         size = f"{config.replicates} x {config.trials}"
         rows.append([name, size, known.describe(name)])
     return ["preset", "runs x trials", "what it is"], rows
+
+
+def learners() -> Rows:
+    """Every learner."""
+    from bns.learners import registry
+
+    rows = [[name, registry.describe(name)] for name in registry.names()]
+    return ["learner", "what it is"], rows
+
+
+def tasks() -> Rows:
+    """Every task with its kind."""
+    from bns.tasks import registry
+
+    rows = [
+        [name, registry.kind(name), registry.describe(name)]
+        for name in registry.names()
+    ]
+    return ["task", "kind", "what it is"], rows
 
 
 def worlds() -> Rows:
@@ -146,6 +165,8 @@ def _parameters(found: list[Any]) -> Rows:
 
 LISTS: dict[str, Callable[[], Rows]] = {
     "presets": presets,
+    "learners": learners,
+    "tasks": tasks,
     "worlds": worlds,
     "robots": robots,
 }

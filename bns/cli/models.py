@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bns.cli.fields import Flat, Positional
-from bns.cli.parse import dispatch
+from bns.cli.parse import Verbs, dispatch
 from bns.errors import BnsError
 from bns.models import legged_files
 from bns.models.new import Wheeled, write
@@ -78,7 +78,7 @@ def main(verb: str, argv: list[str]) -> int:
     Raises:
         BnsError: what the user gave cannot be used.
     """
-    does = {
+    does: Verbs = {
         "view": (View, view),
         "check": (Check, check),
         "new": (New, new),

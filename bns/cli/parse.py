@@ -5,10 +5,14 @@ import contextvars
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, replace
 from difflib import get_close_matches
-from typing import Any, NoReturn, TypeVar, get_args
+from typing import Any, NoReturn, TypeAlias, TypeVar, get_args
 
 from bns.cli.fields import Setting, build, convert, settings
 from bns.errors import BnsError, UnknownNameError
+
+Verbs: TypeAlias = Mapping[str, tuple[type, Callable[[Any], int]]]
+"""a verb's own verbs: what their arguments are, and what they do with them"""
+
 
 T = TypeVar("T")
 
@@ -70,7 +74,7 @@ def parse(
 def dispatch(
     verb: str,
     argv: Sequence[str],
-    does: Mapping[str, tuple[type, Callable[[Any], int]]],
+    does: Verbs,
     manual: str,
 ) -> int:
     """Do one of a verb's own verbs; gives the exit code.
@@ -117,6 +121,7 @@ def manual(
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
+        """Say in one line what is wrong; the exit code is 2."""
         said = message.removeprefix("argument ").rstrip(".")
         required = "the following arguments are required: "
         if said.startswith(required):

@@ -1,7 +1,7 @@
 """`bns run`: train a preset, a TOML file, or go on with a run directory."""
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -40,6 +40,9 @@ class Arguments:
     """save: write recording.rrd; live: stream to a viewer as well; off: neither"""
     report: bool = True
     """write report.html at the end"""
+    setup: Rare[str] = ""
+    """file that `bns hardware setup` wrote, for --world hardware; what is given here
+    goes before it"""
     port: Rare[str] = ""
     """device of a real or emulated robot, for --world hardware"""
     camera: Rare[str] = "emulated"
@@ -145,9 +148,9 @@ def source(text: str) -> tuple[RunConfig, str]:
 def execute(given: Arguments) -> int:
     """Train, draw, and say what happened."""
     if given.config.world.name == "hardware":
-        from bns.cli import hardware_run
+        from bns.cli.hardware import run
 
-        return hardware_run.execute(given)
+        return run.execute(given)
     from bns.storage.lock import Lock
 
     out = Path(given.out)
@@ -184,7 +187,7 @@ def _locked(given: Arguments, out: Path, lock: "Lock") -> int:
 
 
 @contextmanager
-def until_interrupted() -> Iterator[object]:
+def until_interrupted() -> Iterator[Callable[[], bool]]:
     """Gives a question: was Ctrl-C pressed? Pressed twice, it stops at once."""
     pressed: list[int] = []
 

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
 from bns.cli.fields import Positional, Setting, settings
+from bns.cli.file_schemas import DIALECT
+from bns.cli.file_schemas import SCHEMAS as OTHERS
 from bns.cli.parse import parse
 
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
 ANY_NUMBER = {"type": "number"}
 
 
@@ -20,8 +21,16 @@ class Arguments:
     with `#:schema run.schema.json`.
     """
 
-    kind: Positional[Literal["run", "campaign"]] = "run"
-    """run: what `bns run FILE.toml` reads; campaign: what `bns campaign run` reads"""
+    kind: Positional[
+        Literal[
+            "run", "campaign", "worlds", "robot", "numbers", "servo", "servos",
+            "hardware", "model", "columns",
+        ]
+    ] = "run"  # fmt: skip
+    """run: what `bns run FILE.toml` reads; campaign: `bns campaign run`; worlds:
+    worlds.toml; robot, numbers, servo: robot.toml, numbers.toml and law.toml of a
+    robot; servos: of a hexapod; hardware: what `bns hardware setup` writes; model: what
+    `bns gap --model` reads; columns: what `bns gap --columns` reads"""
     out: str = ""
     """file to write, such as run.schema.json; without it the schema is printed"""
 
@@ -142,4 +151,8 @@ _KINDS: dict[Any, dict[str, Any]] = {
     float: {"type": "number"},
     bool: {"type": "boolean"},
 }
-SCHEMAS: dict[str, Callable[[], dict[str, Any]]] = {"run": run, "campaign": campaign}
+SCHEMAS: dict[str, Callable[[], dict[str, Any]]] = {
+    "run": run,
+    "campaign": campaign,
+    **OTHERS,
+}

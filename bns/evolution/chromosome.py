@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from bns.draws import Draws, whole_below
-from bns.experiment.config import ControllerConfig
+from bns.experiment.task_settings import ControllerConfig
 from bns.units import metres_per_second
 from bns.worlds.trial import Commands
 

@@ -13,7 +13,7 @@ from torch import Tensor
 from bns.draws import Draws
 from bns.evolution import crossover, mutation, selection
 from bns.evolution.chromosome import Population
-from bns.experiment.config import EvolutionConfig
+from bns.learners.bns.config import EvolutionConfig
 
 
 class Genes(Protocol):
@@ -53,7 +53,7 @@ class Rates(NamedTuple):
         chicken: probability of a fresh second parent, ``(R,)``; None = that of the
             configuration.
         repeat: probability that a walker's child repeats its commands, ``(R,)``, see
-            `bns.evolution.repetition`; None = none does.
+            `bns.evolution.goals`; None = none does.
     """
 
     rate: Tensor

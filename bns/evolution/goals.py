@@ -7,9 +7,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from bns.draws import Draws
+from bns.draws import Draws, whole_below
 from bns.errors import BnsError
-from bns.evolution import repetition
 from bns.evolution.chromosome import Population
 from bns.evolution.generation import Breeder, Coins, Rates
 from bns.evolution.selection import tournament_by_rank
@@ -113,7 +112,7 @@ class GoalBreeder(Breeder):
         coins = Breeder(one, self.encoding, self.fixed_length).draw(draws, rates)
         if rates.repeat is None:
             return coins
-        shape = (*coins.chicken.shape, repetition.COINS)
+        shape = (*coins.chicken.shape, COINS)
         return coins._replace(repeat=draws.uniform(*shape))
 
     def parents(self, cost: Tensor, coins: Tensor) -> Tensor:
@@ -132,7 +131,36 @@ class GoalBreeder(Breeder):
 
     def _mutate(self, children: Population, rates: Rates, coins: Coins) -> Population:
         mutated = super()._mutate(children, rates, coins)
-        if rates.repeat is None:
+        if rates.repeat is None or coins.repeat is None:
             return mutated
-        genes = repetition.repeated(mutated.genes, coins.repeat, rates.repeat)
+        genes = repeated(mutated.genes, coins.repeat, rates.repeat)
         return mutated._replace(genes=genes)
+
+
+PERIODS = (2, 3, 4)  # commands of a round
+COINS = 6  # uniform numbers that a child takes
+
+
+def repeated(genes: Tensor, coins: Tensor, chance: Tensor) -> Tensor:
+    """Children of which some repeat their own commands.
+
+    With `chance` one command is copied to another place, and with `chance` the
+    commands go round from some place on, in one of `PERIODS`.
+
+    Args:
+        genes: ``(R, N, K, C)``.
+        coins: uniform numbers, ``(R, N, COINS)``.
+        chance: of each run, ``(R,)``.
+    """
+    chance = chance[:, None, None]
+    count = genes.shape[2]
+    copies, source, target, rounds, begin, period = coins.unsqueeze(-1).unbind(-2)
+    place = torch.arange(count, device=genes.device).expand(*genes.shape[:2], -1)
+    hit = (copies < chance) & (place == whole_below(target, count))
+    copied = torch.where(hit, whole_below(source, count), place)
+    first = whole_below(begin, max(count - PERIODS[-1], 1))
+    length = PERIODS[0] + whole_below(period, len(PERIODS))
+    after = (rounds < chance) & (place >= first)
+    turned = torch.where(after, first + (place - first) % length, place)
+    index = copied.gather(2, turned)
+    return genes.gather(2, index.unsqueeze(-1).expand_as(genes))

@@ -16,7 +16,7 @@ from bns.errors import BnsError
 from bns.experiment.config import RunConfig
 from bns.learners.base import Learner, Proposal
 from bns.tasks import registry as tasks
-from bns.worlds import alarm
+from bns.worlds import world
 from bns.worlds.damage import Damage
 from bns.worlds.trial import Trial
 
@@ -54,7 +54,7 @@ class Background(Learner):
         """Ring the alarm when the process is gone."""
         wait([self._process.sentinel])
         if self._process.exitcode:
-            alarm.ring("the learner failed, see its message")
+            world.ring("the learner failed, see its message")
 
     def propose(self, trial: int) -> Proposal[Any]:
         """What to try; from now on the learner thinks until `observe`."""

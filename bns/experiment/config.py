@@ -8,146 +8,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
-from bns.experiment.config_light import LightConfig
-from bns.experiment.config_walk import WalkConfig
-from bns.experiment.config_watch import WatchConfig
+from bns.experiment.task_settings import (
+    ControllerConfig,
+    LightConfig,
+    TaskConfig,
+    WalkConfig,
+)
+from bns.learners.bns.config import (
+    AdaptationConfig,
+    EvolutionConfig,
+    SnnConfig,
+    WatchConfig,
+)
 
-Selection = Literal["tournament", "best", "roulette", "random"]
-Crossover = Literal["single-point", "n-point", "uniform", "sbx"]
-Mutation = Literal["uniform-range", "bounded-uniform", "gaussian"]
 RealChoice = Literal[
     "tournament", "best", "random", "best-worst-random", "disagreement"
 ]
-
-
-@dataclass(frozen=True, kw_only=True)
-class TaskConfig:
-    """What the robot has to do, and how it is scored."""
-
-    name: str = "simple"
-    """simple: A,B,C,D,A; infinity: A,B,E,D,C,E,A; light: drive to a lamp; walk: get
-    far on legs; a file in bns/tasks adds one. What follows is of navigation"""
-    corner_x: float = 0.30
-    """objectives A-D at (+-corner_x, +-corner_y) from the centre E [m] (silent)"""
-    corner_y: float = 0.30
-    """see corner_x [m]"""
-    radius: float = 0.09
-    """an objective is reached within this distance [m] (thesis, Algorithm 5)"""
-    penalty: float = 10000.0
-    """cost per objective not reached (thesis, Algorithm 5)"""
-    squared: bool = False
-    """sum squared distances [cm2] (the prose) or distances [cm] (Algorithm 5)"""
-    command_cost: float = 5.0
-    """cost per command used; the prose asks for few commands [cm]"""
-    charge_unused: bool = True
-    """charge the distance to the open objective for commands not used, too; the
-    printed form (False) rewards giving up"""
-    start_yaw: float = 0.0
-    """heading at the start [deg], counter-clockwise from the board's x axis (silent)"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ControllerConfig:
-    """Open-loop controllers: variable-length lists of (left, right, duration)."""
-
-    max_commands: int = 36
-    """longest list"""
-    initial_min: int = 4
-    """shortest list in a random population"""
-    initial_max: int = 24
-    """longest list in a random population"""
-    speed_low: float = 5000.0
-    """smallest speed gene [speed units]; below `dead_band` it means stop"""
-    speed_high: float = 17500.0
-    """largest speed gene [speed units]"""
-    dead_band: float = 8000.0
-    """speeds of a smaller magnitude count as a stop [speed units]"""
-    duration_low: float = 0.3
-    """shortest command [s]"""
-    duration_high: float = 3.1
-    """longest command [s]"""
-    fixed_length: bool = False
-    """all lists of `max_commands` (a reading of the thesis that never solved)"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class EvolutionConfig:
-    """The evolutionary algorithm that runs inside the SNN."""
-
-    population: int = 100
-    """individuals"""
-    generations: int = 60
-    """generations between two trials in the world (silent)"""
-    selection: Selection = "tournament"
-    """parents"""
-    tournament: int = 3
-    """tournament size for parents"""
-    crossover: Crossover = "single-point"
-    """how two parents make a child; cuts fall between commands, independently"""
-    crossover_points: int = 2
-    """cuts of n-point crossover"""
-    sbx_eta: float = 1.0
-    """distribution index of simulated binary crossover (eq 2.17)"""
-    mutation: Mutation = "bounded-uniform"
-    """uniform-range eq 2.18, bounded-uniform eq 2.19, gaussian eq 2.20"""
-    mutation_rate: float = 0.1
-    """probability per gene"""
-    mutation_magnitude: float = 2000.0
-    """speed genes [speed units]"""
-    duration_magnitude: float = 0.35
-    """duration genes [s] (silent)"""
-    elitism: int = 1
-    """best individuals copied unchanged"""
-    headless_chicken: float = 0.1
-    """probability that the second parent is a fresh random one"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class SnnConfig:
-    """The simulator neural network."""
-
-    kind: Literal["three", "ensemble"] = "three"
-    """three: one 5-20-1 net each for forward, left, turn (thesis Fig 4.4);
-    ensemble: several single networks with dropout and three outputs"""
-    hidden: int = 20
-    """hidden neurons"""
-    members: int = 5
-    """networks in the ensemble (kind = ensemble)"""
-    dropout: float = 0.1
-    """dropout rate after the hidden layer (kind = ensemble)"""
-    epochs: int = 400
-    """Rprop epochs after each trial (silent)"""
-    weight_decay: float = 0.001
-    """weight of the squared weights in the training loss (silent); 0 = none"""
-    warm_start: bool = True
-    """go on from the previous weights"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class AdaptationConfig:
-    """What is changed to recover from damage. "On damage" means: told when it came."""
-
-    window: int = 0
-    """train on the newest patterns only; 0 = all"""
-    population_reset: bool = False
-    """fresh random population on damage"""
-    simulator_reset: bool = False
-    """fresh random SNN on damage (data kept)"""
-    simulator_reset_untrained: bool = False
-    """the SNN of simulator_reset is trained after the next trial only, and evolution
-    goes on in it untrained until then (4.3.5 may be read so); else at once"""
-    simulator_reset_every: int = 0
-    """fresh random SNN every so many trials; 0 = never"""
-    data_reset: bool = False
-    """forget all patterns on damage"""
-    restart: bool = False
-    """population, SNN and patterns all reset on damage"""
-    extra: tuple[str, ...] = ()
-    """adaptations from bns/adaptations by name: population_reset_every:trials=10"""
-    mutation_rate_after: float = 0.0
-    """mutation rate after damage; 0 = unchanged"""
-    mutation_magnitude_after: float = 0.0
-    """mutation magnitude after damage [speed units]; 0 = unchanged"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,19 +53,6 @@ class PriorConfig:
     """effects that hold in the model: what it gets wrong, or right, about the robot"""
     evaluations: int = 4000
     """executions in the model that a run may spend"""
-
-
-BNS_SECTIONS = (
-    "evolution",
-    "snn",
-    "adaptation",
-    "watch",
-    "choose",
-    "choose_tournament",
-    "evolve_from",
-    "compiled",
-)
-"""sections and settings of the learner `bns`; other learners have `settings`"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,8 +9,9 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 import tomli_w
 
 from bns.errors import BnsError, UnknownNameError
-from bns.experiment.config import BNS_SECTIONS, LearnerSettings, PriorConfig, RunConfig
+from bns.experiment.config import LearnerSettings, PriorConfig, RunConfig
 from bns.experiment.validate import check
+from bns.learners.bns.config import BNS_SECTIONS
 from bns.storage import reading
 
 TABLES = ("damage", "reality")

@@ -15,7 +15,8 @@ import torch
 from bns import seeding
 from bns.draws import Draws
 from bns.evolution.chromosome import Encoding
-from bns.experiment.config import RunConfig, SnnConfig
+from bns.experiment.config import RunConfig
+from bns.learners.bns.config import SnnConfig
 from bns.learners.bns.navigation import of_trial
 from bns.snn import training
 from bns.snn.network import Shape, predict

@@ -97,8 +97,11 @@ def _tensors(pairs: list) -> tuple[torch.Tensor, torch.Tensor]:
     """Inputs ``(1, I, N)`` and scaled displacements ``(1, 3, N)``."""
     seen = np.concatenate([inputs for inputs, _ in pairs]).astype(np.float32)
     moved = np.concatenate([moved for _, moved in pairs]) / np.array(MOVED)
-    both = seen.T, moved.T.astype(np.float32)
-    return tuple(torch.from_numpy(np.ascontiguousarray(item))[None] for item in both)
+    inputs, targets = (
+        torch.from_numpy(np.ascontiguousarray(item))[None]
+        for item in (seen.T, moved.T.astype(np.float32))
+    )
+    return inputs, targets
 
 
 def _trained(pairs: list, config: RunConfig, steps: int) -> tuple[torch.Tensor, Shape]:

@@ -6,7 +6,8 @@ from dataclasses import fields, is_dataclass
 from typing import Any, NamedTuple
 
 from bns.errors import BnsError, OutOfBoundsError
-from bns.experiment.config import BNS_SECTIONS, RunConfig
+from bns.experiment.config import RunConfig
+from bns.learners.bns.config import BNS_SECTIONS
 
 
 class Bound(NamedTuple):

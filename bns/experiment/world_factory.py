@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from bns.errors import BnsError
-from bns.experiment.config import AdaptationConfig, RunConfig, WorldConfig
+from bns.experiment.config import RunConfig, WorldConfig
+from bns.learners.bns.config import AdaptationConfig
 from bns.storage import files
 from bns.tasks import registry as tasks
 from bns.worlds import registry as worlds

@@ -6,6 +6,7 @@ A file may start from another preset (`preset` at its top), as any TOML file of 
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 from bns.errors import UnknownNameError
@@ -44,4 +45,4 @@ def _content(name: str) -> dict[str, Any]:
 
     if name not in names():
         raise UnknownNameError("preset", name, names())
-    return read_toml(files(__name__) / f"{name}.toml")
+    return read_toml(Path(str(files(__name__) / f"{name}.toml")))

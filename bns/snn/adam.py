@@ -5,7 +5,7 @@ sizes mistake the noise of dropout for a change of direction; Adam (Kingma and B
 on parts of fixed size does neither. Each run draws from its own patterns.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
@@ -95,10 +95,10 @@ def fit(
     return theta, mean_error(shape, theta, patterns)
 
 
-def _gradient(shape: Shape, theta: Tensor, *patterns: Tensor | None) -> Tensor:
+def _gradient(shape: Shape, theta: Tensor, *patterns: Any) -> Tensor:
     """As `gradient`; on a CPU run by run, since one run's activations fit its cache."""
     if theta.device.type != "cpu":
         return gradient(shape, theta, *patterns)
-    parts = [(None,) * len(theta) if p is None else p.split(1) for p in patterns]
+    parts = [[None] * len(theta) if p is None else p.split(1) for p in patterns]
     rows = zip(theta.split(1), *parts, strict=True)
     return torch.cat([gradient(shape, *row) for row in rows])

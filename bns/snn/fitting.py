@@ -7,7 +7,7 @@ from typing import NamedTuple
 from torch import Tensor
 
 from bns.draws import Draws
-from bns.experiment.config import SnnConfig
+from bns.learners.bns.config import SnnConfig
 from bns.snn import training
 from bns.snn.network import Shape, forward
 

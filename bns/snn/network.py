@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 from bns.draws import Draws
-from bns.experiment.config import SnnConfig
+from bns.learners.bns.config import SnnConfig
 from bns.snn.scaling import INPUTS, OUTPUTS
 
 Activation = Literal["sigmoid", "relu"]

@@ -8,13 +8,17 @@ objectives are reached in the damaged world. Infinite where it never happens.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from scipy import special, stats
 
 from bns.errors import BnsError
 from bns.experiment.record import RunRecord
+
+Sample: TypeAlias = Sequence[float] | np.ndarray
+"""numbers, ``(n,)``"""
+
 
 CONFIDENCE = 0.95
 
@@ -27,7 +31,7 @@ class Interval(NamedTuple):
     high: float
 
 
-def mann_whitney(a: Sequence[float], b: Sequence[float]) -> float:
+def mann_whitney(a: Sample, b: Sample) -> float:
     """Two-sided Mann-Whitney p by the normal approximation, continuity corrected.
 
     Reproduces the dissertation's tables. Infinite values rank as ties at the end.
@@ -35,12 +39,16 @@ def mann_whitney(a: Sequence[float], b: Sequence[float]) -> float:
     Raises:
         BnsError: a sample is empty or holds NaN.
     """
-    a, b = _sample(a), _sample(b)
-    if (np.concatenate([a, b]) == a[0]).all():
+    one, other = _sample(a), _sample(b)
+    if (np.concatenate([one, other]) == one[0]).all():
         return 1.0  # nothing to rank
     return float(
         stats.mannwhitneyu(
-            a, b, method="asymptotic", use_continuity=True, alternative="two-sided"
+            one,
+            other,
+            method="asymptotic",
+            use_continuity=True,
+            alternative="two-sided",
         ).pvalue
     )
 
@@ -58,7 +66,7 @@ def p_of_u(u: float, n_a: int, n_b: int) -> float:
     return float(min(1.0, 2 * special.ndtr(-z)))
 
 
-def holm(p: Sequence[float]) -> np.ndarray:
+def holm(p: Sample) -> np.ndarray:
     """p values adjusted for their number by Holm's step-down method, in order.
 
     Args:
@@ -67,17 +75,15 @@ def holm(p: Sequence[float]) -> np.ndarray:
     Returns:
         ``(n,)``, 1 at most.
     """
-    p = np.asarray(p, dtype=np.float64)
-    order = np.argsort(p, kind="stable")
-    factors = len(p) - np.arange(len(p))
-    adjusted = np.empty_like(p)
-    adjusted[order] = np.minimum(1.0, np.maximum.accumulate(p[order] * factors))
+    given = np.asarray(p, dtype=np.float64)
+    order = np.argsort(given, kind="stable")
+    factors = len(given) - np.arange(len(given))
+    adjusted = np.empty_like(given)
+    adjusted[order] = np.minimum(1.0, np.maximum.accumulate(given[order] * factors))
     return adjusted
 
 
-def a12(
-    a: Sequence[float], b: Sequence[float], *, confidence: float = CONFIDENCE
-) -> Interval:
+def a12(a: Sample, b: Sample, *, confidence: float = CONFIDENCE) -> Interval:
     """Vargha and Delaney's A12 with Newcombe's interval.
 
     A12 is the probability that a value of `a` is larger than one of `b`, ties counted
@@ -95,16 +101,16 @@ def a12(
     return Interval(value, low, high)
 
 
-def a12_value(a: Sequence[float], b: Sequence[float]) -> float:
+def a12_value(a: Sample, b: Sample) -> float:
     """A12 without its interval.
 
     Raises:
         BnsError: a sample is empty or holds NaN.
     """
-    a, b = _sample(a), _sample(b)
-    ranks = stats.rankdata(np.concatenate([a, b]))[: len(a)]
-    u = ranks.sum() - len(a) * (len(a) + 1) / 2
-    return float(u / (len(a) * len(b)))
+    one, other = _sample(a), _sample(b)
+    ranks = stats.rankdata(np.concatenate([one, other]))[: len(one)]
+    u = ranks.sum() - len(one) * (len(one) + 1) / 2
+    return float(u / (len(one) * len(other)))
 
 
 def a12_error(theta: float, n_a: int, n_b: int) -> float:
@@ -114,9 +120,7 @@ def a12_error(theta: float, n_a: int, n_b: int) -> float:
     return float(np.sqrt(theta * (1 - theta) * (1 + mean * shape) / (n_a * n_b)))
 
 
-def median_interval(
-    values: Sequence[float], *, confidence: float = CONFIDENCE
-) -> Interval:
+def median_interval(values: Sample, *, confidence: float = CONFIDENCE) -> Interval:
     """The median and its exact interval from order statistics.
 
     The interval reaches from the k-th smallest to the k-th largest value, k the
@@ -133,7 +137,7 @@ def median_interval(
     return Interval(median(ordered), float(bounds[0]), float(bounds[1]))
 
 
-def median(values: Sequence[float]) -> float:
+def median(values: Sample) -> float:
     """The median; infinite values are allowed (never = inf, half never = inf)."""
     ordered = np.sort(_sample(values))
     low, high = ordered[(len(ordered) - 1) // 2], ordered[len(ordered) // 2]
@@ -177,14 +181,14 @@ def _first(hit: np.ndarray) -> np.ndarray:
     return np.where(hit.any(axis=1), hit.argmax(axis=1) + 1.0, np.inf)
 
 
-def _sample(values: Sequence[float]) -> np.ndarray:
-    values = np.asarray(values, dtype=np.float64)
-    if values.ndim != 1 or len(values) == 0 or np.isnan(values).any():
+def _sample(values: Sample) -> np.ndarray:
+    sample = np.asarray(values, dtype=np.float64)
+    if sample.ndim != 1 or len(sample) == 0 or np.isnan(sample).any():
         raise BnsError(
-            f"A sample of shape {values.shape} with {np.isnan(values).sum()} NaN "
+            f"A sample of shape {sample.shape} with {np.isnan(sample).sum()} NaN "
             "cannot be compared: give a list of numbers, at least one."
         )
-    return values
+    return sample
 
 
 def _newcombe(value: float, n_a: int, n_b: int, z: float, *, upper: bool) -> float:

@@ -8,6 +8,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,13 +16,14 @@ from bns.errors import FormatError
 from bns.storage import files, reading
 
 KINDS = "biufUS"  # of NumPy's types: truth values, numbers, text
-_DAMAGE = (
+DAMAGE = (
     *reading.UNREADABLE,
     zipfile.BadZipFile,
     zlib.error,
     lzma.LZMAError,
     tokenize.TokenError,
 )
+"""what archives and the arrays in them raise where they are damaged"""
 
 
 def write_npz(
@@ -42,7 +44,8 @@ def write_npz(
     if objects:
         raise TypeError(f"arrays of Python objects cannot be stored: {objects}")
     buffer = io.BytesIO()
-    (np.savez_compressed if compressed else np.savez)(buffer, **arrays)
+    save: Any = np.savez_compressed if compressed else np.savez
+    save(buffer, **arrays)
     files.write_bytes(path, buffer.getvalue())
 
 
@@ -74,7 +77,7 @@ def read_npz(path: Path | str, *, most: int = reading.DATA) -> dict[str, np.ndar
                 }
         except FormatError:
             raise
-        except _DAMAGE as error:
+        except DAMAGE as error:
             raise FormatError(f"{path} cannot be read as NPZ: {error}.") from error
 
 

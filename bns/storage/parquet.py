@@ -1,6 +1,7 @@
 """Tables as Parquet files with checksums of their pages and of all they hold."""
 
 import hashlib
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -78,6 +79,63 @@ def decode(data: bytes, name: object, *, most: int = reading.DATA) -> Any:
     return table
 
 
+def foreign(
+    path: Path | str, wanted: Sequence[str], *, most: int = reading.DATA
+) -> dict[str, Any]:
+    """Columns of a file that another project wrote, which carries no digest.
+
+    Args:
+        path: of the file.
+        wanted: names of the columns; of numbers, or of lists of equally many.
+        most: bytes that the columns may have.
+
+    Returns:
+        name -> doubles, ``(N,)``, or ``(N, K)`` of lists; missing ones are NaN.
+
+    Raises:
+        FormatError: absent, torn, damaged, too large, not such a file, a column
+            missing, or not of numbers.
+    """
+    import pyarrow
+
+    try:
+        with reading.regular(path, most=most) as source:
+            file = opened(source, path, most=most)
+            names = file.schema_arrow.names
+            missing = [name for name in wanted if name not in names]
+            if missing:
+                raise FormatError(
+                    f"{path} lacks the columns {_listed(missing)}; it has "
+                    f"{_listed(names)}."
+                )
+            table = file.read(list(wanted), use_threads=False)
+            return {name: _plain(table.column(name), name, path) for name in wanted}
+    except (*reading.UNREADABLE, pyarrow.ArrowException) as error:
+        raise unreadable(error, path) from error
+
+
+def _plain(column: Any, name: str, path: Path | str) -> Any:
+    """A column of numbers, or of lists of equally many, as doubles.
+
+    Raises:
+        FormatError: lists of different lengths, or none at all.
+        pyarrow.ArrowException: no numbers.
+    """
+    from pyarrow import compute, types
+
+    kind, rows = column.type, len(column)
+    if not types.is_nested(kind):
+        return column.cast("float64", safe=False).fill_null(math.nan).to_numpy()
+    lengths = compute.unique(compute.list_value_length(column)).to_pylist()
+    if column.null_count or len(lengths) > 1:
+        raise FormatError(
+            f"{path}: {name} needs a list of equally many numbers in each row."
+        )
+    flat = compute.list_flatten(column).cast("float64", safe=False)
+    values = flat.fill_null(math.nan).to_numpy()
+    return values.reshape(rows, lengths[0] if lengths else 0)
+
+
 def opened(source: Any, name: object, *, most: int = reading.DATA) -> Any:
     """A `pyarrow.parquet.ParquetFile` whose head was looked at.
 
@@ -99,11 +157,11 @@ def opened(source: Any, name: object, *, most: int = reading.DATA) -> Any:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise FormatError(f"{name}: the column {twice[0]!r} is there twice.")
-    claimed = 8 * file.metadata.num_rows * max(1, len(names))
-    if not 0 <= claimed <= most:
+    rows = file.metadata.num_rows
+    if not 0 <= 8 * rows * max(1, len(names)) <= most:
         raise FormatError(
-            f"{name} claims {file.metadata.num_rows} rows; {reading.size(most)} is "
-            "the most that is unpacked."
+            f"{name} claims {rows} rows; {reading.size(most)} is the most that is "
+            "unpacked."
         )
     return file
 

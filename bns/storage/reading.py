@@ -5,9 +5,12 @@ Every reader of the project comes through here (arrays and tables through `array
 content or a `FormatError` of one line.
 """
 
+import gzip
 import os
+import re
 import stat
 import tomllib
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +23,8 @@ from bns.errors import FormatError
 TEXT = 16 << 20  # [bytes] descriptions, settings, heads
 DATA = 4 << 30  # [bytes] recordings, arrays and tables; unpacked as well
 DEEPEST = 64  # tables and lists in one another
+_CHAIN = re.compile(r"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){200,}")
+"""a dotted key so long that parsing it takes a time that grows with its square"""
 WHOLE = 1 << 63  # whole numbers are below, as those of arrays and tables are
 
 UNREADABLE = (
@@ -104,6 +109,22 @@ def read_bytes(path: Path | str, *, most: int = TEXT) -> bytes:
         return file.read(most + 1)
 
 
+def read_packed(path: Path | str, *, most: int = DATA) -> bytes:
+    """The content of a gzipped file; `most` bounds it packed and unpacked.
+
+    Raises:
+        FormatError: as `regular`; damaged.
+    """
+    with regular(path, most=most) as packed:
+        try:
+            data = gzip.GzipFile(fileobj=packed).read(most + 1)
+        except (*UNREADABLE, zlib.error) as error:
+            raise FormatError(f"{path} cannot be unpacked: {error}.") from error
+    if len(data) > most:
+        raise FormatError(f"{path} unpacks to more than {size(most)}.")
+    return data
+
+
 def read_text(path: Path | str, *, most: int = TEXT) -> str:
     """The content of a text file in UTF-8, with or without a byte order mark.
 
@@ -142,6 +163,8 @@ def toml(text: str, name: object) -> dict[str, Any]:
     Raises:
         FormatError: not TOML, nested too deep, a number too large.
     """
+    if _CHAIN.search(text):
+        raise FormatError(f"{name} cannot be read as TOML: it is nested too deep.")
     try:
         content = tomllib.loads(text)
     except (ValueError, RecursionError) as error:

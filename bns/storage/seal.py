@@ -9,6 +9,8 @@ key, or the line, out.
 import hashlib
 import logging
 from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -82,8 +84,16 @@ def damaged(name: object, place: str = "") -> FormatError:
 
 
 def unsealed(name: object) -> None:
-    """Warn of a file that carries no digest."""
-    log.warning("%s carries no checksum: it is read as it is.", name)
+    """Warn of a file that carries no digest, once for all files of its directory."""
+    _warn(Path(str(name)).parent)
+
+
+@cache
+def _warn(directory: Path) -> None:
+    log.warning(
+        "A file in %s carries no checksum: it is read as it is, as are others there.",
+        directory,
+    )
 
 
 def _digest(content: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ import torch
 
 from bns import seeding
 from bns.errors import BnsError
-from bns.experiment.config_light import LightConfig
+from bns.experiment.task_settings import LightConfig
 from bns.tasks.base import Arrays, Picture, Space, Task, seen_places
 from bns.tasks.light_controller import Controllers, GenomePolicy, LightController
 from bns.worlds.trial import Trial

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from bns.errors import UnknownNameError
 from bns.evolution.chromosome import Encoding, Population
-from bns.experiment.config import TaskConfig
+from bns.experiment.task_settings import TaskConfig
 from bns.tasks import registry
 from bns.tasks.base import Arrays, Curve, Picture, Space, Task, seen_places
 from bns.worlds.trial import Commands, Trial

@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from bns.experiment.config import TaskConfig
+from bns.experiment.task_settings import TaskConfig
 from bns.tasks import registry
 from bns.tasks.base import Arrays, Curve, Picture
 from bns.tasks.navigation import CENTIMETRES, MARGIN, WheeledTask

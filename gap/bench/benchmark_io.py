@@ -19,6 +19,7 @@ from bns.gap.diagnose import diagnose
 from bns.gap.models.base import GapModel
 from bns.gap.records import plain
 from bns.storage import files, journal, reading, seal
+from bns.storage.lock import Lock
 from bns.worlds.data import dataset
 
 SCHEMA, VERSION = "bns-gap-answers", 1
@@ -36,7 +37,8 @@ def make(directory: Path, answers: Path, cases: Iterable[tuple[str, Case]]) -> i
         How many were written.
 
     Raises:
-        BnsError: the answers would lie beside the cases, or a case exists.
+        BnsError: the answers would lie beside the cases, a case exists, or another
+            process is writing there.
     """
     directory, answers = Path(directory), Path(answers)
     if directory.resolve() in answers.resolve().parents:
@@ -44,12 +46,12 @@ def make(directory: Path, answers: Path, cases: Iterable[tuple[str, Case]]) -> i
             f"{answers} lies in the casebook {directory}: who runs the cases would "
             "see the answers; put it elsewhere."
         )
-    directory.mkdir(parents=True, exist_ok=True)
     known: dict[str, Any] = {}
-    for name, case in cases:
-        trials = [trial.replace(conditions={}, truth={}) for trial in case.trials]
-        dataset.write(directory / name, trials, provenance={"case": name})
-        known[name] = case.answer.as_dict()
+    with Lock(directory):
+        for name, case in cases:
+            trials = [trial.replace(conditions={}, truth={}) for trial in case.trials]
+            dataset.write(directory / name, trials, provenance={"case": name})
+            known[name] = case.answer.as_dict()
     content = {"schema": SCHEMA, "version": VERSION, "cases": known}
     files.write_json(answers, plain(content))
     return len(known)
@@ -66,11 +68,19 @@ def run(directory: Path, model: GapModel, said: Path, *, seed: int = 0) -> int:
 
     Returns:
         How many were run.
+
+    Raises:
+        BnsError: another process is writing in the directory of `said`.
     """
     said = Path(said)
+    with Lock(said.parent):
+        return _run(Path(directory), model, said, seed)
+
+
+def _run(directory: Path, model: GapModel, said: Path, seed: int) -> int:
     done = {row["name"] for row in _lines(said)}
     count = 0
-    for place in sorted(p for p in Path(directory).iterdir() if p.is_dir()):
+    for place in sorted(p for p in directory.iterdir() if p.is_dir()):
         if place.name in done:
             continue
         trials = dataset.read(place).trials

@@ -8,15 +8,16 @@ degrees, radians, or shares of a range from -100 to 100.
 Format: https://github.com/huggingface/lerobot
 """
 
-import json
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from bns.errors import FormatError
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column, Table
+from bns.storage import parquet, reading
 
 ROLES = {"action": tables.TOLD, "observation.state": tables.SEEN}
 ENDS = {
@@ -33,12 +34,12 @@ def read(path: Path) -> Table:
     Raises:
         FormatError: no frames, or a feature missing or of another size than told.
     """
-    info = _info(path / "meta" / "info.json")
+    features = _info(path / "meta" / "info.json")
     frames = _frames(path)
     columns = []
     for feature, role in ROLES.items():
         values = frames[feature]
-        names = _names(info.get("features", {}).get(feature, {}), values.shape[1])
+        names = _names(features.get(feature, _Feature()), values.shape[1])
         for at, name in enumerate(names):
             part, quantity = name, ""
             for end, kind in ENDS.items():
@@ -52,54 +53,54 @@ def read(path: Path) -> Table:
     )
 
 
-def _info(path: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise FormatError(f"{path} cannot be read as JSON ({error}).") from None
-    if not isinstance(content, dict) or not isinstance(content.get("features"), dict):
-        raise FormatError(f"{path} names no features; a LeRobotDataset does.")
-    return content
+class _Feature(msgspec.Struct):
+    """What is used of a feature in meta/info.json."""
+
+    names: list[Any] | dict[str, Any] | None = None
 
 
-def _names(feature: Any, count: int) -> list[str]:
+class _Info(msgspec.Struct):
+    """What is used of meta/info.json."""
+
+    features: dict[str, _Feature]
+
+
+def _info(path: Path) -> dict[str, _Feature]:
+    todo = "A LeRobotDataset names its features there."
+    return reading.typed(reading.read_json(path), _Info, path, todo=todo).features
+
+
+def _names(feature: _Feature, count: int) -> list[str]:
     """Names of a feature's entries: a list, or a table with one."""
-    names = feature.get("names") if isinstance(feature, dict) else None
+    names = feature.names
     if isinstance(names, dict):
         lists = [item for item in names.values() if isinstance(item, list)]
         names = lists[0] if lists else list(names)
-    return tables.named(names if isinstance(names, list) else (), count)
+    return tables.named(names or (), count)
 
 
 def _frames(path: Path) -> dict[str, np.ndarray]:
-    import pyarrow
-    from pyarrow import parquet
-
-    wanted = ["timestamp", "episode_index", *ROLES]
+    """The frames of all files, in the order of episodes and times."""
+    wanted = ("timestamp", "episode_index", *ROLES)
     files = sorted(path.glob("data/**/*.parquet"))
     if not files:
         raise FormatError(f"{path} has no frames (data/**/*.parquet).")
-    parts: dict[str, list[np.ndarray]] = {name: [] for name in wanted}
+    left, parts = reading.DATA, []
     for file in files:
-        try:
-            table = parquet.read_table(file, columns=wanted)
-            for name in wanted:
-                rows = table.column(name).to_pylist()
-                parts[name].append(np.array(rows, dtype=float))
-        except (pyarrow.ArrowException, OSError, KeyError, TypeError, ValueError) as e:
-            first = str(e).splitlines()[0]
-            raise FormatError(
-                f"{file} needs frames with {', '.join(wanted)} ({first})."
-            ) from None
-    try:
-        made = {name: np.concatenate(items) for name, items in parts.items()}
-    except ValueError:
-        raise FormatError(f"{path}: frames differ in size between files.") from None
-    for name in ROLES:
-        if made[name].ndim != 2:
-            raise FormatError(f"{path}: {name} needs a list of numbers in each frame.")
+        parts.append(parquet.foreign(file, wanted, most=left))
+        left -= sum(values.nbytes for values in parts[-1].values())
+    made = {}
+    for name in wanted:
+        columns = [part[name] for part in parts if len(part["timestamp"])]
+        wide = name in ROLES
+        if wide:  # a robot of one joint has numbers where others have lists
+            columns = [c[:, None] if c.ndim == 1 else c for c in columns]
+        widths = {column.shape[1:] for column in columns}
+        if len(widths) != 1 or any(c.ndim != 1 + wide for c in columns):
+            each = "a list of equally many numbers" if wide else "a number"
+            raise FormatError(f"{path}: {name} needs {each} in each frame.")
+        made[name] = np.concatenate(columns)
+    if not all(np.isfinite(made[name]).all() for name in wanted[:2]):
+        raise FormatError(f"{path}: a frame without a timestamp or an episode_index.")
     order = np.lexsort((made["timestamp"], made["episode_index"]))
-    return {
-        name: np.squeeze(values[order]) if values.ndim < 2 else values[order]
-        for name, values in made.items()
-    }
+    return {name: values[order] for name, values in made.items()}

@@ -11,8 +11,6 @@ one. Time counts from the start of each trial, headings are continuous. A trial 
 the cameras lost the robot for longer than `GAP` is left out.
 """
 
-import gzip
-import zlib
 from pathlib import Path
 
 import numpy as np
@@ -101,7 +99,8 @@ def _table(directory: Path, name: str, columns: int) -> np.ndarray:
             f"{', '.join(map(str, robots(directory))) or 'none'}."
         )
     file = plain if plain.exists() else packed
-    text = _unpacked(file) if file is packed else reading.read_bytes(file, most=MOST)
+    load = reading.read_packed if file is packed else reading.read_bytes
+    text = load(file, most=MOST)
     try:
         rows = [line.split() for line in text.decode().splitlines() if _data(line)]
         table = np.array(rows, dtype=float)
@@ -113,22 +112,6 @@ def _table(directory: Path, name: str, columns: int) -> np.ndarray:
         at = int(np.argmin(np.diff(table[:, 0]))) + 1
         raise FormatError(f"{file}: time goes backwards at row {at + 1}.")
     return table
-
-
-def _unpacked(file: Path) -> bytes:
-    """The content of a gzipped file.
-
-    Raises:
-        FormatError: it is damaged, or too large.
-    """
-    with reading.regular(file, most=MOST) as packed:
-        try:
-            data = gzip.GzipFile(fileobj=packed).read(MOST + 1)
-        except (*reading.UNREADABLE, zlib.error) as error:
-            raise FormatError(f"{file} cannot be unpacked: {error}.") from error
-    if len(data) > MOST:
-        raise FormatError(f"{file} unpacks to more than {reading.size(MOST)}.")
-    return data
 
 
 def _data(line: str) -> bool:

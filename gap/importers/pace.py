@@ -8,13 +8,16 @@ Format: https://github.com/leggedrobotics/pace-sim2real
 """
 
 import pickle
+import zipfile
 from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from bns.errors import FormatError
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column, Table
+from bns.storage import arrays, reading
 
 ENTRIES = {
     "des_dof_pos": (tables.TOLD, tables.POSITION),
@@ -50,28 +53,27 @@ def read(path: Path) -> Table:
 
 
 def _loaded(path: Path) -> dict[str, np.ndarray]:
+    """The entries of a file as arrays of doubles.
+
+    Raises:
+        FormatError: more than tensors in it, too large, or an entry missing.
+    """
     import torch
 
     try:
-        content = torch.load(path, map_location="cpu", weights_only=True)
+        with reading.regular(path) as file:
+            _check(file, path)
+            content = torch.load(file, map_location="cpu", weights_only=True)
         if not isinstance(content, dict):
             raise FormatError(f"{path} holds no dictionary of tensors.")
         found = {
-            str(name): np.asarray(value, dtype=float)
-            for name, value in content.items()
-            if name in ENTRIES or name == "time"
+            name: _array(content[name], f"{name} in {path}")
+            for name in ("time", *ENTRIES)
+            if name in content
         }
     except FormatError:
         raise
-    except (
-        OSError,
-        EOFError,
-        RuntimeError,
-        pickle.UnpicklingError,
-        KeyError,
-        TypeError,
-        ValueError,
-    ) as error:
+    except (*arrays.DAMAGE, pickle.UnpicklingError) as error:
         first = (str(error).splitlines() or [type(error).__name__])[0]
         raise FormatError(f"{path} cannot be read as a PACE file: {first}") from None
     for name in NEEDED:
@@ -80,3 +82,44 @@ def _loaded(path: Path) -> dict[str, np.ndarray]:
                 f"{path} has no entry {name!r}; a PACE file has {', '.join(NEEDED)}."
             )
     return found
+
+
+def _check(file: BinaryIO, path: Path) -> None:
+    """Stop at an archive that claims too much, before anything is unpacked.
+
+    Every member is read to its end, so that the archive's checksums are compared.
+
+    Raises:
+        FormatError: it does, or is packed or encrypted, or a member is damaged.
+        zipfile.BadZipFile, ...: it is no archive.
+    """
+    with zipfile.ZipFile(file) as archive:
+        for member in archive.infolist():
+            if member.flag_bits & 1 or member.compress_type != zipfile.ZIP_STORED:
+                raise FormatError(
+                    f"{path}: {member.filename!r} is packed or encrypted; torch.save "
+                    "does not do that."
+                )
+        broken = archive.testzip()
+    if broken:
+        raise FormatError(f"{path}: {broken!r} is damaged.")
+    file.seek(0)
+
+
+def _array(value: Any, name: str) -> np.ndarray:
+    """A tensor of real numbers as doubles.
+
+    Raises:
+        FormatError: it is none, or larger than can be read.
+    """
+    import torch
+
+    plain = isinstance(value, torch.Tensor) and value.layout == torch.strided
+    if not plain or value.is_complex() or value.is_quantized:
+        raise FormatError(f"{name} is no tensor of real numbers.")
+    if value.numel() * 8 > reading.DATA:
+        raise FormatError(
+            f"{name} has the shape {tuple(value.shape)}; "
+            f"{reading.size(reading.DATA)} is the most that is read."
+        )
+    return value.detach().to(torch.float64).numpy()

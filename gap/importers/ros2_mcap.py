@@ -10,6 +10,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from bns.errors import FormatError
@@ -24,7 +25,67 @@ FIELDS = {
     "velocity": tables.SPEED,
     "effort": tables.EFFORT,
 }
-PLURAL = {"position": "positions", "velocity": "velocities", "effort": "effort"}
+Values = list[float | None] | None
+Log = list[tuple[tuple[int, int], Any]]
+
+
+class Stamp(msgspec.Struct):
+    """A moment, as ROS 2 writes it."""
+
+    sec: int = 0
+    nanosec: int = 0
+    nsec: int = 0
+
+
+class Header(msgspec.Struct):
+    """What is used of a std_msgs/Header."""
+
+    stamp: Stamp = msgspec.field(default_factory=Stamp)
+
+    @property
+    def moment(self) -> int:
+        """The stamp [ns]; 0 = none."""
+        return self.stamp.sec * 1_000_000_000 + (self.stamp.nanosec or self.stamp.nsec)
+
+
+class Point(msgspec.Struct):
+    """What is used of a trajectory_msgs/JointTrajectoryPoint."""
+
+    positions: Values = None
+    velocities: Values = None
+    effort: Values = None
+
+
+class Message(msgspec.Struct):
+    """What is used of a message of any kind that is read."""
+
+    header: Header = msgspec.field(default_factory=Header)
+    name: list[str] | None = None
+    joint_names: list[str] | None = None
+    points: list[Point] | None = None
+    position: Values = None
+    velocity: Values = None
+    effort: Values = None
+    data: Values = None
+
+    @property
+    def joints(self) -> list[str]:
+        """Names of the joints; none in an array."""
+        return self.name or self.joint_names or []
+
+    @property
+    def given(self) -> dict[str, list[float | None]]:
+        """What is given of the joints, by field."""
+        if self.points:
+            point = self.points[0]
+            three = point.positions, point.velocities, point.effort
+        elif self.data is not None:
+            three = self.data, None, None
+        else:
+            three = self.position, self.velocity, self.effort
+        return {
+            field: values or [] for field, values in zip(FIELDS, three, strict=True)
+        }
 
 
 def read(path: Path) -> Table:
@@ -35,11 +96,14 @@ def read(path: Path) -> Table:
         FormatError: no joint states or no commands in it, or more than one of them.
     """
     state, command = _chosen(mcap_log.topics(path), path)
-    logs = mcap_log.messages(path, {state, command})
-    own = all(_stamp(m) > 0 for log in logs.values() for _, m in log)
+    logs = {
+        topic: _typed(log, topic, path)
+        for topic, log in mcap_log.messages(path, {state, command}).items()
+    }
+    own = all(m.header.moment > 0 for log in logs.values() for _, m in log)
     zero = min(_moment(log[0], own) for log in logs.values())
-    seen = _columns(logs[state], state, tables.SEEN, path)
-    told = _columns(logs[command], command, tables.TOLD, path)
+    seen = _columns([m for _, m in logs[state]], state, tables.SEEN, path)
+    told = _columns([m for _, m in logs[command]], command, tables.TOLD, path)
     times = np.array([(_moment(item, own) - zero) * 1e-9 for item in logs[state]])
     sent = np.array([(_moment(item, own) - zero) * 1e-9 for item in logs[command]])
     for stamps, topic in ((times, state), (sent, command)):
@@ -69,53 +133,40 @@ def _chosen(topics: dict[str, str], path: Path) -> tuple[str, str]:
     return seen[0], told[0]
 
 
-def _get(message: Any, name: str, default: Any = None) -> Any:
-    """A field of a message, decoded to an object or to a dictionary."""
-    if isinstance(message, dict):
-        return message.get(name, default)
-    return getattr(message, name, default)
+def _typed(log: Log, topic: str, path: Path) -> list[tuple[tuple[int, int], Message]]:
+    """Messages of a topic, decoded to objects or to dictionaries, as one type.
 
-
-def _stamp(message: Any) -> int:
-    """The header's stamp [ns]; 0 = none."""
-    stamp = _get(_get(message, "header", {}), "stamp", {})
-    seconds = _get(stamp, "sec", 0)
-    return int(seconds) * 1_000_000_000 + int(
-        _get(stamp, "nanosec", _get(stamp, "nsec", 0))
-    )
-
-
-def _moment(item: tuple[tuple[int, int], Any], own: bool) -> int:
-    return _stamp(item[1]) if own else item[0][0]
-
-
-def _content(message: Any) -> tuple[list[str], dict[str, list[float]]]:
-    """Names of joints, and what is given of them by field."""
-    names = list(
-        _get(message, "name", None) or _get(message, "joint_names", None) or []
-    )
-    points = _get(message, "points")
-    if points:
-        return names, {f: list(_get(points[0], PLURAL[f], [])) for f in FIELDS}
-    array = _get(message, "data")
-    if array is not None:
-        return names, {"position": list(array)}
-    return names, {field: list(_get(message, field, [])) for field in FIELDS}
-
-
-def _columns(log: list, topic: str, role: str, path: Path) -> list[Column]:
-    """Columns of a topic; joints keep the order of its first message."""
-    contents = [_content(message) for _, message in log]
-    names, first = contents[0]
+    Raises:
+        FormatError: a field of one holds something else than it should.
+    """
     made = []
+    for stamps, message in log:
+        try:
+            typed = msgspec.convert(message, Message, from_attributes=True)
+        except (msgspec.ValidationError, ValueError, RecursionError) as error:
+            raise FormatError(f"{path}: a message on {topic}: {error}.") from None
+        made.append((stamps, typed))
+    return made
+
+
+def _moment(item: tuple[tuple[int, int], Message], own: bool) -> int:
+    return item[1].header.moment if own else item[0][0]
+
+
+def _columns(
+    contents: list[Message], topic: str, role: str, path: Path
+) -> list[Column]:
+    """Columns of a topic; joints keep the order of its first message."""
+    names, first = contents[0].joints, contents[0].given
+    made: list[Column] = []
     for field, quantity in FIELDS.items():
-        count = len(first.get(field, ()))
+        count = len(first[field])
         if not count:
             continue
         joints = tables.named(names, count)
         rows = []
-        for listed, given in contents:
-            values = given.get(field, [])
+        for message in contents:
+            values, listed = message.given[field], message.joints
             if len(values) != count or sorted(listed) != sorted(names):
                 raise FormatError(f"{path}: the joints on {topic} change on the way.")
             order = {name: at for at, name in enumerate(listed)}

@@ -9,15 +9,18 @@ Format: https://github.com/isaac-sim2real/sage
 """
 
 import csv
-import json
+import io
+import re
 from collections.abc import Iterable
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from bns.errors import FormatError
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column, Table
+from bns.storage import reading
 
 COMMANDS, STATES, JOINTS = "control.csv", "state_motor.csv", "joint_list.txt"
 EVENTS, BEGIN, END = "event.csv", "MOTION_START", "DISABLE"
@@ -28,6 +31,8 @@ QUANTITIES = {
 }
 SECONDS = 1000.0  # [s] stamps beyond are microseconds
 MICRO = 1e-6
+NAN = re.compile(r"\bnan\b", re.IGNORECASE)
+Cell = list[float | None]
 
 
 def read(path: Path) -> Table:
@@ -65,11 +70,13 @@ def _vectors(
     try:
         times = np.array([float(row["timestamp"]) for row in rows])
         values = {
-            name: np.array([json.loads(row[name]) for row in rows], dtype=float)
+            name: np.array([_cell(row[name]) for row in rows], dtype=float)
             for name in present
         }
-    except (TypeError, ValueError) as error:
+    except (*reading.UNREADABLE, msgspec.MsgspecError) as error:
         raise FormatError(f"{path}: a cell is no list of numbers ({error}).") from None
+    if not np.isfinite(times).all():
+        raise FormatError(f"{path}: a timestamp is NaN or infinity.")
     if (np.diff(times) < 0).any():
         raise FormatError(f"{path}: time goes backwards; sort the rows by timestamp.")
     joints = _joints(path.parent / JOINTS, values["positions"], path)
@@ -81,11 +88,21 @@ def _vectors(
     ]
 
 
+def _cell(text: str) -> Cell:
+    """The numbers in a cell; what is not a number is None.
+
+    Raises:
+        msgspec.MsgspecError: it holds something else.
+        TypeError: the row has no such cell.
+    """
+    return msgspec.json.decode(NAN.sub("null", text), type=Cell)
+
+
 def _rows(path: Path) -> list[dict[str, str]]:
+    text = reading.read_text(path, most=reading.DATA)
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        rows = list(csv.DictReader(io.StringIO(text, newline="")))
+    except (csv.Error, ValueError) as error:
         raise FormatError(f"{path} cannot be read as CSV ({error}).") from None
     if not rows:
         raise FormatError(f"{path} has no rows.")
@@ -93,12 +110,9 @@ def _rows(path: Path) -> list[dict[str, str]]:
 
 
 def _joints(path: Path, table: np.ndarray, where: Path) -> list[str]:
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError):
-        raise FormatError(
-            f"{where} needs {path.name} beside it, with the joints."
-        ) from (None)
+    if not path.exists():
+        raise FormatError(f"{where} needs {path.name} beside it, with the joints.")
+    lines = reading.read_text(path).splitlines()
     names = [line.strip() for line in lines if line.strip()]
     if table.ndim != 2 or table.shape[1] != len(names):
         width = table.shape[1] if table.ndim == 2 else 0
@@ -111,7 +125,7 @@ def _joints(path: Path, table: np.ndarray, where: Path) -> list[str]:
 
 def _motion(path: Path) -> tuple[float, float]:
     """First and last stamp of the motion, in the file's own unit."""
-    if not path.is_file():
+    if not path.exists():
         return -np.inf, np.inf
     begin, end = -np.inf, np.inf
     for row in _rows(path):

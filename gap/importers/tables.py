@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from bns.errors import FormatError
+from bns.storage import csv_table, numbers
 
 TIME, TRIAL, SENT = "time", "trial", "command_time"
 """columns that a log may have under these names, beside its channels"""
@@ -20,6 +21,7 @@ TOLD, SEEN = "told", "seen"
 """what a column may hold: a command, or a measurement"""
 
 POSITION, SPEED, EFFORT = "position", "speed", "effort"
+MOST = 1e20  # of numbers of any kind; stamps in nanoseconds are below
 SAME = 1e-6  # [s] moments that are nearer are one
 
 ENDS = ([".csv"], [".tsv"], [".txt"])
@@ -102,7 +104,7 @@ def read(path: str | Path) -> Table:
     """The table in a log.
 
     Raises:
-        FormatError: no such file, of no known kind, or not to be read.
+        FormatError: no such file, of no known kind, not to be read, or as `checked`.
         MissingDependencyError: a package that this kind needs.
     """
     path = Path(path)
@@ -115,7 +117,7 @@ def read(path: str | Path) -> Table:
             "a PACE file (.pt), an MCAP log (.mcap), or the directory of a SAGE motion "
             "(control.csv, state_motor.csv) or of a LeRobotDataset (meta/info.json)."
         )
-    return found(path)
+    return checked(found(path), path)
 
 
 def joined(
@@ -178,30 +180,35 @@ def stamped(
 
 def _csv(path: Path) -> Table:
     """Columns of numbers; others are left out."""
-    import pyarrow
-    from pyarrow import csv, types
-
     plain = path.with_suffix("") if path.suffix.lower() == PACKED else path
     tabbed = plain.suffix.lower() == ".tsv"
-    options = csv.ParseOptions(delimiter="\t" if tabbed else ",")
-    try:
-        table = csv.read_csv(path, parse_options=options)
-    except (pyarrow.ArrowException, OSError) as error:
-        first = str(error).splitlines()[0]
-        raise FormatError(f"{path} is no CSV table of numbers ({first}).") from None
-    found: dict[str, np.ndarray] = {}
-    for name, column in zip(table.column_names, table.columns, strict=True):
-        kind = column.type
-        if types.is_boolean(kind):
-            column = column.cast("int8")
-        elif not (
-            types.is_integer(kind) or types.is_floating(kind) or types.is_null(kind)
-        ):
-            continue
-        found[name] = column.cast("float64").fill_null(np.nan).to_numpy()
-    if not found or not table.num_rows:
+    found = csv_table.read_numbers(path, delimiter="\t" if tabbed else ",")
+    if not found or not len(next(iter(found.values()))):
         raise FormatError(f"{path} is no CSV table of numbers with a line of names.")
     return Table(tuple(Column(n, v) for n, v in found.items()), "CSV table")
+
+
+def checked(table: Table, path: Path) -> Table:
+    """The table, if its columns are what can have been recorded.
+
+    Raises:
+        FormatError: no rows, columns of different lengths, a name twice, infinity, or a
+            number beyond `MOST` (`numbers.BEYOND` in what was told or seen).
+    """
+    rows = {column.values.shape for column in table.columns}
+    if len(rows) != 1 or not min(rows):
+        raise FormatError(f"{path} has no rows, or columns of different lengths.")
+    for column in table.columns:
+        if table.names.count(column.name) > 1:
+            raise FormatError(f"{path}: the column {column.name!r} is there twice.")
+        most = numbers.BEYOND if column.role else MOST
+        largest = float(np.nanmax(np.abs(column.values), initial=0.0))
+        if largest > most:
+            raise FormatError(
+                f"{path}: the column {column.name!r} holds {largest:.3g}; {most:g} is "
+                "the most that is read."
+            )
+    return table
 
 
 def named(names: Sequence[str], count: int) -> list[str]:

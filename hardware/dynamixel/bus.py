@@ -23,8 +23,8 @@ from bns.hardware.faults import FaultLog
 from bns.hardware.khepera.driver import Guard
 from bns.hardware.line import INSTALL, check_port, claim
 from bns.hardware.openers import Openers
-from bns.hardware.stop_order import insist, phantomx
-from bns.hardware.watchdog import LARGEST, send
+from bns.hardware.safety.stop_order import insist, phantomx
+from bns.hardware.safety.watchdog import LARGEST, send
 from bns.worlds.physics.legged_flags import OVERLOAD_TIME, SATURATED, STALLED
 
 TRIES = 4
@@ -358,6 +358,7 @@ def _port(sdk: Any, name: str, latency: float) -> Any:
         came = 0  # bytes of an answer and of what else came
 
         def readPort(self, length: int) -> bytes:
+            """Up to so many bytes, see `PortHandler.readPort`."""
             # the SDK looks at the time in a silent moment only; late answers are good
             if self.came > BABBLE and self.isPacketTimeout():
                 return b""

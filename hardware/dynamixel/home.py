@@ -62,7 +62,7 @@ def _steps(seen: Sighting, target: Sequence[float]) -> int:
 
 def _step(walker: Walker, swing: np.ndarray, target: Sequence[float]) -> None:
     """One step towards the target as it is seen now."""
-    gap, turn = _gap(walker.last.pose, target)
+    gap, turn = _gap((walker.last or walker.wait_for_sight()).pose, target)
     away = float(np.hypot(*gap))
     way = gap * min(1.0, STRIDE / max(away, 1e-9))
     turn = float(np.clip(turn, -TURN, TURN))

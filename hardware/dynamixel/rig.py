@@ -11,12 +11,12 @@ from bns.hardware.dynamixel.bus import EMPTY, Bus
 from bns.hardware.dynamixel.walker import Walker
 from bns.hardware.errors import LinkError
 from bns.hardware.faults import FaultLog
-from bns.hardware.limits import Limits, Operator
 from bns.hardware.line import check_port
-from bns.hardware.priority import urgent
 from bns.hardware.rig import EMULATED, look
+from bns.hardware.safety.limits import Limits, Operator
+from bns.hardware.safety.priority import urgent
+from bns.hardware.safety.watchdog_client import WatchdogClient
 from bns.hardware.tracking.eyes import Eyes
-from bns.hardware.watchdog_client import WatchdogClient
 
 
 @dataclass

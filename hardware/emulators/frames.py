@@ -132,7 +132,8 @@ class Painter:
         if min(width, tall) <= 0:
             return
         end = len(texture) - 0.5
-        own = np.float32([[-0.5, -0.5], [end, -0.5], [end, end], [-0.5, end]])
+        square = [[-0.5, -0.5], [end, -0.5], [end, end], [-0.5, end]]
+        own = np.array(square, np.float32)
         fine = ((pixels - low + 0.5) * FINE - 0.5).astype(np.float32)
         turn = module.getPerspectiveTransform(own, fine)
 

@@ -12,8 +12,10 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.hardware.dynamixel import joints as tables
+from bns.hardware.dynamixel import packets
 from bns.hardware.dynamixel.joints import Joint
 from bns.hardware.emulators.live_body import LiveBody
+from bns.models import servo_numbers
 from bns.models.ax12a import NO_LOAD_SPEED
 from bns.worlds.effects.base import Effect
 from bns.worlds.physics import legged_plan, servo_joint
@@ -119,7 +121,7 @@ class HexapodBody(LiveBody):
         self.model.actuator_gainprm[column, 0] = whole
         self.model.actuator_biasprm[column, 1] = -whole
         values = {name: law[column] for name, law in self._laws.items()}
-        bare = servo_joint.joint_numbers(values, 0.0).damping
+        bare = servo_numbers.joint_numbers(values, 0.0).damping
         self.model.dof_damping[self._rates[column]] = (
             self._damping[column] if on else bare
         )
@@ -131,7 +133,7 @@ class HexapodBody(LiveBody):
         """What a servo reads."""
         column, joint = self._column[servo], self.joints[servo]
         angle = self._angles()[column]
-        units = round(joint.zero + joint.sign * angle * tables.UNITS)
+        units = round(joint.zero + joint.sign * angle * packets.UNITS)
         push = self.data.actuator_force[column]
         most = max(self.model.actuator_forcerange[column, 1], 1e-9)
         speed = float(self.data.qvel[self._rates[column]]) * joint.sign

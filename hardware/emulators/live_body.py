@@ -11,7 +11,14 @@ import numpy as np
 from bns import models
 from bns.errors import BnsError
 from bns.worlds import active
-from bns.worlds.effects.base import BodyEffect, ControlSignal, Effect, ServoEffect
+from bns.worlds.damage import Damage
+from bns.worlds.effects.base import (
+    BodyEffect,
+    CommandEffect,
+    ControlSignal,
+    Effect,
+    ServoEffect,
+)
 from bns.worlds.physics import compile, observe
 from bns.worlds.physics.rollout import STATE, Compiled
 
@@ -45,11 +52,11 @@ class LiveBody(ABC):
         _refuse(given, self.robot.kind)
         held = [event.effect for event in given.events]
         body = tuple(e for e in held if _edits(e))
-        self.signal = [e for e in held if not _edits(e)]
+        self.signal = [e for e in held if isinstance(e, CommandEffect)]
         scene = compile.compiled(robot, body)
         self.model = copy.copy(scene.model)  # its own: a servo can be switched off
         self.data = mujoco.MjData(self.model)
-        begin = self._begin(scene, tuple(float(v) for v in start))
+        begin = self._begin(scene, (float(start[0]), float(start[1]), float(start[2])))
         mujoco.mj_setState(self.model, self.data, begin, STATE)
         mujoco.mj_forward(self.model, self.data)
         self.dt = float(self.model.opt.timestep)
@@ -142,7 +149,7 @@ def _edits(effect: Effect) -> bool:
     return isinstance(effect, BodyEffect | ServoEffect)
 
 
-def _refuse(given, kind: str) -> None:
+def _refuse(given: Damage, kind: str) -> None:
     active.refuse(
         given, stages=("command", "actuator", "body"), kind=kind, world="emulator"
     )

@@ -140,12 +140,13 @@ class ServoBank:
         if at == packets.GOAL and len(data) >= 2 and data[0] | data[1] << 8 > 1023:
             return 1 << 1
         table[at : at + len(data)] = data
-        if self.body is not None:
-            self._tell(number, table)
+        self._tell(number, table)
         return 0
 
     def _tell(self, number: int, table: bytearray) -> None:
-        """Let the body's servo know its registers."""
+        """Let the body's servo know its registers, where there is a body."""
+        if self.body is None:
+            return
         speed = table[packets.SPEED] | table[packets.SPEED + 1] << 8
         self.body.speed(number, speed * packets.SPEED_UNIT)
         self.body.tell(number, table[packets.GOAL] | table[packets.GOAL + 1] << 8)

@@ -12,8 +12,8 @@ from bns.hardware.emulators.khepera_body import KheperaBody
 from bns.hardware.emulators.khepera_device import KheperaDevice
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera.driver import Khepera3
-from bns.hardware.limits import Limits, Operator
 from bns.hardware.rig import SIZE, Rig
+from bns.hardware.safety.limits import Limits, Operator
 from bns.hardware.tracking.camera import Camera
 from bns.hardware.tracking.eyes import VirtualEyes
 from bns.hardware.tracking.marker import Marker

@@ -2,7 +2,7 @@
 
 import contextlib
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from bns.errors import BnsError
 from bns.hardware.clock import Clock
@@ -11,7 +11,7 @@ from bns.hardware.faults import FaultLog
 from bns.hardware.khepera import protocol
 from bns.hardware.khepera.port_diagnosis import port_error
 from bns.hardware.line import Line
-from bns.hardware.stop_order import insist, khepera3
+from bns.hardware.safety.stop_order import insist, khepera3
 from bns.models.khepera3.units import Firmware, firmware
 
 LARGEST = 43_000  # speed units, firmware < 3, regulated (manual 2.2, p. 14)
@@ -28,7 +28,7 @@ STOPPING = 1.0  # s for the robot to acknowledge a stop
 
 
 class Guard(Protocol):
-    """What has to stand behind a moving robot, see `bns.hardware.watchdog`."""
+    """What has to stand behind a moving robot, see `bns.hardware.safety.watchdog`."""
 
     def feed(self, *, moving: bool) -> None:
         """Say that the process is alive; raises if the guard has fired."""
@@ -78,7 +78,7 @@ class Khepera3:
         self.line, self.clock, self.guard = line, clock, guard
         self.faults = faults if faults is not None else FaultLog(clock)
         self.limit, self.timeout = limit, timeout
-        self.units: Firmware | None = None
+        self._firmware: Firmware | None = None
         self.version: tuple[int, int] = (0, 0)
         self.wheels = (1.0, 1.0)
         self.round_trips: list[float] = []
@@ -115,7 +115,7 @@ class Khepera3:
                 f"Firmware {self.version[0]}.{self.version[1]} is not known (1 to "
                 f"{NEWEST} are): its units could be anything, so nothing was moved."
             )
-        self.units = firmware(self.version[0])
+        self._firmware = firmware(self.version[0])
         return self.version
 
     def ask(
@@ -147,7 +147,7 @@ class Khepera3:
             BnsError: too fast, nobody guards, or the firmware is not known yet.
             LinkError: not acknowledged.
         """
-        _ = self._known
+        _ = self.units
         if max(abs(left), abs(right)) > self.limit * (1 + 1e-9):
             raise BnsError(
                 f"Speed {max(abs(left), abs(right)):.3g} m/s is above the limit of "
@@ -169,24 +169,24 @@ class Khepera3:
         return Drive(begin + (took + protocol.longer(command)) / 2, pair, took)
 
     @property
-    def _known(self) -> Firmware:
+    def units(self) -> Firmware:
         """Units of the firmware.
 
         Raises:
             BnsError: it is not known yet.
         """
-        if self.units is None:
+        if self._firmware is None:
             raise BnsError("The firmware is not known yet: call identify() first.")
-        return self.units
+        return self._firmware
 
     def speed(self, units: float) -> float:
         """Over the floor, with the nominal wheel [m/s], of a speed in device units."""
-        return float(self._known.speed(float(units)))
+        return float(self.units.speed(float(units)))
 
     def _device(self, left: float, right: float) -> tuple[int, int]:
         """Speeds over the floor [m/s] in device units."""
         a, b = self.wheels
-        units = self._known.units
+        units = self.units.units
         return round(units(left / a)), round(units(right / b))
 
     def lead(self, *pair: float) -> float:
@@ -302,11 +302,11 @@ class Khepera3:
         command: bytes,
         understood: Callable,
         heard: list[bytes] | None = None,
-    ):
+    ) -> Any:
         what = command.decode().strip()
         return self._repeat(lambda: self._line(command, understood, heard), what)
 
-    def _repeat(self, once: Callable, what: str):
+    def _repeat(self, once: Callable, what: str) -> Any:
         since, self._came = self.clock.now(), 0
         for _ in range(RETRIES + 1):
             self.alive()
@@ -342,7 +342,9 @@ class Khepera3:
         if waited > UNANSWERED:
             raise Void(f"no proper answer to {what!r} in {waited:.2f} s")
 
-    def _line(self, command: bytes, understood: Callable, heard: list[bytes] | None):
+    def _line(
+        self, command: bytes, understood: Callable, heard: list[bytes] | None
+    ) -> Any:
         """One try: lines are read until one is the answer or time is up."""
         self.line.discard()
         self.line.write(command)

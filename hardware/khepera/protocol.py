@@ -58,11 +58,6 @@ def speeds(left: int, right: int) -> bytes:
     return f"D,{wide(left)},{wide(right)}\n".encode()
 
 
-def counters(left: int, right: int) -> bytes:
-    """The command that sets both wheels' position counters [counts]."""
-    return f"I,{wide(left)},{wide(right)}\n".encode()
-
-
 def numbers(line: bytes, letter: str) -> tuple[int, ...] | None:
     """The numbers of an answer, None if it is not the answer to `letter`.
 

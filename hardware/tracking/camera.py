@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import msgspec
 import numpy as np
@@ -63,7 +63,7 @@ class Camera:
     latency: float = 0.0
 
     @classmethod
-    def overhead(cls, size: tuple[int, int], *, height: float = CAMERA_HEIGHT):
+    def overhead(cls, size: tuple[int, int], *, height: float = CAMERA_HEIGHT) -> Self:
         """The ideal camera of the arena model, looking straight down.
 
         Args:
@@ -148,7 +148,9 @@ class Camera:
         )
 
 
-def plane_points(pose: Sequence[float], local: np.ndarray, height: float) -> np.ndarray:
+def plane_points(
+    pose: Sequence[float] | np.ndarray, local: np.ndarray, height: float
+) -> np.ndarray:
     """Points of a robot's frame in the world, ``(N, 3)``.
 
     Args:

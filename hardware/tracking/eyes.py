@@ -4,9 +4,11 @@ import threading
 from collections import deque
 from typing import Protocol
 
+import numpy as np
+
 from bns.errors import BnsError
 from bns.hardware.clock import VirtualClock
-from bns.hardware.priority import urgent
+from bns.hardware.safety.priority import urgent
 from bns.hardware.tracking.sources import Source
 from bns.hardware.tracking.tracker import Frame, Sighting, Tracker
 
@@ -117,7 +119,8 @@ class VirtualEyes:
     ):
         self.source, self.tracker, self.clock = source, tracker, clock
         self.rate, self.latency = rate, latency
-        self._count, self._frame = 0, None
+        self._count = 0
+        self._frame: Frame | None = None
         self.blind = False
 
     def poll(self) -> list[Sighting]:
@@ -128,8 +131,8 @@ class VirtualEyes:
             if self.blind:
                 self.tracker.missed()
                 continue
-            self._frame = Frame(at, self.source.paint_at(at), self._count)
-            sighting = self.tracker.see(self._frame)
+            frame = Frame(at, self.source.paint_at(at), self._count)
+            self._frame, sighting = frame, self.tracker.see(frame)
             if sighting is not None:
                 seen.append(sighting)
         return seen
@@ -145,6 +148,6 @@ class VirtualEyes:
 class Painted(Protocol):
     """Paints the robot as it was at a time."""
 
-    def paint_at(self, at: float):
+    def paint_at(self, at: float) -> np.ndarray:
         """The picture ``(H, W)`` uint8."""
         ...

@@ -20,7 +20,7 @@ class Finder:
     in a whole picture it takes most of a second.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._wide: Any = None
         self._fine: dict[int, Any] = {}
 

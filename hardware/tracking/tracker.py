@@ -116,7 +116,9 @@ class Tracker:
         """Corners near the last place ``(4, 2)``, None where there are none."""
         if self._last is None:
             return None
-        middle = plane_points(self._last.pose, [self._middle], self.marker.height)
+        middle = plane_points(
+            self._last.pose, np.array([self._middle]), self.marker.height
+        )
         at = self.camera.project(middle)[0]
         focal, depth = self.camera.matrix[0, 0], self.camera.position[2]
         side = float(focal * self.marker.side / (depth - self.marker.height))

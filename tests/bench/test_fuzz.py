@@ -5,7 +5,8 @@ import warnings
 import pytest
 
 from bench.storage import reading
-from bench.storage.readers import make, readers
+from bench.storage.readers import readers
+from bench.storage.sample_files import make
 
 INPUTS = 30
 """of each reader; `python -m bench fuzz` tries more"""

@@ -17,7 +17,8 @@ import numpy as np
 
 from bns import seeding
 from bns.experiment import versions
-from bns.experiment.config import ControllerConfig, RunConfig, WorldConfig
+from bns.experiment.config import RunConfig, WorldConfig
+from bns.experiment.task_settings import ControllerConfig
 from bns.learners import registry
 from bns.learners.base import Learner, Proposal
 from bns.storage import files

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bns.cli import gap_after
+from bns.cli.gap import after
 from bns.errors import FormatError
 from bns.gap import store
 from bns.gap.models.servo.model import ServoModel
@@ -174,7 +174,7 @@ def test_each_command_of_a_plan_gets_a_file(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(plan, "_family", lambda *given: family(*given)[:4])
     monkeypatch.setattr(plan, "runs", lambda table: {0: 1, 3: 2})
     store.save(tied(AXLE, WHEELS), tmp_path)
-    assert gap_after.main("plan", [str(tmp_path)]) == 0
+    assert after.main("plan", [str(tmp_path)]) == 0
     said = capsys.readouterr().out
     assert "Run once: " in said and ", and twice: " in said
     first, second = (

@@ -10,10 +10,10 @@ from bns.errors import BnsError
 
 pytest.importorskip("cv2")
 
-from bns.hardware import route
+from bns.hardware.driving import homing
 from bns.hardware.emulators import virtual
 from bns.hardware.errors import SafetyStop
-from bns.hardware.light_world import HardwareLight
+from bns.hardware.worlds.light import HardwareLight
 from bns.worlds.light import sensors as light_sensors
 from bns.worlds.light.field import Lamp
 
@@ -88,13 +88,13 @@ def test_software_damage_changes_readings_and_commands():
 def test_ways_lead_round_lamps():
     lamps = np.zeros((1, 2))
     for begin, end in (([-1, 0], [1, 0.02]), ([0.1, 0.0], [-0.6, 0.1])):
-        corners = route.around(begin, end, lamps, keep=0.25)
+        corners = homing.around(begin, end, lamps, keep=0.25)
         way = np.array([begin, *corners, end])
         share = np.linspace(0, 1, 50)[:, None]
         legs = [a + share * (b - a) for a, b in pairwise(way)]
         legs = legs[1:] if np.hypot(*begin) < 0.25 else legs
         assert corners and min(np.hypot(*leg.T).min() for leg in legs) > 0.22
-    assert route.around([-1, 0.5], [1, 0.5], lamps, keep=0.25) == []
+    assert homing.around([-1, 0.5], [1, 0.5], lamps, keep=0.25) == []
 
 
 def test_a_robot_behind_the_lamp_gets_to_its_start_round_it():

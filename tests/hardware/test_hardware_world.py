@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.worlds import alarm
 from bns.worlds.trial import Commands
+from bns.worlds.world import clear, ring
 
 pytest.importorskip("cv2")
 
 from bns.hardware.emulators import virtual
 from bns.hardware.errors import SafetyStop
-from bns.hardware.world import HardwareWorld
+from bns.hardware.worlds.wheeled import HardwareWorld
 
 AHEAD = Commands([[0.1, 0.1], [0.06, -0.06]], [1.0, 0.8])
 
@@ -52,10 +52,10 @@ def test_software_damage_changes_what_is_sent_from_its_trial_on(trial):
 
 def test_the_alarm_a_covered_camera_and_the_rim_stop_it(trial):
     _, rig, world = trial
-    alarm.ring("the learner failed")
+    ring("the learner failed")
     with pytest.raises(SafetyStop, match="learner failed"):
         world.run([AHEAD])
-    alarm.clear()
+    clear()
     rig.eyes.blind = True
     with pytest.raises(BnsError, match="not in view"):
         world.run([AHEAD])

@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.hardware import excitation, hexapod_world, walked
 from bns.hardware.clock import RealClock
+from bns.hardware.driving import excitation
 from bns.hardware.dynamixel import joints, zeros
 from bns.hardware.dynamixel.walker import SPEED, Walked
 from bns.hardware.emulators.hexapod_body import HexapodBody
 from bns.hardware.emulators.pty_host import PtyHost
-from bns.hardware.emulators.run_bus import phantomx
+from bns.hardware.emulators.run import phantomx
 from bns.hardware.emulators.servo_bank import ServoBank
 from bns.hardware.errors import Void
-from bns.hardware.hexapod_world import HardwareHexapod
 from bns.hardware.tracking.tracker import Sighting
+from bns.hardware.worlds import hexapod, walked
+from bns.hardware.worlds.hexapod import HardwareHexapod
 from bns.models import robot
 from bns.models.legs import JOINTS
 from bns.models.phantomx import servos
@@ -72,7 +73,7 @@ def test_software_damage_changes_what_is_sent_before_the_first_command_as_well()
     given = goals({"left_front_femur": -0.2, "right_rear_coxa": 0.1}, {})
     damage = Damage.parse(["leg_raised:legs=1,blend=1"])
     stages = Stages.of(Damage.none(), damage, 0, given.duration)
-    sent, before = hexapod_world.told(given, stages, 0, 0)
+    sent, before = hexapod.told(given, stages, 0, 0)
     femur = JOINTS.index("left_front_femur")
     assert sent[:, femur] == pytest.approx([1.3, 1.3]) and before[femur] == 1.3
     assert sent[0, JOINTS.index("right_rear_coxa")] == 0.1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.hardware.motion_check import AXLE, SLOWEST, MotionCheck
+from bns.hardware.safety.motion_check import AXLE, SLOWEST, MotionCheck
 from bns.hardware.tracking.tracker import Frame, Sighting, Tracker
 from bns.worlds.trial import Commands
 
@@ -12,7 +12,7 @@ pytest.importorskip("cv2")
 
 from bns.hardware.emulators import virtual
 from bns.hardware.errors import Void
-from bns.hardware.world import HardwareWorld
+from bns.hardware.worlds.wheeled import HardwareWorld
 
 BOTH = np.ones(2)
 ROUND = Commands([[0.04, 0.10]], [4.0])

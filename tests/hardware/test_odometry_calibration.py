@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError, FormatError
-from bns.hardware import odometry
-from bns.hardware.odometry import Wheels, fit
+from bns.hardware.driving import odometry
+from bns.hardware.driving.odometry import Wheels, fit
 from bns.models.khepera3.units import WHEEL_DIAMETER
 
 

@@ -9,7 +9,7 @@ from bns.hardware.emulators.khepera_body import KheperaBody
 from bns.hardware.emulators.khepera_device import KheperaDevice
 from bns.hardware.errors import LinkError, SafetyStop, Void
 from bns.hardware.khepera.driver import Khepera3
-from bns.hardware.stop_order import AGAIN, insist, khepera3, phantomx
+from bns.hardware.safety.stop_order import AGAIN, insist, khepera3, phantomx
 
 GARBAGE = np.random.default_rng(3).bytes(4000)
 

@@ -12,7 +12,7 @@ from bns.hardware.emulators.khepera_device import KheperaDevice
 from bns.hardware.emulators.pty_host import PtyHost
 from bns.hardware.emulators.servo_bank import ServoBank
 from bns.hardware.errors import SafetyStop, Void
-from bns.hardware.watchdog_client import WatchdogClient
+from bns.hardware.safety.watchdog_client import WatchdogClient
 
 SLOW = 20.0  # s; a busy machine
 

@@ -8,8 +8,8 @@ from bns.worlds.trial import Commands
 pytest.importorskip("cv2")
 
 from bns.hardware.emulators import virtual
-from bns.hardware.real_robot import TRIES
-from bns.hardware.world import HardwareWorld
+from bns.hardware.worlds.real_robot import TRIES
+from bns.hardware.worlds.wheeled import HardwareWorld
 
 LONG = Commands([[0.12, 0.11], [-0.10, -0.12]], [2.4, 2.2])
 

@@ -89,3 +89,15 @@ def test_the_readme_links_to_docs_results_and_the_way_to_contribute():
     links = set(LINK.findall((ROOT / "README.md").read_text(encoding="utf-8")))
     wanted = {"docs/index.md", "CONTRIBUTING.md", "bench/results/README.md", "LICENSE"}
     assert wanted <= links
+
+
+def test_the_site_has_its_styles():
+    import subprocess
+
+    found = re.search(r"extra_css: \[(.+)\]", (ROOT / "mkdocs.yml").read_text())
+    assert found
+    path = ROOT / "docs" / found[1]
+    assert path.is_file()
+    if (ROOT / ".git").exists():
+        asked = ["git", "check-ignore", str(path)]
+        assert subprocess.run(asked, cwd=ROOT, check=False).returncode == 1

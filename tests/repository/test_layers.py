@@ -1,6 +1,7 @@
 """Imports point one way: base <- models <- worlds <- the learner; nothing sees viz."""
 
 import graphlib
+import json
 
 import pytest
 
@@ -37,10 +38,9 @@ MAY_IMPORT = {
 }
 PROTOCOL = {
     "bns.worlds",
-    "bns.worlds.alarm",
+    "bns.worlds.world",
     "bns.worlds.counted",
     "bns.worlds.trial",
-    "bns.worlds.world",
     "bns.worlds.damage",
     "bns.worlds.data.dataset",
 }
@@ -131,3 +131,40 @@ def test_the_trees_are_reached_through_bns(module):
 def test_no_module_needs_itself_to_be_imported():
     graph = {m.name: {n for n in ours(m.at_once) if n != "bns"} for m in MODULES}
     graphlib.TopologicalSorter(graph).prepare()  # raises CycleError with the cycle
+
+
+HEAVY = {"torch", "mujoco", "rerun", "matplotlib", "scipy", "pyarrow", "pandas"}
+TREES = {"models", "worlds", "gap", "hardware", "viz"}
+
+
+def loaded(run_python, code, **options) -> set[str]:
+    tell = "import json, sys; print('\\n' + json.dumps(sorted(sys.modules)))"
+    output = run_python("-c", f"{code}\n{tell}", **options)
+    return {name.split(".")[0] for name in json.loads(output.splitlines()[-1])}
+
+
+def test_import_bns_is_light(run_python):
+    assert not loaded(run_python, "import bns") & HEAVY
+
+
+def test_help_is_light(run_python):
+    code = """
+import sys
+sys.argv = ["bns", "--help"]
+from bns.__main__ import main
+try:
+    main()
+except SystemExit as done:
+    assert not done.code, done.code
+"""
+    assert not loaded(run_python, code) & HEAVY
+
+
+def test_every_module_is_importable_and_no_tree_is_imported_twice(run_python, root):
+    from tests.sources import modules
+
+    names = [name for name in sorted(modules()) if not name.endswith("__main__")]
+    code = f"from importlib import import_module\nfor name in {names}:\n"
+    found = loaded(run_python, code + "    import_module(name)", cwd=root)
+    assert "bns" in found
+    assert not found & TREES

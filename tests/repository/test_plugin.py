@@ -1,4 +1,4 @@
-"""Another package adds an effect, a world and a robot, by its entry points alone."""
+"""Another package adds one of each kind that can be added, by entry points alone."""
 
 import json
 import shutil
@@ -74,6 +74,33 @@ def test_its_learner_learns(run_python, site, tmp_path):
     out = ["--out", tmp_path / "run"]
     told = ["-m", "bns", "run", "khepera-simple", *words, *out]
     assert "4 trials of 2 runs" in run_python(*told, PYTHONPATH=str(site))
+
+
+@pytest.mark.parametrize("learner", ["climber", "bns"])
+def test_its_task_is_learned(run_python, site, tmp_path, learner):
+    words = ["--task.name", "edge", "--learner", learner, "--replicates", "2"]
+    words += ["--rerun", "off", "--threads", "1", "--trials", "3"]
+    out = ["--out", tmp_path / "run"]
+    told = ["-m", "bns", "run", "khepera-simple", *words, *out]
+    assert "3 trials of 2 runs" in run_python(*told, PYTHONPATH=str(site))
+    assert "near the upper edge" in (tmp_path / "run" / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ("bns_example.nothing", "cannot be had from 'bns_example.nothing'"),
+        ("bns_example", "the package bns_example holds no other.toml"),
+    ],
+)
+def test_a_task_that_is_not_there_is_said(run_python, site, tmp_path, value, message):
+    broken = tmp_path / "broken"
+    shutil.copytree(site, broken)
+    (info,) = broken.glob("*.dist-info")
+    (info / "entry_points.txt").write_text(f"[bns.tasks]\nother = {value}\n")
+    told = ["-m", "bns", "run", "demo", "--task.name", "other", "--out", tmp_path / "r"]
+    said = run_python(*told, code=2, PYTHONPATH=str(broken))
+    assert message in said and said.count("\n") == 1
 
 
 def test_the_command_line_knows_it(run_python, site):

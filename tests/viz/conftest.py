@@ -5,8 +5,9 @@ import os
 import numpy as np
 import pytest
 
-from bns.experiment.config import RunConfig, TaskConfig, WorldConfig
+from bns.experiment.config import RunConfig, WorldConfig
 from bns.experiment.record import RunRecord
+from bns.experiment.task_settings import TaskConfig
 from bns.seeding import generator
 from bns.worlds.trial import Commands, Trial
 

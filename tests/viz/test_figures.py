@@ -6,10 +6,13 @@ from functools import partial
 import numpy as np
 import pytest
 
+from bns.errors import OutOfBoundsError
 from bns.learners.bns.learner import DIVERSITY, SNN_ERROR
 from bns.viz import facts, figures
-from bns.viz.figures import bands
+from bns.viz.choices import choose, typical
+from bns.viz.figures import trials
 from bns.viz.figures.displacement import SHOWN, groups
+from bns.viz.paths import arcs, dashes, listed
 
 OVER_TRIALS = ("fitness", "solved", "waits")
 OF_BNS = {item.name: item for item in (SNN_ERROR, DIVERSITY)}
@@ -64,7 +67,7 @@ def test_waits_end_at_the_share_that_made_it(record):
 
 
 def test_onsets_are_marked_once(record, undamaged):
-    assert bands.onsets({"a": record, "b": record, "c": undamaged}) == [20]
+    assert trials.onsets({"a": record, "b": record, "c": undamaged}) == [20]
 
 
 def test_displacement_groups_lie_around_the_damage(record):
@@ -94,3 +97,86 @@ def test_the_path_fades_after_the_last_objective(record):
     longer = np.concatenate([poses, poses[-1:] + np.ones(3)])
     assert task.finish(longer) == len(poses) - 1
     assert task.finish(poses[:3]) == 2  # not done: all of it
+
+
+def with_solved(record, rows, onset):
+    """The record with other outcomes."""
+    solved = np.array(rows, dtype=float)
+    fitness = np.where(solved > 0, 300.0, 50000.0 - np.arange(solved.shape[1]))
+    columns = {
+        name: values[: len(rows), : solved.shape[1]]
+        for name, values in record.columns.items()
+    }
+    return replace(
+        record,
+        columns=columns | {"solved": solved, "fitness": fitness},
+        sent=record.sent[: len(rows), : solved.shape[1]],
+        poses=record.poses[: len(rows), : solved.shape[1]],
+        predicted=record.predicted[: len(rows), : solved.shape[1]],
+        damage_onset=np.full(len(rows), onset),
+    )
+
+
+def test_before_at_and_after_the_damage(record):
+    made = with_solved(record, [[0, 1, 1, 0, 0, 0, 1, 1]], onset=4)
+    assert [choice.trial for choice in choose(made, 0)] == [2, 4, 6]
+    assert [choice.label for choice in choose(made, 0)][2] == "recovered"
+
+
+def test_a_run_that_never_solves_says_so(record):
+    made = with_solved(record, [[0, 0, 0, 0, 0, 0]], onset=3)
+    found = choose(made, 0)
+    assert [choice.trial for choice in found] == [2, 3, 5]  # lowest fitness
+    assert "unsolved" in found[0].label and "unsolved" in found[2].label
+
+
+def test_without_damage_first_solved_and_last(record):
+    made = with_solved(record, [[0, 0, 1, 0, 1]], onset=-1)
+    assert [choice.trial for choice in choose(made, 0)] == [0, 2, 4]
+
+
+def test_trials_that_coincide_are_shown_once(record):
+    made = with_solved(record, [[1]], onset=-1)
+    assert [choice.trial for choice in choose(made, 0)] == [0]
+
+
+def test_typical_is_the_median_of_those_that_recovered(record):
+    rows = [[0, 1, 0, 0, 0, 1], [0, 1, 0, 1, 1, 1], [0, 1, 0, 0, 1, 1], [0] * 6]
+    assert typical(with_solved(record, rows, onset=2)) == 2
+
+
+def test_unknown_replicate(record):
+    with pytest.raises(OutOfBoundsError, match="replicate = 99"):
+        choose(record, 99)
+
+
+def test_a_quarter_circle():
+    poses = np.array([[0, 0, 0], [1, 1, np.pi / 2]])
+    found = arcs(poses, 4)
+    assert np.allclose(np.linalg.norm(found[:, :2] - [0, 1], axis=1), 1)
+    assert np.allclose(found[2], [np.sin(np.pi / 4), 1 - np.cos(np.pi / 4), np.pi / 4])
+
+
+def test_arcs_pass_through_the_poses_they_join():
+    poses = np.random.default_rng(0).normal(size=(6, 3))
+    assert np.allclose(arcs(poses, 5)[::5], poses)
+
+
+def test_a_straight_line_and_a_full_turn_stay_finite():
+    poses = np.array([[0, 0, 0], [1, 0, 0], [1.01, 0, 2 * np.pi]])
+    found = arcs(poses, 8)
+    assert np.allclose(found[4], [0.5, 0, 0])
+    assert np.abs(found[:, :2]).max() < 1.1
+
+
+def test_listed_stops_at_the_first_gap():
+    poses = np.zeros((5, 3))
+    poses[3:] = np.nan
+    assert len(listed(poses)) == 3
+    assert len(listed(np.zeros((5, 3)))) == 5
+
+
+def test_dashes_cover_half_the_length():
+    pieces = dashes(np.array([[0.0, 0.0], [1.0, 0.0]]), dash=0.05)
+    assert np.isclose(sum(np.ptp(piece[:, 0]) for piece in pieces), 0.5, atol=0.05)
+    assert dashes(np.zeros((3, 2))) == []

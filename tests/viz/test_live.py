@@ -38,6 +38,19 @@ def test_unexpected_data_do_not_stop_the_run(record, monkeypatch, caplog):
     assert shown.failed
 
 
+def test_the_live_view_listens_on_this_machine_alone(monkeypatch):
+    begun = []
+    monkeypatch.setattr(live, "_no_display", lambda: False)
+    monkeypatch.setattr(live, "executable", lambda: "viewer")
+    monkeypatch.setattr(live, "wait", lambda process, port: None)
+    monkeypatch.setattr(
+        live.subprocess, "Popen", lambda words, **_: begun.append(words)
+    )
+    assert live._spawn().startswith("rerun+http://127.0.0.1:")
+    ((_, flag, address, *_),) = begun
+    assert (flag, address) == ("--bind", "127.0.0.1")
+
+
 def test_trials_reach_a_viewer(record):
     problem = picture.missing()
     if problem:

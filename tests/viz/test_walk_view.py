@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bns import models
-from bns.viz import walk_view
+from bns.viz import moments
 from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Trial
 
 
@@ -44,7 +44,7 @@ def feet(model, qpos):
 
 def test_it_stands_on_all_feet_half_way(model):
     seen = trial({})
-    qpos = walk_view.qpos(model, seen.poses_world, seen, np.arange(2))
+    qpos = moments.walking_qpos(model, seen.poses_world, seen, np.arange(2))
     heights = feet(model, qpos[0])
     assert len(heights) == 6
     np.testing.assert_allclose(list(heights.values()), 0.0, atol=1e-3)
@@ -53,7 +53,7 @@ def test_it_stands_on_all_feet_half_way(model):
 
 def test_a_raised_leg_is_in_the_air_and_the_others_are_not(model):
     seen = trial({"left_middle_femur": 1.0})
-    qpos = walk_view.qpos(model, seen.poses_world, seen, np.arange(2))
+    qpos = moments.walking_qpos(model, seen.poses_world, seen, np.arange(2))
     heights = feet(model, qpos[0])
     assert heights.pop("left_middle") > 0.05
     np.testing.assert_allclose(list(heights.values()), 0.0, atol=1e-3)
@@ -61,7 +61,7 @@ def test_a_raised_leg_is_in_the_air_and_the_others_are_not(model):
 
 def test_only_walking_robots_report_servos():
     bare = Trial(Commands([[0.1, 0.1]], [1.0]), [0, 1], np.zeros((2, 3)), [0, 1])
-    assert walk_view.reports_servos(trial({})) and not walk_view.reports_servos(bare)
+    assert moments.reports_servos(trial({})) and not moments.reports_servos(bare)
 
 
 @pytest.mark.parametrize("walks", [False, True])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
+from bns.worlds.stepwise import rewards
 
 gymnasium = pytest.importorskip("gymnasium")
 checker = pytest.importorskip("gymnasium.utils.env_checker")
@@ -87,6 +88,58 @@ def test_environments_run_side_by_side():
     seen, _ = both.reset(seed=[1, 2])
     assert seen.shape == (2, 2) and not np.array_equal(*seen)
     assert both.step(np.zeros((2, 2), np.float32))[1].shape == (2,)
+
+
+@pytest.mark.parametrize("name", ["Light", "Navigation", "Hexapod"])
+@pytest.mark.filterwarnings("error")
+def test_a_batch_gives_what_single_environments_give(name):
+    """Observations, rewards, ends and infos, over the begin of new episodes."""
+    count = {"num_envs": 3, "cycles": 3}
+    native = gymnasium.make_vec(f"{MODULE}:bns/{name}-v0", **count)
+    single = gymnasium.make_vec(
+        f"{MODULE}:bns/{name}-v0", vectorization_mode="sync", **count
+    )
+    assert type(native).__name__ == "RobotVectorEnv"
+    assert native.observation_space == single.observation_space
+    assert native.action_space == single.action_space
+    native.action_space.seed(5)
+    assert checker.data_equivalence(native.reset(seed=5), single.reset(seed=5))
+    for _ in range(9):
+        action = native.action_space.sample()
+        seen, other = native.step(action), single.step(action)
+        assert checker.data_equivalence(seen, other)
+        assert seen[0] in native.observation_space
+
+
+def test_robots_of_a_batch_end_at_different_times():
+    settings = {"num_envs": 3, "cycles": 4, "damage": [GAIN + "@3"]}
+    goals = {"reward": rewards.Waypoints([(0.05, 0.0), (0.12, 0.0)])}
+    native = gymnasium.make_vec(f"{MODULE}:bns/Navigation-v0", **settings, **goals)
+    native.reset(seed=1, options={"trial": 3})
+    ahead = np.array([[1, 1], [-1, -1], [0, 0]], np.float32)
+    steps = [native.step(ahead) for _ in range(6)]
+    over, late = (np.array([step[at] for step in steps]) for at in (2, 3))
+    assert over[:, 0].any() and not over[:, 1:].any()
+    assert late[3, 1:].all() and not late[:3].any()
+    first = int(over[:, 0].argmax())
+    assert np.abs(steps[first + 1][0][0, :3]).max() < 1e-6
+    assert steps[first + 1][1][0] == 0.0  # it began anew, the others went on
+    assert steps[1][4]["pose_world"].shape == (3, 3)
+
+
+def test_some_robots_of_a_batch_begin_anew():
+    native = gymnasium.make_vec(f"{MODULE}:bns/Light-v0", num_envs=2, cycles=5)
+    with pytest.raises(BnsError, match="call reset first"):
+        native.step(np.zeros((2, 2)))
+    with pytest.raises(BnsError, match="3 seeds for 2 robots"):
+        native.reset(seed=[1, 2, 3])
+    native.reset(seed=[1, 2], options={"start": (0.8, 0.1, 0.3)})
+    seen = native.step(np.ones((2, 2)))[0]
+    again, _ = native.reset(options={"reset_mask": np.array([True, False])})
+    assert np.array_equal(again[1], seen[1]) and not np.array_equal(again[0], seen[0])
+    native.step(np.ones((2, 2)))
+    with pytest.raises(BnsError, match="finite"):
+        native.step(np.full((2, 2), np.nan))
 
 
 def test_cma_es_learns_to_come_near_the_lamp():

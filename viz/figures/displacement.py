@@ -1,12 +1,16 @@
 """What the simulator network foresaw of each command against what happened."""
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from bns.experiment.record import RunRecord
 from bns.viz import style
 from bns.worlds.trial import body_displacements
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 SHOWN = 300
 """Points drawn per group at most."""
@@ -21,7 +25,7 @@ _PANELS = (
 _DOTS = {"markersize": 3, "alpha": 0.55, "markeredgewidth": 0}
 
 
-def displacement(record: RunRecord):
+def displacement(record: RunRecord) -> "Figure":
     """Motion per command as foreseen by the SNN against the real one, per output."""
     with style.plotting() as figure_class:
         figure = figure_class(figsize=(7.0, 3.0), layout="constrained")

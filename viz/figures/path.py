@@ -1,6 +1,7 @@
 """Where the robot went and where its simulator network said it would go."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,10 +12,15 @@ from bns.viz import style
 from bns.viz.choices import Choice, choose, typical
 from bns.viz.paths import arcs, listed
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
 BOARD = np.array(HALF)
 """m; beyond the board paths are cut"""
 
-_FORESEEN = {"color": style.BLACK, "linewidth": 1.3, "ls": (0, (3, 2))}
+_FORESEEN: Any = {"color": style.BLACK, "linewidth": 1.3, "ls": (0, (3, 2))}
 
 
 def path(
@@ -22,7 +28,7 @@ def path(
     *,
     replicate: int | None = None,
     choices: Sequence[Choice] | None = None,
-):
+) -> "Figure":
     """Paths of chosen trials of one replicate, a panel each.
 
     Args:
@@ -51,7 +57,7 @@ def path(
     return figure
 
 
-def _objectives(axes, record: RunRecord) -> None:
+def _objectives(axes: "Axes", record: RunRecord) -> None:
     from matplotlib.patches import Circle
 
     shown = tasks.of(record.config).picture
@@ -62,12 +68,13 @@ def _objectives(axes, record: RunRecord) -> None:
         axes.annotate(name, (x, y), ha="center", va="center", fontweight="bold")
 
 
-def _paths(axes, record: RunRecord, at: tuple[int, int], colour: str) -> None:
+def _paths(axes: "Axes", record: RunRecord, at: tuple[int, int], colour: str) -> None:
     """Foreseen and real path; what follows the last objective is faint."""
-    for poses, line, label in (
+    shown: Any = (
         (record.predicted[at], _FORESEEN, "as the SNN foresaw it"),
         (record.poses[at], {"color": colour, "linewidth": 2.0}, "as the robot drove"),
-    ):
+    )
+    for poses, line, label in shown:
         poses = listed(poses)
         if len(poses) < 2:
             continue
@@ -90,7 +97,7 @@ def _until_done(record: RunRecord, at: tuple[int, int]) -> np.ndarray:
     return arcs(poses[: tasks.of(record.config).finish(poses) + 1])
 
 
-def _limits(axes, record: RunRecord, shown) -> None:
+def _limits(axes: "Axes", record: RunRecord, shown: Any) -> None:
     """The objectives and the paths, but nothing beyond the board."""
     half = np.array(tasks.of(record.config).picture.extent)
     paths = np.concatenate([_until_done(record, at)[:, :2] for at in shown])
@@ -100,4 +107,5 @@ def _limits(axes, record: RunRecord, shown) -> None:
     axes.set_ylim(low[1], high[1])
     wide, tall = high - low
     panel = 6.3 / len(shown)
-    axes.figure.set_figheight(min(panel * tall / wide, 4.0) + 1.25)
+    whole: Any = axes.figure
+    whole.set_figheight(min(panel * tall / wide, 4.0) + 1.25)

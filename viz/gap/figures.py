@@ -1,10 +1,17 @@
 """Figures of a diagnosis: how far the gap closes, where it is, and the motion."""
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from bns.gap.records import Diagnosis
 from bns.viz import style
 from bns.viz.gap.view import View
+
+if TYPE_CHECKING:
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
+
 
 RECORDED, NOMINAL, CORRECTED = style.BLACK, style.VERMILION, style.BLUE
 LISTED = 7  # single effects in the figure of what closes the gap
@@ -14,7 +21,7 @@ ROUND = {"m": ("mm", 1e3), "rad": ("mrad", 1e3)}
 SIDE = 4  # features that fit side by side
 
 
-def shares(found: Diagnosis):
+def shares(found: Diagnosis) -> "Figure":
     """What the gap is made of: the share that each explanation closes, alone and when
     it is added last, and what is left."""
     parts = found.decomposition["parts"][:LISTED]
@@ -36,7 +43,7 @@ def shares(found: Diagnosis):
     return figure
 
 
-def closing(found: Diagnosis):
+def closing(found: Diagnosis) -> "Figure":
     """How far the gap shrinks: nominal, each effect alone, the chosen set, floor."""
     closed = found.closed
     singles = sorted(closed["singles"].items(), key=lambda row: row[1])[:LISTED]
@@ -72,7 +79,7 @@ def closing(found: Diagnosis):
     return figure
 
 
-def horizons(found: Diagnosis, view: View):
+def horizons(found: Diagnosis, view: View) -> "Figure":
     """Root mean square of the residuals against how far ahead was predicted."""
     rms = [np.array(found.where[key], dtype=float) for key in ("rms", "rms_floor")]
     low, high = (np.array(found.where[k], dtype=float) for k in ("rms_low", "rms_high"))
@@ -120,7 +127,7 @@ def horizons(found: Diagnosis, view: View):
     return figure
 
 
-def _log(axis, set_scale) -> None:
+def _log(axis: "Axis", set_scale: Any) -> None:
     """A logarithmic axis with plain numbers."""
     from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
 
@@ -138,7 +145,7 @@ def _horizon(value: float | None) -> str:
     return "trial" if whole else f"{value:g} s"
 
 
-def over_time(view: View):
+def over_time(view: View) -> "Figure":
     """Residuals of one trial over time, nominal and corrected, with the floor."""
     trial = view.shown
     times = view.problem.windows[trial].times
@@ -165,7 +172,7 @@ def over_time(view: View):
     return figure
 
 
-def _legend(figure, view: View, third: str) -> None:
+def _legend(figure: "Figure", view: View, third: str) -> None:
     from matplotlib.lines import Line2D
 
     known = [("recorded minus nominal", NOMINAL), (third, style.GREEN)]
@@ -175,10 +182,10 @@ def _legend(figure, view: View, third: str) -> None:
     figure.legend(handles=lines, loc="outside lower center", ncols=3)
 
 
-def motion(view: View):
+def motion(view: View) -> Any:
     """The trial with the largest gap: the path, or each channel over time."""
     trial = view.trials[view.shown]
-    series = [
+    series: list[tuple] = [
         ("recorded", trial.observed, RECORDED, 2.2, "-"),
         ("nominal", view.nominal[view.shown], NOMINAL, 1.4, "-"),
     ]
@@ -190,7 +197,7 @@ def motion(view: View):
     return _path(series) if planar else _channels(trial, series)
 
 
-def _path(series):
+def _path(series: Any) -> "Figure":
     with style.plotting() as figure_class:
         figure = figure_class(figsize=(7.0, 4.6), layout="constrained")
         axes = figure.subplots()
@@ -208,7 +215,7 @@ def _path(series):
     return figure
 
 
-def _channels(trial, series):
+def _channels(trial: Any, series: Any) -> "Figure":
     size = (7.0, 0.8 + 1.35 * len(trial.channels))
     with style.plotting() as figure_class:
         figure = figure_class(figsize=size, layout="constrained")

@@ -3,17 +3,22 @@
 from collections.abc import Sequence
 from hashlib import sha256
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bns.gap.models.base import GapModel
 from bns.gap.records import Diagnosis
-from bns.viz import rrd, series, style
+from bns.viz import rrd, style
 from bns.viz.blueprint import BACKGROUND, LIVE_TIMELINE
 from bns.viz.gap import scene
 from bns.viz.gap.figures import CORRECTED, NOMINAL
 from bns.viz.gap.view import MOST, View, view
 from bns.worlds.trial import POSE, Channel, Trial
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+
 
 GAP = 1.0
 """s of pause between two trials"""
@@ -68,7 +73,7 @@ def _starts(seen: View, chosen: Sequence[int]) -> list[float]:
     return np.concatenate([[0.0], np.cumsum(lengths)[:-1]]).tolist()
 
 
-def _styles(stream, seen: View) -> None:
+def _styles(stream: "RecordingStream", seen: View) -> None:
     import rerun as rr
 
     colours = {"nominal": NOMINAL, "corrected": CORRECTED, "floor": style.GREEN}
@@ -89,7 +94,9 @@ def _styles(stream, seen: View) -> None:
             )
 
 
-def _residuals(stream, seen: View, number: int, start: float) -> None:
+def _residuals(
+    stream: "RecordingStream", seen: View, number: int, start: float
+) -> None:
     """Recorded minus predicted motion, window by window, in the features' units."""
     windows = seen.problem.windows[number]
     at = start + windows.times - seen.trials[number].times[0]
@@ -99,10 +106,10 @@ def _residuals(stream, seen: View, number: int, start: float) -> None:
     for column, feature in enumerate(seen.problem.model.features):
         for name, values in shown.items():
             path = f"residuals/{feature.name}/{name}"
-            series.send(stream, path, at, values[:, column])
+            rrd.send(stream, path, at, values[:, column])
 
 
-def _observed(stream, seen: View, number: int, start: float) -> None:
+def _observed(stream: "RecordingStream", seen: View, number: int, start: float) -> None:
     trial = seen.trials[number]
     at = start + trial.times - trial.times[0]
     shown = {"recorded": trial.observed, "nominal": seen.nominal[number]}
@@ -112,7 +119,7 @@ def _observed(stream, seen: View, number: int, start: float) -> None:
         for column, channel in enumerate(trial.channels):
             fine = np.isfinite(values[:, column])
             path = f"observed/{channel.name}/{name}"
-            series.send(stream, path, at[fine], values[fine, column])
+            rrd.send(stream, path, at[fine], values[fine, column])
 
 
 def _features(seen: View) -> list[Channel]:
@@ -128,7 +135,7 @@ def _channels(seen: View) -> list[Channel]:
     return channels if len(channels) <= MOST else few
 
 
-def _layout(seen: View, planar: bool, length: float):
+def _layout(seen: View, planar: bool, length: float) -> Any:
     import rerun.blueprint as rrb
 
     span = rrb.TimeRange(
@@ -136,7 +143,7 @@ def _layout(seen: View, planar: bool, length: float):
         rrb.TimeRangeBoundary.absolute(seconds=length),
     )
 
-    def plots(root: str, words: str, channels):
+    def plots(root: str, words: str, channels: Any) -> Any:
         """One below the other, a plot of each channel."""
         return rrb.Vertical(
             *(
@@ -174,7 +181,7 @@ def _layout(seen: View, planar: bool, length: float):
     )
 
 
-def _about(found: Diagnosis, chosen: Sequence[int]):
+def _about(found: Diagnosis, chosen: Sequence[int]) -> Any:
     import rerun as rr
 
     lines = [

@@ -1,13 +1,18 @@
 """The 3D part of a diagnosis's recording: three robots side by side, paths, arrows."""
 
 from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bns.viz import geometry, scene, series, style
+from bns.viz import geometry, rrd, scene, style
 from bns.viz.blueprint import LIVE_TIMELINE
 from bns.viz.gap.figures import NOMINAL
 from bns.viz.gap.view import View
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+
 
 HEIGHT = 0.005  # [m] above the floor at which paths are drawn
 ENLARGED = 5.0  # arrows
@@ -29,7 +34,7 @@ def planar(seen: View) -> bool:
 
 
 @lru_cache(maxsize=8)
-def _ghost(robot: str, colour: str):
+def _ghost(robot: str, colour: str) -> Any:
     """The robot alone, all in one colour."""
     from bns import models
 
@@ -80,7 +85,7 @@ def _lane(seen: View, name: str) -> np.ndarray:
     return np.array([LANES[name] * (high - low)[0], 0.0, 0.0])
 
 
-def log_static(stream, seen: View) -> None:
+def log_static(stream: "RecordingStream", seen: View) -> None:
     """Log coordinates, shapes and names."""
     import rerun as rr
 
@@ -99,7 +104,7 @@ def log_static(stream, seen: View) -> None:
         )
 
 
-def send(stream, seen: View, number: int, start: float) -> None:
+def send(stream: "RecordingStream", seen: View, number: int, start: float) -> None:
     """Log one trial: robots in motion, paths, arrows; they vanish after it.
 
     Args:
@@ -121,12 +126,12 @@ def send(stream, seen: View, number: int, start: float) -> None:
         lane = _lane(seen, name)
         qpos = geometry.planar_qpos(model, rows[fine] + lane)
         geometry.send_poses(
-            stream, model, series.times(at[fine]), qpos, root=f"world/{name}"
+            stream, model, rrd.times(at[fine]), qpos, root=f"world/{name}"
         )
         if name != "recorded":
             stream.send_columns(
                 f"world/paths/{name}",
-                series.times(at[:1]),
+                rrd.times(at[:1]),
                 rr.LineStrips3D.columns(
                     strips=[_lift(rows[fine] + lane)],
                     colors=[style.rgb(colour)],
@@ -137,7 +142,7 @@ def send(stream, seen: View, number: int, start: float) -> None:
             real = real[np.isfinite(real).all(axis=1)]
             stream.send_columns(
                 f"world/paths/recorded_beside_{name}",
-                series.times(at[:1]),
+                rrd.times(at[:1]),
                 rr.LineStrips3D.columns(
                     strips=[_lift(real + lane)], colors=[GREY], radii=[TRAIL / 2]
                 ),
@@ -145,7 +150,7 @@ def send(stream, seen: View, number: int, start: float) -> None:
     _hurts(stream, seen, number, start)
 
 
-def _hurts(stream, seen: View, number: int, start: float) -> None:
+def _hurts(stream: "RecordingStream", seen: View, number: int, start: float) -> None:
     """The recorded path, red where the nominal model fails, with arrows."""
     import rerun as rr
 
@@ -187,7 +192,7 @@ def _lift(poses: np.ndarray) -> np.ndarray:
     return np.column_stack([poses[:, :2], np.full(len(poses), HEIGHT)])
 
 
-def view_3d(seen: View, background):
+def view_3d(seen: View, background: Any) -> Any:
     """The 3D view, its camera set so that all that was driven is seen."""
     import rerun.blueprint as rrb
 

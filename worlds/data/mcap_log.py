@@ -188,9 +188,11 @@ def topics(path: Path) -> dict[str, str]:
             "Reading MCAP logs", "the package mcap", "pip install mcap"
         ) from None
     try:
-        with path.open("rb") as file:
-            found = make_reader(file).get_summary()
-    except (*reading.UNREADABLE, struct.error, McapError) as error:
+        with reading.regular(path) as file:
+            found = make_reader(file, validate_crcs=True).get_summary()
+    except BnsError:
+        raise
+    except (*_broken(), McapError) as error:
         raise FormatError(f"{path} cannot be read as MCAP ({error}).") from None
     if found is None:
         raise FormatError(f"{path} has no summary: mend it with `mcap recover`.")

@@ -1,6 +1,6 @@
 """The physics world with lamps: robots that see light and steer themselves."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import cached_property
 from math import inf
@@ -14,7 +14,6 @@ from bns.worlds import checks, objects
 from bns.worlds.active import Placed, Stages
 from bns.worlds.damage import Damage
 from bns.worlds.light import sensors as light_sensors
-from bns.worlds.light import starts as light_starts
 from bns.worlds.light.field import Lamp, LightField
 from bns.worlds.light.sensing import LEAD, Sensing
 from bns.worlds.light.supervisor import Supervisor
@@ -137,7 +136,7 @@ class LightWorld(MujocoWorld):
         """Anywhere on the board, but not near a lamp, an object or the edge."""
         rng = seeding.generator(seed, "world", trial, "start")
         taken = [(p.x, p.y, p.radius + self.radius) for p in self.posts]
-        return light_starts.anywhere(
+        return anywhere(
             rng, self.arena, self._places, edge=self.supervisor.edge, taken=taken
         )
 
@@ -162,3 +161,44 @@ class LightWorld(MujocoWorld):
                     f"{self.supervisor.safety:g} m; start further away."
                 )
         return poses
+
+
+NEAREST = 0.5
+"""m; trials start no nearer to a lamp than this; assumed"""
+
+TRIES = 10_000
+
+
+def anywhere(
+    rng: np.random.Generator,
+    arena: tuple[float, float],
+    lamps: np.ndarray,
+    *,
+    edge: float = 0.0,
+    taken: Iterable[tuple[float, float, float]] = (),
+) -> tuple[float, float, float]:
+    """A pose anywhere on the board, but not near a lamp, the edge or what is taken.
+
+    Args:
+        rng: the only source of randomness.
+        arena: size of the board [m], its centre the origin.
+        lamps: where the lamps are, shape ``(L, 2)`` [m].
+        edge: kept free along the board's edge [m]; negative = nothing.
+        taken: other places: x, y and what to keep free around them [m].
+
+    Returns:
+        x, y, yaw [m, m, rad].
+
+    Raises:
+        BnsError: there is no such place.
+    """
+    half = np.asarray(arena) / 2 - max(edge, 0.0)
+    x, y, room = np.array([*((*place, NEAREST) for place in lamps), *taken]).T
+    for _ in range(TRIES):
+        place = rng.uniform(-half, half)
+        if (np.hypot(x - place[0], y - place[1]) > room).all():
+            return (*place.tolist(), float(rng.uniform(-np.pi, np.pi)))
+    raise BnsError(
+        f"There is no place on the board {NEAREST} m away from every lamp; give "
+        "starts, or fewer lamps."
+    )

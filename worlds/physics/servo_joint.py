@@ -18,9 +18,8 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.models import ax12a, servo_numbers
-from bns.models.joint_numbers import joint_numbers
 from bns.models.robot_model import RobotModel
-from bns.models.servo_numbers import LAW
+from bns.models.servo_numbers import LAW, joint_numbers
 from bns.worlds.physics.servo_law import NUMBERS, Law, law
 
 REFUSED = ("stribeck", "current_limit", "backlash", "dead_zone", "mass", "lever")

@@ -97,6 +97,7 @@ class _Goals:
             self.value = np.broadcast_to(self.columns[0][:, None], shape).copy()
 
     def at(self, step: int) -> np.ndarray:
+        """Goals in force in a step [rad], ``(R, 1)`` or ``(R, C)``."""
         goal = self._delayed(step) if self.late else self.columns[step][:, None]
         if not self.lagged:
             return goal
@@ -137,6 +138,7 @@ class _State:
         self.motor_speed = self.speed.copy()
 
     def advance(self, step: int) -> None:
+        """Go on by one step."""
         load = -self.weight * np.sin(self.angle)
         motor, brake = self._motor(step)
         if self.has["backlash"]:

@@ -59,7 +59,7 @@ class StaticNets:
     b2: np.ndarray
     input_scale: np.ndarray
     output_scale: np.ndarray
-    provenance: Mapping[str, object] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
     activation: Literal["sigmoid", "relu"] = "sigmoid"
 
     def __post_init__(self) -> None:

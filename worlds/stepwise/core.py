@@ -68,6 +68,7 @@ class Stepwise:
         self.seed = 0
         self._told: list[np.ndarray] = []
         self._session: Any = None
+        self._row = 0  # of this robot in the session
         self._pose = np.zeros(len(POSE_CHANNELS))
 
     @property
@@ -100,23 +101,7 @@ class Stepwise:
             BnsError: a seed that can not be; a start in a world that takes none for an
                 episode.
         """
-        self.seed, self._told = int(bounded("seed", seed, 0, 2**63, "1")), []
-        starts = None if start is None else np.array([start], dtype=np.float64)
-        if self._loops:
-            self._session = self.world.session(
-                cycles=self.cycles,
-                cycle=self.cycle,
-                trial=self.trial_number,
-                seeds=[self.seed],
-                starts=starts,
-            )
-            return self._kept(self.world.trials(self._session)[0])
-        if start is not None:
-            raise BnsError(
-                f"World {self.world.name!r} takes no start for an episode; make it "
-                "with the setting `start`."
-            )
-        return self._kept(self._first(self._run([np.zeros(len(self.bounds[0]))])))
+        return reset_all([self], [seed], start)[0]
 
     def step(self, command: np.ndarray) -> Trial:
         """Do one command.
@@ -130,20 +115,7 @@ class Stepwise:
         Raises:
             BnsError: a command that the robot cannot be told, or no episode.
         """
-        command = np.asarray(command, dtype=np.float64)
-        if self._loops:
-            if self._session is None:
-                raise BnsError("There is no episode to go on with; call reset first.")
-            self._session.step(command[None])
-            self._told.append(command)
-            return self._kept(self.world.trials(self._session)[0])
-        if self.count >= self.cycles:
-            raise BnsError(
-                f"The {self.cycles} cycles of this trial are over; begin another."
-            )
-        made = self._run([*self._told, command])
-        self._told.append(command)
-        return self._kept(made)
+        return step_all([self], [command])[0]
 
     @property
     def _loops(self) -> bool:
@@ -154,11 +126,10 @@ class Stepwise:
         self._pose = np.where(np.isfinite(seen), seen, self._pose)
         return trial
 
-    def _run(self, told: Sequence[np.ndarray]) -> Trial:
-        commands = Commands(
+    def _list(self, told: Sequence[np.ndarray]) -> Commands:
+        return Commands(
             np.stack(told), np.full(len(told), self.cycle), self.command_channels
         )
-        return self.world.run([commands], trial=self.trial_number, seeds=[self.seed])[0]
 
     def _first(self, trial: Trial) -> Trial:
         """A trial cut before its first command."""
@@ -184,7 +155,7 @@ class Stepwise:
         if self._session is None:
             return None
         now = self._session.cycle * self._session.setting.steps
-        return self._session.states[0, now]
+        return self._session.states[self._row, now]
 
     def pose(self) -> np.ndarray:
         """Where the robot was seen last, ``(3,)`` [m, m, rad]; before all: zeros."""
@@ -195,3 +166,103 @@ class Stepwise:
         from bns.worlds.stepwise.look import picture
 
         return picture(self, size)
+
+
+def reset_all(
+    steppers: Sequence[Stepwise],
+    seeds: Sequence[int],
+    start: Sequence[float] | None = None,
+) -> list[Trial]:
+    """Begin an episode of each of several robots of one world, in one batch.
+
+    Args:
+        steppers: all of one world and with equal settings.
+        seeds: of each, see `Stepwise.reset`.
+        start: of all, see `Stepwise.reset`.
+
+    Returns:
+        their trials so far: no command, one sample.
+
+    Raises:
+        BnsError: as `Stepwise.reset`.
+    """
+    first, world = steppers[0], steppers[0].world
+    for stepper, seed in zip(steppers, seeds, strict=True):
+        stepper.seed = int(bounded("seed", seed, 0, 2**63, "1"))
+        stepper._told = []
+    drawn = [stepper.seed for stepper in steppers]
+    if first._loops:
+        session = world.session(
+            cycles=first.cycles,
+            cycle=first.cycle,
+            trial=first.trial_number,
+            seeds=drawn,
+            starts=None
+            if start is None
+            else np.tile(np.float64(start), (len(drawn), 1)),
+        )
+        for row, stepper in enumerate(steppers):
+            stepper._session, stepper._row = session, row
+        made = world.trials(session)
+    elif start is not None:
+        raise BnsError(
+            f"World {world.name!r} takes no start for an episode; make it with the "
+            "setting `start`."
+        )
+    else:
+        idle = first._list([np.zeros(len(first.bounds[0]))])
+        run = world.run([idle] * len(drawn), trial=first.trial_number, seeds=drawn)
+        made = [first._first(trial) for trial in run]
+    return [s._kept(trial) for s, trial in zip(steppers, made, strict=True)]
+
+
+def step_all(
+    steppers: Sequence[Stepwise], commands: Sequence[np.ndarray]
+) -> list[Trial]:
+    """Do one command of each of several robots of one world, in one batch.
+
+    Robots whose episodes began together and that are not given are told nothing: their
+    episodes are over.
+
+    Args:
+        steppers: all of one world and with equal settings.
+        commands: of each, shape ``(C,)``, SI units.
+
+    Returns:
+        their trials so far.
+
+    Raises:
+        BnsError: a command that a robot cannot be told, or no episode.
+    """
+    told = [np.asarray(command, dtype=np.float64) for command in commands]
+    if steppers[0]._loops:
+        made = _looped(steppers, told)
+    else:
+        for stepper in steppers:
+            if stepper.count >= stepper.cycles:
+                raise BnsError(
+                    f"The {stepper.cycles} cycles of this trial are over; begin "
+                    "another."
+                )
+        lists = [s._list([*s._told, c]) for s, c in zip(steppers, told, strict=True)]
+        number, seeds = steppers[0].trial_number, [s.seed for s in steppers]
+        made = steppers[0].world.run(lists, trial=number, seeds=seeds)
+    for stepper, command in zip(steppers, told, strict=True):
+        stepper._told.append(command)
+    return [s._kept(trial) for s, trial in zip(steppers, made, strict=True)]
+
+
+def _looped(steppers: Sequence[Stepwise], told: Sequence[np.ndarray]) -> list[Trial]:
+    """A command in each of the sessions that robots are in."""
+    sessions = {id(stepper._session): stepper._session for stepper in steppers}
+    if None in sessions.values():
+        raise BnsError("There is no episode to go on with; call reset first.")
+    trials: dict[int, list[Trial]] = {}
+    for key, session in sessions.items():
+        commands = np.zeros((len(session.seeds), len(session.setting.channels)))
+        for stepper, command in zip(steppers, told, strict=True):
+            if stepper._session is session:
+                commands[stepper._row] = command
+        session.step(commands)
+        trials[key] = steppers[0].world.trials(session)
+    return [trials[id(stepper._session)][stepper._row] for stepper in steppers]

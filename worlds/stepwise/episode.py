@@ -1,5 +1,6 @@
 """What Gymnasium and dm_env share: observations, actions, rewards of one robot."""
 
+from copy import copy
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -69,6 +70,17 @@ class Episode:
         self.high = np.array([_limits(channel)[1] for channel in shown] + self._ends(1))
         self._last = np.zeros(len(self.names))
 
+    def another(self, reward: Reward | None = None) -> "Episode":
+        """One more robot of the same world, with equal settings.
+
+        Args:
+            reward: its own; None = what the world is for.
+        """
+        made = copy(self)
+        made.stepper = copy(self.stepper)
+        made.reward = reward or _usual(self.stepper.world, self.stepper.model.kind)
+        return made
+
     @property
     def actions(self) -> int:
         """How many numbers an action has."""
@@ -79,13 +91,20 @@ class Episode:
 
     def begin(self, seed: int, start: Any = None) -> Seen:
         """Begin an episode, see `Stepwise.reset`."""
-        trial = self.stepper.reset(seed, start)
+        return self.begun(self.stepper.reset(seed, start))
+
+    def begun(self, trial: Trial) -> Seen:
+        """What is seen at the begin of an episode; `trial` is that so far."""
         self.reward.begin(trial)
         self._last = np.zeros(len(self.names))
         return self._seen(trial, 0.0)
 
     def act(self, action: Any) -> Seen:
-        """Do one command.
+        """Do one command, see `command`."""
+        return self.acted(self.stepper.step(self.command(action)))
+
+    def command(self, action: Any) -> np.ndarray:
+        """What the robot is told by an action, ``(C,)``, SI units.
 
         Args:
             action: shape ``(C,)``, from -1 to 1: from the slowest to the fastest.
@@ -99,8 +118,11 @@ class Episode:
                 f"Action {given.tolist()} is not allowed: give {self.actions} finite "
                 "numbers from -1 to 1."
             )
-        command = self._middle + self._half * np.clip(given, -1.0, 1.0)
-        trial = self.stepper.step(command)
+        made: np.ndarray = self._middle + self._half * np.clip(given, -1.0, 1.0)
+        return made
+
+    def acted(self, trial: Trial) -> Seen:
+        """What is seen after a command; `trial` is that so far."""
         lost = not np.isfinite(trial.observed[-1]).all()
         return self._seen(trial, 0.0 if lost else self.reward.of(trial))
 

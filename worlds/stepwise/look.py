@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bns import models
+from bns.models.arena import lamps
+from bns.worlds import objects
+from bns.worlds.light.world import LightWorld
 
 if TYPE_CHECKING:
     from bns.worlds.stepwise.core import Stepwise
@@ -14,9 +17,9 @@ if TYPE_CHECKING:
 def scene(world: Any) -> Any:
     """The world's arena with its robot, as a `mujoco.MjSpec` to look at."""
     if hasattr(world, "field"):
-        from bns.worlds.light import scene as light_scene
+        pass
 
-        return light_scene.spec(world)
+        return spec(world)
     return models.scene_spec(world.robot)
 
 
@@ -61,3 +64,19 @@ def picture(stepper: "Stepwise", size: tuple[int, int]) -> np.ndarray:
     return render.photograph(
         model, data, camera="perspective", size=size, shadows=False
     )
+
+
+def spec(world: LightWorld) -> Any:
+    """The world's robot on the board, with lamps, their boundaries and objects.
+
+    Args:
+        world: whose lamps are shown.
+
+    Returns:
+        A `mujoco.MjSpec` for pictures and recordings; physics has its own model.
+    """
+    made = models.scene_spec(world.robot)
+    places = [tuple(place) for place in world.field.positions.tolist()]
+    lamps.add(made, places, safety=world.supervisor.safety)
+    objects.stand(made, world.posts)
+    return made

@@ -1,6 +1,6 @@
 """What engines have in common."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -39,7 +39,7 @@ class Engine(Protocol):
 
     name: str
 
-    def run(self, jobs: Sequence[Job], *, beat: Beat) -> Iterator[Outcome]:
+    def run(self, jobs: Sequence[Job], *, beat: Beat) -> Generator[Outcome, None, None]:
         """Run all jobs; gives each outcome as soon as it is known.
 
         Raises:

@@ -1,7 +1,7 @@
 """The engine that needs nothing: this process, one batch after another."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from functools import partial
 
 from bns.campaign import work
@@ -14,7 +14,7 @@ class InlineEngine:
 
     name = "inline"
 
-    def run(self, jobs: Sequence[Job], *, beat: Beat) -> Iterator[Outcome]:
+    def run(self, jobs: Sequence[Job], *, beat: Beat) -> Generator[Outcome, None, None]:
         """See `Engine.run`."""
         for job in jobs:
             started = time.monotonic()

@@ -14,9 +14,9 @@ import sys
 import tempfile
 import time
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import replace
-from typing import IO
+from typing import IO, cast
 
 from bns.campaign.engines import frames
 from bns.campaign.engines.base import PATIENCE, Beat, Outcome
@@ -50,7 +50,7 @@ class PoolEngine:
         self.workers, self.attempts, self.patience = workers, attempts, patience
         self.crew: list[Worker] = []
 
-    def run(self, jobs: Sequence[Job], *, beat: Beat) -> Iterator[Outcome]:
+    def run(self, jobs: Sequence[Job], *, beat: Beat) -> Generator[Outcome, None, None]:
         """See `Engine.run`."""
         waiting = deque((job, 1) for job in jobs)
         self.crew = [Worker() for _ in range(min(self.workers, len(waiting)))]
@@ -97,7 +97,7 @@ class PoolEngine:
             return
         worker.heard = time.monotonic()
         for kind, content in worker.inbox.feed(piece):
-            key = worker.job.key
+            key = worker.busy.key
             if kind == frames.BEAT:
                 beat(key, int(content))
             else:
@@ -107,7 +107,7 @@ class PoolEngine:
         self, worker: "Worker", reason: str
     ) -> tuple[Outcome | None, tuple[Job, int] | None]:
         """A worker is gone: another one in its place, its batch once more."""
-        job, attempts = worker.job, worker.attempts
+        job, attempts = worker.busy, worker.attempts
         ended = worker.end(Outcome(job.key, None, f"worker lost: {reason}"))
         worker.stop()
         self.crew[self.crew.index(worker)] = Worker()
@@ -139,12 +139,23 @@ class Worker:
             env={**os.environ, **ONE_THREAD},
             start_new_session=True,  # Ctrl-C is for the driver alone
         )
-        self.input: IO[bytes] = self.process.stdin
-        self.output: IO[bytes] = self.process.stdout
+        self.input = cast(IO[bytes], self.process.stdin)
+        self.output = cast(IO[bytes], self.process.stdout)
         self.inbox = frames.Inbox()
         self.job: Job | None = None
         self.attempts = 0
         self.started = self.heard = time.monotonic()
+
+    @property
+    def busy(self) -> Job:
+        """The batch it has.
+
+        Raises:
+            RuntimeError: it has none.
+        """
+        if self.job is None:
+            raise RuntimeError("This worker has no batch.")
+        return self.job
 
     def give(self, job: Job, attempts: int) -> None:
         """Let it run a batch."""

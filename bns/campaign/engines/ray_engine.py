@@ -8,13 +8,12 @@ import os
 import socket
 import time
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from bns.campaign import work
 from bns.campaign.engines.base import PATIENCE, Beat, Outcome, outcome
-from bns.campaign.engines.pulse import Pulse, Watch
 from bns.campaign.plan import Job
 from bns.errors import BnsError, MissingDependencyError
 
@@ -45,7 +44,7 @@ class RayEngine:
     ):
         self.address, self.workers, self.patience = address, workers, patience
 
-    def run(self, jobs: Sequence[Job], *, beat: Beat) -> Iterator[Outcome]:
+    def run(self, jobs: Sequence[Job], *, beat: Beat) -> Generator[Outcome, None, None]:
         """See `Engine.run`."""
         ray = self._start()
         try:
@@ -104,7 +103,7 @@ class _Session:
         self.task = ray.remote(num_cpus=1, max_retries=RETRIES)(_heard)
         self.going: dict[Any, tuple[Job, int, float]] = {}
 
-    def run(self, jobs: Sequence[Job], beat: Beat) -> Iterator[Outcome]:
+    def run(self, jobs: Sequence[Job], beat: Beat) -> Generator[Outcome, None, None]:
         """See `Engine.run`."""
         waiting = deque((job, 1) for job in jobs)
         while waiting or self.going:
@@ -203,3 +202,58 @@ def answers(address: str) -> None:
             f"`ray start --head --port={port}`, or leave --ray-address out to start "
             "one on this machine."
         ) from error
+
+
+class Pulse:
+    """Where batches say how far they are; lives where all of them reach it."""
+
+    def __init__(self) -> None:
+        self._done: dict[str, int] = {}
+
+    def beat(self, key: str, trials: int) -> None:
+        """A batch is running and has done so many trials."""
+        self._done[key] = trials
+
+    def all(self) -> dict[str, int]:
+        """Trials done by batch, of those that have started."""
+        return dict(self._done)
+
+
+class Watch:
+    """Who has been heard when, on the driver's clock.
+
+    A batch counts from its first sign of life on: until then it may be waiting for a
+    place to run, which is no fault of its.
+
+    Args:
+        patience: time without news after which a batch hangs [s].
+        clock: seconds, never backwards.
+    """
+
+    def __init__(self, patience: float, clock: Callable[[], float] = time.monotonic):
+        self.patience, self.clock = patience, clock
+        self._heard: dict[str, tuple[int, float]] = {}
+
+    def news(self, done: Mapping[str, int]) -> dict[str, int]:
+        """Those of the reports that say something new, noted as heard now."""
+        now = self.clock()
+        new = {
+            key: trials
+            for key, trials in done.items()
+            if key not in self._heard or self._heard[key][0] != trials
+        }
+        self._heard.update({key: (trials, now) for key, trials in new.items()})
+        return new
+
+    def forget(self, key: str) -> None:
+        """The batch is done, or starts anew."""
+        self._heard.pop(key, None)
+
+    def hanging(self) -> list[str]:
+        """Batches that have been silent for too long."""
+        now = self.clock()
+        return [
+            key
+            for key, (_, heard) in self._heard.items()
+            if now - heard > self.patience
+        ]

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from bns.adaptations import registry
 from bns.experiment.config import RunConfig
+from bns.learners.bns.adaptations import registry
 from bns.units import metres_per_second
 
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bns.experiment.config_watch import WatchConfig
+from bns.learners.bns.config import WatchConfig
 
 LEAST = 0.5  # innovation that is usual where a history's median is lower; assumed
 

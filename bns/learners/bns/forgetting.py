@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bns.experiment.config_watch import WatchConfig
+from bns.learners.bns.config import WatchConfig
 
 KEPT = 0.9  # share of differences that count, the smallest; assumed
 

@@ -16,10 +16,11 @@ from bns import seeding
 from bns.draws import Draws
 from bns.errors import BnsError
 from bns.evolution.chromosome import Population
-from bns.experiment.config import BNS_SECTIONS, RunConfig
+from bns.experiment.config import RunConfig
 from bns.learners.base import Curves, Learner, Panel, Proposal
 from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.change_detection import Detector
+from bns.learners.bns.config import BNS_SECTIONS
 from bns.learners.bns.problem import Problem, should_compile
 from bns.learners.bns.trial_selection import choose
 from bns.tasks import registry as tasks

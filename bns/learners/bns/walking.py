@@ -26,7 +26,7 @@ from bns.evolution.chromosome import Population
 from bns.evolution.generation import Rates
 from bns.evolution.goals import TICK, GoalBreeder, Goals
 from bns.experiment.config import RunConfig
-from bns.experiment.config_walk import WalkConfig
+from bns.experiment.task_settings import WalkConfig
 from bns.learners.bns import change_evidence
 from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.memory import Memory

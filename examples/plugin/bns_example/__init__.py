@@ -1,1 +1,1 @@
-"""A package that adds an effect, a world and a robot to the BNS testbed."""
+"""A package that adds to the BNS testbed one of each kind that can be added."""

@@ -2,7 +2,8 @@
 
 import pytest
 
-from bns.campaign import file, identity, sample
+from bns.campaign import file, identity
+from bns.campaign.file import draw
 from bns.campaign.plan import Job, plan
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig
@@ -53,7 +54,7 @@ def test_samples_stay_inside_and_more_of_them_keep_the_first():
         "evolution.population": {"low": 10, "high": 20},
         "evolution.crossover": ["sbx", "uniform"],
     }
-    few, many = (sample.draw(ranges, n, 1, "[sample]") for n in (5, 50))
+    few, many = (draw(ranges, n, 1, "[sample]") for n in (5, 50))
     assert many[:5] == few
     rates = [row["evolution.mutation_rate"] for row in many]
     assert 0.01 <= min(rates) < 0.04 and 0.08 < max(rates) <= 0.3

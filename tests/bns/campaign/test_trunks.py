@@ -9,7 +9,8 @@ from bns.campaign import trunk, work
 from bns.campaign.file import Member
 from bns.campaign.part import decode
 from bns.claims import schedule
-from bns.experiment.config import AdaptationConfig, RunConfig, WorldConfig
+from bns.experiment.config import RunConfig, WorldConfig
+from bns.learners.bns.config import AdaptationConfig
 
 DAMAGE = "wheel_gain:wheel=left,factor=0.6@2"
 

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import signal
+import subprocess
 import sys
 import tomllib
 from functools import reduce
@@ -154,10 +155,15 @@ def test_a_setting_is_read_as_it_is_written(monkeypatch, words, values):
     assert given[0].preset == "demo"
 
 
-@pytest.mark.parametrize("verb", ["presets", "worlds", "robots", "effects"])
+LISTS = ["presets", "learners", "tasks", "worlds", "robots", "effects"]
+
+
+@pytest.mark.parametrize("verb", LISTS)
 def test_lists_name_what_exists(capsys, verb):
     known = {
         "presets": "khepera-simple",
+        "learners": "cma",
+        "tasks": "infinity",
         "worlds": "static-snn",
         "robots": "khepera3",
         "effects": "wheel_gain",
@@ -293,6 +299,43 @@ def test_view_of_a_diagnosis(capsys, tmp_path):
     assert "diagnosis without a recording" in text
     (tmp_path / "recording.rrd").write_bytes(b"")
     assert view.find(tmp_path) == tmp_path / "recording.rrd"
+
+
+@pytest.mark.parametrize(
+    ("words", "address"),
+    [([], "127.0.0.1"), (["--web"], "127.0.0.1"), (["--bind", "0.0.0.0"], "0.0.0.0")],
+)
+def test_a_view_listens_on_this_machine_alone_unless_asked(
+    words, address, tmp_path, monkeypatch
+):
+    from bns.viz import picture
+
+    called = []
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr(picture, "executable", lambda: "viewer")
+    monkeypatch.setattr(subprocess, "call", lambda given: called.append(given) or 0)
+    recording = tmp_path / "a.rrd"
+    recording.write_bytes(b"")
+    assert main(["view", str(recording), *words]) == 0
+    (given,) = called
+    assert given[given.index("--bind") + 1] == address and given.count("--bind") == 1
+
+
+def test_a_report_replaces_reports_alone_unless_forced(capsys, run, tmp_path):
+    page = tmp_path / "page.html"
+    page.write_text("<title>mine</title>")
+    asked = ["report", str(run), "--out", str(page)]
+    assert main(asked) == WRONG_INPUT
+    assert "was not made by `bns report`: add --force" in capsys.readouterr().err
+    assert page.read_text() == "<title>mine</title>"
+    assert main([*asked, "--force"]) == 0
+    made = page.read_bytes()
+    assert b"BNS report</title>" in made
+    assert main(asked) == 0  # its own it replaces
+    (tmp_path / "directory").mkdir()
+    assert main(["report", str(run), "--out", str(tmp_path / "directory")]) == (
+        WRONG_INPUT
+    )
 
 
 def test_run_to_the_end_and_once_more(capsys, tmp_path):

@@ -1,13 +1,14 @@
-"""What every adaptation of bns/adaptations keeps to; a new one brings no new test."""
+"""What every adaptation of the learner bns keeps to; a new one brings no new test."""
 
 from dataclasses import replace
 
 import pytest
 
-from bns.adaptations import registry
 from bns.errors import BnsError, UnknownNameError
-from bns.experiment.config import AdaptationConfig, RunConfig
+from bns.experiment.config import RunConfig
 from bns.learners.bns.adaptation import Adaptations
+from bns.learners.bns.adaptations import registry
+from bns.learners.bns.config import AdaptationConfig
 
 
 @pytest.mark.parametrize("name", registry.names())

@@ -9,15 +9,10 @@ import torch
 from bns.draws import Draws
 from bns.errors import BnsError
 from bns.experiment.batch import Batch
-from bns.experiment.config import (
-    AdaptationConfig,
-    EvolutionConfig,
-    RunConfig,
-    SnnConfig,
-    TaskConfig,
-    WorldConfig,
-)
+from bns.experiment.config import RunConfig, WorldConfig
+from bns.experiment.task_settings import TaskConfig
 from bns.learners.bns.adaptation import Adaptations
+from bns.learners.bns.config import AdaptationConfig, EvolutionConfig, SnnConfig
 from bns.learners.bns.learner import Bns
 from bns.learners.bns.memory import PatternBuffer
 from bns.learners.bns.navigation import of_trial

@@ -8,11 +8,12 @@ import pytest
 from bns import presets
 from bns.errors import BnsError, UnknownNameError
 from bns.experiment.batch import Batch
-from bns.experiment.config import AdaptationConfig, LearnerSettings
+from bns.experiment.config import LearnerSettings
 from bns.experiment.loading import from_mapping, to_mapping, with_learner
 from bns.experiment.run import train
 from bns.learners import registry
 from bns.learners.base import Curves
+from bns.learners.bns.config import AdaptationConfig
 from bns.storage import store
 from bns.tasks import registry as tasks
 from bns.worlds import registry as worlds

@@ -8,7 +8,7 @@ import torch
 
 from bns.draws import Draws
 from bns.errors import BnsError
-from bns.experiment.config_light import LightConfig
+from bns.experiment.task_settings import LightConfig
 from bns.learners.bns.light import patterns
 from bns.learners.bns.light.simulator import Simulator, Thetas
 from bns.tasks.light import LampGoal, lost

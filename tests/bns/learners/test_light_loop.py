@@ -12,8 +12,8 @@ from bns.errors import BnsError
 from bns.evolution.chromosome import Population
 from bns.evolution.generation import Breeder, Rates
 from bns.experiment.config import RunConfig
-from bns.experiment.config_light import LightConfig
 from bns.experiment.run import train
+from bns.experiment.task_settings import LightConfig
 from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.learner import Bns
 from bns.learners.bns.light import islands

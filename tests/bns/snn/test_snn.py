@@ -5,7 +5,8 @@ import torch
 
 from bns.draws import Draws
 from bns.evolution.chromosome import Encoding
-from bns.experiment.config import ControllerConfig, SnnConfig
+from bns.experiment.task_settings import ControllerConfig
+from bns.learners.bns.config import SnnConfig
 from bns.snn import training
 from bns.snn.network import Shape, forward, predict
 from bns.snn.scaling import Scaling

@@ -4,12 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats as scipy_stats
 
 from bns import stats
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
+from bns.stats import resampling
 from bns.stats.compare import compare
+from bns.stats.designs import MARGIN, Design, equivalence, of_share, up_to
+from bns.stats.resampling import power
 
 # |U - 450| and p as the dissertation prints it, thirty runs against thirty: tables
 # 5.3, 5.5, 5.6, 5.7, 5.10, 5.18, 6.2, 6.3b, 6.6, 7.6b, 7.7b.
@@ -190,3 +194,129 @@ def test_holm_in_compare_runs_over_the_pairs_of_a_measure():
     p = [pair.p for pair in pairs]
     np.testing.assert_allclose([pair.p_holm for pair in pairs], stats.holm(p))
     assert len(pairs) == 3
+
+
+def test_equivalence_by_hand():
+    # Newcombe's error of A12 at 0.64, 100 runs a side: variance of one pair times
+    # 1 + 99 (0.36 / 1.36 + 0.64 / 1.64), over 10,000 pairs
+    error = np.sqrt(0.64 * 0.36 * (1 + 99 * (0.36 / 1.36 + 0.64 / 1.64)) / 1e4)
+    assert stats.a12_error(0.64, 100, 100) == pytest.approx(error)
+    z = 0.04 / error
+    assert of_share(0.60, 100, 100) == pytest.approx(0.1519, abs=5e-4)
+    assert z == pytest.approx(1.028, abs=1e-3)
+    assert of_share(0.5 + MARGIN, 100, 100) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("share", [0.40, 0.47, 0.5, 0.56, 0.58, 0.6])
+def test_equivalent_is_where_the_90_percent_interval_lies_inside(share):
+    runs = 100
+    # two samples of that A12, without ties: b steps over so many values of a
+    a = np.arange(runs, dtype=float)
+    b = np.full(runs, (1 - share) * runs) - 0.5 + np.arange(runs) * 1e-6
+    limits = stats.a12(a, b, confidence=0.9)
+    assert limits.value == pytest.approx(share, abs=0.006)
+    inside = limits.low > 0.5 - MARGIN and limits.high < 0.5 + MARGIN
+    assert (equivalence(a, b) < 0.05) == inside
+
+
+def test_thirty_runs_hardly_ever_show_that_sides_are_alike():
+    assert of_share(0.50, 30, 30) < 0.05 < of_share(0.53, 30, 30)
+    assert of_share(0.56, 100, 100) < 0.05
+
+
+def test_all_ties_are_alike_and_margins_have_bounds():
+    never = np.full(100, np.inf)
+    assert equivalence(never, never) < 0.001
+    for margin in (0, 0.5, -1):
+        with pytest.raises(BnsError, match="margin"):
+            equivalence(never, never, margin=margin)
+
+
+def test_the_level_is_spent_in_proportion_to_runs():
+    assert Design().shares == pytest.approx((0.1, 0.1, 0.1, 0.2, 0.5))
+    assert sum(up_to(30).shares) == pytest.approx(1)
+    assert up_to(35).looks == (10, 20, 30, 35)
+
+
+def test_the_p_of_looks_by_hand():
+    design = Design()
+    assert design.p([0.004]) == pytest.approx(0.04)
+    assert design.p([0.004, 0.5]) == pytest.approx(0.04)  # what was found stays found
+    assert design.p([0.5, 0.5, 0.5, 0.5, 0.02]) == pytest.approx(0.04)
+    assert design.p([0.5]) == 1.0
+
+
+def test_looks_made_are_those_with_enough_runs():
+    design = Design()
+    assert design.made(35) == (10, 20, 30)
+    assert design.made(100) == design.looks == design.made(400)
+    assert design.made(4) == (4,)
+
+
+@pytest.mark.parametrize("looks", [(), (10, 10), (20, 10), (0, 10)])
+def test_looks_have_to_grow(looks):
+    with pytest.raises(BnsError, match="grow"):
+        Design(looks)
+
+
+def test_looking_often_finds_no_more_than_the_level_where_nothing_is():
+    rng = np.random.default_rng(0)
+    design, found, many = Design(), 0, 400
+    for _ in range(many):
+        a, b = rng.normal(size=(2, 100))
+        seen = [stats.mann_whitney(a[:n], b[:n]) for n in design.looks]
+        found += design.p(seen) < 0.05
+    assert found / many < 0.05 + 2 * np.sqrt(0.05 * 0.95 / many)
+    assert found / many > 0.01  # it does find some
+
+
+@pytest.mark.parametrize(("a12", "runs"), [(0.65, 30), (0.65, 100), (0.3, 30)])
+def test_power_is_how_often_the_test_finds_it(a12, runs):
+    # normal sides whose A12 is Phi(shift / sqrt 2)
+    shift = scipy_stats.norm.ppf(a12) * np.sqrt(2)
+    rng = np.random.default_rng(1)
+    a = rng.normal(shift, 1, (1500, runs))
+    b = rng.normal(0, 1, (1500, runs))
+    p = scipy_stats.mannwhitneyu(a, b, method="asymptotic", axis=1).pvalue
+    assert power(a12, runs, runs) == pytest.approx((p < 0.05).mean(), abs=0.04)
+
+
+def test_power_of_nothing_is_the_level_and_of_everything_is_one():
+    assert power(0.5, 1000, 1000) == pytest.approx(0.05, abs=0.001)
+    assert power(1.0, 30, 30) == power(0.0, 30, 30) == 1.0
+    assert power(0.65, 30, 60) == pytest.approx(power(0.35, 60, 30))
+    assert power(0.9, 2, 2) < 0.05  # two runs a side find nothing
+
+
+@pytest.mark.parametrize(("a12", "runs"), [(1.2, 30), (0.5, 0)])
+def test_power_of_what_is_none(a12, runs):
+    with pytest.raises(BnsError, match="has no power"):
+        power(a12, runs, runs)
+
+
+def test_bootstrap_median_by_hand():
+    assert resampling.median([4.0]) == (4.0, 4.0, 4.0)
+    assert resampling.median([1.0, 3.0]).value == 2.0
+    never = resampling.median([1.0, 2.0, np.inf])
+    assert (never.value, never.low, never.high) == (2.0, 1.0, np.inf)
+    values = np.random.default_rng(0).normal(size=30)
+    assert resampling.median(values) == resampling.median(values)
+
+
+def test_bootstrap_median_covers_at_its_nominal_rate():
+    draws = np.random.default_rng(7).exponential(size=(30, 3000))
+    _, low, high = resampling.median_band(draws)
+    assert 0.92 <= np.mean((low <= np.log(2)) & (np.log(2) <= high)) <= 0.96
+
+
+def test_bootstrap_of_a_curve_is_that_of_its_columns():
+    curve = np.random.default_rng(2).normal(np.array([0, 5, 10]), size=(20, 3))
+    middle, low, high = resampling.median_band(curve)
+    np.testing.assert_allclose(middle, np.median(curve, axis=0))
+    assert (low < middle).all() and (middle < high).all()
+
+
+@pytest.mark.parametrize("values", [np.zeros((0, 2)), [[np.nan]], [1.0]])
+def test_bootstrap_of_what_is_none(values):
+    with pytest.raises(BnsError, match="no median"):
+        resampling.median_band(np.array(values))

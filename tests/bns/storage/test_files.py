@@ -33,7 +33,13 @@ def test_json_that_python_would_choke_on_is_one_line(text, match):
 
 
 @pytest.mark.parametrize(
-    "text", ["a = " + "[" * 5000, "a = " + "9" * 5000, "a = 1\na = 2"]
+    "text",
+    [
+        "a = " + "[" * 5000,
+        "a = " + "9" * 5000,
+        "a = 1\na = 2",
+        "a." * 100_000 + "b = 1",
+    ],
 )
 def test_toml_that_python_would_choke_on_is_one_line(text):
     with pytest.raises(FormatError) as caught:
@@ -106,6 +112,17 @@ def test_a_table_without_checksum_is_read_with_a_warning(tmp_path, caplog):
     pq.write_table(pa.table({"a": [1.0]}), tmp_path / "old.parquet")
     assert parquet.read(tmp_path / "old.parquet")["a"].to_pylist() == [1.0]
     assert "carries no checksum" in caplog.text
+
+
+def test_files_of_one_directory_without_checksum_warn_once(tmp_path, caplog):
+    for place in ("one", "other"):
+        (tmp_path / place).mkdir()
+        for name in ("a.parquet", "b.parquet"):
+            pq.write_table(pa.table({"a": [1.0]}), tmp_path / place / name)
+            parquet.read(tmp_path / place / name)
+    said = [record.getMessage() for record in caplog.records]
+    assert len(said) == 2
+    assert str(tmp_path / "one") in said[0] and str(tmp_path / "other") in said[1]
 
 
 def test_a_column_twice_is_refused(tmp_path):

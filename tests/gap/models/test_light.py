@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.cli import gap_after
+from bns.cli.gap import after
 from bns.errors import BnsError
 from bns.gap import diagnose
 from bns.gap.bench import light_cases
@@ -218,7 +218,7 @@ def test_ties_on_light_have_no_plan():
         verdict=verdict("either", "sensor_gain[left]", "sensor_stuck_min[left]")
     )
     with pytest.raises(BnsError, match=r"part sensor_gain\[left\], sensor_stuck_min"):
-        gap_after._plannable(tied, WheeledModel(threads=1))
+        after._plannable(tied, WheeledModel(threads=1))
 
 
 @pytest.mark.parametrize(
@@ -230,4 +230,4 @@ def test_ties_on_light_have_no_plan():
     ],
 )
 def test_a_corrected_world_is_of_the_recording_s_kind(model, floor, base):
-    assert gap_after._base(SimpleNamespace(model=model, floor=floor))[0] == base
+    assert after._base(SimpleNamespace(model=model, floor=floor))[0] == base

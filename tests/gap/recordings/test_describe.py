@@ -166,3 +166,13 @@ def test_command_time_dates_a_command_between_samples(tmp_path):
     (trial,) = model.read_log(str(tmp_path / "a.csv"))
     assert trial.commands.durations[0] == pytest.approx(0.53)
     assert np.isnan(trial.observed[trial.boundaries[1]]).all()
+
+
+def test_a_time_that_is_missing_is_told(tmp_path):
+    (tmp_path / "arm.xml").write_text(ARM.replace("ACTUATORS", SERVOS))
+    path = recorded(tmp_path / "log.csv", seconds=1.0)
+    lines = path.read_text().splitlines()
+    lines[6] = lines[6][lines[6].index(",") :]
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(FormatError, match="'stamp' is missing in row 5"):
+        describe(tmp_path / "arm.xml", path)

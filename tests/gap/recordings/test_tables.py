@@ -1,90 +1,24 @@
 """Logs of other tools: each kind gives its table; what is wrong with one is said."""
 
-import csv
-import json
-
 import numpy as np
 import pytest
 
+from bench.storage.foreign_logs import (
+    GOALS,
+    JOINTS,
+    SEEN,
+    TIMES,
+    lerobot,
+    mcap,
+    pace,
+    sage,
+)
 from bns.errors import FormatError
 from bns.gap.importers import tables
-
-TIMES = np.arange(6) * 0.02
-GOALS = np.column_stack([np.sin(TIMES), np.cos(TIMES)])
-SEEN = GOALS + 0.01
-JOINTS = ("hip", "knee")
 
 
 def columns(table, role):
     return {c.name: c for c in table.columns if c.role == role}
-
-
-def pace(path):
-    import torch
-
-    content = {"time": TIMES, "dof_pos": SEEN, "des_dof_pos": GOALS}
-    torch.save({name: torch.tensor(value) for name, value in content.items()}, path)
-    return path
-
-
-def sage(path, *, unit=1e6):
-    path.mkdir()
-    (path / "joint_list.txt").write_text("\n".join(JOINTS) + "\n")
-    for name, rows in (("control.csv", GOALS), ("state_motor.csv", SEEN)):
-        late = 0.0 if name == "state_motor.csv" else 0.005
-        with (path / name).open("w", newline="") as file:
-            writer = csv.writer(file)
-            writer.writerow(["type", "timestamp", "positions"])
-            for time, row in zip(TIMES, rows, strict=True):
-                stamp = 1e9 + (time + late) * unit
-                writer.writerow(["X", stamp, json.dumps(row.tolist())])
-    return path
-
-
-def lerobot(path, names=JOINTS):
-    import pyarrow
-    from pyarrow import parquet
-
-    (path / "meta").mkdir(parents=True)
-    (path / "data" / "chunk-000").mkdir(parents=True)
-    feature = {"names": {"motors": [f"{name}.pos" for name in names]}}
-    info = {"fps": 50, "features": dict.fromkeys(("action", "observation.state"))}
-    info["features"] = {name: feature for name in info["features"]}
-    (path / "meta" / "info.json").write_text(json.dumps(info))
-    for episode in (1, 0):
-        frames = {
-            "timestamp": TIMES,
-            "episode_index": np.full(6, episode),
-            "action": list(GOALS + episode),
-            "observation.state": list(SEEN + episode),
-        }
-        file = path / "data" / "chunk-000" / f"episode_{1 - episode:06d}.parquet"
-        parquet.write_table(pyarrow.table(frames), file)
-    return path
-
-
-def mcap(path):
-    from mcap.writer import Writer
-
-    with path.open("wb") as file:
-        log = Writer(file)
-        log.start()
-        channels = []
-        for topic, schema in (("/joint_states", "JointState"), ("/cmd", "JointState")):
-            number = log.register_schema(f"sensor_msgs/msg/{schema}", "jsonschema", b"")
-            channels.append(log.register_channel(topic, "json", number))
-        for time, goal, seen in zip(TIMES, GOALS, SEEN, strict=True):
-            # names in another order than before: joints go by name
-            for channel, row, late in (
-                (channels[0], seen, 0.0),
-                (channels[1], goal, 5e-3),
-            ):
-                turned = slice(None, None, -1 if time > 0.05 else 1)
-                said = {"name": JOINTS[turned], "position": row[turned].tolist()}
-                stamp = 10**18 + round((time + late) * 1e9)
-                log.add_message(channel, stamp, json.dumps(said).encode(), stamp)
-        log.finish()
-    return path
 
 
 def test_a_pace_file_has_numbered_joints(tmp_path):
@@ -167,7 +101,7 @@ def test_a_csv_keeps_its_numbers_alone(tmp_path):
         ("a.xyz", b"", "no log that is known"),
         ("a.pt", b"nothing", "PACE"),
         ("a.mcap", b"nothing", "MCAP"),
-        ("a.csv", b"", "no CSV table"),
+        ("a.csv", b"", "as CSV"),
     ],
 )
 def test_what_is_no_log_is_said(name, content, said, tmp_path):
@@ -181,3 +115,50 @@ def test_files_that_do_not_fit_each_other_are_said(tmp_path):
     (place / "joint_list.txt").write_text("hip\n")
     with pytest.raises(FormatError, match="2 positions a row"):
         tables.read(place)
+
+
+def test_a_column_is_there_once_and_of_numbers_that_can_be(tmp_path):
+    for content, said in (("t,q,q\n0,1,2\n", "twice"), ("t,q\n0,inf\n", "inf")):
+        (tmp_path / "a.csv").write_text(content)
+        with pytest.raises(FormatError, match=said):
+            tables.read(tmp_path / "a.csv")
+    place = sage(tmp_path / "a")
+    _say(place / "state_motor.csv", "1e12")
+    with pytest.raises(FormatError, match=r"positions.hip' holds 1e\+12"):
+        tables.read(place)
+
+
+def test_a_value_that_is_missing_is_nan(tmp_path):
+    place = sage(tmp_path / "a")
+    whole = tables.read(place)["positions.hip"]
+    _say(place / "state_motor.csv", "NaN")
+    angle = tables.read(place)["positions.hip"]
+    assert np.isnan(angle).sum() == np.isnan(whole).sum() + 1
+
+
+def _say(path, value):
+    """Another position of the first joint in the last row."""
+    rows = path.read_text().rsplit("[", 1)
+    path.write_text(f"{rows[0]}[{value},{rows[1].partition(',')[2]}")
+
+
+def test_a_tensor_of_many_numbers_in_few_bytes_is_refused(tmp_path):
+    import torch
+
+    wide = torch.zeros(1, dtype=torch.float64).expand(10**12)
+    torch.save({"time": wide, "dof_pos": wide, "des_dof_pos": wide}, tmp_path / "a.pt")
+    with pytest.raises(FormatError, match="the most that is read"):
+        tables.read(tmp_path / "a.pt")
+
+
+def test_a_dataset_of_one_joint_has_numbers_where_others_have_lists(tmp_path):
+    import pyarrow
+    from pyarrow import parquet
+
+    place = lerobot(tmp_path / "a", names=["hip"])
+    for file in (place / "data").rglob("*.parquet"):
+        frames = {"timestamp": TIMES, "episode_index": np.zeros(6)}
+        frames |= {"action": GOALS[:, 0], "observation.state": SEEN[:, 0]}
+        parquet.write_table(pyarrow.table(frames), file)
+    table = tables.read(place)
+    np.testing.assert_allclose(table["action.hip.pos"], np.repeat(GOALS[:, 0], 2))

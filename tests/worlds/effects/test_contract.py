@@ -1,5 +1,6 @@
 """What every effect must keep to; a new effect is tested by being there."""
 
+import json
 import re
 
 import mujoco
@@ -298,3 +299,68 @@ def test_servo_effects_change_one_number_and_keep_it_in_bounds(name):
     for item in kind.parameters:
         for value in (item.low, item.high):
             servo_law.law(registry.make(name, **{item.name: value}).change(law))
+
+
+ON_BODY = [
+    name
+    for name in registry.names()
+    if registry.get(name).stage == "body"
+    and not issubclass(registry.get(name), ServoEffect)
+    and not on_part(registry.get(name))  # their bounds hold for models of any size
+]
+
+
+def stepped(effect) -> np.ndarray:
+    """Where a robot with the effect is after 0.4 s of driving [m]."""
+    model = compiled(effect)
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    data.ctrl[:] = 0.2 if model.nkey else 3.0  # [rad], [rad/s]
+    mujoco.mj_step(model, data, nstep=round(0.4 / model.opt.timestep))
+    return data.qpos[:3].copy()
+
+
+@pytest.mark.parametrize("name", ON_BODY)
+def test_body_effects_do_not_jump_at_their_bounds(name):
+    kind = registry.get(name)
+    others = listing.example(kind).values
+    for item in (item for item in kind.parameters if not item.integer):
+        inwards = 1e-6 * (item.high - item.low)
+        for bound, beside in ((item.low, inwards), (item.high, -inwards)):
+            ends = [
+                stepped(registry.make(name, **{**others, item.name: value}))
+                for value in (bound, bound + beside)
+            ]
+            assert ends[0] == pytest.approx(ends[1], abs=5e-3), (item.name, bound)
+
+
+def test_listing_is_plain_data_for_every_effect():
+    rows = listing.rows()
+    assert json.loads(json.dumps(rows)) == rows
+    assert sorted(row["name"] for row in rows) == list(NAMES)
+    stages = [STAGES.index(row["stage"]) for row in rows]
+    assert stages == sorted(stages)
+    for row in rows:
+        assert str(registry.parse(row["example"])) == row["example"]
+
+
+def test_unknown_effect_gets_a_suggestion():
+    with pytest.raises(UnknownNameError, match="Did you mean 'wheel_gain'"):
+        registry.get("wheel_gian")
+
+
+def test_a_piece_without_equals_belongs_to_the_value_before_it():
+    with pytest.raises(UnknownNameError, match="'left,right'"):
+        registry.parse("wheel_gain:wheel=left,right,factor=0.8")
+
+
+@pytest.mark.parametrize("rest", ["", "0.8", "=1", "factor=1,,", "factor=1,factor=0.5"])
+def test_bad_text_is_refused_with_an_example(rest):
+    with pytest.raises(BnsError, match=re.escape(registry.EXAMPLE)):
+        registry.parse(f"wheel_gain:{rest}")
+
+
+def test_a_table_without_a_name_is_refused():
+    with pytest.raises(BnsError, match="has no name"):
+        registry.from_table({"factor": 0.8})

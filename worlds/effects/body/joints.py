@@ -31,6 +31,7 @@ class _JointNumber(BodyEffect):
     field: ClassVar[str]
 
     def edit(self, spec: Any) -> None:
+        """See `BodyEffect.edit`."""
         if self.is_nominal:
             return
         for joint in parts.joints(spec, self["part"]):

@@ -6,8 +6,8 @@ A wheel's miss is that of the way it rolled: half the turn's share less (left) o
 
 import numpy as np
 
-from bns.experiment.config_watch import WatchConfig
 from bns.learners.bns.change_detection import Ground, Misses, innovation
+from bns.learners.bns.config import WatchConfig
 from bns.learners.bns.memory import Memory, Patterns
 
 CHANNELS = ("left wheel", "right wheel", "left sensor", "right sensor")

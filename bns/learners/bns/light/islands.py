@@ -13,7 +13,7 @@ from bns.draws import Draws, whole_below
 from bns.evolution import selection
 from bns.evolution.chromosome import Population
 from bns.evolution.generation import take, whole_index
-from bns.experiment.config_light import LightConfig
+from bns.experiment.task_settings import LightConfig
 
 TOURNAMENT = 3  # of migrants chosen by tournament; silent
 

@@ -16,7 +16,8 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from bns.experiment.config import RunConfig, SnnConfig
+from bns.experiment.config import RunConfig
+from bns.learners.bns.config import SnnConfig
 from bns.snn.network import Shape, forward, predict
 from bns.snn.scaling import AXLE
 from bns.tasks.light_controller import Controllers

@@ -1,0 +1,192 @@
+"""A small file of each kind that is read."""
+
+import gzip
+import json
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.storage.campaigns import text, tiny
+from bench.versions import ROOT
+
+
+def make(home: Path) -> None:
+    """Write all the files."""
+    from bns.campaign import drive
+    from bns.campaign.engines.inline import InlineEngine
+    from bns.campaign.file import Campaign
+    from bns.experiment.run import train
+
+    campaign = tiny(2, trials=2)
+    config = campaign.members[0].config
+    from dataclasses import replace
+
+    config = replace(config, replicates=2, record_replicates=1, trials=3, threads=1)
+    train(config, home / "run")
+    asked = iter([False, False, True])
+    train(config, home / "begun", stop=lambda: next(asked))
+    file = home / "campaign.toml"
+    file.write_text(text(2, trials=2, replicates=2))
+    whole = Campaign(
+        campaign.name,
+        campaign.members,
+        campaign.replicates,
+        campaign.seed,
+        campaign.batch_runs,
+        text=file.read_text(),
+    )
+    drive.run(whole, home / "store", InlineEngine())
+    _parts(home)
+    _calibrations(home)
+    _robots(home)
+    _logs(home)
+    _recordings(home)
+    _tables(home)
+
+
+def _tables(home: Path) -> None:
+    from bench.storage import foreign_logs as logs
+
+    logs.pace(home / "pace.pt")
+    logs.sage(home / "sage")
+    events = "timestamp,event\n1000000000.0,MOTION_START\n"
+    (home / "sage" / "event.csv").write_text(events)
+    logs.lerobot(home / "lerobot")
+    logs.mcap(home / "ros2.mcap")
+    with gzip.open(home / "own.csv.gz", "wb") as out:
+        out.write((home / "own.csv").read_bytes())
+
+
+def _parts(home: Path) -> None:
+    """A part that is not compacted, a failure, nets, a diagnosis, answers, commands."""
+    from bns.campaign.part import encode
+    from bns.campaign.store import CampaignStore
+    from bns.gap.planning import command_file
+    from bns.storage import files
+    from bns.worlds.static_snn.nets import kinematic_nets
+    from bns.worlds.trial import Commands
+
+    store = CampaignStore.open(home / "store")
+    loose = CampaignStore.create(home / "loose", "tiny", store.seed)
+    for part in list(store.read())[:1]:
+        loose.add(part.key, encode(part))
+        (home / "part.parquet").write_bytes(encode(part))
+    loose.fail("00ff", reason="it did not", attempts=2)
+    kinematic_nets(hidden=5, patterns=60).save(home / "nets.npz")
+    from bns.gap import store as gap_store
+
+    gap_store.save(_diagnosis(), home / "gap")
+    answer = {"kind": "none", "names": [], "aliases": {}}
+    content = {"schema": "bns-gap-answers", "version": 1, "cases": {"a": answer}}
+    files.write_json(home / "answers.json", content)
+    commands = Commands([[0.1, 0.05], [-0.1, 0.2]], [0.5, 1.0])
+    command_file.write(commands, home / "commands.csv")
+
+
+def _diagnosis() -> Any:
+    from bns.gap.records import Diagnosis, Fit, Verdict
+
+    fit = Fit(("a",), ("b",), (1.0,), ((0.5, 1.5),), ("m",), 1.0, 2.0, 0.1, 3.0)
+    none = Fit((), (), (), (), (), 1.0, 2.0, 0.1, 3.0)
+    verdict = Verdict(
+        "effect", (("a",),), (("a",),), 1.0, 0.01, 0.5, (), 2.0, "a it is"
+    )
+    parts: list[Mapping[str, Any]] = [{"share": [1.0, None]}, {}, {}, {"closed": 0.5}]
+    return Diagnosis("khepera3", 3, ("one",), verdict, (fit, none), *parts)
+
+
+def _calibrations(home: Path) -> None:
+    from bns.hardware.driving.odometry import Wheels
+    from bns.hardware.dynamixel import joints
+    from bns.hardware.tracking.camera import Camera
+    from bns.worlds.corrected import Corrected, _table
+
+    Camera.overhead((1280, 720)).write(home / "camera.json")
+    Wheels(left=0.0411, right=0.0409, axle=0.0885).write(home / "wheels.json")
+    joints.write(home / "servos.toml", joints.read(), said="Zeros of a test.")
+    import tomli_w
+
+    world = Corrected("kitchen", "mujoco", "khepera3", ("wheel_gain:factor=0.9",), "x")
+    text = tomli_w.dumps({"worlds": {"kitchen": _table(world)}})
+    (home / "worlds.toml").write_text(text)
+
+
+def _robots(home: Path) -> None:
+    for name in ("burger", "arm"):
+        shutil.copytree(ROOT / "examples" / name, home / name)
+    (home / "law").mkdir()
+    shutil.copy(ROOT / "models" / "ax12a" / "law.toml", home / "law" / "law.toml")
+
+
+MAP = """robot = "khepera3"
+[columns]
+time = {column = "t", unit = "ms"}
+x = {column = "px", unit = "mm"}
+y = "py"
+yaw = "heading"
+left_speed = "vl"
+right_speed = "vr"
+"""
+FIELDS = {
+    "time": "log_time", "x": "/pose:x", "y": "/pose:y", "yaw": "/pose:yaw",
+    "left_speed": "/speed:left", "right_speed": "/speed:right",
+}  # fmt: skip
+
+
+def _logs(home: Path) -> None:
+    (home / "map.toml").write_text(MAP)
+    rows = [
+        f"{100 * k},{k},{k / 10},{k / 20},0.1,{0.1 + (k > 3) / 10}" for k in range(8)
+    ]
+    (home / "log.csv").write_text("t,px,py,heading,vl,vr\n" + "\n".join(rows) + "\n")
+    head = "time,shoulder_goal,elbow_goal,shoulder,elbow\n"
+    rows = [f"{k / 10},0.1,{0.1 * (k > 3)},{k / 50},{k / 60}" for k in range(8)]
+    (home / "own.csv").write_text(head + "\n".join(rows) + "\n")
+    from mcap.writer import Writer
+
+    with (home / "log.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = writer.register_schema("any", "jsonschema", b"{}")
+        pose = writer.register_channel("/pose", "json", schema)
+        speed = writer.register_channel("/speed", "json", schema)
+        for k in range(6):
+            stamp = 1_700_000_000_000_000_000 + k * 100_000_000
+            seen = json.dumps({"x": k, "y": 2 * k, "yaw": k / 10}).encode()
+            told = json.dumps({"left": 0.1, "right": 0.1 * (k > 2)}).encode()
+            writer.add_message(pose, stamp, seen, stamp)
+            writer.add_message(speed, stamp, told, stamp)
+        writer.finish()
+
+
+def _recordings(home: Path) -> None:
+    from bns.gap.importers import kscale_sts3215, xl330
+
+    for name in ("khepera", "kscale", "xl330", "mrclam"):
+        (home / name).mkdir()
+    items = [{"T": 0.5, "phi_l": 1.0, "phi_r": 2.0, "sm": [0.01, 0.0, 0.1]}] * 5
+    lines = "\n".join(map(json.dumps, items))
+    (home / "khepera" / "lstraight.tuple").write_text(lines)
+    known = dict.fromkeys(("axle", "l_diam", "r_diam", "l_x", "l_y", "l_theta"), 0.04)
+    known |= {"covariance": (np.eye(6) * 1e-6).tolist()}
+    (home / "khepera" / "lstraight_results.json").write_text(json.dumps(known))
+    columns = list(kscale_sts3215.SOURCES.values())
+    table = np.zeros((20, len(columns)), np.float32)
+    table[:, 0], table[:, 1] = np.arange(20) / 100, np.sin(np.arange(20) / 10)
+    np.savez(home / "kscale" / "runs.npz", _columns=np.array(columns), a=table)
+    head = "file,kp,length,mass,trajectory,vin\n"
+    (home / "kscale" / "index.csv").write_text(head + "a,16,0.15,0.741,sin,15.0\n")
+    entry = dict.fromkeys(xl330.ENTRIES.values(), 1.0)
+    entries = [entry | {"timestamp": k / 100, "position": k / 50} for k in range(9)]
+    told = {"mass": 0.5, "length": 0.1, "kp": 200, "vin": 7.4, "trajectory": "sin"}
+    (home / "xl330" / "a.json").write_text(json.dumps(told | {"entries": entries}))
+    times = np.arange(0, 6, 0.1)
+    seen = np.column_stack([1e9 + times, times / 10, times / 20, times / 30])
+    sent = np.column_stack([1e9 + times, 0 * times + 0.1, np.sin(times)])
+    np.savetxt(home / "mrclam" / "Robot2_Groundtruth.dat", seen)
+    packed = home / "mrclam" / "Robot2_Odometry.dat.gz"
+    with gzip.open(packed, "wt") as out:
+        np.savetxt(out, sent)

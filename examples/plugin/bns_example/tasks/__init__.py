@@ -1,0 +1,1 @@
+"""Tasks: `edge.toml` names one, `edge` runs and scores it."""

@@ -1,0 +1,155 @@
+"""What the joint fit found in a recording."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bns.gap.decomposition import descent, onset, rest, shares, ties
+from bns.gap.decomposition.fit import Point
+from bns.gap.decomposition.linear import Support
+from bns.gap.decomposition.onset import Onset
+from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.shares import Part
+
+MOST = 0.5  # share of the gap beyond which what is left is most of it
+FELT = 0.02  # of the floor's variance: a gap below shows in no picture
+LARGE = 2.0  # variances of the floor: more than heavy tails of any camera's noise
+SCATTER = 3.0  # times what differs between repeats
+BROKEN = 0.05  # of its motion: no sound robot scatters by as much (assumed)
+
+
+@dataclass(frozen=True, eq=False)
+class Decomposition:
+    """What the joint fit found.
+
+    Attributes:
+        problem: the recording; split where something sets in.
+        start: the nominal model.
+        point: the explanations, fitted.
+        parts: their shares, the largest first.
+        tied: sets that the data cannot tell from the one of `point`, itself first.
+        onset: what sets in; None = nothing.
+        floor: what measuring scatters.
+        before, after: excess over the floor of the nominal model and of `point`.
+        recurs: standard errors by which what `point` leaves recurs.
+        scatter: excess over the floor of what differs between repeats.
+        moved: mean square of the recorded motion in units of the floor.
+        closed: share closed on stretches that were not fitted.
+    """
+
+    problem: Problem
+    start: Point
+    point: Point
+    parts: tuple[Part, ...]
+    tied: tuple[Support, ...]
+    onset: Onset | None
+    floor: rest.Floor
+    before: float
+    after: float
+    recurs: float
+    scatter: float
+    moved: float
+    closed: float
+
+    @property
+    def left(self) -> float:
+        """Share of the gap that is left."""
+        return max(self.after, 0.0) / max(self.before, self.after, 1e-9)
+
+    @property
+    def recurring(self) -> bool:
+        """Whether the rest is the same whenever the motion is."""
+        return self.recurs > rest.SURE
+
+    @property
+    def broken(self) -> bool:
+        """Whether the rest is more than a sound robot may scatter."""
+        large = np.sqrt(max(self.after, 0.0) / self.moved) > BROKEN
+        return bool(large and self.after > LARGE)
+
+    @property
+    def unexplained(self) -> float:
+        """Share of the gap that is left and is not what differs between repeats."""
+        apart = 0.0 if self.broken else self.scatter
+        return max(self.after - apart, 0.0) / max(self.before, self.after, 1e-9)
+
+    @property
+    def lasting(self) -> bool:
+        """Whether the rest is more than scatter: it recurs, or it is far beyond what
+        measuring scatters and what differs between repeats, or beyond what a sound
+        robot may scatter (what happens at one place, or by chance)."""
+        if self.broken:
+            return True
+        if self.after <= self.scatter:
+            return False
+        if self.recurring:
+            return self.after > FELT
+        return self.after > max(LARGE, SCATTER * self.scatter)
+
+    @property
+    def kind(self) -> str:
+        """Kind of the verdict, one of `records.KINDS`."""
+        if self.lasting and self.unexplained > MOST:
+            return "none of the library"
+        if not self.point.support:
+            return "no gap"
+        if len(self.tied) > 1:
+            return "either"
+        return "effect" if len(self.point.support) == 1 else "together"
+
+
+def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
+    """Fit, date, guard against what makes held-out errors worse, and weigh the rest.
+
+    Args:
+        problem: the recording.
+        seed: of the noise that measures the floor.
+    """
+    start = descent.nothing(problem)
+    point = descent.decompose(problem, start)
+    found = onset.dated(problem, start, point)
+    late = None
+    if found:
+        problem, point, late = found
+    support = shares.guarded(problem, point)
+    if support != point.support:
+        point = descent.refitted(problem, point, support)
+    known = rest.floor(problem, seed=seed)
+    full = point.linear.rest(point.linear.solve(point.linear.free))
+    inside = rest.kept(problem, full, point.noise.sd)
+    left = point.linear.rest(point.linear.solve(point.support))
+    plain = left if not point.noise.memory.factors.size else point.rest
+    made = Decomposition(
+        problem=problem,
+        start=start,
+        point=point,
+        parts=tuple(shares.parts(problem, point)),
+        tied=tuple(ties.tied(problem, point)),
+        onset=late,
+        floor=known,
+        before=rest.excess(start.rest, known, inside),
+        after=rest.excess(plain, known, inside),
+        recurs=rest.recurrence(
+            problem,
+            left,
+            point.noise.sd,
+            piece=rest.SHORT if point.noise.order else rest.PIECE,
+        ),
+        scatter=rest.scattered(problem, plain, known, inside),
+        moved=max(rest.excess(problem.recorded, known, inside), 1.0),
+        closed=0.0,
+    )
+    return replace(made, closed=_closable(made, inside)) if point.support else made
+
+
+def _closable(made: Decomposition, inside: np.ndarray) -> float:
+    """Share that is closed on stretches that were not fitted, of what can be closed:
+    down to what measuring scatters, or where the rest is no more than scatter to what
+    all explanations together leave."""
+    problem, point = made.problem, made.point
+    held = shares.HeldOut.of(problem, point, shares.PIECES, inside)
+    none, some = held.nominal(made.start.rest), held.error(point.support).sum()
+    least = held.nominal(made.floor.sd)
+    if not made.lasting:
+        least = held.error(point.linear.free).sum()
+    return float((none - some) / max(none - min(least, some), 1e-9))

@@ -1,0 +1,1 @@
+"""Real robots on wheels as they drive: points, homing, steering, odometry."""

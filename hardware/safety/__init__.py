@@ -1,0 +1,1 @@
+"""What keeps a real robot from harm: bounds, monitors, watchdog, stop order."""

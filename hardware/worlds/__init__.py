@@ -1,0 +1,1 @@
+"""Worlds of real robots: one on wheels, one with light, one on legs."""
