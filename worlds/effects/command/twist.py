@@ -32,7 +32,7 @@ class TurningLoss(CommandEffect):
     def apply(
         self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
-        """The signal with a slower forward speed; it never changes its sign.
+        """See `CommandEffect.apply`; forward speed never changes its sign.
 
         Raises:
             UnknownNameError: the robot is not told a forward speed and a turning rate.
