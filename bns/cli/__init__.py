@@ -13,6 +13,7 @@ VERBS = {
     "view": ("view", "open a run's recording, or make a picture of it"),
     "campaign": ("campaign", "many configurations: run them, tables, pictures"),
     "claims": ("claims", "the dissertation's claims: list, run, judge"),
+    "repertoire": ("repertoire", "gaits and drives made beforehand: make, list, show"),
     "presets": ("lists", "list the presets"),
     "worlds": ("lists", "list the worlds"),
     "robots": ("lists", "list the robot models"),
@@ -29,7 +30,7 @@ VERBS = {
 
 GROUPS = {
     "Learn": ("run", "report", "compare", "view"),
-    "Many runs": ("campaign", "claims"),
+    "Many runs": ("campaign", "claims", "repertoire"),
     "What there is": ("presets", "worlds", "robots", "effects", "models", "examples"),
     "Real robots": ("gap", "hardware"),
     "This machine": ("doctor", "completion", "schema"),

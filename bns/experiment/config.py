@@ -177,6 +177,11 @@ class PriorConfig:
     """effects that hold in the model: what it gets wrong, or right, about the robot"""
     evaluations: int = 4000
     """executions in the model that a run may spend"""
+    step: float = 0.0
+    """physics step of the model, where it is a hexapod's [s]; 0 = as the world's"""
+    repertoire: str = ""
+    """controllers made in a model beforehand, see `bns repertoire list`, or PATH.npz;
+    empty = none"""
 
 
 BNS_SECTIONS = (

@@ -98,6 +98,7 @@ BOUNDS = {
     "watch.forget_reach": Bound(0, 100),
     "watch.forget_least": Bound(1, 100_000, "patterns"),
     "prior.evaluations": Bound(1, 1_000_000_000, "executions"),
+    "prior.step": Bound(0, 0.02, "s"),
     "world.sample_dt": Bound(0.005, 10, "s"),
     "choose_tournament": Bound(0, 1),
     "evolve_from": Bound(0, 1_000_000, "trials"),
