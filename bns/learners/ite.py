@@ -312,7 +312,9 @@ class Ite(Learner):
             "tests": counts,
             "at": np.concatenate([np.array(t.at, np.int64) for t in self.tests]),
             "seen": np.concatenate([np.array(t.seen, float) for t in self.tests]),
-            "scale": np.array(scale if self._counts_scale else [], float).reshape(-1, 2),
+            "scale": np.array(scale if self._counts_scale else [], float).reshape(
+                -1, 2
+            ),
             "map_counts": getattr(self, "_counts", np.empty(0, np.int64)),
             "map_genes": made[0],
             "map_behaviours": made[1],

@@ -232,7 +232,9 @@ def check(found: Repertoire, config: RunConfig) -> Repertoire:
             f"{config.task.name!r}: {again}."
         )
     if head.robot != robot:
-        raise BnsError(f"The repertoire is of {head.robot!r}, not of {robot!r}: {again}.")
+        raise BnsError(
+            f"The repertoire is of {head.robot!r}, not of {robot!r}: {again}."
+        )
     if head.model != robots.digest(robot):
         raise BnsError(
             f"The repertoire is of another model of {robot!r} than the one here, which "
