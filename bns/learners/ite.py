@@ -88,6 +88,7 @@ class Tests:
     Attributes:
         at: rows of the map that were tried, in order.
         seen: what they achieved, scaled.
+        harm: 1 where they did harm, see `harmed`.
         next: row that is tried now.
         best: row that is deployed.
         foreseen: what `next` is expected to achieve, scaled.
@@ -97,6 +98,7 @@ class Tests:
     def __init__(self) -> None:
         self.at: list[int] = []
         self.seen: list[float] = []
+        self.harm: list[float] = []
         self.next = self.best = 0
         self.foreseen, self.done = 0.0, False
 
@@ -104,6 +106,7 @@ class Tests:
         """Forget all tests but so many of the newest."""
         first = len(self.at) - newest
         self.at, self.seen = self.at[first:], self.seen[first:]
+        self.harm = self.harm[first:]
 
 
 class Ite(Learner):
@@ -116,6 +119,7 @@ class Ite(Learner):
         "(walking: m; elsewhere the cost, its sign turned)",
         "worth_seen": "what it achieved",
         "tests": "different controllers tried since the robot changed",
+        "harmed": "1 where the robot fell, strained a servo or came too near a lamp",
     }
     figures = (
         Curves(
@@ -281,7 +285,7 @@ class Ite(Learner):
     ) -> dict[str, np.ndarray]:
         """See `Learner.observe`."""
         del trial, best
-        worth = self.task.worth(tried)
+        worth, harm = self.task.worth(tried), harmed(tried)
         foreseen = np.empty(self.runs)
         for run, tests in enumerate(self.tests):
             seen = self._scaled(run, float(worth[run]))
@@ -290,10 +294,16 @@ class Ite(Learner):
             fell_short = tests.done and seen < self.rule.drop * max(tests.seen)
             tests.at.append(tests.next)
             tests.seen.append(seen)
+            tests.harm.append(float(harm[run]))
             if self.rule.told == "never" and fell_short:
                 tests.forget(newest=1)
         count = np.array([float(len(set(tests.at))) for tests in self.tests])
-        return {"worth_foreseen": foreseen, "worth_seen": worth, "tests": count}
+        return {
+            "worth_foreseen": foreseen,
+            "worth_seen": worth,
+            "tests": count,
+            "harmed": harm,
+        }
 
     def _scaled(self, run: int, worth: float) -> float:
         known = self.maps[run]
@@ -312,6 +322,7 @@ class Ite(Learner):
             "tests": counts,
             "at": np.concatenate([np.array(t.at, np.int64) for t in self.tests]),
             "seen": np.concatenate([np.array(t.seen, float) for t in self.tests]),
+            "harm": np.concatenate([np.array(t.harm, float) for t in self.tests]),
             "scale": np.array(scale if self._counts_scale else [], float).reshape(
                 -1, 2
             ),
@@ -331,10 +342,9 @@ class Ite(Learner):
         """See `Learner.restore`."""
         self.begin()
         edges = np.cumsum(arrays["tests"])[:-1]
-        at, seen = (np.split(arrays[name], edges) for name in ("at", "seen"))
-        for tests, rows, values in zip(self.tests, at, seen, strict=True):
-            tests.at, tests.seen = rows.tolist(), values.tolist()
-            tests.best = tests.next = 0
+        parts = [np.split(arrays[name], edges) for name in ("at", "seen", "harm")]
+        for tests, at, seen, harm in zip(self.tests, *parts, strict=True):
+            tests.at, tests.seen, tests.harm = at.tolist(), seen.tolist(), harm.tolist()
         if len(arrays["map_counts"]):
             ends = np.cumsum(arrays["map_counts"])[:-1]
             parts = [
@@ -347,6 +357,19 @@ class Ite(Learner):
                 self.maps[run] = self.maps[run]._replace(zero=zero, unit=unit)
         for model, spent in zip(self.models, arrays["spent"], strict=True):
             model.spent = int(spent)
+
+
+def harmed(trials: Sequence[Trial]) -> np.ndarray:
+    """Trials in which the robot fell, strained a servo or came too near a lamp.
+
+    Returns:
+        ``(N,)``, 1 or 0.
+    """
+    outcomes = [trial.outcome for trial in trials]
+    found = [
+        o.fell or o.overloaded or o.overheated or o.lamp_stops > 0 for o in outcomes
+    ]
+    return np.array(found, np.float64)
 
 
 LEARNER = Ite

@@ -27,7 +27,7 @@ PRESETS = {
     "light": "khepera-light",
     "walk": "hexapod-walk",
 }
-THINKING = ("cma", "ite")
+THINKING = ("cma", "ite", "safe_ite")
 """learners that are tried with a model; all are without one, too"""
 GIVEN = {"columns": ("fitness", "fitness_best", "solved", "reached", "commands")}
 
