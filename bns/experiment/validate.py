@@ -43,6 +43,7 @@ BOUNDS = {
     "evolution.duration_magnitude": Bound(0, 60, "s"),
     "evolution.elitism": Bound(0, 100_000, "individuals"),
     "evolution.headless_chicken": Bound(0, 1),
+    "evolution.cells": Bound(0, 100, "bins"),
     "snn.hidden": Bound(1, 4096, "neurons"),
     "snn.members": Bound(1, 100, "networks"),
     "snn.dropout": Bound(0, 0.95),

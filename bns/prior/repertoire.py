@@ -1,7 +1,7 @@
 """Repertoires: many different controllers of a robot, each with what it achieves.
 
-A repertoire is one NPZ file: the elites of a grid (`bns.prior.archive`), and a head that
-says of which robot and model they are, what was spent on them and how the grid grew.
+A repertoire is one NPZ file: the elites of a grid (`bns.prior.archive`), and a head
+that says of which robot and model they are, what was spent and how the grid grew.
 Those that ship lie in `bns/prior/data`; a path names one of a user's own. Genes are
 kept in `LEVELS` steps of their range, so that a file is small and exact.
 """

@@ -197,7 +197,7 @@ class TestMaking:
 
     @pytest.mark.parametrize("what", [{"genotype": "gaits"}, {"behaviour": "feet"}])
     def test_an_unknown_name(self, what):
-        with pytest.raises(UnknownNameError, match="Did you mean|Available"):
+        with pytest.raises(UnknownNameError, match=r"Did you mean|Available"):
             maker.Maker(replace(PLAN, **what), Slider())
 
 
@@ -206,7 +206,7 @@ class TestRefused:
         held = arrays.read_npz(file)
         held["worth"][0] += 1e-6
         arrays.write_npz(tmp_path / "r.npz", held, compressed=True)
-        with pytest.raises(FormatError, match="damaged.*bns repertoire make r"):
+        with pytest.raises(FormatError, match=r"damaged.*bns repertoire make r"):
             repertoire.read(tmp_path / "r.npz")
 
     def test_a_file_that_is_none(self, tmp_path):
