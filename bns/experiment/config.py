@@ -194,6 +194,7 @@ BNS_SECTIONS = (
     "watch",
     "choose",
     "choose_tournament",
+    "deploy",
     "evolve_from",
     "compiled",
 )
@@ -231,6 +232,10 @@ class RunConfig:
     """which controller is tried in the world"""
     choose_tournament: float = 0.1
     """tournament for that choice, as a share of the population"""
+    deploy: Literal["population", "seen"] = "population"
+    """what a user would run if trials ended now. population: the best of the population
+    inside the SNN; seen (own): the best one seen to work since the robot last changed,
+    tried again in doubt (bns/learners/bns/deployed.py)"""
     evolve_from: int = 1
     """trials with random controllers before evolution starts"""
     trials: int = 100
