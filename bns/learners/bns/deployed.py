@@ -10,8 +10,8 @@ Nobody tells of a change. It shows where a controller that is tried again does m
 worse than it did, or where the learner forgets by evidence; what was seen before is
 dropped then. A controller is tried again in doubt: where a trial went much worse than
 the networks foresaw, where the deployed one was not seen for `AGE` trials or, where
-trials differ by chance, only once, or where another may be better. Two such trials
-never follow each other, but for the first kind, so that learning goes on.
+trials differ by chance, only once, or where another may be better. Between two such
+trials lie `PAUSE` others, so that learning goes on.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,6 +23,8 @@ KEPT = 12
 """controllers that a run keeps; assumed"""
 AGE = 10
 """trials after which the deployed one is tried again; assumed"""
+PAUSE = 3
+"""trials between two in which a controller is tried again; assumed"""
 OFTEN = 5
 """trials of a controller after which it is no longer in doubt; assumed"""
 SURPRISE = 4.0
@@ -72,7 +74,7 @@ class Deployed:
         seen: controllers, best first.
         misses: how far the networks' foresight of the last trials was off, newest last.
         surprised: whether the last trial went much worse than was foreseen.
-        again: whether the last trial was one of a controller that is kept.
+        again: trial in which a controller was last tried again; -1 = none.
         changed: trials at which a change was seen.
     """
 
@@ -80,7 +82,7 @@ class Deployed:
     seen: list[Seen] = field(default_factory=list)
     misses: list[float] = field(default_factory=list)
     surprised: bool = False
-    again: bool = False
+    again: int = -1
     changed: int = -1
 
     @property
@@ -101,7 +103,7 @@ class Deployed:
     def wanted(self, trial: int) -> Seen | None:
         """The controller that is to be tried again in a trial; None = a new one."""
         best = self.best
-        if best is None or (self.again and not self.surprised):
+        if best is None or (self.again >= 0 and trial - self.again <= PAUSE):
             return None
         once = len(best.costs) == 1 and not self.repeatable
         if self.surprised or trial - best.last >= AGE or once:
@@ -127,8 +129,9 @@ class Deployed:
         known = next(
             (item for item in self.seen if np.array_equal(item.genes, genes)), None
         )
-        self.again = known is not None
         self._watch(cost - foreseen)
+        if known is not None:
+            self.again = trial
         if known is None:
             self.seen.append(Seen(genes.copy(), length, [cost], trial))
         elif self._contradicts(known, cost):
@@ -201,5 +204,5 @@ def unpack(runs: Sequence[Deployed], arrays: Mapping[str, np.ndarray]) -> None:
     for number, run in enumerate(runs):
         run.seen = seen[ends[number] - held["runs"][number] : ends[number]]
         run.misses = misses[number].tolist()
-        surprised, again, run.changed = held["flags"][number].tolist()
-        run.surprised, run.again = bool(surprised), bool(again)
+        surprised, run.again, run.changed = held["flags"][number].tolist()
+        run.surprised = bool(surprised)

@@ -237,7 +237,7 @@ class Bns(Learner):
             if row.get("forgotten", np.zeros(self.runs))[run]:
                 marks = [memory.trials[run].min() for memory in self.memories]
                 kept.forget(int(min(marks)), trial)
-        return np.array([float(kept.again) for kept in self.deployed])
+        return np.array([float(kept.again == trial) for kept in self.deployed])
 
     def _evolve(self, trial: int, generations: int) -> None:
         self.population, self.cost = self.problem.evolve(
