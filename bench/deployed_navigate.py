@@ -7,7 +7,7 @@ from bench.result import Result
 from bns.experiment.config import RunConfig
 
 DOC = "share of the last ten trials that deployed controllers solve after damage, worst"
-BAR = f">= {_deployed.BAR} on each of four damages; tried beside it"
+BAR = ">= 0.90 on each of four damages; tried beside it"
 RUNS = 10  # of each damage
 
 

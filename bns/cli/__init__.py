@@ -13,6 +13,7 @@ VERBS = {
     "view": ("view", "open a run's recording, or make a picture of it"),
     "campaign": ("campaign", "many configurations: run them, tables, pictures"),
     "claims": ("claims", "the dissertation's claims: list, run, judge"),
+    "standings": ("standings", "all learners on the same damages: who recovers"),
     "repertoire": ("repertoire", "gaits and drives made beforehand: make, list, show"),
     "presets": ("lists", "list the presets"),
     "worlds": ("lists", "list the worlds"),
@@ -30,7 +31,7 @@ VERBS = {
 
 GROUPS = {
     "Learn": ("run", "report", "compare", "view"),
-    "Many runs": ("campaign", "claims", "repertoire"),
+    "Many runs": ("campaign", "claims", "standings", "repertoire"),
     "What there is": ("presets", "worlds", "robots", "effects", "models", "examples"),
     "Real robots": ("gap", "hardware"),
     "This machine": ("doctor", "completion", "schema"),
