@@ -13,7 +13,7 @@ LEAST, MOST, BEST = 0.20, 0.30, 20
 
 
 def run(quick: bool) -> Result:
-    """The best of the map in the nominal world and in that with the gap; quick: five."""
+    """The best of the map in both worlds; quick: five of them."""
     from bns.prior import mismatch, repertoire
     from bns.tasks import registry as tasks
     from bns.worlds import registry as worlds

@@ -16,6 +16,9 @@ from bns.standings.design import DESIGNS, Entry
 
 LEVEL = 0.05
 """p (Holm) below which a difference counts as won or lost"""
+FEWEST = 4
+"""runs that differ, on both sides, below which nothing counts as won or lost: an exact
+test of three against three cannot find a difference"""
 SHARES = (0.5, 0.75)
 """of the ceiling, beside the task's own bar"""
 
@@ -48,6 +51,11 @@ class Cell:
     def runs(self) -> int:
         """How many there are."""
         return len(self.deployed)
+
+    @property
+    def distinct(self) -> int:
+        """How many of them differ: where nothing is left to chance all are alike."""
+        return len(np.unique(self.deployed, axis=0))
 
     def waits(self, bar: float) -> np.ndarray:
         """Trials with the damage until the one deployed achieved `bar`, ``(R,)``.
@@ -122,7 +130,7 @@ class Row:
 
     Attributes:
         rival: by name.
-        runs: least of a damage, and how many damages.
+        runs: least of a damage, how many damages, and least of runs that differ.
         waits: bar by name -> median of trials and its exact interval, and how many of
             how many runs never got there.
         deployed, tried, last: mean share of the ceiling (or of trials solved): of the
@@ -133,7 +141,7 @@ class Row:
     """
 
     rival: str
-    runs: tuple[int, int]
+    runs: tuple[int, int, int]
     waits: Mapping[str, tuple[stats.Interval, int, int]]
     deployed: float
     tried: float
@@ -160,7 +168,11 @@ def row(rival: str, cells: Sequence[Cell]) -> Row:
     trials = sum(c.tried.size for c in cells)
     return Row(
         rival,
-        (min(c.runs for c in cells), len(cells)),
+        (
+            min(c.runs for c in cells),
+            len(cells),
+            min(c.distinct for c in cells),
+        ),
         waits,
         float(np.mean([c.deployed.mean() / top for c, top in known])),
         float(np.mean([c.tried.mean() / top for c, top in known])),
@@ -190,8 +202,9 @@ class Match:
 
 def matches(cells: Sequence[Cell]) -> list[Match]:
     """All pairs of learners in cells of one task, prior and set."""
+    known = {(c.entry.rival, c.entry.damage): c for c in cells}
     held: dict[tuple[str, str], np.ndarray] = {
-        (c.entry.rival, c.entry.damage): c.deployed.mean(1) for c in cells
+        key: c.deployed.mean(1) for key, c in known.items()
     }
     names = list(dict.fromkeys(c.entry.rival for c in cells))
     pairs = [
@@ -201,7 +214,14 @@ def matches(cells: Sequence[Cell]) -> list[Match]:
         if (a, damage) in held and (b, damage) in held
     ]
     samples = [(held[a, damage], held[b, damage]) for a, b, damage in pairs]
-    p = stats.holm([stats.mann_whitney(*both) for both in samples]) if pairs else []
+    enough = [
+        min(known[a, d].distinct, known[b, d].distinct) >= FEWEST for a, b, d in pairs
+    ]
+    raw = [
+        stats.mann_whitney(*both) if some else 1.0
+        for both, some in zip(samples, enough, strict=True)
+    ]
+    p = stats.holm(raw) if pairs else []
     found: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for (a, b, _), value, both in zip(pairs, p, samples, strict=True):
         found.setdefault((a, b), []).append((float(value), stats.a12_value(*both)))

@@ -23,7 +23,10 @@ median. Shares of the ceiling are of the damages whose ceiling is known (walking
 and navigation they are shares of trials in which the task is done.
 
 **Few runs say little.** n stands in every table; thirty runs a cell are wanted, and
-with less than seven an exact 95 % interval of a median is infinite.
+with fewer than six an exact 95 % interval of a median is infinite. IT&E on one map, in
+a world without noise, does the same in every run: there n is the number of maps, and
+the table says how many runs differ. Nothing counts as won or lost with fewer than four
+of these on either side.
 """
 EMPTY = """
 Nothing has been run for this page yet: `bns standings plan`, then `bns standings run`
@@ -72,8 +75,9 @@ def table(rows: Sequence[Row]) -> list[str]:
     heads += [f"{share}: deployed", "last five", "tried", "harmed", "evaluations"]
     lines = [_line(heads), _line(["---"] * len(heads))]
     for row in sorted(rows, key=lambda each: -each.deployed):
-        runs, damages = row.runs
-        texts = [row.rival, f"{runs} x {damages}"]
+        runs, damages, distinct = row.runs
+        alike = f", {distinct} that differ" if distinct < runs else ""
+        texts = [row.rival, f"{runs} x {damages}{alike}"]
         texts += [_waits(row.waits.get(bar)) for bar in bars]
         shares = (row.deployed, row.last, row.tried, row.harmed)
         texts += [f"{value:.2f}" for value in shares]

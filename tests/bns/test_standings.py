@@ -111,11 +111,17 @@ class TestFigures:
         (match,) = figures.matches([cells("random", low), cells("cma", high)])
         assert match.tied == 1 and match.better == 0.0
 
+    def test_runs_that_are_all_alike_are_one_run(self):
+        low, high = np.full((30, 5), 0.2), np.full((30, 5), 1.0)
+        (match,) = figures.matches([cells("random", low), cells("cma", high)])
+        assert match.tied == 1 and match.better == 0.0
+        assert figures.row("random", [cells("random", low)]).runs == (30, 1, 1)
+
 
 def test_the_page_says_n_and_what_was_not_run():
     held = [cells("random", np.full((3, 50), 0.2)), cells("cma", np.full((3, 50), 1.5))]
     text = page.page(held)
-    assert "3 x 1" in text and "not run: type1, type3" in text
+    assert "3 x 1, 1 that differ" in text and "not run: type1, type3" in text
     lines = [line for line in text.splitlines() if line.startswith("| ")]
     assert lines[2].startswith("| cma") and lines[3].startswith("| random")
     assert "never [-, never], 3 of 3" in lines[3]
