@@ -114,7 +114,11 @@ class Archive:
         return children.clip(0.0, 1.0)
 
     def state(self) -> dict[str, np.ndarray]:
-        """All of it as plain arrays, name -> array as `restore` takes it."""
+        """All of it as plain arrays.
+
+        Returns:
+            name -> array: genes ``(N, D)``, behaviours ``(N, B)``, worth ``(N,)``.
+        """
         return {
             "genes": self.genes.copy(),
             "behaviours": self.behaviours.copy(),

@@ -109,7 +109,7 @@ class Repertoire:
 
 
 def quantised(genes: np.ndarray) -> np.ndarray:
-    """Genes as files keep them: the nearest of `LEVELS` steps."""
+    """Genes ``(N, D)`` as files keep them: the nearest of `LEVELS` steps."""
     found: np.ndarray = np.rint(genes * LEVELS) / LEVELS
     return found
 

@@ -4,15 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.result import Result
+from bench.result import Result, bench
 from bns import presets
 
-DOC = "loss of the best walks of the repertoire in the world of the prior P2"
-BAR = "0.20 to 0.30 (median of the best twenty)"
 LEAST, MOST, BEST = 0.20, 0.30, 20
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "loss of the best walks of the repertoire in the world of the prior P2",
+    bar="0.20 to 0.30 (median of the best twenty)",
+)
+def prior_off(quick: bool) -> Result:
     """The best of the map in both worlds; quick: five of them."""
     from bns.prior import mismatch, repertoire
     from bns.tasks import registry as tasks

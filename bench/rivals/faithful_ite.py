@@ -8,11 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.result import Result
+from bench.result import Result, bench
 from bns import presets
 
-DOC = "tests of IT&E until it keeps a gait: intact, one leg, pairs of legs raised"
-BAR = "intact 1; one leg <= 4; opposite or next but one <= 12; neighbours >= twice one"
 DAMAGES = {
     "intact": {"none": ""},
     "one leg": {"1": "1", "3": "3", "5": "5"},
@@ -32,7 +30,11 @@ PUBLISHED = {
 """median tests (5 to 95 %) on a map of 20,000 cells and 40 M evaluations"""
 
 
-def run(quick: bool) -> Result:
+@bench(
+    "tests of IT&E until it keeps a gait: intact, one leg, pairs of legs raised",
+    bar="intact 1; one leg <= 4; opposite, next but one <= 12; neighbours >= 2 x one",
+)
+def faithful_ite(quick: bool) -> Result:
     """One recovery a damage on the map that ships; quick: intact and one leg."""
     from bns.prior import repertoire
 
