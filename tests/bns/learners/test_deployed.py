@@ -131,3 +131,13 @@ def test_killed_and_resumed_it_gives_the_same_bytes(tmp_path, small):
 def test_off_it_is_as_it_was():
     record = train(walkers.small(trials=3), world=walkers.Slider())
     assert not {"solved_best", "retried"} & set(record.columns)
+
+
+def test_a_report_shows_deployed_and_tried_apart(tmp_path):
+    from bns.viz import report
+
+    record = train(deploying(trials=6), world=walkers.Slider())
+    page = report.write(record, tmp_path / "r.html").read_text()
+    assert "Deployed, it solves" in page
+    plain = train(walkers.small(trials=3), world=walkers.Slider())
+    assert "Deployed" not in report.write(plain, tmp_path / "p.html").read_text()
