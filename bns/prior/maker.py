@@ -115,7 +115,7 @@ class Maker:
             {"genes": found.genes, "behaviours": found.behaviours, "worth": found.worth}
         )
         self.evaluations = head.evaluations
-        self.growth = [tuple(row) for row in head.growth]
+        self.growth = [tuple(row) for row in head.growth if _noted(row[0])]
 
     def advance(self) -> None:
         """One generation."""
@@ -135,7 +135,7 @@ class Maker:
         seen = self._behaviours(trials).astype(np.float32).astype(float)
         archive.add(genes, seen, worth)
         self.evaluations += BATCH
-        if self.evaluations // BATCH % KEEP == 0:
+        if _noted(self.evaluations):
             self.growth.append(self.row)
 
     @property
@@ -147,6 +147,7 @@ class Maker:
 
     def _head(self, command: str) -> dict[str, Any]:
         plan, world = self.plan, self.config.world
+        growth = self.growth if _noted(self.evaluations) else [*self.growth, self.row]
         return {
             "command": command,
             "task": self.config.task.name,
@@ -161,7 +162,7 @@ class Maker:
             "controllers": repertoire.controllers(self.config),
             "seed": plan.seed,
             "evaluations": self.evaluations,
-            "growth": self.growth,
+            "growth": growth,
             "versions": {name: package(name) for name in ("mujoco", "numpy")},
         }
 
@@ -176,6 +177,11 @@ class Maker:
             StorageError: no space, or no permission.
         """
         repertoire.write(file, self._head(command), self.archive.state())
+
+
+def _noted(evaluations: int) -> bool:
+    """Whether a row of the growth curve is kept for good after so many."""
+    return evaluations > 0 and evaluations % (KEEP * BATCH) == 0
 
 
 def _model(config: RunConfig, plan: Plan) -> Any:
@@ -221,7 +227,7 @@ def make(
     while maker.evaluations < evaluations and not stopped:
         maker.advance()
         stopped = stop()
-        if maker.evaluations // BATCH % KEEP == 0 or stopped:
+        if _noted(maker.evaluations) or stopped:
             maker.write(file, command)
             on_kept(maker)
     maker.write(file, command)

@@ -9,6 +9,7 @@ from bns import presets
 from bns.errors import BnsError, UnknownNameError
 from bns.experiment.batch import Batch
 from bns.experiment.loading import with_learner
+from bns.experiment.world_factory import make_world
 from bns.learners import registry
 from bns.learners.safe_ite import improvement
 from bns.prior import maker
@@ -76,6 +77,16 @@ def test_nobody_tells_and_it_sees_for_itself(repertoire):
     assert (found["tests"][:, ONSET] == 1).all()
     assert (found["tests"][:, -1] > 1).all()
     assert (found["worth_seen"][:, -1] > 1.5 * found["worth_seen"][:, ONSET]).all()
+
+
+def test_the_map_that_ships_foresees_the_intact_hexapod():
+    """It was made at steps of 8 ms, the world has 4 ms: not the same, but near."""
+    told = {"prior.repertoire": "phantomx-1", "world.damage": []}
+    one = replace(with_learner(WALK, "ite").with_(told), replicates=1)
+    batch = Batch([one], [make_world(one)])
+    rows = [batch.advance(trial)[0].columns for trial in range(2)]
+    assert rows[0]["worth_seen"] == pytest.approx(rows[0]["worth_foreseen"], rel=0.1)
+    assert rows[1]["tests"] == 1 and rows[1]["fitness"] == rows[1]["fitness_best"]
 
 
 def test_it_stops_at_the_most_tests(repertoire):

@@ -166,7 +166,8 @@ class TestMaking:
         maker.make(made(0), whole, **say)
         asked = iter([False] * 10 + [True])
         assert not maker.make(made(0), cut, **say, stop=lambda: next(asked))
-        assert repertoire.read(cut).head.evaluations == 11 * maker.BATCH
+        head = repertoire.read(cut).head
+        assert head.evaluations == head.growth[-1][0] == 11 * maker.BATCH
         again = made(0)
         again.restore(repertoire.read(cut))
         assert maker.make(again, cut, **say)
