@@ -10,6 +10,7 @@ from bns.errors import BnsError
 from bns.evolution import elites
 from bns.experiment.run import train
 from bns.learners import registry
+from bns.tasks.base import BOARD
 from tests.bns import light_fakes, walkers
 
 
@@ -61,6 +62,20 @@ def test_behaviours_inside_the_snn_are_those_of_the_task():
     trials = walkers.Slider().run(tried)
     inside = learner.problem.behaviours(learner.memories, learner._chosen)[:, 0]
     assert inside.double().numpy() == pytest.approx(learner.task.behaviour(trials))
+
+
+def test_on_wheels_behaviours_are_where_lists_are_predicted_to_end():
+    config = presets.load("khepera-simple")
+    sizes = {"population": 20, "generations": 5, "cells": 4}
+    changes = {f"evolution.{name}": size for name, size in sizes.items()}
+    config = config.with_({**changes, "evolve_from": 0, "compiled": "no"})
+    learner = made(config)
+    learner.propose(0)
+    inside = learner.problem.behaviours(learner.memories, learner.population)
+    poses = learner.problem.evaluator.poses(learner.theta, learner.population)
+    ends = poses[:, :, -1, :2] / torch.tensor(BOARD)
+    torch.testing.assert_close(inside, (ends + 1) / 2)
+    assert all(len(set(row.tolist())) >= 2 for row in elites.cells(inside, 4))
 
 
 def test_killed_and_resumed_it_gives_the_same_bytes(tmp_path):
