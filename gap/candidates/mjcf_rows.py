@@ -48,8 +48,8 @@ def rows(
         trials: a recording; levels of dead zones lie between what it was told.
         dt: physics step [s].
     """
-    made = [row for item in candidates for row in _of(item, trials)]
     lead = max(0.002, 0.5 * dt)
+    made = [row for item in candidates for row in _of(item, trials, lead)]
     made.append(Row(LEAD, 0.0, lead, -0.02, 0.02, unit="s", nuisance=True, step=0.001))
     return tuple(made)
 
@@ -77,7 +77,7 @@ def grouped(candidates: Sequence[OwnCandidate]) -> list[OwnCandidate]:
     return made
 
 
-def _of(item: OwnCandidate, trials: Sequence[Trial]) -> Iterable[Row]:
+def _of(item: OwnCandidate, trials: Sequence[Trial], lead: float) -> Iterable[Row]:
     excite = EXCITE.get(item.effect, "any command")
     edges = {"low": item.low, "high": item.high, "unit": item.unit, "excite": excite}
     third = (item.high - item.low) / 3
@@ -96,7 +96,7 @@ def _of(item: OwnCandidate, trials: Sequence[Trial]) -> Iterable[Row]:
         item.name,
         item.nominal,
         sd,
-        slack=item.slack or slack,
+        slack=item.slack or (lead if late else slack),  # its steps lead by as much
         levels=(0.15, 0.3) if late else (),
         step=0.01 if late else 0.0,
         **edges,

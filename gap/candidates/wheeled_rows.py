@@ -1,6 +1,7 @@
 """Numbers of a wheeled robot that may be off, and how far they plausibly are."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,18 +26,22 @@ _SMOOTH = (
     ("axle_length", 0.04, 0.7, 1.3, False, {"slack": 0.004}),
     ("motor_lag", 0.06, 0, 2, True, {"levels": (0.1, 0.25, 0.6), "step": 0.01}),
     ("command_latency", 0.05, 0, 1, False, {"levels": (0.1, 0.2, 0.4), "step": 0.01}),
-    ("tracker_latency", 0.05, 0, 1, False, {"step": 0.005}),
+    ("tracker_latency", 0.05, 0, 1, False, {"step": 0.01}),
     ("rolling_drag.torque", 0.004, 0, 0.03, True,
      {"step": 5e-4, "levels": (0.004, 0.01)}),
     ("rolling_drag.viscous", 2e-4, 0, 0.01, True, {"step": 2e-5}),
-    ("centre_of_mass.dx", 0.008, -0.02, 0.03, False, {"slack": 7e-4}),
-    ("centre_of_mass.dy", 0.008, -0.03, 0.03, False, {"slack": 5e-4}),
-    ("payload", 0.4, 0, 2, False, {"slack": 0.01, "levels": (0.3, 0.8)}),
+    ("centre_of_mass.dx", 0.008, -0.02, 0.03, False,
+     {"slack": 7e-4, "family": "centre_of_mass"}),
+    ("centre_of_mass.dy", 0.008, -0.03, 0.03, False,
+     {"slack": 5e-4, "family": "centre_of_mass"}),
     ("tracker_scale", 0.02, 0.8, 1.25, False, {}),
     ("clock_drift", 0.02, -0.1, 0.1, False, {}),
-    ("marker_mount.dx", 0.008, -0.06, 0.06, False, {"slack": 2e-4}),
-    ("marker_mount.dy", 0.008, -0.06, 0.06, False, {"slack": 2e-4}),
-    ("marker_mount.yaw", 0.04, -0.5, 0.5, False, {"slack": 1e-3}),
+    ("marker_mount.dx", 0.008, -0.06, 0.06, False,
+     {"slack": 2e-4, "family": "marker_mount"}),
+    ("marker_mount.dy", 0.008, -0.06, 0.06, False,
+     {"slack": 2e-4, "family": "marker_mount"}),
+    ("marker_mount.yaw", 0.04, -0.5, 0.5, False,
+     {"slack": 1e-3, "family": "marker_mount"}),
     ("battery_sag.per_second", 0.015, 0, 0.2, False, {}),
     ("battery_sag.per_metre", 0.08, 0, 2, False, {}),
     ("battery_fade", 0.01, 0, 0.2, False, {"per_trial": True}),
@@ -44,7 +49,18 @@ _SMOOTH = (
     ("caster_drag", 0.2, 0, 1, False, {"step": 0.05}),
     ("wheel_backlash", 0.004, 0, 0.03, True, {"step": 1e-3, "levels": (0.005,)}),
 )  # fmt: skip
-_PLANES = (("floor_slope", 0.03, 0.3, False), ("wheel_eccentricity", 1e-3, 4e-3, True))
+# a mass that is carried and its moments about the middle of the axle, and about the top
+# plate
+_LOAD = (
+    ("payload.mass", 0.4, 0.0, 2.0, "kg", {"slack": 0.01, "levels": (0.3, 0.8)}),
+    ("payload.mx", 0.015, -0.1, 0.1, "kg m", {"slack": 4e-4}),
+    ("payload.my", 0.015, -0.1, 0.1, "kg m", {"slack": 4e-4}),
+    ("payload.mz", 0.04, -0.1, 0.3, "kg m", {}),
+)
+_PLANES = (
+    ("floor_slope", 0.03, 0.3, False, ()),
+    ("wheel_eccentricity", 1e-3, 4e-3, True, (-1.5e-3, 1.5e-3)),
+)
 """explanations with a size and a direction: two rows each, along x and y"""
 
 
@@ -55,8 +71,13 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
         trials: a recording; levels of dead bands and limits lie between its speeds.
     """
     made = [row for entry in _SMOOTH for row in _smooth(*entry)]
+    made += [
+        Row(name, 0.0, sd, low, high, unit=unit, group="payload",
+            excite=EXCITE["payload"], **given)
+        for name, sd, low, high, unit, given in _LOAD
+    ]  # fmt: skip
     made.append(Row(LEAD, 0.0, 0.003, -0.02, 0.02, unit="s", nuisance=True, step=0.001))
-    for name, sd, high, sided in _PLANES:
+    for name, sd, high, sided, levels in _PLANES:
         for side in SIDES[:2] if sided else ("",):
             term = f"{name}[{side}]" if side else name
             made += [
@@ -67,6 +88,7 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
                     -high,
                     high,
                     group=term,
+                    levels=levels,
                     unit=_unit(name),
                     excite=EXCITE.get(name, "any drive"),
                 )
@@ -74,11 +96,18 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
             ]
     for side in SIDES:
         made += _rough(side, trials)
+    made = [_joining(row) if row.name.endswith("[both]") else row for row in made]
     made.append(
         Row("floor_friction", 1.0, 0.3, 0.01, 3.0, smooth=False,
             levels=(0.02, 0.05, 0.1, 0.25), excite=EXCITE["floor_friction"])
     )  # fmt: skip
     return tuple(made)
+
+
+def _joining(row: Row) -> Row:
+    """A row of both wheels, which is one of each that hold alike."""
+    parts = tuple(row.name.replace("[both]", f"[{side}]") for side in SIDES[:2])
+    return replace(row, joins=parts)
 
 
 def _smooth(

@@ -2,12 +2,13 @@
 around it; and which of several is the best."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from bns.gap.decomposition import fit, levels
 from bns.gap.decomposition.fit import Noise, Point, linearised, newton, placed
-from bns.gap.decomposition.linear import Linear
+from bns.gap.decomposition.linear import Linear, Support
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.shares import HeldOut
 
@@ -15,6 +16,8 @@ TURNS = 4  # of fitting and searching
 SINGLES = 4  # explanations that are tried alone
 ROUNDS = 2  # of levels
 MARGIN = 1.02  # of the held-out error that an autoregression may cost
+WEAK = 0.05  # of what a set explains: so little may be left to the others
+TRIED = 3  # of these, the weakest first
 WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
 
 
@@ -65,11 +68,11 @@ def descend(
         slopes, at = (slopes, at) if near else (None, values.copy())
         linear, known, slopes = linearised(problem, values, rest, known, slopes)
         found = linear.search(start=support)[1]
-        point = Point(values, found, rest, linear, slopes, known)
         if found == support:
-            return point
+            break
         support = found
         values = placed(problem, linear, support, values)
+    # the last fit was under the noise of the point before
     values, rest = newton(problem, values, _fitted(problem, support), known, turns=2)
     return Point(values, support, rest, linear, slopes, known)
 
@@ -84,11 +87,16 @@ def better(problem: Problem, points: Sequence[Point]) -> Point:
 
 
 def costs(problem: Problem, points: Sequence[Point]) -> list[float]:
-    """Costs of points, all under the noise of the one that leaves least."""
-    least = min(points, key=lambda p: float(np.log(p.noise.sd).mean()))
+    """Costs of points, each under its own noise with what that noise costs; as many
+    residuals count as one for all."""
     lam = min(point.noise.lam for point in points)
-    known = Noise(least.noise.sd, least.noise.memory, lam)
-    return [relinearised(problem, p, known).cost(p.support) for p in points]
+    found = []
+    for point in points:
+        known = replace(point.noise, lam=lam)
+        cost = relinearised(problem, point, known).cost(point.support)
+        size = np.log(known.sd[problem.seen]).sum() / lam
+        found.append(float(cost + size))
+    return found
 
 
 def relinearised(problem: Problem, point: Point, known: Noise) -> Linear:
@@ -138,7 +146,75 @@ def decompose(problem: Problem, start: Point | None = None) -> Point:
         if chosen is best:
             break
         best = chosen
-    return best
+    return pruned(problem, best)
+
+
+def pruned(problem: Problem, point: Point) -> Point:
+    """A point without what the others explain as well once they are fitted again: what
+    is strong and not linear leaves that to small ones beside it.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+    """
+    point = joined(problem, point)
+    while len(point.support) > 1:
+        linear, support = point.linear, point.support
+        whole = max(linear.squares(()) - linear.squares(support), 1e-9)
+        last = {
+            name: (linear.squares(support - {name}) - linear.squares(support)) / whole
+            for name in support
+        }
+        weak = sorted((n for n in last if last[n] < WEAK), key=lambda n: (last[n], n))
+        for name in weak[:TRIED]:
+            smaller = refitted(problem, point, support - {name})
+            least, here = costs(problem, [smaller, point])
+            if least <= here:
+                point = smaller
+                break
+        else:
+            return point
+    return point
+
+
+def joined(problem: Problem, point: Point) -> Point:
+    """A point with one explanation for several where they hold alike: one dead band of
+    both wheels for one of each."""
+    for row in problem.rows:
+        if not row.joins or not set(row.joins) <= point.support:
+            continue
+        values = point.values.copy()
+        parts = [k for name in row.joins for k in problem.terms[name]]
+        (number,) = problem.terms[row.term]
+        values[number] = values[parts].mean()
+        values[parts] = problem.nominal[parts]
+        support = (point.support - set(row.joins)) | {row.term}
+        other = _fitted_at(problem, replace(point, values=values), support)
+        least, here = costs(problem, [other, point])
+        if least <= here:
+            point = other
+    return point
+
+
+def refitted(problem: Problem, point: Point, support: Support) -> Point:
+    """A point with a smaller set, fitted to the simulation.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+        support: the smaller set.
+    """
+    values = placed(problem, point.linear, support, point.values)
+    return _fitted_at(problem, replace(point, values=values), support)
+
+
+def _fitted_at(problem: Problem, point: Point, support: Support) -> Point:
+    """A set fitted from a point's values, with its noise."""
+    fitted = _fitted(problem, support)
+    values, rest = newton(problem, point.values, fitted, point.noise)
+    values, rest = levels.zoomed(problem, values, rest, support, point.noise)
+    linear, known, slopes = linearised(problem, values, rest, point.noise)
+    return Point(values, support, rest, linear, slopes, known)
 
 
 def _others(problem: Problem, start: Point, first: Point) -> list[Point]:
@@ -147,17 +223,32 @@ def _others(problem: Problem, start: Point, first: Point) -> list[Point]:
     order = sorted(linear.free, key=lambda name: linear.cost({name}))[:SINGLES]
     few = problem.sample(fit.ROUGH)
     few = None if len(few) == len(problem.trials) else few
+    starts = [(n, placed(problem, linear, {n}, start.values)) for n in order]
+    starts += levels.alone(problem, start, SINGLES)
     tried = []
-    for name in order:
-        values = placed(problem, linear, {name}, start.values)
+    for name, values in starts:
         fitted = _fitted(problem, {name})
-        values, rest = newton(problem, values, fitted, start.noise, turns=4, only=few)
+        values, rest = newton(problem, values, fitted, start.noise, turns=6, only=few)
         tried.append((first.noise.loss(rest), name, values))
     _, name, values = min(tried, key=lambda item: item[0])
     made = [descend(problem, values, {name}, first.noise)]
+    if len(made[0].support) > 1 and (both := _with_level(problem, name, values, first)):
+        made.append(both)
     if problem.model.many:
         made.append(_from_all(problem, start))
     return made
+
+
+def _with_level(problem: Problem, name: str, values, first: Point) -> Point | None:
+    """A point from a single explanation and a level on top of it: through a tangent
+    that lacks the level, the rest of it looks like several others."""
+    values, rest = newton(problem, values, _fitted(problem, {name}), first.noise)
+    linear, known, slopes = linearised(problem, values, rest, first.noise)
+    single = Point(values, frozenset({name}), rest, linear, slopes, known)
+    level = levels.best(problem, single)
+    if level is None or level.cost > single.cost - WORTH:
+        return None
+    return descend(problem, level.values, level.support, known)
 
 
 def _from_all(problem: Problem, start: Point) -> Point:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bns.gap.decomposition import descent, onset, rest, shares, words
+from bns.gap.decomposition import descent, onset, rest, shares, ties, words
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.model import DecomposableModel
@@ -22,6 +22,7 @@ MOST = 0.5  # share of the gap beyond which what is left is most of it
 FELT = 0.02  # of the floor's variance: a gap below shows in no picture
 LARGE = 2.0  # variances of the floor: more than heavy tails of any camera's noise
 SCATTER = 3.0  # times what differs between repeats
+BROKEN = 0.05  # of its motion: no sound robot scatters by as much (assumed)
 SINGLES = 8  # explanations whose share alone is reported
 
 
@@ -40,6 +41,7 @@ class Decomposition:
         before, after: excess over the floor of the nominal model and of `point`.
         recurs: standard errors by which what `point` leaves recurs.
         scatter: excess over the floor of what differs between repeats.
+        moved: mean square of the recorded motion in units of the floor.
         closed: share closed on stretches that were not fitted.
     """
 
@@ -54,6 +56,7 @@ class Decomposition:
     after: float
     recurs: float
     scatter: float
+    moved: float
     closed: float
 
     @property
@@ -62,19 +65,39 @@ class Decomposition:
         return max(self.after, 0.0) / max(self.before, self.after, 1e-9)
 
     @property
+    def recurring(self) -> bool:
+        """Whether the rest is the same whenever the motion is."""
+        return self.recurs > rest.SURE
+
+    @property
+    def broken(self) -> bool:
+        """Whether the rest is more than a sound robot may scatter."""
+        large = np.sqrt(max(self.after, 0.0) / self.moved) > BROKEN
+        return bool(large and self.after > LARGE)
+
+    @property
+    def unexplained(self) -> float:
+        """Share of the gap that is left and is not what differs between repeats."""
+        apart = 0.0 if self.broken else self.scatter
+        return max(self.after - apart, 0.0) / max(self.before, self.after, 1e-9)
+
+    @property
     def lasting(self) -> bool:
         """Whether the rest is more than scatter: it recurs, or it is far beyond what
-        measuring scatters and what differs between repeats."""
+        measuring scatters and what differs between repeats, or beyond what a sound
+        robot may scatter (what happens at one place, or by chance)."""
+        if self.broken:
+            return True
         if self.after <= self.scatter:
             return False
-        if self.recurs > rest.SURE:
+        if self.recurring:
             return self.after > FELT
         return self.after > max(LARGE, SCATTER * self.scatter)
 
     @property
     def kind(self) -> str:
         """Kind of the verdict, one of `records.KINDS`."""
-        if self.lasting and self.left > MOST:
+        if self.lasting and self.unexplained > MOST:
             return "none of the library"
         if not self.point.support:
             return "no gap"
@@ -98,22 +121,18 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         problem, point, late = found
     support = shares.guarded(problem, point)
     if support != point.support:
-        point = refitted(problem, point, support)
+        point = descent.refitted(problem, point, support)
     known = rest.floor(problem, seed=seed)
     full = point.linear.rest(point.linear.solve(point.linear.free))
     inside = rest.kept(problem, full, point.noise.sd)
     left = point.linear.rest(point.linear.solve(point.support))
     plain = left if not point.noise.memory.factors.size else point.rest
-    held = shares.HeldOut.of(problem, point, shares.PIECES)
-    none, some = held.nominal(start.rest), held.error(point.support).sum()
-    least = held.error(point.linear.free).sum()
-    share = float((none - some) / max(none - min(least, some), 1e-9))
-    return Decomposition(
+    made = Decomposition(
         problem=problem,
         start=start,
         point=point,
         parts=tuple(shares.parts(problem, point)),
-        tied=tuple(shares.swaps(point)),
+        tied=tuple(ties.tied(problem, point)),
         onset=late,
         floor=known,
         before=rest.excess(start.rest, known, inside),
@@ -125,25 +144,23 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
             piece=rest.SHORT if point.noise.order else rest.PIECE,
         ),
         scatter=rest.scattered(problem, plain, known, inside),
-        closed=share if point.support else 0.0,
+        moved=max(rest.excess(problem.recorded, known, inside), 1.0),
+        closed=0.0,
     )
+    return replace(made, closed=_closable(made, inside)) if point.support else made
 
 
-def refitted(problem: Problem, point: Point, support: Support) -> Point:
-    """A point with a smaller set, fitted to the simulation.
-
-    Args:
-        problem: the recording.
-        point: a fitted set.
-        support: the smaller set.
-    """
-    from bns.gap.decomposition import fit
-
-    values = fit.placed(problem, point.linear, support, point.values)
-    fitted = set(support) | fit.nuisances(problem)
-    values, left = fit.newton(problem, values, fitted, point.noise)
-    linear, known, slopes = fit.linearised(problem, values, left, point.noise)
-    return Point(values, support, left, linear, slopes, known)
+def _closable(made: Decomposition, inside: np.ndarray) -> float:
+    """Share that is closed on stretches that were not fitted, of what can be closed:
+    down to what measuring scatters, or where the rest is no more than scatter to what
+    all explanations together leave."""
+    problem, point = made.problem, made.point
+    held = shares.HeldOut.of(problem, point, shares.PIECES, inside)
+    none, some = held.nominal(made.start.rest), held.error(point.support).sum()
+    least = held.nominal(made.floor.sd)
+    if not made.lasting:
+        least = held.error(point.linear.free).sum()
+    return float((none - some) / max(none - min(least, some), 1e-9))
 
 
 class Clock:
@@ -311,7 +328,9 @@ def statements(made: Decomposition) -> list[str]:
     return [
         words.size(before, beyond, features, window),
         words.explained(listed, made.closed, date, swapped),
-        words.left(made.left, made.lasting, words.sized(left, features)),
+        words.left(
+            made.left, made.lasting, made.recurring, words.sized(left, features)
+        ),
     ]
 
 
@@ -328,14 +347,18 @@ def _sizes(made: Decomposition, left: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def _main(made: Decomposition, part: Part) -> tuple[str, str]:
     """Unit and name of the row that stands for an explanation."""
     rows = {row.name: row for row in made.problem.rows}
-    name = max(part.values, key=lambda n: abs(part.values[n] - rows[n].nominal))
+    moved = [n for n in part.values if part.values[n] != rows[n].nominal]
+    name = (moved or [*part.values])[0]
+    alike = [n for n in moved if rows[n].unit == rows[name].unit]
+    if alike:
+        name = max(alike, key=lambda n: abs(part.values[n] - rows[n].nominal))
     return rows[name].unit, name
 
 
 def _fits(made: Decomposition) -> tuple[Fit, ...]:
     """The fits of what is named, of each alone, and of nothing."""
     linear = made.point.linear
-    wanted = list(made.tied)
+    wanted = [s for s in made.tied if s <= set(linear.terms)]
     order = sorted(linear.free, key=lambda name: linear.cost({name}))[:SINGLES]
     wanted += [frozenset({n}) for n in order if frozenset({n}) not in wanted]
     if frozenset() not in wanted:

@@ -14,8 +14,8 @@ DAMPING = (0.0, 2.0, 20.0, 200.0)  # added to the curvature, in units of the pri
 LONGEST = 4.0  # prior standard deviations of one step
 STILL = 0.02  # prior standard deviations below which a fit has converged
 FAR = 0.3  # prior standard deviations beyond which slopes are taken anew
-INEXACT = 0.01  # of what effects change: how well they are simulated (assumed); another
-# integrator or way to model an effect is no second effect
+INEXACT = 0.01  # of what effects change: how well they are simulated at best (assumed);
+# another integrator or way to model an effect is no second effect
 MEASURED = 4  # times that noise is measured from what it leaves
 TURNS = 4  # of fitting and searching
 SINGLES = 4  # explanations that are tried alone
@@ -192,8 +192,9 @@ def linearised(
         if order and turn < MEASURED - 1:
             memory = Memory.of(left, problem.trial, order)
         seen = np.where(problem.seen, memory(left), np.nan)
-        sd = noise.scale(seen, motion, problem.model.least)
-        known = Noise(np.hypot(sd, INEXACT * np.abs(memory(moved))), memory, 1.0)
+        change = np.abs(memory(moved))
+        sd = noise.scale(seen, motion, problem.model.least, change)
+        known = Noise(np.hypot(sd, INEXACT * change), memory, 1.0)
     made = _linear(problem, values, slopes, whole, known, left)
     found = made.solve(made.free)
     whitened = np.sqrt(made.weight) * made.rest(found)

@@ -1,7 +1,7 @@
 """Starts over the whole range of what has no slope at the nominal: dead bands, limits,
 lags that are long, wheels that stop."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,6 +59,37 @@ def best(problem: Problem, point: Point) -> Level | None:
         if count[number] <= EACH and len(made) < SEARCHED:
             made.append(_level(problem, point, number, value, linear))
     return min(made, key=lambda level: level.cost) if made else None
+
+
+def alone(problem: Problem, point: Point, most: int) -> list[tuple[str, np.ndarray]]:
+    """Explanations that are best started from a level of one of their rows, by
+    themselves, their other rows free.
+
+    Args:
+        problem: the recording.
+        point: the nominal model.
+        most: how many.
+
+    Returns:
+        names and values of all rows, ``(R,)``; the best first.
+    """
+    todo = [(number, value) for number, row in enumerate(problem.rows)
+            for value in row.levels if row.smooth]  # fmt: skip
+    found: dict[str, tuple[float, tuple[int, float]]] = {}
+    for _, (number, value), linear in _scored(problem, point, todo, problem.sample()):
+        term = problem.rows[number].term
+        free = dict.fromkeys((*linear.free, term))
+        linear = replace(linear, free=tuple(free), _costs={})
+        cost = min(linear.cost({term}), linear.cost(()))
+        if term not in found or cost < found[term][0]:
+            found[term] = (cost, (number, value))
+    made = []
+    for term in sorted(found, key=lambda name: found[name][0])[:most]:
+        number, value = found[term][1]
+        values = problem.nominal.copy()
+        values[number] = value
+        made.append((term, values))
+    return made
 
 
 def _level(problem, point: Point, number: int, value: float, linear: Linear) -> Level:
@@ -119,7 +150,8 @@ def _scored(problem: Problem, point: Point, todo, only: list[int] | None):
         if (point.linear.weight * change**2).sum() < FELT:
             continue
         term = problem.rows[number].term
-        linear = point.linear.moved(change, drop=term)
+        several = len(problem.terms[term]) > 1
+        linear = point.linear.moved(change, drop="" if several else term)
         linear = linear if inside is None else linear.of_blocks(inside)
         costs = [linear.cost(_in(linear, s)) for s in (point.support, frozenset())]
         found.append((min(costs), which, linear))
@@ -163,8 +195,9 @@ def _zoom(problem: Problem, values, rest, number: int, known: Noise):
         losses = [known.loss(rest - (path - base)) for path in made]
         at = int(np.argmin(losses))
         if losses[at] < known.loss(rest) - GAIN:
-            values = sets[at]
-            rest, _ = problem.residual(values)
+            left, _ = problem.residual(sets[at])
+            if known.loss(left) < known.loss(rest):  # at the fine step as well
+                values, rest = sets[at], left
         width = (high - low) / (PARTS - 1)
         low, high = max(values[number] - width, row.low), values[number] + width
         high = min(high, row.high)

@@ -41,6 +41,7 @@ class Linear:
         low, high: bounds in units of the prior, from the nominal, ``(K,)``.
         lam: residuals that count as one independent one.
         penalty: what each explanation costs.
+        family: of explanations that share one cause, and pay once.
         design: whitened-free columns, ``(N, C, K)``.
         target: residuals of the nominal model, ``(N, C)``.
         weight: of the squares, ``(N, C)``.
@@ -59,6 +60,7 @@ class Linear:
     high: np.ndarray
     lam: float
     penalty: Mapping[str, float]
+    family: Mapping[str, str]
     design: np.ndarray
     target: np.ndarray
     weight: np.ndarray
@@ -113,6 +115,7 @@ class Linear:
             high=(high - middle) / unit,
             lam=lam,
             penalty=dict.fromkeys(free, KAPPA),
+            family={row.term: row.family or row.term for row in rows},
             design=matrix,
             target=target,
             weight=weight,
@@ -241,7 +244,7 @@ class Linear:
         half = np.linalg.solve(factor, slope[used] / self.lam)
         value = 0.5 * square / self.lam - 0.5 * half @ half
         value += np.log(np.diag(factor)).sum() + np.log(prior[used]).sum()
-        value += sum(self.penalty[name] for name in key)
+        value += self._paid(key)
         found = np.zeros(len(prior))
         found[used] = np.linalg.solve(factor.T, half)
         beyond = (found < self.low - 1e-6) | (found > self.high + 1e-6)
@@ -250,6 +253,14 @@ class Linear:
             if out:
                 value = max(value, self.cost(key - out) + KAPPA * len(out))
         return float(value)
+
+    def _paid(self, support: Support) -> float:
+        """What a set costs: each family once, its dearest member."""
+        most: dict[str, float] = {}
+        for name in support:
+            family = self.family.get(name, name)
+            most[family] = max(most.get(family, 0.0), self.penalty[name])
+        return sum(most.values())
 
     def search(
         self, start: Iterable[str] | None = None, *, quick: bool = False

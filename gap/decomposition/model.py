@@ -27,6 +27,9 @@ class DecomposableModel(ABC):
         memory: order of the autoregression that residuals may have; 0 = none.
         many: whether fits are also started from all rows at once: where many depart
             at once a tangent at the nominal misleads.
+        longest: seconds of a recording that are fitted; of a longer one each trial is
+            shortened (`bns.gap.recordings.stretches`).
+        before: seconds after which a simulation begun at rest moves as the robot.
     """
 
     name: str
@@ -35,6 +38,8 @@ class DecomposableModel(ABC):
     process: np.ndarray
     memory: int = 0
     many: bool = False
+    longest: float = float("inf")
+    before: float = 0.0
 
     @property
     @abstractmethod

@@ -1,9 +1,11 @@
 """How large residuals are that nothing explains, measured from a joint fit's rest.
 
-The standard deviation of a feature grows with its motion, ``s^2 = a^2 + b^2 v^2``: `a`
-is the measurement's, `b` holds the jitter of time stamps times speed and scatter in
-proportion to speed. Tails are heavy, so all is robust, and neighbouring residuals are
-correlated, so they count as fewer.
+The standard deviation of a feature grows with its motion and with what explanations
+change of it, ``s^2 = a^2 + b^2 v^2 + c^2 m^2``: `a` is the measurement's, `b` holds the
+jitter of time stamps times speed and scatter in proportion to speed, `c` how inexactly
+the simulation shows what it explains (a wheel that slides is predicted to a fifth, one
+that is 3 % larger to a hundredth). Tails are heavy, so all is robust, and neighbouring
+residuals are correlated, so they count as fewer.
 """
 
 from dataclasses import dataclass
@@ -17,13 +19,19 @@ HUBER = 2.5  # deviations at which residuals begin to count linearly
 LAGS = 25  # windows over which residuals may be correlated
 
 
-def scale(rest: np.ndarray, motion: np.ndarray, least: np.ndarray) -> np.ndarray:
+def scale(
+    rest: np.ndarray,
+    motion: np.ndarray,
+    least: np.ndarray,
+    change: np.ndarray | None = None,
+) -> np.ndarray:
     """Standard deviation of each residual, ``(N, C)``.
 
     Args:
         rest: residuals, ``(N, C)``; NaN = not seen.
         motion: size of the predicted motion, ``(N, C)``.
         least: smallest deviations that are believed, ``(C,)``.
+        change: what explanations change of the prediction, ``(N, C)``; None = nothing.
     """
     made = np.empty_like(rest)
     for column, low in enumerate(least):
@@ -32,19 +40,21 @@ def scale(rest: np.ndarray, motion: np.ndarray, least: np.ndarray) -> np.ndarray
         if not len(error):
             made[:, column] = low
             continue
-        variance = np.maximum(_variance(error, speed), low**2)
+        parts = [np.ones_like(speed), speed**2]
+        if change is not None and change[seen, column].any():
+            parts.append(change[seen, column] ** 2)
+        variance = np.maximum(_variance(error, np.stack(parts, axis=1)), low**2)
         heavy = NORMAL * np.median(error / np.sqrt(variance))
         made[:, column] = np.sqrt(variance.mean())
         made[seen, column] = np.sqrt(variance) * max(heavy, 0.7)
     return np.maximum(made, least)
 
 
-def _variance(error: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """``a^2 + b^2 v^2`` by non-negative least squares on clipped squares."""
+def _variance(error: np.ndarray, parts: np.ndarray) -> np.ndarray:
+    """Non-negative combination of parts ``(N, K)`` nearest to clipped squares."""
     middle = max(NORMAL * np.median(error), 1e-12)
-    parts = np.stack([np.ones_like(speed), speed**2], axis=1)
     size = parts.std(axis=0) + parts.mean(axis=0) + 1e-30
-    variance = np.full(len(speed), middle**2)
+    variance = np.full(len(error), middle**2)
     for _ in range(5):
         squares = np.minimum(error**2, CLIP**2 * variance)
         weight = 1 / variance

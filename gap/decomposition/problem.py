@@ -9,7 +9,7 @@ import numpy as np
 from bns.gap.decomposition.model import DecomposableModel
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import Windows
-from bns.gap.recordings import trial_labels
+from bns.gap.recordings import stretches, trial_labels
 from bns.worlds.trial import Trial
 
 FAR = 1e3  # residual of a diverged simulation
@@ -45,11 +45,15 @@ class Problem:
     @classmethod
     def of(cls, trials: Sequence[Trial], model: DecomposableModel) -> "Problem":
         """Features of a checked recording, and the model's rows."""
+        kept = stretches.shortened(trials, model.longest, model.before)
+        trials = [trial for trial, _ in kept]
         windows = tuple(model.joint_windows(trial) for trial in trials)
         seen = [
             model.compare(trial, trial.observed[:, : len(model.channels)], parts)
             for trial, parts in zip(trials, windows, strict=True)
         ]
+        for features, parts, (trial, begun) in zip(seen, windows, kept, strict=True):
+            features[parts.times - trial.times[0] < begun] = np.nan
         counts = [len(parts) for parts in windows]
         return cls(
             model,

@@ -26,6 +26,9 @@ class Row:
         per_trial: whether its effect grows with the number of the trial.
         group: name of the explanation it belongs to; "" = its own. Rows of a group go
             in and out together.
+        family: name of the cause that explanations share; one of them or all cost as
+            much. "" = its own.
+        joins: explanations that are this one where they hold alike.
         excite: which commands make it felt, in words.
     """
 
@@ -43,6 +46,8 @@ class Row:
     step: float = 0.0
     per_trial: bool = False
     group: str = ""
+    family: str = ""
+    joins: tuple[str, ...] = ()
     excite: str = ""
 
     def __post_init__(self):

@@ -1,6 +1,6 @@
 """What each explanation of a fit closes, how sure it is, and what it ties with."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,6 @@ from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Linear, Support
 from bns.gap.decomposition.problem import Problem
 
-TIED = 3.0  # nats within which explanations tie: odds of 20 to 1
 CHOICE = 4.0  # nats within which the held-out error decides
 PIECES = 4  # of a stretch, each left out by itself for the share that is closed
 NINETY = 1.645  # standard deviations of a 90 % interval
@@ -78,25 +77,6 @@ def _values(problem: Problem, point: Point, name: str, spread: np.ndarray):
     return values, low, high
 
 
-def swaps(point: Point, within: float = TIED) -> list[Support]:
-    """Sets that the data can hardly tell from a point's, itself first: one explanation
-    is another, the evidence within so many nats."""
-    linear, support = point.linear, point.support
-    if not support:
-        return [support]
-    here = linear.cost(support)
-    outside = [name for name in linear.free if name not in support]
-    found = []
-    for name in sorted(support):
-        for other in outside:
-            swapped = (support - {name}) | {other}
-            cost = linear.cost(swapped) - here
-            if cost < within:
-                found.append((cost, swapped))
-    found.sort(key=lambda item: (item[0], sorted(item[1])))
-    return [support, *(swapped for _, swapped in found)]
-
-
 @dataclass(frozen=True, eq=False)
 class HeldOut:
     """Plain squared errors on stretches that were not fitted.
@@ -105,14 +85,23 @@ class HeldOut:
         linear: what is fitted.
         plain: the same recording, every residual of a channel weighing the same.
         weight: of each residual in `plain`, ``(N, C)``; 0 = not seen.
+        fixed: by explanation set to a level, what it changes as in `linear` and as in
+            `plain`, ``(N, C)`` each: a level was chosen, it is not fitted again.
     """
 
     linear: Linear
     plain: Linear
     weight: np.ndarray
+    fixed: Mapping[str, tuple[np.ndarray, np.ndarray]]
 
     @classmethod
-    def of(cls, problem: Problem, point: Point, pieces: int = 1) -> "HeldOut":
+    def of(
+        cls,
+        problem: Problem,
+        point: Point,
+        pieces: int = 1,
+        inside: np.ndarray | None = None,
+    ) -> "HeldOut":
         """For a point's linear model.
 
         Args:
@@ -121,17 +110,26 @@ class HeldOut:
             pieces: how many parts of each stretch are left out by themselves. More than
                 one lets an effect that shows in a single trial be fitted to a part of
                 that trial; windows beside a cut overlap by half.
+            inside: which residuals count, ``(N, C)``; None = all that were seen.
         """
         linear = point.linear
         if pieces > 1:
             problem = replace(problem, block=_pieces(problem.block, pieces))
             linear = linear.in_blocks(problem.block)
         sd = np.sqrt(np.nanmean(point.rest**2, axis=0))
-        weight = np.where(problem.seen, 1 / sd**2, 0.0)
+        weight = np.where(problem.seen if inside is None else inside, 1 / sd**2, 0.0)
         units = fit.units(problem, point.values)
         whole = fit.target(problem, point.values, point.rest, point.slopes)
         plain = Linear.of(problem, point.slopes, units, whole, weight)
-        return cls(linear, plain, weight)
+        fixed = {}
+        for number, slope in point.slopes.items():
+            row = problem.rows[number]
+            if not row.smooth:
+                change = slope * (point.values[number] - row.nominal)
+                one, other = fixed.get(row.term, (0.0, 0.0))
+                change = (one + point.noise.memory(change), other + change)
+                fixed[row.term] = change
+        return cls(linear, plain, weight, fixed)
 
     def nominal(self, rest: np.ndarray) -> float:
         """Squared error of the nominal model as it was simulated, whose residuals
@@ -141,10 +139,16 @@ class HeldOut:
 
     def error(self, support: Iterable[str]) -> np.ndarray:
         """Squared error of each stretch, the rows fitted to the others, ``(B,)``."""
-        support, plain = tuple(support), self.plain
+        linear, plain, fitted = self.linear, self.plain, []
+        for name in support:
+            if name in self.fixed:
+                linear = linear.moved(self.fixed[name][0])
+                plain = plain.moved(self.fixed[name][1])
+            else:
+                fitted.append(name)
         made = np.empty(len(plain.square))
         for number in range(len(made)):
-            values = self.linear.solve(support, slack=False, without=number)
+            values = linear.solve(fitted, slack=False, without=number)
             made[number] = (
                 plain.square[number]
                 - 2 * plain.slope[number] @ values

@@ -73,18 +73,20 @@ def explained(
     return text
 
 
-def left(share: float, recurs: bool, sizes: str) -> str:
+def left(share: float, lasting: bool, recurs: bool, sizes: str) -> str:
     """Third statement: how large the rest is, and whether it recurs.
 
     Args:
         share: of the gap that is left.
+        lasting: whether it is more than a sound robot and its camera scatter.
         recurs: whether it is the same whenever the motion is.
         sizes: how large it is, in words.
     """
-    if not recurs:
+    if not lasting:
         return "What is left does not recur: the robot scatters it, or the camera."
+    how = "recurs" if recurs else "is more than a sound robot scatters"
     return (
-        f"What is left, {_percent(share)} of the gap, recurs and is explained by no "
+        f"What is left, {_percent(share)} of the gap, {how} and is explained by no "
         f"effect of the library: about {sizes}."
     )
 

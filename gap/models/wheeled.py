@@ -35,6 +35,8 @@ KEPT = 40_000  # simulated drives kept in memory, about 24 kB each
 WINDOW = 0.1  # [s] shortest piece of motion that is compared
 HORIZON = 0.4  # [s] over which motion is compared in the joint fit, half overlapping
 LEAST = (2e-4, 2e-4, 1e-3)  # [m, m, rad] smallest believed deviations over it; assumed
+LONGEST = 150.0  # [s] of driving that are fitted: what a few minutes' session gives
+BEFORE = 1.5  # [s] until wheels with a lag of up to 0.5 s follow as the robot's do
 ABSOLUTE = ("floor_slope",)  # effects that tell one heading in the world from another
 FAR = np.inf
 AT_ONCE = 600  # drives that are computed together
@@ -56,6 +58,7 @@ class WheeledModel(DecomposableModel):
 
     channels = POSE_CHANNELS
     features = (Channel("forward", "m"), Channel("left", "m"), Channel("turn", "rad"))
+    longest, before = LONGEST, BEFORE
 
     def __init__(
         self,

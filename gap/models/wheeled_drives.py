@@ -11,7 +11,7 @@ import numpy as np
 from bns import models
 from bns.gap.candidates.wheeled_rows import LEAD, parameter
 from bns.gap.core.segments import moved
-from bns.worlds.effects import registry
+from bns.worlds.effects import bodies, registry
 from bns.worlds.effects.base import BodyEffect, ControlSignal, Effect
 from bns.worlds.physics import compile, observe, servo_joint
 from bns.worlds.physics.rollout import Compiled, Job, Pool, Segment
@@ -24,8 +24,8 @@ AFTER = 0.05  # [s] that are simulated beyond the last command
 RESTING = 0.2  # [s] over which the pose at the start is the median of what was seen
 PLANES = ("floor_slope", "wheel_eccentricity")
 TRACKING = ("marker_mount", "tracker_latency", "tracker_scale", "clock_drift", LEAD)
+LATENCY = "command_latency"  # comes before all others, at any fraction of a step
 ORDER = (
-    "command_latency",
     "wheel_intermittent",
     "wheel_stuck_max",
     "wheel_stuck_min",
@@ -40,7 +40,7 @@ ORDER = (
 """in which effects on commands follow each other, from what is told to the wheel"""
 SWITCHING = ("dead_band", "dead_zone", "speed_saturation", "wheel_stuck_max",
              "wheel_stuck_min", "wheel_intermittent")  # fmt: skip
-FIXED = {"payload": {"z": 0.07}}
+LIGHT = 0.03  # [kg] below which a payload's moments do not tell its place
 
 
 @dataclass(frozen=True)
@@ -50,18 +50,20 @@ class Changes:
     Attributes:
         body: edits of the model.
         command: effects on what is told, in order.
+        late: seconds by which commands come late.
         lost: share of every speed that a falling battery takes.
         seen: values of what the tracker does, by row.
     """
 
     body: tuple[BodyEffect, ...]
     command: tuple[Effect, ...]
+    late: float
     lost: float
     seen: Mapping[str, float]
 
     @classmethod
-    def of(cls, values: Mapping[str, float]) -> "Changes":
-        """Sort the rows of a drive."""
+    def of(cls, values: Mapping[str, float], robot: str) -> "Changes":
+        """Sort the rows of a drive of a robot."""
         terms: dict[str, dict[str, float]] = {}
         seen = {}
         for name, value in values.items():
@@ -70,17 +72,22 @@ class Changes:
             else:
                 terms.setdefault(term(name), {})[name] = value
         lost = terms.pop("battery_fade", {}).get("battery_fade", 0.0)
-        made = [effect(name, rows) for name, rows in terms.items()]
+        late = terms.pop(LATENCY, {}).get(LATENCY, 0.0)
+        made = load(terms.pop("payload"), robot) if "payload" in terms else []
+        for name, rows in terms.items():
+            whole = name.startswith(PLANES)
+            parts = [rows] if whole else [{row: rows[row]} for row in rows]
+            made += [effect(name, part) for part in parts]
         body = tuple(item for item in made if item.stage == "body")
         told = [item for item in made if item.stage != "body"]
         told.sort(key=lambda item: ORDER.index(item.name))
-        return cls(body, tuple(told), lost, seen)
+        return cls(body, tuple(told), late, lost, seen)
 
 
 def term(name: str) -> str:
     """The explanation that a row belongs to."""
     stem, _, rest = name.partition("[")
-    if stem.startswith(PLANES):
+    if stem.startswith(PLANES) or stem.startswith("payload."):
         return name.rpartition(".")[0]
     return name.partition("@")[0] if rest else name
 
@@ -99,14 +106,72 @@ def effect(name: str, values: Mapping[str, float]) -> Effect:
         size, way = [p.name for p in registry.get(stem).parameters]
         length = min(float(np.hypot(x, y)), registry.get(stem).parameters[0].high)
         return registry.make(stem, **given, **{size: length, way: np.arctan2(y, x)})
-    ((row, value),) = [item for item in values.items() if item[1]] or values.items()
+    if stem == "payload":
+        return carried(values)
+    moved = [item for item in values.items() if item[1]]
+    row, value = (moved or [*values.items()])[0]
     if "@" in row:
         given["direction"] = row.partition("@")[2]
     about = parameter(stem)
     value = min(max(float(value), about.low), about.high)
     kind = stem.partition(".")[0]
     given[about.name] = round(value) if about.integer else value
-    return registry.make(kind, **FIXED.get(kind, {}), **given)
+    return registry.make(kind, **given)
+
+
+def carried(values: Mapping[str, float]) -> Effect:
+    """A payload from its mass and its moments.
+
+    Args:
+        values: of its rows: mass [kg]; mx and my about the middle of the axle and mz
+            about the top plate [kg m].
+    """
+    about = registry.get("payload").parameters
+    mass = float(np.clip(values.get("payload.mass", 0.0), 0.0, about[0].high))
+    if any(value for name, value in values.items() if name != "payload.mass"):
+        mass = max(mass, LIGHT)
+    place = {}
+    for edge in about[1:]:
+        away = values.get(f"payload.m{edge.name}", 0.0) / max(mass, LIGHT)
+        place[edge.name] = float(np.clip(edge.nominal + away, edge.low, edge.high))
+    return registry.make("payload", mass=mass, **place)
+
+
+def load(values: Mapping[str, float], robot: str) -> list[BodyEffect]:
+    """The edits that a payload is simulated by.
+
+    A light one, whose place would be far off for its moments, is a mass above the axle
+    and a shift of the common centre of mass: so its moments have a slope at no mass.
+
+    Args:
+        values: of its rows that are not nominal.
+        robot: by name.
+    """
+    mass = max(float(values.get("payload.mass", 0.0)), 0.0)
+    if mass > LIGHT:
+        return [carried(values)]
+    made = [registry.make("payload", mass=mass)] if mass else []
+    moved = {}
+    for edge in registry.get("centre_of_mass").parameters:
+        moment = values.get(f"payload.m{edge.name[1:]}", 0.0)
+        away = moment / (base_mass(robot) + mass)
+        moved[edge.name] = float(np.clip(away, edge.low, edge.high))
+    return [*made, registry.make("centre_of_mass", **moved)]
+
+
+@lru_cache
+def base_mass(robot: str) -> float:
+    """Mass of the body that carries the wheels [kg]."""
+    spec = models.spec(robot, visuals=False)
+    return bodies.Inertial.of(spec, bodies.base(spec)).mass
+
+
+@lru_cache(maxsize=4000)
+def begun(
+    robot: str, body: tuple[BodyEffect, ...], dt: float, yaw: float
+) -> np.ndarray:
+    """Full physics state at rest at the origin with a heading [rad], see `scene`."""
+    return compile.start_state(scene(robot, body, dt), (0.0, 0.0, yaw))
 
 
 @lru_cache(maxsize=2000)
@@ -152,7 +217,7 @@ class Drives:
         starts = [start(trial) for trial in trials]
         drives = [
             [
-                (trial, Changes.of(values), begin)
+                (trial, Changes.of(values, self.robot), begin)
                 for trial, values, begin in zip(trials, row, starts, strict=True)
             ]
             for row in sets
@@ -188,10 +253,11 @@ class Drives:
         for trial, changes, begin in wanted.values():
             compiled = scene(self.robot, changes.body, dt)
             yaw = heading(changes, begin)
-            speeds = told(trial.commands, changes.command, dt) * (1 - changes.lost)
+            speeds = told(trial.commands, changes.command, dt, changes.late)
+            speeds = speeds * (1 - changes.lost)
             jobs.append(
                 Job(
-                    compile.start_state(compiled, (0.0, 0.0, yaw)),
+                    begun(self.robot, changes.body, dt, yaw),
                     (Segment(compiled, speeds * self._per_command),),
                 )
             )
@@ -208,16 +274,15 @@ class Drives:
 
 
 def heading(changes: Changes, begin: np.ndarray) -> float:
-    """Heading at which a drive is simulated: the one seen, where it matters."""
-    if any(item.name == "floor_slope" for item in changes.body):
-        return round(float(begin[2] - changes.seen.get("marker_mount.yaw", 0.0)), 6)
-    return 0.0
+    """Heading in the world at which a drive is simulated: a slope tells headings apart,
+    and so does the friction of wheels that slide (MuJoCo's pyramidal cone)."""
+    return round(float(begin[2] - changes.seen.get("marker_mount.yaw", 0.0)), 4)
 
 
 def _key(trial: Trial, changes: Changes, begin: np.ndarray, dt: float) -> bytes:
     told_as = trial.commands.values.tobytes() + trial.commands.durations.tobytes()
     words = [*map(str, (*changes.body, *changes.command)), repr(changes.lost)]
-    words += [repr(heading(changes, begin)), repr(dt)]
+    words += [repr(heading(changes, begin)), repr(dt), repr(changes.late)]
     digest = hashlib.blake2b(told_as, digest_size=16)
     digest.update(";".join(words).encode())
     return digest.digest()
@@ -232,7 +297,9 @@ def start(trial: Trial) -> np.ndarray:
     return np.median(trial.observed[seen[:count], :3], axis=0)
 
 
-def told(commands: Commands, effects: Sequence[Effect], dt: float) -> np.ndarray:
+def told(
+    commands: Commands, effects: Sequence[Effect], dt: float, late: float = 0.0
+) -> np.ndarray:
     """Speeds told to both wheels at each physics step after effects, ``(S, 2)``.
 
     A step in which a command ends gets the mean of both by their time, unless an effect
@@ -242,9 +309,11 @@ def told(commands: Commands, effects: Sequence[Effect], dt: float) -> np.ndarray
         commands: wheel speeds [m/s] and how long each is held.
         effects: on commands and actuators, applied in order.
         dt: physics step [s].
+        late: by how much all comes late [s].
     """
     begins = np.concatenate([[0.0], np.cumsum(commands.durations)])
     count = int(np.ceil(begins[-1] / dt)) + 1 + round(AFTER / dt)
+    begins = begins + late
     at = np.arange(count) * dt
     index = np.searchsorted(begins, at + dt / 2, side="right") - 1
     index = np.where(index >= len(commands), -1, index)

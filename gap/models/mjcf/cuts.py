@@ -12,7 +12,8 @@ import numpy as np
 
 from bns.gap.models.mjcf import start
 from bns.gap.models.mjcf.config import OwnConfig
-from bns.worlds.trial import Commands, Trial
+from bns.gap.recordings.stretches import piece
+from bns.worlds.trial import Trial
 
 HALF = 0.03  # [s] on each side of a start, of the samples that tell its state
 LEAST = 4  # samples on each side at least
@@ -36,36 +37,17 @@ def pieces(trial: Trial, config: OwnConfig) -> list[Trial]:
     rows = seen[np.clip(np.searchsorted(trial.times[seen], wanted), 0, len(seen) - 1)]
     rows = np.unique(np.append(rows[:-1], len(trial.times) - 1))
     return [
-        _begun(_piece(trial, first, last), trial, first, config)
+        _begun(piece(trial, first, last), trial, first, config)
         for first, last in pairwise(rows)
     ]
 
 
-def _piece(trial: Trial, first: int, last: int) -> Trial:
-    """Samples first to last, and the commands between them."""
-    bounds = trial.boundaries
-    inner = bounds[(bounds > first) & (bounds < last)]
-    marks = np.concatenate([[first], inner, [last]])
-    index = np.clip(
-        np.searchsorted(bounds, marks[:-1], side="right") - 1, 0, len(bounds) - 2
-    )
-    lasting = np.diff(trial.times[marks])
-    told = Commands(trial.commands.values[index], lasting, trial.commands.channels)
-    return trial.replace(
-        commands=told,
-        times=trial.times[first : last + 1] - trial.times[first],
-        observed=trial.observed[first : last + 1],
-        boundaries=marks - first,
-        handled=np.zeros(0, bool),
-    )
-
-
-def _begun(piece: Trial, whole: Trial, first: int, config: OwnConfig) -> Trial:
-    conditions = {**piece.conditions, start.STATE: state(whole, first, config)}
+def _begun(part: Trial, whole: Trial, first: int, config: OwnConfig) -> Trial:
+    conditions = {**part.conditions, start.STATE: state(whole, first, config)}
     past = commands_before(whole, first)
     if past:
         conditions |= {start.BEFORE: past, start.STEP: GRID}
-    return piece.replace(conditions=conditions)
+    return part.replace(conditions=conditions)
 
 
 def commands_before(trial: Trial, row: int) -> list[list[float]]:
