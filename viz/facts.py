@@ -163,6 +163,12 @@ def rows(record: RunRecord, facts: Facts) -> list[tuple[str, str, str]]:
         ]
     last = f"{facts.last_solved} of {facts.runs} runs"
     found.append(("Solved in the last trial", last, "whether it lasts"))
+    if "solved_best" in record.columns:
+        held = int((record["solved_best"][:, -1] > 0).sum())
+        value = f"{held} of {facts.runs} runs"
+        found.append(
+            ("Deployed, it solves", value, "what would be run if trials ended there")
+        )
     return found + _errors(record, facts)
 
 

@@ -31,9 +31,11 @@ DAMAGES = {
     "left-50": "wheel_gain:wheel=left,factor=0.5",
     "right-50": "wheel_gain:wheel=right,factor=0.5",
 }
-LATER = ("learner", "light", "walk", "watch")  # newer than the first stored runs
+LATER = ("learner", "light", "walk", "watch", "deploy")
+"""settings and sections newer than the first stored runs"""
 NEWER = (
     ("adaptation", "simulator_reset_untrained"),
+    ("evolution", "cells"),
     ("light", "readings"),
     ("light", "renewed"),
     ("walk", "repeat"),

@@ -99,9 +99,10 @@ def train(
         BnsError: a setting that is not allowed.
     """
     from bns.experiment.batch import Batch, resolve
+    from bns.experiment.world_factory import make_models
 
     settled, mode = resolve(config, begun.mode if begun else "")
-    batch = Batch([settled], [world])
+    batch = Batch([settled], [world], models=make_models(settled))
     first = 0
     if begun is not None:
         batch.learner.restore({key: value.copy() for key, value in begun.state.items()})

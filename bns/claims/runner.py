@@ -154,7 +154,7 @@ def _work(
     found: Found,
 ) -> None:
     """Run batches, trunks before the sides that begin with them."""
-    for part in _phases(jobs):
+    for part in phases(jobs):
         shown = Progress(f"claims in {world}", part, 0, enabled=progress)
         with shown.start(), closing(engine.run(part, beat=shown.beat)) as outcomes:
             for outcome in outcomes:
@@ -179,7 +179,8 @@ def _work(
                     return
 
 
-def _phases(jobs: Sequence[Job]) -> Iterator[list[Job]]:
+def phases(jobs: Sequence[Job]) -> Iterator[list[Job]]:
+    """Batches that make trunks, then those that begin with one."""
     for grows in (True, False):
         part = [job for job in jobs if job.grows == grows]
         if part:

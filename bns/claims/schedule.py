@@ -103,6 +103,14 @@ def jobs(wanted: Sequence[Due], done: Mapping[str, int], store: Path) -> list[Jo
         for name in sorted(members)
         for start, count in blocks(runs[name], done.get(name, 0))
     ]
+    return [
+        *trunks(made),
+        *sorted(made, key=lambda job: (-job.work, job.key)),
+    ]
+
+
+def trunks(made: Sequence[Job]) -> list[Job]:
+    """The batches that make trunks which several of some batches share, by key."""
     shared: dict[str, Job] = {}
     for batch in made:
         if batch.trunk and not Path(batch.trunk).exists():
@@ -113,10 +121,7 @@ def jobs(wanted: Sequence[Due], done: Mapping[str, int], store: Path) -> list[Jo
         for path, each in shared.items()
         if many[path] > 1
     ]
-    return [
-        *sorted(growing, key=lambda job: job.key),
-        *sorted(made, key=lambda job: (-job.work, job.key)),
-    ]
+    return sorted(growing, key=lambda job: job.key)
 
 
 def job(member: Member, start: int, count: int, store: Path) -> Job:

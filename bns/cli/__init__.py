@@ -14,6 +14,8 @@ VERBS = {
     "export": ("export", "write trials as a LeRobotDataset or a Parquet table"),
     "campaign": ("campaign", "many configurations: run them, tables, pictures"),
     "claims": ("claims", "the dissertation's claims: list, run, judge"),
+    "standings": ("standings", "all learners on the same damages: who recovers"),
+    "repertoire": ("repertoire", "gaits and drives made beforehand: make, list, show"),
     "presets": ("lists", "list the presets"),
     "learners": ("lists", "list the learners"),
     "tasks": ("lists", "list the tasks"),
@@ -32,7 +34,7 @@ VERBS = {
 
 GROUPS = {
     "Learn": ("run", "report", "compare", "view", "export"),
-    "Many runs": ("campaign", "claims"),
+    "Many runs": ("campaign", "claims", "standings", "repertoire"),
     "What there is": (
         "presets",
         "learners",

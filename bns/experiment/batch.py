@@ -94,7 +94,11 @@ class Batch:
         """What the task says of the trials; fitness_best is that of `best`."""
         row = self.task.measured(tried)
         others = row["fitness"] if best is None else self.task.fitness(best)
-        return {**row, "fitness_best": others}
+        row["fitness_best"] = others
+        if self.learner.deploys:
+            deployed = row if best is None else self.task.measured(best)
+            row["solved_best"] = deployed["solved"]
+        return row
 
     def _execute(self, tried: Sequence[Any], trial: int, stream: str) -> list[Trial]:
         trials: list[Trial] = []

@@ -53,6 +53,11 @@ class PriorConfig:
     """effects that hold in the model: what it gets wrong, or right, about the robot"""
     evaluations: int = 4000
     """executions in the model that a run may spend"""
+    step: float = 0.0
+    """physics step of the model, where it is a hexapod's [s]; 0 = as the world's"""
+    repertoire: str = ""
+    """controllers made in a model beforehand, see `bns repertoire list`, or PATH.npz;
+    empty = none"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,6 +91,10 @@ class RunConfig:
     """which controller is tried in the world"""
     choose_tournament: float = 0.1
     """tournament for that choice, as a share of the population"""
+    deploy: Literal["population", "seen"] = "population"
+    """what a user would run if trials ended now. population: the best of the population
+    inside the SNN; seen (own): the best one seen to work since the robot last changed,
+    tried again in doubt (bns/learners/bns/deployed.py)"""
     evolve_from: int = 1
     """trials with random controllers before evolution starts"""
     trials: int = 100

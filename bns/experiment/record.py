@@ -25,6 +25,7 @@ class RunRecord:
         columns: per-trial figures, each ``(R, T)``. Whatever the task and the learner:
             fitness: of the controller tried, in the world (minimised).
             fitness_best: of what the learner would drive with, in the world.
+            solved_best: whether that did the task, where the learner deploys one.
             reached: objectives reached in the world.
             solved: 1 where the task was done.
             commands: commands in the list.

@@ -1,5 +1,6 @@
 """What robots can be told, for learners that need it: channels and their limits."""
 
+import hashlib
 import math
 from typing import NamedTuple
 
@@ -35,6 +36,20 @@ def told(name: str) -> Told:
     robot = models.robot(name)
     channels = tuple(Channel(*channel) for channel in robot.channels)
     return Told(robot.kind, channels, robot.ranges)
+
+
+def digest(name: str) -> str:
+    """What a robot's model is: 16 hexadecimal digits of all its XML and TOML files.
+
+    Raises:
+        UnknownNameError: no such robot.
+    """
+    directory = models.robot(name).directory
+    files = sorted(p for p in directory.iterdir() if p.suffix in (".xml", ".toml"))
+    held = hashlib.sha256()
+    for file in files:
+        held.update(file.name.encode() + b"\0" + file.read_bytes())
+    return held.hexdigest()[:16]
 
 
 def check_speeds(config: RunConfig) -> None:

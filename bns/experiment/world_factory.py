@@ -15,12 +15,19 @@ from bns.worlds.counted import CountedWorld
 from bns.worlds.world import World
 
 
-def make_world(config: RunConfig, directory: Path | None = None) -> World:
+def make_world(
+    config: RunConfig, directory: Path | None = None, **others: Any
+) -> World:
     """The world of a configuration.
 
     Args:
         config: says which, where the robot starts, and what is wrong with it.
         directory: where a static SNN world keeps its nets; None trains them anew.
+        others: settings of the world that no configuration has, as `truth`.
+
+    Raises:
+        UnknownNameError: no such world, or it has no such setting.
+        BnsError: a setting that the world refuses.
     """
     name = config.world.name
     settings: dict[str, Any] = {
@@ -28,6 +35,7 @@ def make_world(config: RunConfig, directory: Path | None = None) -> World:
         "damage": config.world.damage,
         "reality": config.world.reality,
         **surroundings(config),
+        **others,
     }
     if name == "static-snn":
         return worlds.make(name, nets=_nets(config, directory), **settings)
@@ -71,7 +79,8 @@ def make_models(config: RunConfig) -> list[CountedWorld]:
     if not prior.world:
         return []
     world = replace(config.world, name=prior.world, reality=prior.reality, damage=())
-    made = make_world(replace(config, world=world))
+    others = {"step": prior.step} if prior.step else {}
+    made = make_world(replace(config, world=world), **others)
     return [CountedWorld(made, prior.evaluations) for _ in range(config.replicates)]
 
 

@@ -97,6 +97,10 @@ class Learner(ABC):
     figures: ClassVar[tuple[Curves | str, ...]] = ()
     """what a report shows of it: own columns, or figures of `bns.viz.figures`"""
 
+    deploys: bool = False
+    """whether `Proposal.best` is what a user would run, and its figures are recorded
+    apart from those of what is tried: the column `solved_best`"""
+
     def __init__(
         self,
         configs: Sequence[RunConfig],
@@ -108,6 +112,7 @@ class Learner(ABC):
         self.check_alike(configs)
         self.config, self.configs, self.runs = configs[0], list(configs), len(configs)
         self.replicates, self.models = list(replicates), list(models)
+        self.onsets = list(onsets)
         self.task: Task = tasks.of(configs[0])
         self.begin()
 

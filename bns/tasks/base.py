@@ -141,6 +141,11 @@ class Task(ABC):
     """per-trial figures beside fitness, fitness_best, solved, reached and commands"""
     closed_loop: ClassVar[bool] = False
     """whether controllers steer by what they sense while a trial runs"""
+    from_zero: ClassVar[bool] = False
+    """whether `worth` has a zero, at which nothing is achieved"""
+    makes_controllers: ClassVar[tuple[str, ...]] = ()
+    """sections, or settings by dotted name, on which it depends what a vector means;
+    none = all of `sections`"""
 
     def __init__(self, config: RunConfig):
         self.config = config
@@ -172,6 +177,24 @@ class Task(ABC):
     @abstractmethod
     def fitness(self, trials: Sequence[Trial]) -> np.ndarray:
         """Cost of N trials, ``(N,)``; lower is better."""
+
+    def worth(self, trials: Sequence[Trial]) -> np.ndarray:
+        """What N trials achieved, ``(N,)``; higher is better."""
+        return -self.fitness(trials)
+
+    @property
+    def genotypes(self) -> dict[str, Space]:
+        """Spaces that hold some or all controllers, by name; `space` is "vector"."""
+        return {"vector": self.space}
+
+    def behaviour(self, trials: Sequence[Trial]) -> np.ndarray:
+        """How, not how well, N trials went: ``(N, B)``, each from 0 to 1.
+
+        As a rule where they ended: x and y as shares of the board.
+        """
+        ends = [seen_places(trial.command_poses_world)[-1] for trial in trials]
+        found: np.ndarray = (np.array(ends) / BOARD + 1.0) / 2.0
+        return found.clip(0.0, 1.0)
 
     @abstractmethod
     def measured(self, tried: Sequence[Trial]) -> Arrays:

@@ -9,6 +9,7 @@ import torch
 
 from bns.evolution.chromosome import Population
 from bns.evolution.goals import Goals
+from bns.tasks import gaits
 from bns.tasks.base import Arrays, Curve, Picture, Space, Task
 from bns.worlds.trial import Commands, Trial
 
@@ -61,6 +62,8 @@ class WalkTask(Task):
     """
 
     sections = ("walk",)
+    from_zero = True
+    makes_controllers = ("walk.commands", "walk.limit", "walk.reach")
     columns: ClassVar[Mapping[str, str]] = {
         "distance": "from start to end [m]",
         "seconds": "what the trial took [s]",
@@ -104,6 +107,31 @@ class WalkTask(Task):
     def fitness(self, trials: Sequence[Trial]) -> np.ndarray:
         """See `cost`."""
         return cost(of_trials(trials))
+
+    def worth(self, trials: Sequence[Trial]) -> np.ndarray:
+        """Distances [m], ``(N,)``."""
+        return of_trials(trials)
+
+    @property
+    def genotypes(self) -> dict[str, Space]:
+        """See `Task.genotypes`; six legs of three servos have "gait" (`gaits`), too."""
+        found, count = super().genotypes, gaits.SIZE
+        if len(self.goals.channels) == 18:
+            none, all_of_it = np.zeros(count), np.ones(count)
+            found["gait"] = Space(none, all_of_it, none, all_of_it, self._gaits)
+        return found
+
+    def _gaits(self, genes: np.ndarray) -> list[Commands]:
+        reach = min(self.config.walk.reach, gaits.REACH)
+        found = gaits.goals(genes, self.goals.max_commands, reach)
+        return self.space.controllers(found.reshape(len(genes), -1))
+
+    def behaviour(self, trials: Sequence[Trial]) -> np.ndarray:
+        """Share of commands in which each leg is not told to be up, ``(N, L)``."""
+        names = [channel.name for channel in self.goals.channels]
+        femurs = [at for at, name in enumerate(names) if name.endswith("_femur")]
+        told = np.stack([trial.commands.values for trial in trials])
+        return gaits.down(told, np.array(femurs))
 
     def measured(self, tried: Sequence[Trial]) -> Arrays:
         """See `Task.measured`; sent are goals ``(R, K, C)`` [rad]."""

@@ -146,7 +146,7 @@ def decompose(problem: Problem, start: Point | None = None) -> Point:
         if chosen is best:
             break
         best = chosen
-    return pruned(problem, best)
+    return best if problem.model.many else pruned(problem, best)
 
 
 def pruned(problem: Problem, point: Point) -> Point:

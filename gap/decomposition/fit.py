@@ -193,7 +193,8 @@ def linearised(
             memory = Memory.of(left, problem.trial, order)
         seen = np.where(problem.seen, memory(left), np.nan)
         change = np.abs(memory(moved))
-        sd = noise.scale(seen, motion, problem.model.least, change)
+        felt = None if problem.model.many else change
+        sd = noise.scale(seen, motion, problem.model.least, felt)
         known = Noise(np.hypot(sd, INEXACT * change), memory, 1.0)
     made = _linear(problem, values, slopes, whole, known, left)
     found = made.solve(made.free)

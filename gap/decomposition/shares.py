@@ -7,10 +7,11 @@ import numpy as np
 
 from bns.gap.decomposition import fit
 from bns.gap.decomposition.fit import Point
-from bns.gap.decomposition.linear import Linear, Support
+from bns.gap.decomposition.linear import KAPPA, Linear, Support
 from bns.gap.decomposition.problem import Problem
 
 CHOICE = 4.0  # nats within which the held-out error decides
+CLEARLY = 0.02  # of the held-out error that a further explanation has to lower
 PIECES = 4  # of a stretch, each left out by itself for the share that is closed
 NINETY = 1.645  # standard deviations of a 90 % interval
 
@@ -178,6 +179,7 @@ def guarded(problem: Problem, point: Point) -> Support:
     best = support
     if len(support) > 3:  # several at once: which of them is for the held-out error
         best = min([support, *near], key=lambda s: held.error(s).sum())
+        best = _grown(point.linear, held, best)
     while best:
         total = held.error(best).sum()
         without = {name: held.error(best - {name}).sum() for name in sorted(best)}
@@ -186,3 +188,17 @@ def guarded(problem: Problem, point: Point) -> Support:
             break
         best = best - {name}
     return best
+
+
+def _grown(linear: Linear, held: HeldOut, support: Support) -> Support:
+    """A set with what lowers its held-out error clearly, by more than its standard
+    error, and has evidence but for its price."""
+    while True:
+        before, here = held.error(support), linear.cost(support)
+        more = [support | {n} for n in linear.free if n not in support]
+        more = [s for s in more if linear.cost(s) < here + KAPPA - 1e-6]
+        best = min(more, key=lambda s: held.error(s).sum(), default=support)
+        gain = before - held.error(best)
+        if gain.sum() < max(CLEARLY * before.sum(), np.sqrt((gain**2).sum())):
+            return support
+        support = best

@@ -170,7 +170,14 @@ def base_mass(robot: str) -> float:
 def begun(
     robot: str, body: tuple[BodyEffect, ...], dt: float, yaw: float
 ) -> np.ndarray:
-    """Full physics state at rest at the origin with a heading [rad], see `scene`."""
+    """Full physics state at rest at the origin with a heading.
+
+    Args:
+        robot: by name.
+        body: edits of the model, applied in order.
+        dt: physics step [s].
+        yaw: the heading [rad].
+    """
     return compile.start_state(scene(robot, body, dt), (0.0, 0.0, yaw))
 
 

@@ -57,7 +57,7 @@ EXPERIMENT = {
         "static_walk",
         "world_factory",
     )
-} | {"bns.doctor"}
+} | {"bns.doctor", "bns.prior.contact", "bns.prior.maker"}
 """modules around the learner that set experiments up: they make worlds by name"""
 
 

@@ -151,7 +151,11 @@ def _mark(axes: "Axes", value: float, text: str) -> None:
 
 
 def solved(runs: Mapping[str, RunRecord]) -> "Figure":
-    """Left: objectives reached (median, middle half). Right: share of runs solving."""
+    """Left: objectives reached (median, middle half). Right: share of runs solving.
+
+    Dotted: of the controllers deployed, where a learner deploys one apart from what it
+    tries.
+    """
     shown = [picture(record.config) for record in runs.values()]
 
     with style.plotting() as figure_class:
@@ -161,6 +165,10 @@ def solved(runs: Mapping[str, RunRecord]) -> "Figure":
             band(left, record["reached"], colour, label)
             share = 100 * record["solved"].mean(axis=0)
             right.plot(share, color=colour, label=label, drawstyle="steps-mid")
+            if "solved_best" in record.columns:
+                best = 100 * record["solved_best"].mean(axis=0)
+                said = f"{label} deployed".strip()
+                right.plot(best, ":", color=colour, label=said, drawstyle="steps-mid")
         goals = max(len(one.order) for one in shown)
         left.set_ylim(-0.15, goals + 0.15)
         left.set_yticks(range(goals + 1))

@@ -21,14 +21,19 @@ SETTLE = 0.5  # [s] at rest before a trial, so that it starts without a bounce; 
 
 
 @lru_cache(maxsize=256)
-def compiled(robot: str, effects: tuple[ModelEdit, ...] = ()) -> Compiled:
+def compiled(
+    robot: str, effects: tuple[ModelEdit, ...] = (), step: float = 0.0
+) -> Compiled:
     """The robot's scene with the effects written into it.
 
     Args:
         robot: name of the robot model.
         effects: edits, in order.
+        step: physics step [s]; 0 = the model's own.
     """
     spec = models.spec(robot, visuals=False)
+    if step:
+        spec.option.timestep = step
     servo_joint.fit(spec, models.robot(robot))
     for effect in effects:
         effect.edit(spec)
@@ -87,7 +92,11 @@ def free_joint(model: mujoco.MjModel) -> slice:
 
 
 def segments(
-    robot: str, effects: tuple[Placed[ModelEdit], ...], values: np.ndarray, dt: float
+    robot: str,
+    effects: tuple[Placed[ModelEdit], ...],
+    values: np.ndarray,
+    dt: float,
+    step: float = 0.0,
 ) -> tuple[Segment, ...]:
     """The trial cut where a body effect starts or stops.
 
@@ -96,17 +105,25 @@ def segments(
         effects: body effects with their spans.
         values: actuator controls on the physics grid, shape ``(S, nu)``.
         dt: physics step [s].
+        step: the same where it is not the model's own, else 0.
     """
     total = len(values)
     if not effects:
-        return (Segment(compiled(robot), values),)
+        return (Segment(_scene(robot, (), step), values),)
     moments = [moment for item in effects for moment in (item.start, item.stop)]
     inside = {control.step_at(moment, dt) for moment in moments if np.isfinite(moment)}
     cuts = [0, *sorted(step for step in inside if 0 < step < total), total]
     return tuple(
-        Segment(compiled(robot, _held(effects, begin, dt)), values[begin:end])
+        Segment(_scene(robot, _held(effects, begin, dt), step), values[begin:end])
         for begin, end in pairwise(cuts)
     )
+
+
+def _scene(robot: str, effects: tuple[ModelEdit, ...], step: float) -> Compiled:
+    """As `compiled`, called so that one model has one place in its cache."""
+    if step:
+        return compiled(robot, effects, step)
+    return compiled(robot, effects) if effects else compiled(robot)
 
 
 def _held(

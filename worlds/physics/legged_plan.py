@@ -150,6 +150,7 @@ def job(
     seed: int,
     trial: int,
     counts: np.ndarray | None = None,
+    step: float = 0.0,
 ) -> tuple[WalkJob, Servos]:
     """What the physics gets for one robot's trial.
 
@@ -162,11 +163,12 @@ def job(
         seed, trial: identity of what is random.
         counts: physics steps of each command, which then does not wait for the robot
             to rest; None = as planned.
+        step: physics step [s]; 0 = the model's own.
 
     Raises:
         BnsError: an effect that changes the joints sets in within the trial.
     """
-    dt = timestep(robot)
+    dt = step or timestep(robot)
     limits = legged_goals.limits(commands, dt) if counts is None else counts
     counts = legged_goals.planned(commands, speed, dt) if counts is None else counts
     values, home = np.repeat(commands.values, counts, axis=0), commands.values[0] * 0
@@ -174,7 +176,7 @@ def job(
         told = control.signal(commands, counts, dt)
         values = control.disturbed(told, stages.control, seed, trial)
         home = _home(told, stages, seed, trial)
-    segments = compile.segments(robot, stages.body, values, dt)
+    segments = compile.segments(robot, stages.body, values, dt, step)
     first = segments[0].compiled
     _refuse_other_sizes(segments)
     laws, before, goals = servos(first).laws, home, []

@@ -18,6 +18,7 @@ BNS_SECTIONS = (
     "watch",
     "choose",
     "choose_tournament",
+    "deploy",
     "evolve_from",
     "compiled",
 )
@@ -54,6 +55,9 @@ class EvolutionConfig:
     """best individuals copied unchanged"""
     headless_chicken: float = 0.1
     """probability that the second parent is a fresh random one"""
+    cells: int = 0
+    """bins along each behaviour of a grid whose elites survive (own; MAP-Elites inside
+    the SNN, bns/evolution/elites.py); 0 = children replace their parents"""
 
 
 @dataclass(frozen=True, kw_only=True)

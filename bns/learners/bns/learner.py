@@ -21,6 +21,7 @@ from bns.learners.base import Curves, Learner, Panel, Proposal
 from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.change_detection import Detector
 from bns.learners.bns.config import BNS_SECTIONS
+from bns.learners.bns.deployed import Deployed, Seen, packed, unpack
 from bns.learners.bns.problem import Problem, should_compile
 from bns.learners.bns.trial_selection import choose
 from bns.tasks import registry as tasks
@@ -74,7 +75,8 @@ class Bns(Learner):
 
     With `watch.detect` nobody is told the onsets; the adaptations to damage follow
     what is detected. With `watch.forget` patterns of the robot before it changed are
-    dropped.
+    dropped. With
+    `deploy` = "seen" what was seen to work is held on to.
     """
 
     sections = BNS_SECTIONS
@@ -121,6 +123,9 @@ class Bns(Learner):
             torch.zeros(self.runs, dtype=torch.long)
         )
         self._background, self._trial, self._generations = False, 0, 0
+        self.deploys = config.deploy == "seen"
+        repeatable = not self.task.closed_loop
+        self.deployed = [Deployed(repeatable) for _ in range(self.runs)]
 
     def check_alike(self, configs: Sequence[RunConfig]) -> None:
         """See `Learner.check_alike`; more is free in light following."""
@@ -165,6 +170,8 @@ class Bns(Learner):
         with self.draws.aside("resets", trial):
             self._reset(trial)
         self.cost = self.problem.cost(self.memories, self.population)
+        if self.deploys:
+            self._keep_deployed()
         if trial >= self.config.evolve_from:
             self.population, self.cost = self.problem.settle(
                 trial, self.memories, self.population, self.cost
@@ -181,10 +188,57 @@ class Bns(Learner):
             lambda: problem.disagreement(self.memories, whole),
         )  # fmt: skip
         self._chosen, best = whole.pick(index), cost.argmin(1)
+        if self.deploys:
+            return self._deploying(trial, whole.pick(best))
         tried = problem.controllers(self._chosen)
         if torch.equal(best, index):
             return Proposal(tried, None)
         return Proposal(tried, problem.controllers(whole.pick(best)))
+
+    def _deploying(self, trial: int, predicted: Population) -> Proposal[Any]:
+        """What is tried, in doubt again, and what was seen to work best.
+
+        Args:
+            trial: its number.
+            predicted: the population's best of each run, deployed where nothing was
+                seen since the robot changed.
+        """
+        again = [run.wanted(trial) for run in self.deployed]
+        self._chosen = _with(self._chosen, again)
+        best = _with(predicted, [run.best for run in self.deployed])
+        return Proposal(
+            self.problem.controllers(self._chosen), self.problem.controllers(best)
+        )
+
+    def _keep_deployed(self) -> None:
+        """Let those that were seen to work live in the populations."""
+        genes, lengths = (part.clone() for part in self.population)
+        worst = self.cost.argmax(1)
+        for run, kept in enumerate(self.deployed):
+            row, best = run * self.problem.islands, kept.best
+            if best is not None:
+                genes[row, worst[row]] = torch.from_numpy(best.genes).to(genes)
+                lengths[row, worst[row]] = best.length
+        self.population = Population(genes, lengths)
+        self.cost = self.problem.cost(self.memories, self.population)
+
+    def _note(self, trial: int, cost: np.ndarray, row: Mapping[str, Any]) -> np.ndarray:
+        """Take note of what was tried; whether it was tried before, ``(R,)``.
+
+        Args:
+            trial: its number.
+            cost: in the world, ``(R,)``.
+            row: figures of the trial.
+        """
+        genes, lengths = (part[:, 0].cpu().numpy() for part in self._chosen)
+        for run, kept in enumerate(self.deployed):
+            foreseen = float(row["fitness_predicted"][run])
+            length = int(lengths[run])
+            kept.note(trial, genes[run], length, float(cost[run]), foreseen)
+            if row.get("forgotten", np.zeros(self.runs))[run]:
+                marks = [memory.trials[run].min() for memory in self.memories]
+                kept.forget(int(min(marks)), trial)
+        return np.array([float(kept.again == trial) for kept in self.deployed])
 
     def _evolve(self, trial: int, generations: int) -> None:
         self.population, self.cost = self.problem.evolve(
@@ -218,6 +272,8 @@ class Bns(Learner):
         del best
         row = self.problem.predicted(self.memories, self._chosen, tried)
         row.update(self._learn(trial, tried))
+        if self.deploys:
+            row["retried"] = self._note(trial, self.task.fitness(tried), row)
         for memory in self.memories:
             row[f"{memory.prefix or 'snn_'}loss"] = memory.loss.double().numpy()
             row[f"{memory.prefix}patterns"] = memory.buffer.counts.astype(np.float64)
@@ -296,6 +352,8 @@ class Bns(Learner):
             "innovations": self.detector.past,
             **self.problem.state(),
         }
+        if self.deploys:
+            arrays |= packed(self.deployed, tuple(arrays["genes"].shape[2:]))
         for memory in self.memories:
             arrays |= memory.state()
         return arrays
@@ -314,6 +372,18 @@ class Bns(Learner):
         self.problem.restore(arrays)
         for memory in self.memories:
             memory.restore(arrays)
+        if self.deploys:
+            unpack(self.deployed, arrays)
+
+
+def _with(chosen: Population, kept: Sequence[Seen | None]) -> Population:
+    """One individual a run, ``(R, 1, ...)``, that of `kept` where there is one."""
+    genes, lengths = chosen.genes.clone(), chosen.lengths.clone()
+    for run, item in enumerate(kept):
+        if item is not None:
+            genes[run, 0] = torch.from_numpy(item.genes).to(genes)
+            lengths[run, 0] = item.length
+    return Population(genes, lengths)
 
 
 def replaced(population: Population, rows: np.ndarray, fresh: Population) -> Population:

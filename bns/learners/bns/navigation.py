@@ -22,7 +22,7 @@ from bns.learners.bns.problem import Problem
 from bns.path import integrate
 from bns.snn.network import Shape, forward, predict
 from bns.snn.scaling import AXLE, OUTPUTS, Scaling
-from bns.tasks.base import Task
+from bns.tasks.base import BOARD, Task
 from bns.tasks.navigation import PathGoal, WheeledTask
 from bns.worlds.trial import Trial, body_displacements
 
@@ -256,6 +256,7 @@ class WheeledProblem(OpenLoopProblem):
 
     stream = "learner"
     channels = ("left wheel", "right wheel")
+    has_behaviours = True
 
     def __init__(
         self,
@@ -277,6 +278,12 @@ class WheeledProblem(OpenLoopProblem):
         self.usual = np.zeros((self.runs, OUTPUTS))  # RMS errors on the patterns
         self.rolled = np.zeros((self.runs, 2))  # of the ways the wheels rolled [m]
         self._compile()
+
+    def behaviours(self, memories: Sequence[Memory], population: Population) -> Tensor:
+        """See `Problem.behaviours`: where lists are predicted to end on the board."""
+        ends = self.evaluator.poses(memories[0].theta, population)[:, :, -1, :2]
+        half = torch.tensor(BOARD, dtype=ends.dtype, device=ends.device)
+        return (ends / half + 1.0) / 2.0
 
     def rates(self, trial: int) -> Rates:
         """See `Problem.rates`."""

@@ -16,9 +16,10 @@ import torch
 from torch import Tensor
 
 from bns.draws import Draws
-from bns.errors import MissingDependencyError
+from bns.errors import BnsError, MissingDependencyError
+from bns.evolution import elites
 from bns.evolution.chromosome import Population
-from bns.evolution.generation import Breeder, Coins, Genes, Rates
+from bns.evolution.generation import Breeder, Coins, Genes, Rates, take
 from bns.experiment.config import RunConfig
 from bns.learners.base import Curves
 from bns.learners.bns.adaptation import Adaptations
@@ -81,6 +82,8 @@ class Problem(ABC):
     """of these columns"""
     errors: ClassVar[tuple[str, ...]] = ("snn_forward", "snn_left", "snn_turn")
     """names of the networks' errors on a trial before they are trained on it"""
+    has_behaviours: ClassVar[bool] = False
+    """whether `behaviours` says how controllers do, for a grid of elites"""
     islands = 1
     """populations apart from each other that a run has, rows of their own"""
     encoding: Genes
@@ -100,6 +103,10 @@ class Problem(ABC):
         if self.compiled:
             torch._dynamo.config.cache_size_limit = 64
         self._epochs: dict[Shape, fitting.Epoch] = {}
+        if self.config.evolution.cells and not self.has_behaviours:
+            raise BnsError(
+                "evolution.cells is for walking and navigation; leave it out."
+            )
 
     @classmethod
     def shared(cls, config: RunConfig, first: RunConfig) -> RunConfig:
@@ -171,8 +178,36 @@ class Problem(ABC):
         """
         for _ in range(generations):
             coins = self.breeder.draw(self.draws, rates)
-            population, cost = self.generation(memories, population, cost, rates, coins)
+            bred = self.generation(memories, population, cost, rates, coins)
+            if self.config.evolution.cells:
+                bred = self._elites(memories, (population, cost), bred)
+            population, cost = bred
         return population, cost
+
+    def _elites(
+        self,
+        memories: Sequence[Memory],
+        old: tuple[Population, Tensor],
+        new: tuple[Population, Tensor],
+    ) -> tuple[Population, Tensor]:
+        """Of two populations and their costs, the elites of the grid's cells."""
+        both = Population(
+            torch.cat([old[0].genes, new[0].genes], dim=1),
+            torch.cat([old[0].lengths, new[0].lengths], dim=1),
+        )
+        cost = torch.cat([old[1], new[1]], dim=1)
+        bins = self.config.evolution.cells
+        cells = elites.cells(self.behaviours(memories, both), bins)
+        index = elites.survivors(cells, cost, old[1].shape[1])
+        return take(both, index), cost.gather(1, index)
+
+    def behaviours(self, memories: Sequence[Memory], population: Population) -> Tensor:
+        """How, not how well, individuals do: ``(R, P, B)``, each from 0 to 1.
+
+        Raises:
+            NotImplementedError: the task has none.
+        """
+        raise NotImplementedError
 
     @abstractmethod
     def rates(self, trial: int) -> Rates:

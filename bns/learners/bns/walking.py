@@ -200,6 +200,7 @@ class WalkProblem(OpenLoopProblem):
     stream = "walk-learner"
     relative_cost = 0.0
     bucket = 256
+    has_behaviours = True
     columns: ClassVar[Mapping[str, str]] = {
         "distance_predicted": "from start to end as the SNN foresaw it [m]",
         "disagreement": "of the ensemble on the controller tried (equation 7.2)",
@@ -229,6 +230,8 @@ class WalkProblem(OpenLoopProblem):
             activation=config.walk.activation,
         )
         self.output = torch.tensor(MOVED)
+        names = [channel.name for channel in self.encoding.channels]
+        self._femurs = [i for i, name in enumerate(names) if name.endswith("_femur")]
         self.evaluator = WalkEvaluator(self.shape, config.walk)
         self.breeder = GoalBreeder(config.evolution, self.encoding, True)
         self._compile()
@@ -277,6 +280,11 @@ class WalkProblem(OpenLoopProblem):
             "worth_predicted": worth.double().cpu().numpy(),
             "fitness_predicted": walking.cost(far),
         }
+
+    def behaviours(self, memories: Sequence[Memory], population: Population) -> Tensor:
+        """See `Problem.behaviours`: what `WalkTask.behaviour` says of commands."""
+        del memories
+        return (population.genes[..., self._femurs] <= 0).float().mean(2)
 
     def inputs_and_motion(self, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
         """See `OpenLoopProblem.inputs_and_motion`."""

@@ -13,7 +13,10 @@ from tests.sources import ROOT
 
 ASKED = {
     "verb": (["comp"], {"compare", "completion"}),
-    "preset": (["run", "hexapod-"], {"hexapod-recover", "hexapod-walk"}),
+    "preset": (
+        ["run", "hexapod-"],
+        {"hexapod-hybrid", "hexapod-recover", "hexapod-walk"},
+    ),
     "verb of a verb": (["campaign", "pl"], {"plot"}),
     "verb of a verb of a verb": (["gap", "bench", ""], {"make", "run", "score"}),
     "option": (["run", "demo", "--world.r"], {"--world.reality", "--world.robot"}),

@@ -28,6 +28,8 @@ PRESETS = {
     "light": "khepera-light",
     "walk": "hexapod-walk",
 }
+THINKING = ("cma", "ite", "safe_ite")
+"""learners that are tried with a model; all are without one, too"""
 GIVEN = {"columns": ("fitness", "fitness_best", "solved", "reached", "commands")}
 
 
@@ -57,7 +59,7 @@ def made(config, task: str, **settings):
         [config] * runs,
         replicates=range(runs),
         onsets=[-1] * runs,
-        models=models if config.learner == "cma" else (),
+        models=models if config.learner in THINKING else (),
         **settings,
     )
 

@@ -1,0 +1,1 @@
+"""Learners beside each other: faithfulness, priors, and what is deployed."""

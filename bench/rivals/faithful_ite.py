@@ -1,0 +1,95 @@
+"""Does our IT&E do what the original's tests did (Mailer, Nitschke and Raw 2021)?
+
+Compared are numbers of tests, not speeds: walking that rests after each command is no
+gait of 1 Hz, and how far a map's gaits get is a matter of the evaluations spent on it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from bench.result import Result, bench
+from bns import presets
+
+DAMAGES = {
+    "intact": {"none": ""},
+    "one leg": {"1": "1", "3": "3", "5": "5"},
+    "opposite": {"1,4": "1,4", "2,3": "2,3", "5,6": "5,6"},
+    "next but one": {"1,3": "1,3", "1,6": "1,6", "3,6": "3,6"},
+    "neighbours": {"1,2": "1,2", "1,5": "1,5", "3,5": "3,5", "3,4": "3,4"},
+}
+"""legs by number: 1, 5, 3, 4, 6, 2 around the body"""
+MOST = 20  # tests, as in Cully et al. 2015
+PUBLISHED = {
+    "intact": "1",
+    "one leg": "2 (1-4)",
+    "opposite": "3 (1-5)",
+    "next but one": "8 (1-21)",
+    "neighbours": "24 (12-38)",
+}
+"""median tests (5 to 95 %) on a map of 20,000 cells and 40 M evaluations"""
+
+
+@bench(
+    "tests of IT&E until it keeps a gait: intact, one leg, pairs of legs raised",
+    bar="intact 1; one leg <= 4; opposite, next but one <= 12; neighbours >= 2 x one",
+)
+def faithful_ite(quick: bool) -> Result:
+    """One recovery a damage on the map that ships; quick: intact and one leg."""
+    from bns.prior import repertoire
+
+    groups = list(DAMAGES)[: 2 if quick else None]
+    found = {name: _group(DAMAGES[name]) for name in groups}
+    tests = {name: float(np.median(row["tests"])) for name, row in found.items()}
+    head = repertoire.read("phantomx-1").head
+    details: dict[str, object] = {
+        name: {**row, "median": tests[name], "published": PUBLISHED[name]}
+        for name, row in found.items()
+    }
+    details["evaluations of the map"] = head.evaluations
+    return Result(
+        figure=max(tests.values()),
+        unit="tests",
+        holds=None if quick else holds(tests),
+        n=sum(len(DAMAGES[name]) for name in groups),
+        details=details,
+    )
+
+
+def holds(tests: dict[str, float]) -> bool:
+    """Whether medians of tests are as published."""
+    return (
+        tests["intact"] == 1
+        and tests["one leg"] <= 4
+        and max(tests["opposite"], tests["next but one"]) <= 12
+        and tests["neighbours"] >= 2 * tests["one leg"]
+    )
+
+
+def _group(damages: dict[str, str]) -> dict[str, list[float]]:
+    """Tests and distances of some damages, one recovery each, as one batch."""
+    from bns.experiment.batch import Batch
+    from bns.experiment.loading import with_learner
+    from bns.experiment.world_factory import make_world
+
+    base = replace(presets.load("hexapod-walk"), replicates=1, threads=1)
+    base = with_learner(base, "ite").with_({"prior.repertoire": "phantomx-1"})
+    configs = [
+        replace(base, world=replace(base.world, damage=_texts(legs)))
+        for legs in damages.values()
+    ]
+    batch = Batch(configs, [make_world(config) for config in configs])
+    rows = []
+    for trial in range(MOST + 2):
+        rows.append(batch.advance(trial)[0].columns)
+        if trial > 1 and all(tests.done for tests in batch.learner.tests):
+            break
+    return {
+        "tests": rows[-1]["tests"].tolist(),
+        "kept [m]": (np.sqrt(-rows[-1]["fitness_best"]) / 100).round(3).tolist(),
+        "at once [m]": rows[1]["worth_seen"].round(3).tolist(),
+    }
+
+
+def _texts(legs: str) -> tuple[str, ...]:
+    return (f"leg_raised:legs={legs},blend=1@1",) if legs else ()

@@ -1,0 +1,184 @@
+"""`bns standings`: all learners on the same robots; who recovers, and how soon."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from bns.cli.fields import Positional
+from bns.cli.parse import dispatch
+from bns.cli.tables import show
+
+MANUAL = """usage: bns standings {plan,run,table,plot} [RIVAL ...] [...]
+
+  plan   what a part of the standings costs in processor hours
+  run    run what is missing of it; it goes on wherever it was stopped
+  table  what the runs say: trials to the bar, shares of the ceiling, wins
+  plot   what is deployed over the trials after the damage, as PNG
+
+RIVAL is an entry of the standings or any learner, one of your own as well; none means
+all entries. `bns standings VERB --help` is the manual of a verb."""
+
+FAILED = 1
+"""exit code where batches failed"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Say what a part of the standings costs in processor hours; nothing runs."""
+
+    rivals: Positional[tuple[str, ...]] = ()
+    """entries or learners; none means all entries"""
+    tasks: tuple[str, ...] = ()
+    """walk, navigate, light; none means all"""
+    priors: tuple[str, ...] = ()
+    """P0 none, P1 exact, P2 off by a fixed gap; none means all that a rival has"""
+    kinds: tuple[str, ...] = ()
+    """sets of damages: inside, outside; none means both"""
+    damages: tuple[str, ...] = ()
+    """some of these sets by name, as type0; none means all"""
+    runs: int = 30
+    """of each learner, prior and damage"""
+    json: bool = False
+    """print JSON instead of a table"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run(Plan):
+    """Run what is missing. Runs are kept and never done twice; learners that are the
+    same until the damage train those trials once. Ctrl-C stops after the next batch.
+    """
+
+    root: str = "runs/standings"
+    """where runs are kept"""
+    engine: Literal["local", "inline", "ray"] = "local"
+    """local: processes of one thread each; inline: this process; ray: a Ray cluster"""
+    workers: int = 0
+    """processes or CPUs; 0 = one a core"""
+    ray_address: str = ""
+    """HOST:PORT of a Ray cluster; without it one is started here"""
+    retry: bool = False
+    """try batches again that failed before"""
+    mix: bool = False
+    """allow results of several package versions in one directory"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table(Plan):
+    """Say what the runs say, for each task, prior and set of damages."""
+
+    root: str = "runs/standings"
+    """where runs are kept"""
+    write: str = ""
+    """write the page to this file (docs/standings.md)"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plot(Plan):
+    """Draw what is deployed over the trials after the damage, a picture a task."""
+
+    root: str = "runs/standings"
+    """where runs are kept"""
+    out: str = "."
+    """folder for the pictures"""
+
+
+def main(verb: str, argv: list[str]) -> int:
+    """Run a verb of the standings; gives the exit code."""
+    does = {
+        "plan": (Plan, _plan),
+        "run": (Run, _run),
+        "table": (Table, _table),
+        "plot": (Plot, _plot),
+    }
+    return dispatch(verb, argv, does, MANUAL)
+
+
+def _entries(given: Plan) -> list:
+    from bns.standings.design import Wanted, entries
+
+    return entries(
+        Wanted(
+            tasks=given.tasks,
+            rivals=given.rivals,
+            priors=given.priors,
+            kinds=given.kinds,
+            damages=given.damages,
+            runs=given.runs,
+        )
+    )
+
+
+def _plan(given: Plan) -> int:
+    from bns.standings.run import hours
+
+    found = hours(_entries(given), given.runs)
+    rows = [[*key, f"{value:.2f}"] for key, value in found.items()]
+    show(["task", "rival", "prior", "hours"], rows, json=given.json)
+    if not given.json:
+        print(f"{sum(found.values()):.1f} processor hours in all.")
+    return 0
+
+
+def _run(given: Run) -> int:
+    from bns.campaign.engines import registry
+    from bns.cli.run import STOPPED, until_interrupted
+    from bns.standings.run import hours, run
+
+    entries = _entries(given)
+    print(
+        f"{sum(hours(entries, given.runs).values()):.1f} processor hours from nothing."
+    )
+    engine = registry.make(
+        given.engine, workers=given.workers, ray_address=given.ray_address
+    )
+    with until_interrupted() as stop:
+        session = run(
+            entries,
+            engine,
+            runs=given.runs,
+            root=Path(given.root),
+            retry=given.retry,
+            mix=given.mix,
+            stop=stop,
+        )
+    bad = len(session.failed) + session.waiting
+    print(f"{session.done} batches done, {bad} failed. Results: {given.root}")
+    for key, reason in list(session.failed.items())[:5]:
+        print(f"  {key}: {reason}")
+    if session.stopped:
+        return STOPPED
+    return FAILED if bad else 0
+
+
+def _table(given: Table) -> int:
+    from bns.standings import figures, page
+    from bns.storage import files
+
+    cells = figures.read(_entries(given), Path(given.root))
+    if given.write:
+        files.write_text(Path(given.write), page.page(cells))
+        print(f"{len(cells)} cells: {given.write}")
+        return 0
+    rows = []
+    for key, held in figures.groups(cells).items():
+        for name, some in figures.by_rival(held).items():
+            found = figures.row(name, some)
+            middle, never, runs = found.waits["the task"]
+            waits = f"{middle.value:g} [{middle.low:g}, {middle.high:g}]"
+            shares = (found.deployed, found.last, found.tried)
+            size = f"{found.runs[0]} x {found.runs[1]}"
+            texts = [waits, f"{never} of {runs}", *(f"{share:.2f}" for share in shares)]
+            rows.append([" ".join(key), name, size, *texts])
+    head = ["standing", "learner", "n", "trials", "never", "deployed", "last", "tried"]
+    show(head, rows, json=given.json)
+    return 0
+
+
+def _plot(given: Plot) -> int:
+    from bns.standings import figures
+    from bns.viz import standings
+
+    cells = figures.read(_entries(given), Path(given.root))
+    for path in standings.write(cells, Path(given.out)):
+        print(path)
+    return 0
