@@ -75,7 +75,7 @@ class Archive:
         good = np.isfinite(worth) & np.isfinite(behaviours).all(1)
         cells = self.cells(np.nan_to_num(behaviours))
         kept = np.zeros(len(worth), bool)
-        fresh: list[int] = []
+        fresh: list[np.intp] = []
         new: dict[int, int] = {}
         best = self.worth.copy()
         for index in np.flatnonzero(good):
