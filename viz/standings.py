@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from bns.standings.design import PRIORS
 from bns.standings.figures import Cell
 from bns.storage import files
 from bns.viz import style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def write(cells: Sequence[Cell], folder: Path) -> list[Path]:
@@ -32,7 +36,7 @@ def write(cells: Sequence[Cell], folder: Path) -> list[Path]:
     return made
 
 
-def curves(cells: Sequence[Cell]):
+def curves(cells: Sequence[Cell]) -> "Figure":
     """Mean of all runs and damages, a panel for each prior and set of damages.
 
     Args:

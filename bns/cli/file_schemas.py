@@ -160,6 +160,7 @@ def _start() -> Schema:
 def columns() -> Schema:
     """Schema of the map of a log's columns, for `--columns`."""
     from bns.worlds.data import column_map
+    from bns.worlds.trial import POSE
 
     known = {
         name: _source(tuple(column_map.FACTORS[unit]))
@@ -168,7 +169,7 @@ def columns() -> Schema:
     table = {
         "type": "object",
         "properties": known,
-        "required": ["time", *column_map.POSE],
+        "required": ["time", *POSE],
         "additionalProperties": _source(),
     }
     top = {"robot": TEXT | _said("that the recording is of"), "columns": table}

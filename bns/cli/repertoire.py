@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from bns.cli.fields import Positional
-from bns.cli.parse import dispatch
+from bns.cli.parse import Verbs, dispatch
 from bns.cli.tables import show
 from bns.errors import BnsError
 
@@ -71,7 +71,7 @@ class List:
 
 def main(verb: str, argv: list[str]) -> int:
     """Run a verb of repertoires; gives the exit code."""
-    does = {"make": (Make, _make), "list": (List, _list), "show": (Show, _show)}
+    does: Verbs = {"make": (Make, _make), "list": (List, _list), "show": (Show, _show)}
     return dispatch(verb, argv, does, MANUAL)
 
 

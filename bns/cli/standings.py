@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Literal
 
 from bns.cli.fields import Positional
-from bns.cli.parse import dispatch
+from bns.cli.parse import Verbs, dispatch
 from bns.cli.tables import show
 
 MANUAL = """usage: bns standings {plan,run,table,plot} [RIVAL ...] [...]
@@ -84,7 +84,7 @@ class Plot(Plan):
 
 def main(verb: str, argv: list[str]) -> int:
     """Run a verb of the standings; gives the exit code."""
-    does = {
+    does: Verbs = {
         "plan": (Plan, _plan),
         "run": (Run, _run),
         "table": (Table, _table),

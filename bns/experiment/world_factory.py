@@ -79,7 +79,7 @@ def make_models(config: RunConfig) -> list[CountedWorld]:
     if not prior.world:
         return []
     world = replace(config.world, name=prior.world, reality=prior.reality, damage=())
-    others = {"step": prior.step} if prior.step else {}
+    others: dict[str, Any] = {"step": prior.step} if prior.step else {}
     made = make_world(replace(config, world=world), **others)
     return [CountedWorld(made, prior.evaluations) for _ in range(config.replicates)]
 

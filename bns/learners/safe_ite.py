@@ -5,8 +5,9 @@ a stop at a lamp. What is tried next has the highest expected improvement times 
 probability of doing no harm (Gardner et al. 2014). In the model nothing was harmful.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import cast
+from typing import ClassVar, cast
 
 import numpy as np
 from scipy import special
@@ -22,7 +23,10 @@ class SafeIteSettings(IteSettings):
     harmless: float = 0.5
     """harm, from 0 to 1, up to which a gait counts as doing none"""
 
-    bounds = IteSettings.bounds | {"harmless": (1e-3, 1, "1")}
+    bounds: ClassVar[Mapping[str, tuple[float, float, str]]] = {
+        **IteSettings.bounds,
+        "harmless": (1e-3, 1, "1"),
+    }
 
 
 class SafeIte(Ite):

@@ -74,7 +74,8 @@ class Archive:
         """
         good = np.isfinite(worth) & np.isfinite(behaviours).all(1)
         cells = self.cells(np.nan_to_num(behaviours))
-        kept, fresh = np.zeros(len(worth), bool), []
+        kept = np.zeros(len(worth), bool)
+        fresh: list[np.intp] = []
         new: dict[int, int] = {}
         best = self.worth.copy()
         for index in np.flatnonzero(good):

@@ -83,10 +83,11 @@ class Maker:
             raise UnknownNameError("behaviour", plan.behaviour, BEHAVIOURS)
         self.space = genotypes[plan.genotype]
         self.world = world or _model(self.config, plan)
-        middle = self.space.controllers([(self.space.low + self.space.high) / 2])
+        middle = self.space.controllers((self.space.low + self.space.high)[None] / 2)
         (seen,) = self._behaviours(self._run(middle, [0]))
         self.archive = Archive(self.space.size, len(seen), plan.bins)
-        self.evaluations, self.growth = 0, []
+        self.evaluations = 0
+        self.growth: list[tuple[int, int, float, float]] = []
 
     def _run(self, tried: Sequence[Any], seeds: Sequence[int]) -> list[Trial]:
         return self.task.execute(self.world, tried, trial=0, seeds=seeds)
@@ -115,7 +116,11 @@ class Maker:
             {"genes": found.genes, "behaviours": found.behaviours, "worth": found.worth}
         )
         self.evaluations = head.evaluations
-        self.growth = [tuple(row) for row in head.growth if _noted(row[0])]
+        self.growth = [
+            (evaluations, cells, best, quality)
+            for evaluations, cells, best, quality in head.growth
+            if _noted(evaluations)
+        ]
 
     def advance(self) -> None:
         """One generation."""
@@ -142,8 +147,8 @@ class Maker:
     def row(self) -> tuple[int, int, float, float]:
         """Evaluations, cells, best worth and worth of all together, now."""
         best = float(self.archive.worth.max(initial=0.0))
-        numbers = (round(value, 5) for value in (best, self.archive.quality))
-        return (self.evaluations, len(self.archive), *numbers)
+        quality = self.archive.quality
+        return self.evaluations, len(self.archive), round(best, 5), round(quality, 5)
 
     def _head(self, command: str) -> dict[str, Any]:
         plan, world = self.plan, self.config.world

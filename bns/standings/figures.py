@@ -221,7 +221,7 @@ def matches(cells: Sequence[Cell]) -> list[Match]:
         stats.mann_whitney(*both) if some else 1.0
         for both, some in zip(samples, enough, strict=True)
     ]
-    p = stats.holm(raw) if pairs else []
+    p: Sequence[float] | np.ndarray = stats.holm(raw) if pairs else []
     found: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for (a, b, _), value, both in zip(pairs, p, samples, strict=True):
         found.setdefault((a, b), []).append((float(value), stats.a12_value(*both)))

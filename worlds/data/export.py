@@ -9,7 +9,7 @@ observed channels; the unit of each column is in its metadata.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,12 @@ CHUNK = 1000
 EPISODE = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
 ACTION, STATE = "action", "observation.state"
 COUNTS = ("frame_index", "episode_index", "index", "task_index")
+FIGURES: Mapping[str, Callable[..., Any]] = {
+    "min": np.nanmin,
+    "max": np.nanmax,
+    "mean": np.nanmean,
+    "std": np.nanstd,
+}
 
 
 def lerobot(
@@ -195,9 +201,7 @@ def _episode(
     for name, values in frames.items():
         rows = np.atleast_2d(values.T).T.astype(np.float64)
         seen = np.where(np.isfinite(rows).any(0), rows, 0.0)
-        figures = {"min": np.nanmin, "max": np.nanmax, "mean": np.nanmean}
-        figures |= {"std": np.nanstd}
-        stats[name] = {key: of(seen, 0).tolist() for key, of in figures.items()}
+        stats[name] = {key: of(seen, 0).tolist() for key, of in FIGURES.items()}
         stats[name]["count"] = [len(rows)]
     length = len(frames["timestamp"])
     return {

@@ -187,12 +187,13 @@ def topics(path: Path) -> dict[str, str]:
         raise MissingDependencyError(
             "Reading MCAP logs", "the package mcap", "pip install mcap"
         ) from None
+    broken: tuple[type[Exception], ...] = (*_broken(), McapError)
     try:
         with reading.regular(path) as file:
             found = make_reader(file, validate_crcs=True).get_summary()
     except BnsError:
         raise
-    except (*_broken(), McapError) as error:
+    except broken as error:
         raise FormatError(f"{path} cannot be read as MCAP ({error}).") from None
     if found is None:
         raise FormatError(f"{path} has no summary: mend it with `mcap recover`.")

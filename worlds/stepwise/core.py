@@ -199,7 +199,7 @@ def reset_all(
             seeds=drawn,
             starts=None
             if start is None
-            else np.tile(np.float64(start), (len(drawn), 1)),
+            else np.tile(np.asarray(start, np.float64), (len(drawn), 1)),
         )
         for row, stepper in enumerate(steppers):
             stepper._session, stepper._row = session, row

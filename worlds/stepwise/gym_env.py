@@ -184,7 +184,8 @@ class RobotVectorEnv(VectorEnv):
             if seeds[robot] is not None:
                 self._rngs[robot] = seeding.np_random(seeds[robot])[0]
         self._ended[robots] = False
-        self._seen = self._seen or [None] * self.num_envs
+        unseen: list[Any] = [None] * self.num_envs
+        self._seen = self._seen or unseen
         self._begin(robots, start)
         return self._observed(), self._told(robots)
 

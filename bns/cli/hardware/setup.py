@@ -139,16 +139,21 @@ def _calibrated() -> Iterator[Question]:
         ("khepera3", "wheels", "wheels (diameters and axle)"),
         ("phantomx", "servos", "servos (zeros and end stops)"),
     ):
-        file = {"wheels": "wheels.json", "servos": "servos.toml"}[key]
-        yield Question(
-            key,
-            f"Its {key}?",
-            f"The file of its {what}, which `bns hardware calibrate --what {key}` "
-            "makes; none = nominal ones.",
-            _no_file,
-            lambda found, file=file: file if Path(file).is_file() else "",
-            lambda found, robot=robot: found["robot"] == robot,
-        )
+        yield _measured(robot, key, what)
+
+
+def _measured(robot: str, key: str, what: str) -> Question:
+    """The question for the file of what was measured on one kind of robot."""
+    file = {"wheels": "wheels.json", "servos": "servos.toml"}[key]
+    return Question(
+        key,
+        f"Its {key}?",
+        f"The file of its {what}, which `bns hardware calibrate --what {key}` "
+        "makes; none = nominal ones.",
+        _no_file,
+        lambda found: file if Path(file).is_file() else "",
+        lambda found: found["robot"] == robot,
+    )
 
 
 def _ports() -> dict[str, str]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from bns.experiment.config import TaskConfig
+from bns.experiment.task_settings import TaskConfig
 from bns.tasks import registry
 from bns.tasks.base import BOARD, Arrays, Picture
 from bns.tasks.navigation import CENTIMETRES, WheeledTask
