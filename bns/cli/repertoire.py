@@ -17,8 +17,9 @@ MANUAL = """usage: bns repertoire {make,list,show} ... [...]
   list       those that ship with the package
   show NAME  what one is of, how it was made, and how it grew
 
-A repertoire is one file, NAME.npz, that `--prior.repertoire NAME` gives to learners
-which start from one. `bns repertoire VERB --help` is the manual of a verb."""
+A repertoire is one file, NAME.npz, that `--prior.repertoire NAME` gives to
+learners which start from one. `bns repertoire VERB --help` is the manual of a
+verb."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,8 +15,8 @@ MANUAL = """usage: bns standings {plan,run,table,plot} [RIVAL ...] [...]
   table  what the runs say: trials to the bar, shares of the ceiling, wins
   plot   what is deployed over the trials after the damage, as PNG
 
-RIVAL is an entry of the standings or any learner, one of your own as well; none means
-all entries. `bns standings VERB --help` is the manual of a verb."""
+RIVAL is an entry of the standings or any learner, one of your own as well;
+none means all entries. `bns standings VERB --help` is the manual of a verb."""
 
 FAILED = 1
 """exit code where batches failed"""

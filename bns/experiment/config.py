@@ -88,13 +88,12 @@ class RunConfig:
     prior: PriorConfig = field(default_factory=PriorConfig)
     settings: LearnerSettings = field(default_factory=LearnerSettings)
     choose: RealChoice = "best"
-    """which controller is tried in the world"""
+    """controller tried in the world"""
     choose_tournament: float = 0.1
     """tournament for that choice, as a share of the population"""
     deploy: Literal["population", "seen"] = "population"
-    """what a user would run if trials ended now. population: the best of the population
-    inside the SNN; seen (own): the best one seen to work since the robot last changed,
-    tried again in doubt (bns/learners/bns/deployed.py)"""
+    """what a user would run now: the best in the SNN, or the best seen to work since
+    the robot last changed (own)"""
     evolve_from: int = 1
     """trials with random controllers before evolution starts"""
     trials: int = 100
@@ -106,12 +105,11 @@ class RunConfig:
     seed: int = 0
     """master seed"""
     compiled: Literal["auto", "yes", "no"] = "auto"
-    """torch.compile the learner's inner loops: auto = where a compiler exists and
-    the run is long enough to pay"""
+    """torch.compile the learner's inner loops; auto = where it pays"""
     device: str = "cpu"
     """torch device of the learner"""
     threads: int = 2
-    """threads of the learner and of the physics"""
+    """threads of learner and physics"""
 
     def with_(self, changes: Mapping[str, Any]) -> "RunConfig":
         """This configuration with some settings changed, checked as a file's are.

@@ -27,7 +27,7 @@ BNS_SECTIONS = (
 
 @dataclass(frozen=True, kw_only=True)
 class EvolutionConfig:
-    """The evolutionary algorithm that runs inside the SNN."""
+    """Evolution inside the SNN."""
 
     population: int = 100
     """individuals"""
