@@ -1,12 +1,12 @@
 """The loop around a campaign: what is missing is run and stored as it comes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bns.campaign.engines.base import Engine
+from bns.campaign.engines.base import Engine, Outcome
 from bns.campaign.file import Campaign
 from bns.campaign.identity import changed_default
 from bns.campaign.plan import Job, plan
@@ -155,24 +155,42 @@ def _work(
     store.note(event="start", engine=engine.name, batches=len(jobs))
     failed: dict[str, str] = {}
     finished = 0
-    with shown.start(), closing(engine.run(jobs, beat=shown.beat)) as outcomes:
+    with closing(ended(jobs, store, engine, shown)) as outcomes:
         for outcome in outcomes:
             if outcome.data is None:
                 failed[outcome.key] = outcome.reason
-                attempts, reason = outcome.attempts, outcome.reason
-                store.fail(outcome.key, reason=reason, attempts=attempts)
             else:
-                store.add(outcome.key, outcome.data)
                 finished += 1
-            store.note(
-                batch=outcome.key,
-                seconds=round(outcome.seconds, 3),
-                computed=round(outcome.computed, 3),
-                attempts=outcome.attempts,
-            )
-            shown.end(outcome.key, failed=outcome.data is None)
             if stop():
                 break
     missing = len(jobs) - finished - len(failed)
     store.note(event="end", done=finished, failed=len(failed), missing=missing)
     return {"done": finished, "failed": failed, "missing": missing}
+
+
+def ended(
+    jobs: Sequence[Job], store: CampaignStore, engine: Engine, shown: Progress
+) -> Iterator[Outcome]:
+    """Run batches; each is kept, noted and shown before it is told of.
+
+    Args:
+        jobs: the batches.
+        store: where results and failures are kept; a batch that made a trunk has none.
+        engine: where they run.
+        shown: how far they are.
+    """
+    with shown.start(), closing(engine.run(jobs, beat=shown.beat)) as outcomes:
+        for outcome in outcomes:
+            attempts = outcome.attempts
+            if outcome.data is None:
+                store.fail(outcome.key, reason=outcome.reason, attempts=attempts)
+            elif outcome.data:
+                store.add(outcome.key, outcome.data)
+            store.note(
+                batch=outcome.key,
+                seconds=round(outcome.seconds, 3),
+                computed=round(outcome.computed, 3),
+                attempts=attempts,
+            )
+            shown.end(outcome.key, failed=outcome.data is None)
+            yield outcome

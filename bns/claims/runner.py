@@ -119,7 +119,16 @@ def run(
                 break
             if progress and not quick:
                 print(price.left(rows, world=world))
-            _work(todo, store, engine, session, stop, progress, world, found)
+            work(
+                todo,
+                store,
+                engine,
+                session,
+                title=f"claims in {world}",
+                stop=stop,
+                progress=progress,
+                found=found,
+            )
         store.compact()
     return session
 
@@ -143,37 +152,38 @@ def _round(
     return [job for job in jobs if job.key not in known]
 
 
-def _work(
+def work(
     jobs: Sequence[Job],
     store: CampaignStore,
     engine: Engine,
     session: Session,
+    *,
+    title: str,
     stop: Stop,
     progress: bool,
-    world: str,
-    found: Found,
+    found: Found = lambda: None,
 ) -> None:
-    """Run batches, trunks before the sides that begin with them."""
+    """Run batches, trunks before the sides that begin with them.
+
+    Args:
+        jobs: the batches.
+        store: what keeps them.
+        engine: where they run.
+        session: what was done, which is counted on.
+        title: of the progress.
+        stop: asked after every batch; True ends the session there.
+        progress: show it on the standard error stream.
+        found: told of every batch with runs.
+    """
     for part in phases(jobs):
-        shown = Progress(f"claims in {world}", part, 0, enabled=progress)
-        with shown.start(), closing(engine.run(part, beat=shown.beat)) as outcomes:
+        shown = Progress(title, part, 0, enabled=progress)
+        with closing(drive.ended(part, store, engine, shown)) as outcomes:
             for outcome in outcomes:
                 if outcome.data is None:
                     session.failed[outcome.key] = outcome.reason
-                    store.fail(
-                        outcome.key, reason=outcome.reason, attempts=outcome.attempts
-                    )
                 elif outcome.data:
-                    store.add(outcome.key, outcome.data)
                     found()
                 session.done += outcome.data is not None
-                store.note(
-                    batch=outcome.key,
-                    seconds=round(outcome.seconds, 3),
-                    computed=round(outcome.computed, 3),
-                    attempts=outcome.attempts,
-                )
-                shown.end(outcome.key, failed=outcome.data is None)
                 if stop():
                     session.stopped = True
                     return

@@ -1,18 +1,15 @@
 """Run what the standings lack; sides that share trials train them once."""
 
 from collections.abc import Callable, Sequence
-from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 from bns.campaign import drive
 from bns.campaign.engines.base import Engine
 from bns.campaign.file import Campaign, Member
 from bns.campaign.plan import Job
-from bns.campaign.progress import Progress
-from bns.campaign.store import CampaignStore
 from bns.claims import schedule
-from bns.claims.runner import phases
+from bns.claims.runner import Session, work
 from bns.experiment import versions
 from bns.experiment.batch import check_world
 from bns.standings.design import Entry
@@ -29,27 +26,10 @@ SECONDS = {
     ("light", "bns"): 1.5,
     ("light", "other"): 0.1,
 }
-"""processor time of a trial of one run [s], by task and learner; measured in batches
-of ten runs on an AMD EPYC core, 2026-11-23"""
+"""processor time of a trial of one run [s], by task and learner; estimated, in batches
+of ten runs on an AMD EPYC core"""
 EVALUATION = {"walk": 0.031, "navigate": 0.02, "light": 0.04}
 """processor time of an evaluation of the model [s]"""
-
-
-@dataclass
-class Session:
-    """What a call of `run` did.
-
-    Attributes:
-        done: batches it ran, trunks among them.
-        failed: batches that failed, by key, with the reason.
-        waiting: batches that failed before and were not tried again.
-        stopped: whether it was told to stop before the end.
-    """
-
-    done: int = 0
-    failed: dict[str, str] = field(default_factory=dict)
-    waiting: int = 0
-    stopped: bool = False
 
 
 def hours(entries: Sequence[Entry], runs: int) -> dict[tuple[str, str, str], float]:
@@ -139,39 +119,14 @@ def run(
         known = store.failures()
         session.waiting = sum(job.key in known for job in todo)
         todo = [job for job in todo if job.key not in known]
-        for part in phases(todo):
-            if not session.stopped:
-                _work(part, store, engine, session, stop, progress)
+        work(
+            todo,
+            store,
+            engine,
+            session,
+            title="standings",
+            stop=stop,
+            progress=progress,
+        )
         store.compact()
     return session
-
-
-def _work(
-    part: Sequence[Job],
-    store: CampaignStore,
-    engine: Engine,
-    session: Session,
-    stop: Callable[[], bool],
-    progress: bool,
-) -> None:
-    """Run some batches; what was done is kept one by one."""
-    shown = Progress("standings", part, 0, enabled=progress)
-    with shown.start(), closing(engine.run(part, beat=shown.beat)) as outcomes:
-        for outcome in outcomes:
-            if outcome.data is None:
-                session.failed[outcome.key] = outcome.reason
-                attempts = outcome.attempts
-                store.fail(outcome.key, reason=outcome.reason, attempts=attempts)
-            elif outcome.data:
-                store.add(outcome.key, outcome.data)
-            session.done += outcome.data is not None
-            store.note(
-                batch=outcome.key,
-                seconds=round(outcome.seconds, 3),
-                computed=round(outcome.computed, 3),
-                attempts=outcome.attempts,
-            )
-            shown.end(outcome.key, failed=outcome.data is None)
-            if stop():
-                session.stopped = True
-                return

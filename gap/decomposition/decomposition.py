@@ -1,6 +1,7 @@
 """What the joint fit found in a recording."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -34,7 +35,7 @@ class Decomposition:
         recurs: standard errors by which what `point` leaves recurs.
         scatter: excess over the floor of what differs between repeats.
         moved: mean square of the recorded motion in units of the floor.
-        closed: share closed on stretches that were not fitted.
+        inside: which residuals count, ``(N, C)``: no wild points.
     """
 
     problem: Problem
@@ -49,7 +50,22 @@ class Decomposition:
     recurs: float
     scatter: float
     moved: float
-    closed: float
+    inside: np.ndarray
+
+    @cached_property
+    def closed(self) -> float:
+        """Share that is closed on stretches that were not fitted, of what can be
+        closed: down to what measuring scatters, or where the rest is no more than
+        scatter to what all explanations together leave."""
+        problem, point = self.problem, self.point
+        if not point.support:
+            return 0.0
+        held = shares.HeldOut.of(problem, point, shares.PIECES, self.inside)
+        none, some = held.nominal(self.start.rest), held.error(point.support).sum()
+        least = held.nominal(self.floor.sd)
+        if not self.lasting:
+            least = held.error(point.linear.free).sum()
+        return float((none - some) / max(none - min(least, some), 1e-9))
 
     @property
     def left(self) -> float:
@@ -119,7 +135,7 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
     inside = rest.kept(problem, full, point.noise.sd)
     left = point.linear.rest(point.linear.solve(point.support))
     plain = left if not point.noise.memory.factors.size else point.rest
-    made = Decomposition(
+    return Decomposition(
         problem=problem,
         start=start,
         point=point,
@@ -137,19 +153,5 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         ),
         scatter=rest.scattered(problem, plain, known, inside),
         moved=max(rest.excess(problem.recorded, known, inside), 1.0),
-        closed=0.0,
+        inside=inside,
     )
-    return replace(made, closed=_closable(made, inside)) if point.support else made
-
-
-def _closable(made: Decomposition, inside: np.ndarray) -> float:
-    """Share that is closed on stretches that were not fitted, of what can be closed:
-    down to what measuring scatters, or where the rest is no more than scatter to what
-    all explanations together leave."""
-    problem, point = made.problem, made.point
-    held = shares.HeldOut.of(problem, point, shares.PIECES, inside)
-    none, some = held.nominal(made.start.rest), held.error(point.support).sum()
-    least = held.nominal(made.floor.sd)
-    if not made.lasting:
-        least = held.error(point.linear.free).sum()
-    return float((none - some) / max(none - min(least, some), 1e-9))

@@ -242,13 +242,11 @@ def _others(problem: Problem, start: Point, first: Point) -> list[Point]:
 def _with_level(problem: Problem, name: str, values, first: Point) -> Point | None:
     """A point from a single explanation and a level on top of it: through a tangent
     that lacks the level, the rest of it looks like several others."""
-    values, rest = newton(problem, values, _fitted(problem, {name}), first.noise)
-    linear, known, slopes = linearised(problem, values, rest, first.noise)
-    single = Point(values, frozenset({name}), rest, linear, slopes, known)
+    single = _fitted_at(problem, replace(first, values=values), frozenset({name}))
     level = levels.best(problem, single)
     if level is None or level.cost > single.cost - WORTH:
         return None
-    return descend(problem, level.values, level.support, known)
+    return descend(problem, level.values, level.support, single.noise)
 
 
 def _from_all(problem: Problem, start: Point) -> Point:

@@ -17,8 +17,6 @@ FAR = 0.3  # prior standard deviations beyond which slopes are taken anew
 INEXACT = 0.01  # of what effects change: how well they are simulated at best (assumed);
 # another integrator or way to model an effect is no second effect
 MEASURED = 4  # times that noise is measured from what it leaves
-TURNS = 4  # of fitting and searching
-SINGLES = 4  # explanations that are tried alone
 ROUGH = 20.0  # [s] of recording for comparing these
 
 
@@ -281,7 +279,7 @@ def _rest(problem: Problem, values: np.ndarray, only) -> np.ndarray:
 def _step(problem, values, rest, which, known: Noise, only):
     """One damped step that lowers the loss; None if there is none."""
     which = np.array(which)
-    slopes = _slopes(problem, values, which, only)
+    slopes = problem.slopes(values, which, only=only)
     weight = known.weights(rest, problem.seen).ravel()
     design = np.stack([known.memory(slopes[k]).ravel() for k in which], axis=-1)
     design = design * problem.sd[which]
@@ -311,24 +309,6 @@ def _step(problem, values, rest, which, known: Noise, only):
         if height(there, left) <= now + 1e-6:
             return there, left
     return None
-
-
-def _slopes(problem: Problem, values, which, only) -> dict[int, np.ndarray]:
-    if only is None:
-        return problem.slopes(values, which)
-    sets, steps = [values], []
-    for number in which:
-        moved = values.copy()
-        step = problem.rows[number].difference
-        step = step if values[number] + step <= problem.bounds[1][number] else -step
-        moved[number] += step
-        sets.append(moved)
-        steps.append(step)
-    base, *made = problem.predict(sets, fine=False, only=only)
-    return {
-        number: np.nan_to_num((path - base) / step)
-        for number, path, step in zip(which, made, steps, strict=True)
-    }
 
 
 def placed(

@@ -157,10 +157,21 @@ class Problem:
         """Residuals of the nominal model, ``(N, C)``."""
         return self.residual(self.nominal)[0]
 
-    def slopes(self, values: np.ndarray, which: Sequence[int]) -> dict[int, np.ndarray]:
+    def slopes(
+        self,
+        values: np.ndarray,
+        which: Sequence[int],
+        *,
+        only: Sequence[int] | None = None,
+    ) -> dict[int, np.ndarray]:
         """Derivatives of the features by some rows, ``(N, C)`` each.
 
         One whose simulation diverges is 0.
+
+        Args:
+            values: of all rows, ``(R,)``.
+            which: numbers of the rows.
+            only: see `predict`.
         """
         high = self.bounds[1]
         sets, steps = [values], []
@@ -171,7 +182,7 @@ class Problem:
             moved[number] += step
             sets.append(moved)
             steps.append(step)
-        base, *made = self.predict(sets, fine=False)
+        base, *made = self.predict(sets, fine=False, only=only)
         return {
             number: np.nan_to_num((path - base) / step, posinf=0.0, neginf=0.0)
             for number, path, step in zip(which, made, steps, strict=True)

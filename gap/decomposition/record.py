@@ -142,8 +142,7 @@ def statements(made: Decomposition) -> list[str]:
 
 def _sizes(made: Decomposition, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Root mean square by feature, and beyond the floor; without wild points."""
-    full = made.point.linear.rest(made.point.linear.solve(made.point.linear.free))
-    inside = rest.kept(made.problem, full, made.point.noise.sd)
+    inside = made.inside
     square = np.where(inside, np.nan_to_num(left) ** 2, 0.0).sum(axis=0)
     square /= np.maximum(inside.sum(axis=0), 1)
     beyond = np.maximum(square - (made.floor.sd**2).mean(axis=0), 0.0)
@@ -180,9 +179,7 @@ def _fit(made: Decomposition, support: Support) -> Fit:
     parts = shares.parts(problem, replace(point, values=values, support=support))
     order = {part.name: part for part in parts}
     names = _ordered(made, support)
-    shown = [
-        shown_effect(problem, name, order[name], made.floor.sd.shape) for name in names
-    ]
+    shown = [shown_effect(problem, name, order[name]) for name in names]
     errors = point.linear.held_out(support)
     none = point.linear.held_out(())
     return Fit(
@@ -204,14 +201,13 @@ def _at_bound(problem: Problem, part: Part) -> bool:
     return any(value in (rows[n].low, rows[n].high) for n, value in part.values.items())
 
 
-def shown_effect(problem: Problem, name: str, part: Part, _shape):
+def shown_effect(problem: Problem, name: str, part: Part):
     """Text, magnitude, interval and unit of an explanation.
 
     Args:
         problem: the recording.
         name: of the explanation.
         part: its values and intervals.
-        _shape: not used.
 
     Returns:
         text; magnitude, which for several numbers is the length of the departure of the

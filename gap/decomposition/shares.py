@@ -197,8 +197,9 @@ def _grown(linear: Linear, held: HeldOut, support: Support) -> Support:
         before, here = held.error(support), linear.cost(support)
         more = [support | {n} for n in linear.free if n not in support]
         more = [s for s in more if linear.cost(s) < here + KAPPA - 1e-6]
-        best = min(more, key=lambda s: held.error(s).sum(), default=support)
-        gain = before - held.error(best)
+        errors = {s: held.error(s) for s in more}
+        best = min(errors, key=lambda s: errors[s].sum(), default=support)
+        gain = before - errors.get(best, before)
         if gain.sum() < max(CLEARLY * before.sum(), np.sqrt((gain**2).sum())):
             return support
         support = best

@@ -138,6 +138,7 @@ class Painter:
         turn = module.getPerspectiveTransform(own, fine)
 
         def seen(what: np.ndarray) -> np.ndarray:
+            """A texture as the camera's pixels see it."""
             size = (width * FINE, tall * FINE)
             warped = module.warpPerspective(what.astype(np.float32), turn, size)
             small = module.resize(

@@ -60,6 +60,7 @@ def lerobot(
     said = task or f"drive the {data.robot}"
 
     def fill(temporary: Path) -> None:
+        """Write all files of the dataset into a directory."""
         first, rows = 0, []
         for number, trial in enumerate(data.trials):
             frames = _frames(trial, rate, number, first)
