@@ -1,6 +1,8 @@
 """Rows: the numbers of a model that may differ from what it says."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 from bns.errors import BnsError
 
@@ -27,6 +29,11 @@ class Row:
         group: name of the explanation it belongs to; "" = its own. Rows of a group go
             in and out together.
         excite: which commands make it felt, in words.
+        effect: name of the effect in the library that it is a number of; "" = the
+            model knows.
+        parameter: which number of the effect it is.
+        fixed: values of the effect's other parameters and choices.
+        aliases: names of rows known to look alike whatever is commanded.
     """
 
     name: str
@@ -44,6 +51,10 @@ class Row:
     per_trial: bool = False
     group: str = ""
     excite: str = ""
+    effect: str = ""
+    parameter: str = ""
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+    aliases: tuple[str, ...] = ()
 
     def __post_init__(self):
         if not (self.low <= self.nominal <= self.high and self.sd > 0):

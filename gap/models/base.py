@@ -1,20 +1,26 @@
 """What the diagnosis needs of a nominal model: `GapModel`.
 
-The diagnosis knows nothing of robots. A model re-executes recorded commands with
-candidate effects and says how observations become features: small pieces of relative
+The diagnosis knows nothing of robots. A model re-executes recorded commands with any of
+its numbers changed and says how observations become features: small pieces of relative
 motion, each over one window between two samples, so that an early error does not
 spoil all that follows.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
-from bns.gap.records import Candidate
+from bns.gap.decomposition.row import Row
+from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Channel, Trial
+
+BLOCK = 2.0  # [s] of one long recording that count as one trial
+FEW = 4  # trials, below which recordings are cut into blocks
+PLANE = "xy"
+"""parameters of rows that together are the size and the direction of an effect"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,19 +43,24 @@ class Windows:
         return len(self.first)
 
 
-class GapModel(Protocol):
-    """A nominal model that can be simulated with candidate effects.
+class GapModel(ABC):
+    """A nominal model all of whose doubtful numbers can be changed at once.
 
     Attributes:
         name: of the model.
         channels: what is observed, as in `Trial.channels`.
         features: what is compared, C channels (for a planar robot forward [m], left
             [m], turn [rad] over a window).
-        process: standard deviation of what a nominal robot scatters by itself in one
-            second of motion, by feature channel, shape ``(C,)``; grows with the square
-            root of time. Used until repeats tell better.
+        process: what a nominal robot scatters by itself in one second of motion, by
+            feature, ``(C,)``; for plans.
         resolution: smallest standard deviation of the measurement of each observed
-            channel that is believed, shape ``(n_channels,)``.
+            channel that is believed, ``(n_channels,)``.
+        limits: lowest and highest command and its unit, by channel; empty = not known.
+        dt: physics step [s]; 0 = none.
+        timed: whether commands last as long as they are told.
+        memory: order of the autoregression that residuals may have; 0 = none.
+        many: whether fits are also started from all rows at once: where many depart
+            at once a tangent at the nominal misleads.
     """
 
     name: str
@@ -57,19 +68,30 @@ class GapModel(Protocol):
     features: tuple[Channel, ...]
     process: np.ndarray
     resolution: np.ndarray
+    limits: Mapping[str, tuple[float, float, str]] = {}
+    dt: float = 0.0
+    timed: bool = True
+    memory: int = 0
+    many: bool = False
 
-    def candidates(self) -> tuple[Candidate, ...]:
-        """All explanations that may be given, in a fixed order."""
-        ...
+    @property
+    @abstractmethod
+    def least(self) -> np.ndarray:
+        """Smallest believed standard deviation of each feature, ``(C,)``."""
 
+    @abstractmethod
+    def rows(self, trials: Sequence[Trial]) -> tuple[Row, ...]:
+        """All numbers that may be off, in a fixed order; they may depend on what was
+        told (a dead band is tried between the speeds told)."""
+
+    @abstractmethod
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
         """What would have been observed, had these effects held.
 
-        The recorded commands are executed again from the observed start of each trial
-        (or of each short segment of it), all sets of effects in one batch. Nothing is
-        random: noise effects have none here.
+        The recorded commands are executed again from the observed start of each trial,
+        all sets of effects in one batch. Nothing is random.
 
         Args:
             trials: N recorded trials.
@@ -79,31 +101,173 @@ class GapModel(Protocol):
             Per set, per trial: ``(T, n_channels)`` at the trial's own samples; NaN
             from where the simulation diverged.
         """
-        ...
 
-    def windows(self, trial: Trial) -> Windows:
-        """The windows of a trial, one short horizon, tiling it."""
-        ...
+    @abstractmethod
+    def paths(
+        self,
+        trials: Sequence[Trial],
+        sets: Sequence[Sequence[Mapping[str, float]]],
+        *,
+        fine: bool = True,
+    ) -> list[list[np.ndarray]]:
+        """Predicted observations with rows changed.
 
+        Args:
+            trials: N recorded trials.
+            sets: E sets; of each, by trial, the values of the rows that are not
+                nominal.
+            fine: at the fine step; False = at the coarse one, which is for differences.
+
+        Returns:
+            Per set, per trial ``(T, n_channels)``; NaN from where it diverged.
+        """
+
+    @abstractmethod
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """Features of observations or predictions of a trial.
+        """Features of observations or predictions, ``(..., W, C)``.
 
         Args:
             trial: recorded trial.
             observed: ``(..., T, n_channels)``, recorded or simulated.
-            windows: any windows into the trial, also longer ones.
-
-        Returns:
-            ``(..., W, C)``.
+            windows: W windows into the trial, also longer ones.
         """
-        ...
+
+    @abstractmethod
+    def windows(self, trial: Trial) -> Windows:
+        """The windows of a trial, one short horizon, tiling it."""
+
+    def joint_windows(self, trial: Trial) -> Windows:
+        """Windows over which motion is compared in the fit; they may overlap."""
+        return self.windows(trial)
+
+    @abstractmethod
+    def effect(self, term: str, values: Mapping[str, float]) -> Effect | None:
+        """The effect of an explanation; None for a nuisance.
+
+        Args:
+            term: name of the explanation.
+            values: of its rows.
+        """
+
+    def parse(self, text: str) -> Effect:
+        """An effect as a diagnosis with this model writes it."""
+        return registry.parse(text)
 
     def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
         """What went on in each window, by name in words, each ``(W,)``.
 
-        For localising in which regime a gap sits and for the flexible ceiling:
-        commands, their signs and changes, heading, position, time.
+        For localising in which regime a gap sits: commands, their signs and changes,
+        heading, position, time.
         """
-        ...
+        del trial, windows
+        return {}
+
+    def motion(self, features: np.ndarray) -> np.ndarray:
+        """How fast each feature moved, ``(N, C)``: noise may grow with it."""
+        return np.abs(features)
+
+    def blocks(self, trials: Sequence[Trial], windows: Sequence[Windows]) -> np.ndarray:
+        """Number of the stretch that each window belongs to, ``(N,)``.
+
+        Stretches are what is resampled and left out. A trial is one; where there are
+        few trials, each `BLOCK` seconds.
+        """
+        made, first = [], 0
+        for trial, parts in zip(trials, windows, strict=True):
+            number = np.zeros(len(parts), dtype=int)
+            if len(trials) < FEW:
+                number = ((parts.times - trial.times[0]) / BLOCK).astype(int)
+            made.append(first + number)
+            first += int(number.max(initial=0)) + 1
+        return np.concatenate(made)
+
+    def at_rest(self, trial: Trial, predicted: np.ndarray) -> frozenset[str]:
+        """Observed channels that stand still because of what they measure does.
+
+        Args:
+            trial: recorded trial.
+            predicted: by the nominal model, ``(T, n_channels)``.
+        """
+        del trial, predicted
+        return frozenset()
+
+
+class LibraryModel(GapModel):
+    """A model whose rows say which effect of the library they are, and which is
+    simulated with effects.
+
+    Attributes:
+        known: its rows by explanation, as `rows` gave them last.
+    """
+
+    known: Mapping[str, tuple[Row, ...]] = {}
+
+    def remembered(self, rows: Sequence[Row]) -> tuple[Row, ...]:
+        """Rows, kept so that effects can be made of them."""
+        made: dict[str, tuple[Row, ...]] = {}
+        for row in rows:
+            made[row.term] = (*made.get(row.term, ()), row)
+        self.known = {**self.known, **made}
+        return tuple(rows)
+
+    def effect(self, term: str, values: Mapping[str, float]) -> Effect | None:
+        """See `GapModel.effect`."""
+        rows = [row for row in self.known[term] if row.name in values]
+        return made_of(rows, values)
+
+    def paths(
+        self,
+        trials: Sequence[Trial],
+        sets: Sequence[Sequence[Mapping[str, float]]],
+        *,
+        fine: bool = True,
+    ) -> list[list[np.ndarray]]:
+        """See `GapModel.paths`."""
+        del fine
+        made: list[list[np.ndarray]] = []
+        for row in sets:
+            same = [self._effects(values) for values in row]
+            if all(item == same[0] for item in same):
+                made += self.simulate(trials, [same[0]])
+                continue
+            made.append(
+                [
+                    self.simulate([trial], [effects])[0][0]
+                    for trial, effects in zip(trials, same, strict=True)
+                ]
+            )
+        return made
+
+    def _effects(self, values: Mapping[str, float]) -> tuple[Effect, ...]:
+        terms: dict[str, dict[str, float]] = {}
+        owner = {row.name: term for term, rows in self.known.items() for row in rows}
+        for name, value in values.items():
+            terms.setdefault(owner[name], {})[name] = value
+        found = [self.effect(term, rows) for term, rows in terms.items()]
+        return tuple(effect for effect in found if effect is not None)
+
+
+def made_of(rows: Sequence[Row], values: Mapping[str, float]) -> Effect | None:
+    """The effect that rows of one explanation make; None for a nuisance.
+
+    Args:
+        rows: of the explanation.
+        values: of them, by name.
+    """
+    moved = [row for row in rows if values[row.name] != row.nominal] or list(rows)
+    first = moved[0]
+    if not first.effect:
+        return None
+    given: dict[str, float | str] = {**first.fixed}
+    about = {p.name: p for p in registry.get(first.effect).parameters}
+    numbers = {row.parameter: float(values[row.name]) for row in moved}
+    if not set(numbers) <= set(about) and set(numbers) <= set(PLANE):
+        size, way = list(about)[:2]
+        x, y = (numbers.get(axis, 0.0) for axis in PLANE)
+        numbers = {size: float(np.hypot(x, y)), way: float(np.arctan2(y, x))}
+    for name, value in numbers.items():
+        value = min(max(value, about[name].low), about[name].high)
+        given[name] = round(value) if about[name].integer else value
+    return registry.make(first.effect, **given)

@@ -5,28 +5,38 @@ they were. Where a command lasts, speeds are the ones told; there is no dynamics
 that a lag or a delay is what dynamics looks like.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from bns.gap.candidates.mjcf import EXCITE, LATE, RATIOS, OwnCandidate
-from bns.gap.core import segments
-from bns.gap.models.base import Windows
-from bns.gap.models.mjcf import effects as own_effects
-from bns.gap.records import Candidate
-from bns.worlds.effects.base import ControlSignal, Effect
+from bns.gap.candidates.mjcf import EXCITE
+from bns.gap.decomposition.row import Row
+from bns.gap.models.base import LibraryModel, Windows
+from bns.gap.recordings import segments
+from bns.worlds.effects import registry
+from bns.worlds.effects.base import ControlSignal, Effect, PoseSignal
 from bns.worlds.physics import control
 from bns.worlds.trial import POSE_CHANNELS, Channel, Trial, body_displacement
 
 STEP = 0.01  # [s] grid of the integration
-WINDOW = 0.5  # [s] between two poses that are compared
+WINDOW, HORIZON = 0.5, 1.0  # [s] between two poses that are compared; in the fit
 LEAD = 1.0  # [s] of the first command before a trial, for what is late
 FASTEST, QUICKEST = 0.5, 2.0  # [m/s], [rad/s] limits of plans; assumed
 TOLD = ("forward_speed", "turning_rate")
-SLIGHT = (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
+LATE = (0.1, 0.2, 0.4)  # [s] delays and lags that fits are started from
+ZONES = (0.05, 0.15, 0.4)  # dead zones, likewise, of the largest
+OFFSETS, DEAD = (0.03, 0.1), (0.1, 0.3)  # [m/s], [rad/s] plausible and largest; assumed
+UNITS = {
+    ("command_offset", TOLD[0]): "m/s",
+    ("command_offset", TOLD[1]): "rad/s",
+    ("command_dead_zone", TOLD[0]): "m/s",
+    ("command_dead_zone", TOLD[1]): "rad/s",
+}
+LEAST = (5e-4, 5e-4, 2e-3)  # [m, m, rad] smallest believed deviations; assumed
 
 
-class UnicycleModel:
+class UnicycleModel(LibraryModel):
     """Kinematics of a robot told forward speed and turning rate.
 
     Args:
@@ -54,35 +64,29 @@ class UnicycleModel:
 
     dt = STEP
 
-    @staticmethod
-    def parse(text: str) -> Effect:
-        """An effect on this model, as a diagnosis writes it."""
-        return own_effects.parse(text)
+    @property
+    def least(self) -> np.ndarray:
+        """Smallest believed standard deviation of each feature [m, m, rad]."""
+        return np.array(LEAST)
 
-    def candidates(self) -> tuple[Candidate, ...]:
-        """Gains, delay, lag, offset and dead zones, in a fixed order."""
-        made = [
-            _candidate("command_gain", TOLD[0], "1", 1.0, RATIOS[1], 1.6, SLIGHT),
-            _candidate("command_gain", TOLD[1], "1", 1.0, RATIOS[1], 1.6, SLIGHT),
-            _candidate("command_delay", "all", "s", 0.0, 0.0, 1.0, (*LATE, 1.0)),
-            _candidate("command_lag", "all", "s", 0.0, 0.0, 1.0, (*LATE, 1.0)),
-        ]
-        for channel, unit, size in ((TOLD[0], "m/s", 0.1), (TOLD[1], "rad/s", 0.3)):
-            grid = tuple(size * share for share in (0.03, 0.1, 0.3, 1.0))
-            both = tuple(sorted((*grid, *(-value for value in grid))))
-            made.append(
-                _candidate("command_offset", channel, unit, 0.0, -size, size, both)
-            )
-            made.append(
-                _candidate("command_dead_zone", channel, unit, 0.0, 0.0, size, grid)
-            )
-        return tuple(made)
+    def rows(self, trials: Sequence[Trial]) -> tuple[Row, ...]:
+        """Gains, delay, lag, offsets, dead zones, and how the tracker sees it."""
+        del trials
+        return self.remembered(tuple(_rows()))
 
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
         """See `GapModel.simulate`: predicted poses, each ``(T, 3)`` [m, m, rad]."""
         return [[_path(trial, items) for trial in trials] for items in effects]
+
+    def joint_windows(self, trial: Trial) -> Windows:
+        """Windows of `HORIZON` between seen samples, half overlapping."""
+        return segments.overlapping(trial, HORIZON)
+
+    def motion(self, features: np.ndarray) -> np.ndarray:
+        """Speed of each feature over a window."""
+        return np.abs(features) / HORIZON
 
     def windows(self, trial: Trial) -> Windows:
         """Windows between samples that were seen."""
@@ -110,18 +114,52 @@ class UnicycleModel:
         }
 
 
-def _candidate(effect, part, unit, nominal, low, high, grid) -> OwnCandidate:
-    return OwnCandidate(
-        name=f"{effect}[{part}]",
-        effect=effect,
-        parameter=own_effects.CLASSES[effect].parameters[0].name,
-        unit=unit,
-        nominal=nominal,
+def _rows() -> Iterator[Row]:
+    for channel in TOLD:
+        yield _row("command_gain", "factor", 0.1, 0.4, 1.6, part=channel, slack=0.003)
+    for name, parameter in (
+        ("command_delay", "delay"),
+        ("command_lag", "time_constant"),
+    ):
+        yield _row(name, parameter, 0.1, 0, 1, part="all", levels=LATE, step=0.01)
+    for channel, offset, dead in zip(TOLD, OFFSETS, DEAD, strict=True):
+        size = dead
+        yield _row("command_offset", "added", offset / 3, -size, size, part=channel)
+        yield _row(
+            "command_dead_zone", "size", size / 3, 0, size, part=channel,
+            smooth=False, levels=tuple(size * share for share in ZONES),
+        )  # fmt: skip
+    yield _row("turning_loss", "loss", 0.05, 0, 0.3)
+    for axis in ("dx", "dy"):
+        yield _row("marker_mount", axis, 0.02, -0.2, 0.2, slack=2e-4)
+    yield _row("marker_mount", "yaw", 0.04, -0.5, 0.5, slack=1e-3)
+
+
+def _row(
+    effect: str,
+    parameter: str,
+    sd: float,
+    low: float,
+    high: float,
+    *,
+    part: str = "",
+    **more: Any,
+) -> Row:
+    known = registry.get(effect).parameters
+    about = next(p for p in known if p.name == parameter)
+    stem = effect if sum(p.scales for p in known) == 1 else f"{effect}.{parameter}"
+    return Row(
+        name=f"{stem}[{part}]" if part else stem,
+        nominal=float(about.nominal),
+        sd=sd,
         low=low,
         high=high,
-        grid=tuple(grid),
-        fixed={"part": part},
-        excite=EXCITE[effect],
+        unit=UNITS.get((effect, part), about.unit),
+        excite=EXCITE.get(effect, "arcs and turns"),
+        effect=effect,
+        parameter=parameter,
+        fixed={"part": part} if part else {},
+        **more,
     )
 
 
@@ -135,8 +173,9 @@ def _path(trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
     command = np.repeat(np.arange(-1, len(counts)), [lead, *counts])
     times = np.arange(len(values)) * STEP
     for effect in effects:
-        signal = ControlSignal(times, values, command, TOLD, STEP)
-        values = effect.apply(signal, on, rng)
+        if effect.stage == "command":
+            signal = ControlSignal(times, values, command, TOLD, STEP)
+            values = effect.apply(signal, on, rng)
     speed, rate = values[lead:].T
     seen = trial.poses_world[np.isfinite(trial.poses_world).all(axis=1)]
     x, y, yaw = seen[0]
@@ -149,6 +188,11 @@ def _path(trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
             turned,
         ]
     )
-    at = trial.times - trial.times[trial.boundaries[0]]
     grid = np.arange(made.shape[1]) * STEP
-    return np.stack([np.interp(at, grid, axis) for axis in made], axis=1)
+    poses, always = made.T, np.ones(len(grid), bool)
+    for effect in effects:
+        if effect.stage == "tracking":
+            signal = PoseSignal(grid, poses, grid, poses)
+            _, poses = effect.apply(signal, always, rng)
+    at = trial.times - trial.times[trial.boundaries[0]]
+    return np.stack([np.interp(at, grid, axis) for axis in poses.T], axis=1)

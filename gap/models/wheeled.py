@@ -10,14 +10,21 @@ import numpy as np
 from bns import models
 from bns.errors import BnsError
 from bns.gap.candidates import wheeled, wheeled_rows
-from bns.gap.core import segments as pieces
-from bns.gap.core.segments import WHOLE, Piece, moved, pieces_of, stitched, windows
 from bns.gap.decomposition.model import DecomposableModel
 from bns.gap.decomposition.row import Row
 from bns.gap.models import planar_rollout, wheeled_drives
 from bns.gap.models.base import Windows
 from bns.gap.models.planar_rollout import EVERY
 from bns.gap.models.surrogate import STEEPEST, Reduced, between, reduced
+from bns.gap.recordings import segments as pieces
+from bns.gap.recordings.segments import (
+    WHOLE,
+    Piece,
+    moved,
+    pieces_of,
+    stitched,
+    windows,
+)
 from bns.gap.records import Candidate
 from bns.worlds.active import Placed
 from bns.worlds.effects.base import ControlSignal, Effect, PoseSignal

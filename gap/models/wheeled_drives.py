@@ -10,7 +10,7 @@ import numpy as np
 
 from bns import models
 from bns.gap.candidates.wheeled_rows import LEAD, parameter
-from bns.gap.core.segments import moved
+from bns.gap.recordings.segments import moved
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import BodyEffect, ControlSignal, Effect
 from bns.worlds.physics import compile, observe, servo_joint

@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bns.gap.candidates import legged
-from bns.gap.core import segments
 from bns.gap.core.floor import Floor
 from bns.gap.core.problem import Problem
 from bns.gap.core.whitening import Whitener
@@ -20,6 +19,7 @@ from bns.gap.models.legged import lost as walk_lost
 from bns.gap.models.legged import signs as walk_signs
 from bns.gap.models.legged.signs import Signs
 from bns.gap.models.legged.where import Suspects
+from bns.gap.recordings import segments
 from bns.gap.records import Candidate
 from bns.models.legs import names as legs_of
 from bns.worlds.active import Stages, as_damage

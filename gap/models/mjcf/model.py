@@ -10,13 +10,13 @@ import numpy as np
 
 from bns.errors import FormatError, UnknownNameError
 from bns.gap.candidates import mjcf, mjcf_rows
-from bns.gap.core import segments
 from bns.gap.decomposition.model import DecomposableModel
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import Windows
 from bns.gap.models.mjcf import effects as own_effects
 from bns.gap.models.mjcf import log, prepared, start, view
 from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.recordings import segments
 from bns.gap.records import Candidate
 from bns.models import mjcf as mjcf_file
 from bns.storage import files
