@@ -20,7 +20,7 @@ from bns.worlds.physics import control
 from bns.worlds.trial import POSE_CHANNELS, Channel, Trial, body_displacement
 
 STEP = 0.01  # [s] grid of the integration
-WINDOW, HORIZON = 0.5, 1.0  # [s] between two poses that are compared; in the fit
+WINDOW = 0.5  # [s] between two poses that are compared
 LEAD = 1.0  # [s] of the first command before a trial, for what is late
 FASTEST, QUICKEST = 0.5, 2.0  # [m/s], [rad/s] limits of plans; assumed
 TOLD = ("forward_speed", "turning_rate")
@@ -81,12 +81,12 @@ class UnicycleModel(LibraryModel):
         return [[_path(trial, items) for trial in trials] for items in effects]
 
     def joint_windows(self, trial: Trial) -> Windows:
-        """Windows of `HORIZON` between seen samples, half overlapping."""
-        return segments.overlapping(trial, HORIZON)
+        """Windows of `WINDOW` between seen samples, half overlapping."""
+        return segments.overlapping(trial, WINDOW)
 
     def motion(self, features: np.ndarray) -> np.ndarray:
         """Speed of each feature over a window."""
-        return np.abs(features) / HORIZON
+        return np.abs(features) / WINDOW
 
     def windows(self, trial: Trial) -> Windows:
         """Windows between samples that were seen."""
