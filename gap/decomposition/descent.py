@@ -12,7 +12,6 @@ from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.shares import HeldOut
 
 TURNS = 4  # of fitting and searching
-SINGLES = 4  # explanations that are tried alone
 ROUNDS = 2  # of levels
 MARGIN = 1.02  # of the held-out error that an autoregression may cost
 WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
@@ -124,7 +123,9 @@ def decompose(problem: Problem, start: Point | None = None) -> Point:
     start = start or nothing(problem)
     found = start.linear.search()[1]
     best = start
-    if found:
+    if found and problem.model.singly:
+        best = _others(problem, start, start)[0]
+    elif found:
         values = placed(problem, start.linear, found, start.values)
         best = descend(problem, values, found, start.noise)
         if len(best.support) > 1:
@@ -144,7 +145,8 @@ def decompose(problem: Problem, start: Point | None = None) -> Point:
 def _others(problem: Problem, start: Point, first: Point) -> list[Point]:
     """Points from the best single explanation and from all at once."""
     linear = start.linear
-    order = sorted(linear.free, key=lambda name: linear.cost({name}))[:SINGLES]
+    order = sorted(linear.free, key=lambda name: linear.cost({name}))
+    order = order[: problem.model.singles]
     few = problem.sample(fit.ROUGH)
     few = None if len(few) == len(problem.trials) else few
     tried = []

@@ -11,10 +11,10 @@ import numpy as np
 from bns.gap.decomposition import descent, onset, rest, shares, words
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Support
-from bns.gap.decomposition.model import DecomposableModel
 from bns.gap.decomposition.onset import Onset
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.shares import Part
+from bns.gap.models.base import GapModel
 from bns.gap.records import Diagnosis, Fit, Verdict
 from bns.worlds.trial import Trial
 
@@ -161,7 +161,7 @@ class Clock:
 
 def diagnose(
     trials: Sequence[Trial],
-    model: DecomposableModel,
+    model: GapModel,
     *,
     seed: int = 0,
     faults: Sequence[str] = (),
@@ -238,6 +238,8 @@ def recorded(
             "sigma": made.floor.sigma.tolist(),
             "process": np.asarray(model.process).tolist(),
             "channels": [channel.name for channel in model.channels],
+            "features": np.median(made.point.noise.sd, axis=0).tolist(),
+            "counted": made.point.noise.lam,
         },
         closed=closed,
         warnings=(),

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bns.errors import BnsError
+from bns.worlds.effects import registry
+from bns.worlds.effects.base import Effect
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,18 @@ class Row:
     def term(self) -> str:
         """Name of the explanation it belongs to."""
         return self.group or self.name
+
+    def make(self, value: float) -> Effect:
+        """The effect of the library at a value, clipped to the bounds.
+
+        Raises:
+            UnknownNameError: the row is of no effect of the library.
+        """
+        about = {p.name: p for p in registry.get(self.effect).parameters}
+        value = min(max(float(value), self.low), self.high)
+        whole = about[self.parameter].integer
+        given = {**self.fixed, self.parameter: round(value) if whole else value}
+        return registry.make(self.effect, **given)
 
     @property
     def difference(self) -> float:

@@ -9,9 +9,11 @@ spoil all that follows.
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from bns.errors import BnsError
 from bns.gap.decomposition.row import Row
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect
@@ -58,9 +60,14 @@ class GapModel(ABC):
         limits: lowest and highest command and its unit, by channel; empty = not known.
         dt: physics step [s]; 0 = none.
         timed: whether commands last as long as they are told.
+        logs: whether `read_log` reads logs.
         memory: order of the autoregression that residuals may have; 0 = none.
         many: whether fits are also started from all rows at once: where many depart
             at once a tangent at the nominal misleads.
+        singles: explanations from which alone fits are started as well; more where a
+            tangent at the nominal says little of which it is.
+        singly: whether fits are started from single explanations alone: where there
+            are more rows than a tangent at the nominal can tell apart.
     """
 
     name: str
@@ -71,8 +78,11 @@ class GapModel(ABC):
     limits: Mapping[str, tuple[float, float, str]] = {}
     dt: float = 0.0
     timed: bool = True
+    logs: bool = False
     memory: int = 0
     many: bool = False
+    singles: int = 4
+    singly: bool = False
 
     @property
     @abstractmethod
@@ -183,6 +193,26 @@ class GapModel(ABC):
             first += int(number.max(initial=0)) + 1
         return np.concatenate(made)
 
+    def read_log(self, path: str) -> list[Trial]:
+        """Trials of a log as the model describes it, where `logs` says that it does.
+
+        Raises:
+            BnsError: it does not.
+        """
+        raise BnsError(f"{path}: model {self.name!r} describes no logs.")
+
+    def excitations(
+        self, *, seed: int = 0, told: Mapping[str, float] | None = None
+    ) -> tuple[Any, ...]:
+        """Commands for plans (`gap/planning/excitation.py`); empty = by its limits.
+
+        Args:
+            seed: of random ones.
+            told: settings of the robot that all recordings share.
+        """
+        del seed, told
+        return ()
+
     def at_rest(self, trial: Trial, predicted: np.ndarray) -> frozenset[str]:
         """Observed channels that stand still because of what they measure does.
 
@@ -214,8 +244,8 @@ class LibraryModel(GapModel):
 
     def effect(self, term: str, values: Mapping[str, float]) -> Effect | None:
         """See `GapModel.effect`."""
-        rows = [row for row in self.known[term] if row.name in values]
-        return made_of(rows, values)
+        found = effects_of([r for r in self.known[term] if r.name in values], values)
+        return found[0] if found else None
 
     def paths(
         self,
@@ -224,20 +254,22 @@ class LibraryModel(GapModel):
         *,
         fine: bool = True,
     ) -> list[list[np.ndarray]]:
-        """See `GapModel.paths`."""
+        """See `GapModel.paths`; there is one step alone."""
         del fine
-        made: list[list[np.ndarray]] = []
-        for row in sets:
-            same = [self._effects(values) for values in row]
-            if all(item == same[0] for item in same):
-                made += self.simulate(trials, [same[0]])
-                continue
-            made.append(
-                [
-                    self.simulate([trial], [effects])[0][0]
-                    for trial, effects in zip(trials, same, strict=True)
-                ]
-            )
+        wanted: dict[tuple[Effect, ...], list[tuple[int, int]]] = {}
+        made: list[list[np.ndarray]] = [[np.empty(0)] * len(trials) for _ in sets]
+        for place, row in enumerate(sets):
+            for number, values in enumerate(row):
+                wanted.setdefault(self._effects(values), []).append((place, number))
+        alike: dict[tuple[int, ...], list[tuple[Effect, ...]]] = {}
+        for effects, places in wanted.items():
+            needed = tuple(sorted({number for _, number in places}))
+            alike.setdefault(needed, []).append(effects)
+        for needed, groups in alike.items():
+            found = self.simulate([trials[number] for number in needed], groups)
+            for effects, paths in zip(groups, found, strict=True):
+                for place, number in wanted[effects]:
+                    made[place][number] = paths[needed.index(number)]
         return made
 
     def _effects(self, values: Mapping[str, float]) -> tuple[Effect, ...]:
@@ -245,24 +277,36 @@ class LibraryModel(GapModel):
         owner = {row.name: term for term, rows in self.known.items() for row in rows}
         for name, value in values.items():
             terms.setdefault(owner[name], {})[name] = value
-        found = [self.effect(term, rows) for term, rows in terms.items()]
-        return tuple(effect for effect in found if effect is not None)
+        return tuple(
+            effect
+            for term, rows in terms.items()
+            for effect in effects_of(
+                [r for r in self.known[term] if r.name in rows], rows
+            )
+        )
 
 
-def made_of(rows: Sequence[Row], values: Mapping[str, float]) -> Effect | None:
-    """The effect that rows of one explanation make; None for a nuisance.
+def effects_of(rows: Sequence[Row], values: Mapping[str, float]) -> list[Effect]:
+    """The effects that rows of one explanation make, one for each way in which it may
+    act; none for a nuisance.
 
     Args:
         rows: of the explanation.
         values: of them, by name.
     """
-    moved = [row for row in rows if values[row.name] != row.nominal] or list(rows)
-    first = moved[0]
-    if not first.effect:
-        return None
+    moved = [row for row in rows if values[row.name] != row.nominal] or list(rows[:1])
+    ways: dict[str, list[Row]] = {}
+    for row in moved:
+        if row.effect:
+            ways.setdefault(str(sorted(row.fixed.items())), []).append(row)
+    return [_made(group, values) for group in ways.values()]
+
+
+def _made(rows: Sequence[Row], values: Mapping[str, float]) -> Effect:
+    first = rows[0]
     given: dict[str, float | str] = {**first.fixed}
     about = {p.name: p for p in registry.get(first.effect).parameters}
-    numbers = {row.parameter: float(values[row.name]) for row in moved}
+    numbers = {row.parameter: float(values[row.name]) for row in rows}
     if not set(numbers) <= set(about) and set(numbers) <= set(PLANE):
         size, way = list(about)[:2]
         x, y = (numbers.get(axis, 0.0) for axis in PLANE)
