@@ -10,7 +10,6 @@ BAR = "0.85 to 0.95"
 def run(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
     from bns.gap.bench import scoring
-    from bns.gap.core import conformal
 
     found = [row for row in ensure(quick) if "verdict" in row["said"]]
     known = [row for row in found if row["kind"] in ("single", "pair")]
@@ -29,21 +28,8 @@ def run(quick: bool) -> Result:
                 scoring.of(named, "single", 3.0)
             ),
             "pair": _share([r for r in named if r["kind"] == "pair"]),
-            conformal.TIMING: _share([r for r in named if _about(r, True)]),
-            conformal.OTHER: _share([r for r in named if _about(r, False)]),
         },
     )
-
-
-def _about(row: dict, time: bool) -> bool:
-    """Whether all of a row's effects are about time, or none of them."""
-    from bns.gap.bench import scoring
-    from bns.gap.core import conformal
-
-    groups = {
-        conformal.group(*scoring.described(name)) for name in row["answer"]["names"]
-    }
-    return groups == {conformal.TIMING if time else conformal.OTHER}
 
 
 def _share(rows: list[dict]) -> dict[str, float]:

@@ -37,15 +37,16 @@ def _median(ordered: list[float]) -> float | None:
 def _cold() -> tuple[float, float]:
     from bench.gap_effects import other_solver
     from bns.gap.bench import cases
+    from bns.gap.bench.wheeled_cases import WheeledStand
     from bns.gap.diagnose import diagnose
-    from bns.gap.models.surrogate import between, reduced
     from bns.gap.models.wheeled import WheeledModel
 
     case = cases.build(
-        3, "single", WheeledModel(), extra=other_solver(), wanted="wheel_gain[left]"
+        3,
+        "single",
+        WheeledStand(WheeledModel(), other_solver()),
+        wanted="wheel_gain[left]",
     )
-    reduced.cache_clear()
-    between.cache_clear()
     begin, busy = time.perf_counter(), time.process_time()
     diagnose(case.trials, WheeledModel(threads=1))
     return time.perf_counter() - begin, time.process_time() - busy

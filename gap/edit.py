@@ -79,7 +79,7 @@ def edit(
     kept = tuple(store.parse(text, model) for _, text in pairs)
     left = tuple(store.parse(text, model) for name, text in pairs if name not in gone)
     sets: dict[str, tuple[Effect, ...]] = {"edited": left, "kept": kept, "nominal": ()}
-    losses = _losses(usable, model, sets)
+    losses = errors(usable, model, sets)
     compared = Compared.diagnosed(found, usable, model)
     return Edited(
         tuple(gone),
@@ -92,11 +92,16 @@ def edit(
     )
 
 
-def _losses(
+def errors(
     trials: Sequence[Trial], model: GapModel, sets: Mapping[str, Sequence[Effect]]
 ) -> dict[str, float]:
-    """Loss per residual of each set of effects; 1 = what no row of the model explains
-    of this recording."""
+    """Loss per residual of sets of effects; 1 = what no row of the model explains.
+
+    Args:
+        trials: a checked recording.
+        model: nominal model.
+        sets: of effects, by name.
+    """
     problem = Problem.of(trials, model)
     sd = descent.nothing(problem).noise.sd
     made = {}

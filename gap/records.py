@@ -50,7 +50,7 @@ class Fit:
         intervals: 90 % interval of each magnitude.
         units: of the magnitudes.
         loss: minus twice the log-likelihood on all trials, the noise's constant left
-            out (robust; see `gap/core/whitening.py`).
+            out (robust).
         held_out: the same on trials that were not fitted, all folds together.
         held_out_se: standard error over trials of the improvement on nothing.
         evidence: minus twice the log marginal likelihood (Laplace).

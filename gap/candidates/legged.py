@@ -77,6 +77,14 @@ def rows(
     )
 
 
+def unsure(joints: Sequence[str] = JOINTS) -> tuple[Row, ...]:
+    """Numbers of all legs together that even a sound robot's model is unsure of."""
+    shin = f"link_length[{parts(joints)[-1]},all]"
+    names_ = ("servo_gain[all]", "servo_voltage[all]", "foot_slippery[all]", "payload")
+    every = rows(Suspects((), (), True), joints)
+    return tuple(row for row in every if row.name in (*names_, shin))
+
+
 def lost(signs: Signs) -> tuple[Row, ...]:
     """Legs and joints that may be lost, by what servos say of them."""
     return (

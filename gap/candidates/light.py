@@ -10,10 +10,11 @@ from bns.models.light_sites import NAMES, SIDES
 from bns.worlds.effects import registry
 from bns.worlds.effects.sensors import FORWARD, SINGLE
 
+SHARE = 0.02  # slack of a number over its plausible departure; assumed
 GROUPS = ("all", "left", "right")
 HEADING = 0.005  # [rad] how well the tracker's zero of a heading is known; assumed
-RHYTHMS = np.arange(0.05, 1.26, 0.0125)  # [Hz] of a flicker that are tried
-AZIMUTHS, WIDTHS = np.arange(-8, 8) * np.pi / 8, (0.7, 1.5, 3.0)  # [rad] of a shadow
+RHYTHMS = np.arange(0.05, 1.26, 0.025)  # [Hz] of a flicker that are tried
+AZIMUTHS, WIDTHS = np.arange(-6, 6) * np.pi / 6, (0.7, 1.5, 3.0)  # [rad] of a shadow
 
 # effect, parameter, plausible departure (standard deviation), low, high, slack of a
 # single sensor (what sensors of one kind differ by), settings; all assumed.
@@ -25,7 +26,7 @@ _SENSORS: tuple[tuple[str, str, float, float, float, float, dict[str, Any]], ...
     ("sensor_stuck_min", "blend", 0.3, 0, 1, 0.0, {"levels": (0.5, 1.0)}),
     ("sensor_intermittent", "every", 1.0, 0, 20, 0.0,
      {"smooth": False, "stepped": True, "levels": (2, 3, 4, 5, 6, 8, 11, 15)}),
-    ("sensor_noise", "factor", 1.0, 0, 20, 0.0, {"levels": (2.5, 6.0)}),
+    ("sensor_noise", "factor", 1.0, 0, 20, 0.1, {"levels": (2.5, 6.0)}),
     ("sensor_dead", "loss", 0.3, 0, 1, 0.01, {"levels": (0.5, 1.0)}),
     ("sensor_frozen", "blend", 0.3, 0, 1, 0.0, {"levels": (0.5, 1.0)}),
     ("sensor_drift", "rate", 20, -300, 300, 0.0, {"levels": (-100, -30, 30, 100)}),
@@ -85,9 +86,9 @@ def _sensors(names: Iterable[str]) -> Iterable[Row]:
 
 def _slack(effect: str, sensor: str, single: float) -> float:
     """How uncertain the nominal sensors are: each, and the robot's heading for all."""
-    if sensor in GROUPS:
-        return HEADING if (effect, sensor) == ("sensor_misaligned", "all") else 0.0
-    return single
+    if sensor not in GROUPS or effect == "sensor_noise":
+        return single
+    return HEADING if (effect, sensor) == ("sensor_misaligned", "all") else 0.0
 
 
 def _light() -> Iterable[Row]:
@@ -148,5 +149,5 @@ def _row(
         excite=EXCITE.get(effect, usual),
         effect=effect,
         parameter=parameter,
-        **more,
+        **{**more, "slack": more.get("slack") or SHARE * sd},
     )

@@ -124,7 +124,7 @@ def decompose(problem: Problem, start: Point | None = None) -> Point:
     found = start.linear.search()[1]
     best = start
     if found and problem.model.singly:
-        best = _others(problem, start, start)[0]
+        best = _alone(problem, start)
     elif found:
         values = placed(problem, start.linear, found, start.values)
         best = descend(problem, values, found, start.noise)
@@ -144,22 +144,52 @@ def decompose(problem: Problem, start: Point | None = None) -> Point:
 
 def _others(problem: Problem, start: Point, first: Point) -> list[Point]:
     """Points from the best single explanation and from all at once."""
-    linear = start.linear
-    order = sorted(linear.free, key=lambda name: linear.cost({name}))
-    order = order[: problem.model.singles]
-    few = problem.sample(fit.ROUGH)
-    few = None if len(few) == len(problem.trials) else few
-    tried = []
-    for name in order:
-        values = placed(problem, linear, {name}, start.values)
-        fitted = _fitted(problem, {name})
-        values, rest = newton(problem, values, fitted, start.noise, turns=4, only=few)
-        tried.append((first.noise.loss(rest), name, values))
+    tried = _singles(problem, start, first.noise)
     _, name, values = min(tried, key=lambda item: item[0])
     made = [descend(problem, values, {name}, first.noise)]
     if problem.model.many:
         made.append(_from_all(problem, start))
     return made
+
+
+def _singles(problem: Problem, start: Point, known: Noise) -> list[tuple]:
+    """Loss, name and values of the single explanations that come first in a tangent,
+    each fitted to a part of the recording."""
+    linear = start.linear
+    order = sorted(linear.free, key=lambda name: linear.cost({name}))
+    few = problem.sample(fit.ROUGH)
+    few = None if len(few) == len(problem.trials) else few
+    tried = []
+    for name in order[: problem.model.singles]:
+        values = placed(problem, linear, {name}, start.values)
+        fitted = _fitted(problem, {name})
+        values, rest = newton(problem, values, fitted, start.noise, turns=4, only=few)
+        tried.append((known.loss(rest), name, values))
+    return tried
+
+
+def _alone(problem: Problem, start: Point) -> Point:
+    """From the single explanation that leaves least, those without a slope included."""
+    tried = _singles(problem, start, start.noise)
+    sets = [
+        (row.term, number, value)
+        for number, row in enumerate(problem.rows)
+        for value in row.levels
+        if not row.smooth and value != row.nominal
+    ]
+    moved = []
+    for _, number, value in sets:
+        values = start.values.copy()
+        values[number] = value
+        moved.append(values)
+    if moved:
+        made = problem.predict(moved, fine=False)
+        for (name, _, _), values, path in zip(sets, moved, made, strict=True):
+            if np.isfinite(path[problem.seen]).all():
+                left = start.noise.loss(problem.recorded - path)
+                tried.append((left, name, values))
+    _, name, values = min(tried, key=lambda item: item[0])
+    return descend(problem, values, {name}, start.noise)
 
 
 def _from_all(problem: Problem, start: Point) -> Point:

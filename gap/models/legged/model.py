@@ -12,8 +12,9 @@ import numpy as np
 from bns.gap.candidates import legged
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import LibraryModel, Windows
+from bns.gap.models.legged import lost as walk_lost
+from bns.gap.models.legged import scatter, where
 from bns.gap.models.legged import signs as walk_signs
-from bns.gap.models.legged import where
 from bns.gap.models.legged.signs import Signs
 from bns.gap.recordings import segments
 from bns.worlds.active import Stages, as_damage
@@ -67,6 +68,7 @@ class WalkModel(LibraryModel):
             *joints,
         )
         self.process = np.array([*SCATTER, *[WOBBLE] * len(joints)])
+        self._walks: dict[bytes, np.ndarray] = {}
         self.resolution = np.array([*pose_sd, *[READING] * len(joints)])
 
     @property
@@ -84,7 +86,42 @@ class WalkModel(LibraryModel):
             for trial, path in zip(trials, predicted, strict=True)
         ]
         found = where.suspects(rests, self.joints, READING)
-        return self.remembered(legged.rows(found, self.joints, signs))
+        lost = walk_lost.likely(trials, legged.lost(signs), self.simulate)
+        self._scatter(trials, lost)
+        listed = legged.rows(found, self.joints, signs)
+        return self.remembered((*listed, *scatter.rows()))
+
+    def _scatter(self, trials: Sequence[Trial], lost: Sequence[Effect]) -> None:
+        """Simulate the robots that this one may be, see `scatter`."""
+        drawn = scatter.robots(legged.unsure(self.joints))
+        sets = [lost, *((*robot, *lost) for robot in drawn)]
+        midst, *walks = self.simulate(trials, sets)
+        for number, trial in enumerate(trials):
+            made = np.stack([walk[number] - midst[number] for walk in walks])
+            self._walks[_key(trial)] = np.nan_to_num(made)
+
+    def paths(
+        self,
+        trials: Sequence[Trial],
+        sets: Sequence[Sequence[Mapping[str, float]]],
+        *,
+        fine: bool = True,
+    ) -> list[list[np.ndarray]]:
+        """See `GapModel.paths`: what walks scatter is added to what effects do."""
+        own = [
+            [{n: v for n, v in row.items() if scatter.number(n) < 0} for row in values]
+            for values in sets
+        ]
+        made = super().paths(trials, own, fine=fine)
+        for paths, values in zip(made, sets, strict=True):
+            for at, (trial, row) in enumerate(zip(trials, values, strict=True)):
+                shares = {scatter.number(n): v for n, v in row.items()}
+                shares.pop(-1, None)
+                if shares:
+                    walks = self._walks[_key(trial)][list(shares)]
+                    off = np.tensordot(list(shares.values()), walks, axes=1)
+                    paths[at] = paths[at] + off
+        return made
 
     def signs(self, trials: Sequence[Trial], predicted: Sequence[np.ndarray]) -> Signs:
         """What the servos say of joints and legs that hold, hang or are gone."""
@@ -154,6 +191,11 @@ class WalkModel(LibraryModel):
             "time since the command changed": windows.times - times[at],
             "time in the trial": windows.times - times[0],
         }
+
+
+def _key(trial: Trial) -> bytes:
+    told = trial.commands.values.tobytes() + trial.times.tobytes()
+    return told + trial.boundaries.tobytes()
 
 
 def _sloping(effects: Sequence[Effect]) -> bool:

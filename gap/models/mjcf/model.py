@@ -66,9 +66,9 @@ class OwnModel(GapModel):
         if config.keyframe:
             _index(model, "key", config.keyframe)  # there, before anything runs
         self.view = view.View.of(config, model)
-        listed = mjcf.candidates(config, model)
+        self.listed = mjcf.candidates(config, model)
         self._terms = {
-            item.name: item for item in (*listed, *mjcf_rows.grouped(listed))
+            item.name: item for item in (*self.listed, *mjcf_rows.grouped(self.listed))
         }
 
     @classmethod

@@ -132,10 +132,7 @@ def _near(candidate: Row, at: float) -> np.ndarray:
     grid = np.unique([*candidate.levels, candidate.nominal])
     after = int(np.clip(np.searchsorted(grid, at), 1, len(grid) - 1))
     low, high = grid[after - 1], grid[after]
-    if ratio(candidate):
-        made = at * (high / low) ** FINE
-    else:
-        made = at + (high - low) * FINE
+    made = at * (high / low) ** FINE if ratio(candidate) else at + (high - low) * FINE
     return np.clip(made, candidate.low, candidate.high)
 
 
