@@ -6,7 +6,7 @@ import math
 import os
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -19,7 +19,6 @@ from bns.errors import BnsError, UnknownNameError
 
 HERE = Path(__file__).resolve().parent
 RESULTS = HERE / "results"
-CONSTANTS = ("DOC", "BAR")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,7 +27,7 @@ class Bench:
 
     Attributes:
         name: as given on the command line, with dashes.
-        module: importable name.
+        module: importable name of the module that has its function.
         doc: what is measured.
         bar: the bar as text.
     """
@@ -40,13 +39,14 @@ class Bench:
 
     def run(self, *, quick: bool) -> Result:
         """Measure."""
-        return import_module(self.module).run(quick=quick)
+        function = getattr(import_module(self.module), self.name.replace("-", "_"))
+        return function(quick=quick)
 
 
 def discover(directory: Path = HERE) -> dict[str, Bench]:
-    """All benches by name: the modules that define `DOC`, `BAR` and `run`."""
-    found = (_read(path) for path in sorted(directory.glob("*.py")))
-    return {bench.name: bench for bench in found if bench}
+    """All benches by name: the functions that `bench.result.bench` marks."""
+    found = [each for path in directory.rglob("*.py") for each in _read(path)]
+    return {each.name: each for each in sorted(found, key=lambda each: each.name)}
 
 
 def find(name: str) -> Bench:
@@ -144,21 +144,18 @@ def plain(value: object) -> object:
     return value
 
 
-def _read(path: Path) -> Bench | None:
+def _read(path: Path) -> Iterator[Bench]:
     tree = ast.parse(path.read_text(), filename=str(path))
-    has_run = any(isinstance(n, ast.FunctionDef) and n.name == "run" for n in tree.body)
-    texts = {
-        target.id: node.value.value
-        for node in tree.body
-        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant)
-        for target in node.targets
-        if isinstance(target, ast.Name) and target.id in CONSTANTS
-    }
-    if not has_run or set(texts) != set(CONSTANTS):
-        return None
-    return Bench(
-        name=path.stem.replace("_", "-"),
-        module=f"{__package__}.{path.stem}",
-        doc=texts["DOC"],
-        bar=texts["BAR"],
-    )
+    module = ".".join(path.relative_to(HERE.parent).with_suffix("").parts)
+    for function in tree.body:
+        if not isinstance(function, ast.FunctionDef):
+            continue
+        for mark in function.decorator_list:
+            match mark:
+                case ast.Call(
+                    func=ast.Name("bench"),
+                    args=[ast.Constant(doc)],
+                    keywords=[ast.keyword("bar", ast.Constant(bar))],
+                ):
+                    name = function.name.replace("_", "-")
+                    yield Bench(name=name, module=module, doc=str(doc), bar=str(bar))

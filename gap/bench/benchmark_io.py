@@ -18,7 +18,7 @@ from bns.gap.bench import scoring
 from bns.gap.bench.cases import Answer, Case
 from bns.gap.diagnose import diagnose
 from bns.gap.models.base import GapModel
-from bns.gap.records import Diagnosis, plain
+from bns.gap.records import plain
 from bns.storage import files, journal, reading, seal
 from bns.worlds.data import dataset
 
@@ -97,9 +97,7 @@ def score(said: Path, answers: Path) -> list[dict[str, Any]]:
             raise FormatError(f"{answers} has no answer for {line['name']!r}.")
         answer, found = known[line["name"]], line["diagnosis"]
         row = {"kind": answer["kind"], "seed": line["name"], "answer": answer}
-        row["said"] = (
-            found if "error" in found else scoring.said_of(Diagnosis.of(found))
-        )
+        row["said"] = found if "error" in found else scoring.said_of(found)
         row["seconds"] = sum(found.get("seconds", {}).values())
         rows.append(row)
     return rows

@@ -1,7 +1,8 @@
 """Scores of the withheld-effect bench, from the rows that its runner writes."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from itertools import pairwise, permutations
 from typing import Any
 
@@ -26,7 +27,7 @@ def row(kind: str, seed: int, case: Case, found: Diagnosis) -> dict[str, Any]:
         case: with the true answer.
         found: the diagnosis.
     """
-    said = said_of(found)
+    said = said_of(asdict(found))
     said["intervals"] = _intervals(found, case.answer.names)
     return {"kind": kind, "seed": seed, "answer": case.answer.as_dict(), "said": said}
 
@@ -49,23 +50,24 @@ def edited(found: Diagnosis, case: Case, model: GapModel) -> dict[str, float]:
     return errors(alone, model, sets)
 
 
-def said_of(found: Diagnosis) -> dict[str, Any]:
-    """What a diagnosis says, without its fits."""
-    verdict = found.verdict
+def said_of(found: Mapping[str, Any]) -> dict[str, Any]:
+    """What a diagnosis says, without its fits.
+
+    Args:
+        found: the diagnosis as plain data; what it leaves out is not scored.
+    """
+    verdict = found["verdict"]
+    made = {key: verdict[key] for key in ("named", "sets", "p_gap", "p_misfit")}
+    parts = found.get("decomposition", {}).get("parts", ())
     return {
-        "verdict": verdict.kind,
-        "named": verdict.named,
-        "sets": verdict.sets,
-        "p_gap": verdict.p_gap,
-        "p_misfit": verdict.p_misfit,
-        "ranked": found.signatures.get("ranked", []),
-        "faults": found.faults,
-        "closed": found.closed.get("closed"),
-        "before": found.closed.get("before"),
-        "after": found.closed.get("after"),
-        "parts": [part["name"] for part in found.decomposition.get("parts", ())],
-        "left": found.decomposition.get("left"),
-        "seconds": dict(found.seconds),
+        **made,
+        "verdict": verdict["kind"],
+        "ranked": found["signatures"].get("ranked", []),
+        "faults": found.get("faults", ()),
+        **{key: found["closed"].get(key) for key in ("closed", "before", "after")},
+        "parts": [part["name"] for part in parts],
+        "left": found.get("decomposition", {}).get("left"),
+        "seconds": dict(found.get("seconds", {})),
     }
 
 

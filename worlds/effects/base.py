@@ -21,7 +21,7 @@ import numpy as np
 
 from bns.errors import BnsError, UnknownNameError
 from bns.worlds.effects.leg_sets import SERVO, chosen
-from bns.worlds.effects.parameter import Choice, Parameter
+from bns.worlds.effects.parameter import Choice, Parameter, factor, strength
 from bns.worlds.effects.signals import ControlSignal, PoseSignal
 from bns.worlds.physics.servo_law import clipped
 
@@ -39,6 +39,8 @@ __all__ = [
     "SensorEffect",
     "ServoEffect",
     "TrackingEffect",
+    "factor",
+    "strength",
 ]
 
 STAGES = ("command", "actuator", "body", "sensor", "tracking")
@@ -47,7 +49,8 @@ STAGES = ("command", "actuator", "body", "sensor", "tracking")
 class Effect(ABC):
     """One departure from the nominal model, with its parameter values.
 
-    Subclasses say what they are in class variables; they add no `__init__`.
+    Subclasses say what they are in class variables; they add no `__init__`. The first
+    line of a subclass's docstring is its `doc`, unless it gives another.
 
     Args:
         values: parameter and choice values by name; missing ones take the
@@ -66,6 +69,12 @@ class Effect(ABC):
     robots: ClassVar[tuple[str, ...]] = ("wheeled",)  # kinds it makes sense for
     random: ClassVar[bool] = False  # whether it draws from the generator
     source: ClassVar[str] = ""  # page, paper or "assumed" for the model
+
+    def __init_subclass__(cls, **words: Any) -> None:
+        super().__init_subclass__(**words)
+        if "doc" not in cls.__dict__ and cls.__doc__:
+            first = cls.__doc__.partition("\n")[0]
+            cls.doc = first[:1].lower() + first[1:].removesuffix(".")
 
     def __init__(self, values: Mapping[str, Any] | None = None):
         given = dict(values or {})

@@ -53,6 +53,37 @@ class Parameter:
         return number
 
 
+def factor(
+    bounds: tuple[float, float], doc: str, *, example: float, scales: bool = True
+) -> Parameter:
+    """A ratio to the nominal value: at 1 the effect changes nothing.
+
+    Args:
+        bounds: inclusive.
+        doc, example, scales: see `Parameter`.
+    """
+    return Parameter("factor", "1", 1.0, *bounds, doc, example, scales=scales)
+
+
+def strength(
+    name: str,
+    unit: str,
+    bounds: tuple[float, float],
+    doc: str,
+    *,
+    example: float,
+    integer: bool = False,
+    scales: bool = True,
+) -> Parameter:
+    """A number that is 0 where the effect changes nothing.
+
+    Args:
+        bounds: inclusive.
+        name, unit, doc, example, integer, scales: see `Parameter`.
+    """
+    return Parameter(name, unit, 0.0, *bounds, doc, example, integer, scales)
+
+
 @dataclass(frozen=True)
 class Choice:
     """A setting with named alternatives (`wheel` = left, right, both).

@@ -2,36 +2,31 @@
 
 import numpy as np
 
-from bns.worlds.effects.base import ActuatorEffect, ControlSignal, Parameter
+from bns.worlds.effects.base import ActuatorEffect, ControlSignal, Parameter, strength
 
 
 class BatterySag(ActuatorEffect):
-    """The speed decays exponentially with time on and with distance driven.
+    """The speed reached falls during a trial, with time and with use.
 
     Every trial starts with a full battery (worlds hold no state between trials); a
     decline over trials is a `wheel_gain` with a ramp.
     """
 
     name = "battery_sag"
-    doc = "the speed reached falls during a trial, with time and with use"
     source = "assumed: speed in proportion to supply, exponential discharge"
     parameters = (
-        Parameter(
+        strength(
             "per_second",
-            unit="1/s",
-            nominal=0.0,
-            low=0.0,
-            high=0.2,
-            doc="share of the speed lost per second; bounds assumed",
+            "1/s",
+            (0.0, 0.2),
+            "share of the speed lost per second; bounds assumed",
             example=0.01,
         ),
-        Parameter(
+        strength(
             "per_metre",
-            unit="1/m",
-            nominal=0.0,
-            low=0.0,
-            high=2.0,
-            doc="share of the speed lost per metre told to drive; bounds assumed",
+            "1/m",
+            (0.0, 2.0),
+            "share of the speed lost per metre told to drive; bounds assumed",
             example=0.05,
         ),
     )
@@ -52,23 +47,20 @@ class BatterySag(ActuatorEffect):
 
 
 class BatteryFade(ActuatorEffect):
-    """The speed decays exponentially with the number of trials that were driven.
+    """The speed reached falls from trial to trial.
 
     In an experiment the trials since the onset are counted; with a recurrence the
     battery is charged at the start of every period.
     """
 
     name = "battery_fade"
-    doc = "the speed reached falls from trial to trial"
     source = "assumed: speed in proportion to supply, exponential discharge"
     parameters = (
-        Parameter(
+        strength(
             "per_trial",
-            unit="1",
-            nominal=0.0,
-            low=0.0,
-            high=0.5,
-            doc="share of the speed lost with each trial; bounds assumed",
+            "1",
+            (0.0, 0.5),
+            "share of the speed lost with each trial; bounds assumed",
             example=0.02,
         ),
         Parameter(

@@ -2,29 +2,26 @@
 
 import numpy as np
 
-from bns.worlds.effects.base import ActuatorEffect, ControlSignal, Parameter
+from bns.worlds.effects.base import ActuatorEffect, ControlSignal, strength
 from bns.worlds.effects.common import WHEEL, columns, spans
 
 
 class MotorLag(ActuatorEffect):
-    """A first-order lag on top of the robot model's own.
+    """The wheels follow their commands with a first-order lag.
 
     Solved exactly for commands that are constant over a physics step: a step from rest
     has reached 1 - 1/e = 63.2 % at the time constant.
     """
 
     name = "motor_lag"
-    doc = "the wheels follow their commands with a first-order lag"
     source = "first-order model assumed; the lab's robot loses 0.07-0.14 s from rest"
     choices = (WHEEL,)
     parameters = (
-        Parameter(
+        strength(
             "time_constant",
-            unit="s",
-            nominal=0.0,
-            low=0.0,
-            high=2.0,
-            doc="time to 63 % of a step; bounds assumed",
+            "s",
+            (0.0, 2.0),
+            "time to 63 % of a step; bounds assumed",
             example=0.2,
         ),
     )
@@ -50,24 +47,21 @@ class MotorLag(ActuatorEffect):
 
 
 class WheelBacklash(ActuatorEffect):
-    """Play between a wheel and its motor: at each reversal some travel is lost.
+    """Play between motor and wheel: travel is lost at each reversal.
 
     The motor turns as it is told; the wheel stands still while the play is open. A
     trial, or the effect, begins with the play half open either way.
     """
 
     name = "wheel_backlash"
-    doc = "play between motor and wheel: travel is lost at each reversal"
     source = "play operator (Nordin and Gutman, Automatica 38, 2002); bounds assumed"
     choices = (WHEEL,)
     parameters = (
-        Parameter(
+        strength(
             "play",
-            unit="m",
-            nominal=0.0,
-            low=0.0,
-            high=0.05,
-            doc="full play at the wheel's rim, angle times radius; bounds assumed",
+            "m",
+            (0.0, 0.05),
+            "full play at the wheel's rim, angle times radius; bounds assumed",
             example=0.005,
         ),
     )

@@ -6,7 +6,7 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.worlds.effects import parts
-from bns.worlds.effects.base import BodyEffect, Parameter
+from bns.worlds.effects.base import BodyEffect, Parameter, factor
 from bns.worlds.effects.parts import ALL, UNSERVOED, WIDE
 
 NO_BIAS, AFFINE = 0, 1  # mjtBias
@@ -14,24 +14,13 @@ LEAST = 1e-9  # of the force; MuJoCo takes a range of nothing for no limit at al
 
 
 def _factor(doc: str, example: float) -> tuple[Parameter, ...]:
-    return (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.0,
-            high=WIDE,
-            doc=doc,
-            example=example,
-        ),
-    )
+    return (factor((0.0, WIDE), doc, example=example),)
 
 
 class ActuatorGain(BodyEffect):
-    """An actuator gives a share of the force that it should."""
+    """An actuator is weaker, or stronger, than the model says."""
 
     name = "actuator_gain"
-    doc = "an actuator is weaker, or stronger, than the model says"
     source = "MuJoCo's actuator model: gain and bias scaled together"
     robots = UNSERVOED
     choices = parts.part("actuator")
@@ -64,10 +53,9 @@ def _servos(spec: Any, which: str, gain: int, called: str) -> list[Any]:
 
 
 class ActuatorKp(BodyEffect):
-    """The gain on the position error of a position actuator; damping stays."""
+    """The position gain of a servo differs from the model's."""
 
     name = "actuator_kp"
-    doc = "the position gain of a servo differs from the model's"
     source = "MuJoCo's position actuator: force = kp (goal - position) - kd speed"
     robots = UNSERVOED
     choices = parts.part("actuator")
@@ -89,10 +77,9 @@ class ActuatorKp(BodyEffect):
 
 
 class ActuatorKd(BodyEffect):
-    """The gain on the speed of a position actuator."""
+    """The damping gain of a servo differs from the model's."""
 
     name = "actuator_kd"
-    doc = "the damping gain of a servo differs from the model's"
     source = "MuJoCo's position actuator: force = kp (goal - position) - kd speed"
     robots = UNSERVOED
     choices = parts.part("actuator")
@@ -111,14 +98,13 @@ class ActuatorKd(BodyEffect):
 
 
 class ActuatorTorqueLimit(BodyEffect):
-    """The largest force of an actuator is scaled.
+    """An actuator's largest force or torque differs from the model's.
 
     Where the model gives no range of forces, the largest one is the gain times the
     largest control.
     """
 
     name = "actuator_torque_limit"
-    doc = "an actuator's largest force or torque differs from the model's"
     source = "MuJoCo's actuator model: the range of forces"
     robots = UNSERVOED
     choices = parts.part("actuator")

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from bns.worlds.effects import parts
-from bns.worlds.effects.base import BodyEffect, Parameter
+from bns.worlds.effects.base import BodyEffect, Parameter, strength
 from bns.worlds.effects.parts import ANY, UNSERVOED, WIDE
 
 
@@ -41,39 +41,35 @@ class _JointNumber(BodyEffect):
 
 
 class JointDamping(_JointNumber):
-    """A joint resists motion in proportion to its speed."""
+    """A joint is damped more, or less, than the model says."""
 
     name, field, robots = "joint_damping", "damping", UNSERVOED
-    doc = "a joint is damped more, or less, than the model says"
     parameters = _added("N m s/rad or N s/m", "damping", 0.05)
 
 
 class JointFriction(_JointNumber):
-    """A joint resists motion by a constant force."""
+    """A joint has more, or less, dry friction than the model says."""
 
     name, field, robots = "joint_friction", "frictionloss", UNSERVOED
-    doc = "a joint has more, or less, dry friction than the model says"
     parameters = _added("N m or N", "friction loss", 0.1)
 
 
 class JointArmature(_JointNumber):
-    """Inertia of a rotor that the joint turns."""
+    """A joint carries more, or less, rotor inertia than the model says."""
 
     name, field, robots = "joint_armature", "armature", UNSERVOED
-    doc = "a joint carries more, or less, rotor inertia than the model says"
     parameters = _added("kg m2 or kg", "armature", 0.02)
 
 
 class JointStiffness(_JointNumber):
-    """A spring at a joint."""
+    """A joint is held by a spring that the model does not know."""
 
     name, field, robots = "joint_stiffness", "stiffness", ANY
-    doc = "a joint is held by a spring that the model does not know"
     parameters = _added("N m/rad or N/m", "stiffness", 2.0)
 
 
 class JointStribeck(BodyEffect):
-    """Dry friction that is largest at standstill and fades with the joint's speed.
+    """A joint sticks: extra dry friction at low speed (Stribeck).
 
     friction = torque exp(-(v / speed)^2) in steady motion, by bristles that give way
     (LuGre). Their stiffness and damping follow from the joint's inertia and the
@@ -82,20 +78,13 @@ class JointStribeck(BodyEffect):
     """
 
     name = "joint_stribeck"
-    doc = "a joint sticks: extra dry friction at low speed (Stribeck)"
     source = "LuGre: Canudas de Wit et al., IEEE TAC 40(3), 1995; MuJoCo's dcmotor"
     robots = ("own",)
     choices = parts.part("joint")
     resizes = True
     parameters = (
-        Parameter(
-            "torque",
-            unit="N m or N",
-            nominal=0.0,
-            low=0.0,
-            high=WIDE,
-            doc="friction at standstill",
-            example=0.5,
+        strength(
+            "torque", "N m or N", (0.0, WIDE), "friction at standstill", example=0.5
         ),
         Parameter(
             "speed",
@@ -142,28 +131,17 @@ class JointStribeck(BodyEffect):
 
 
 class JointBacklash(BodyEffect):
-    """Play behind a joint: a second joint moves freely between two stops.
+    """Play between a joint's drive and what it moves.
 
     What drives and reads the joint is on the motor's side of the play.
     """
 
     name = "joint_backlash"
-    doc = "play between a joint's drive and what it moves"
     source = "backlash as a joint of its own with stops; bounds assumed"
     robots = ("own",)
     choices = parts.part("joint")
     resizes = True
-    parameters = (
-        Parameter(
-            "play",
-            unit="rad or m",
-            nominal=0.0,
-            low=0.0,
-            high=1.0,
-            doc="full play",
-            example=0.1,
-        ),
-    )
+    parameters = (strength("play", "rad or m", (0.0, 1.0), "full play", example=0.1),)
 
     def edit(self, spec: Any) -> None:
         """See `BodyEffect.edit`."""
@@ -174,7 +152,7 @@ class JointBacklash(BodyEffect):
 
 
 class EncoderOffset(BodyEffect):
-    """A joint's encoder reads a constant too much.
+    """A joint's encoder reads a constant too much, its servo goes by it.
 
     What is read and what is controlled is the reading: a position servo that is told
     an angle stands short of it by the offset, and reports the angle told. End stops
@@ -182,19 +160,12 @@ class EncoderOffset(BodyEffect):
     """
 
     name = "encoder_offset"
-    doc = "a joint's encoder reads a constant too much, its servo goes by it"
     source = "MuJoCo's joint coordinate, shifted; bounds: half a turn"
     robots = ("own",)
     choices = parts.part("joint")
     parameters = (
-        Parameter(
-            "added",
-            unit="rad or m",
-            nominal=0.0,
-            low=-3.2,
-            high=3.2,
-            doc="reading minus true position",
-            example=0.1,
+        strength(
+            "added", "rad or m", (-3.2, 3.2), "reading minus true position", example=0.1
         ),
     )
 

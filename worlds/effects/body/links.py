@@ -7,27 +7,24 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.worlds.effects import parts
-from bns.worlds.effects.base import BodyEffect, Parameter
+from bns.worlds.effects.base import BodyEffect, Parameter, factor, strength
 from bns.worlds.effects.bodies import Inertial
 from bns.worlds.effects.parts import ANY, WIDE
 
 
 class BodyMass(BodyEffect):
-    """A mass added to a body at its centre of mass; its inertia stays."""
+    """A body is heavier, or lighter, than the model says."""
 
     name = "body_mass"
-    doc = "a body is heavier, or lighter, than the model says"
     source = "rigid-body mechanics; a point mass at the centre of mass is assumed"
     robots = ANY
     choices = parts.part("body")
     parameters = (
-        Parameter(
+        strength(
             "added",
-            unit="kg",
-            nominal=0.0,
-            low=-WIDE,
-            high=WIDE,
-            doc="mass added; 1 % of the body's stays at least",
+            "kg",
+            (-WIDE, WIDE),
+            "mass added; 1 % of the body's stays at least",
             example=0.2,
         ),
     )
@@ -43,22 +40,19 @@ class BodyMass(BodyEffect):
 
 
 def _shift(axis: str) -> Parameter:
-    return Parameter(
+    return strength(
         f"d{axis}",
-        unit="m",
-        nominal=0.0,
-        low=-10.0,
-        high=10.0,
-        doc=f"shift along the body's own {axis} axis; bounds assumed",
+        "m",
+        (-10.0, 10.0),
+        f"shift along the body's own {axis} axis; bounds assumed",
         example=0.02,
     )
 
 
 class BodyCentre(BodyEffect):
-    """A body's centre of mass is moved; mass and inertia about it stay."""
+    """A body's centre of mass lies elsewhere than in the model."""
 
     name = "body_centre"
-    doc = "a body's centre of mass lies elsewhere than in the model"
     source = "rigid-body mechanics"
     robots = ANY
     choices = parts.part("body")
@@ -75,7 +69,7 @@ class BodyCentre(BodyEffect):
 
 
 class BodyLength(BodyEffect):
-    """A body is stretched along its length, and its mass with it.
+    """A link is longer or shorter than in the model.
 
     Its length runs from its joint to the body that it carries, or to its centre of
     mass where it carries none or several. Mass stays; the centre of mass, the inertia,
@@ -83,21 +77,10 @@ class BodyLength(BodyEffect):
     """
 
     name = "body_length"
-    doc = "a link is longer or shorter than in the model"
     source = "inertia of a mass that is stretched evenly; bounds assumed"
     robots = ANY
     choices = parts.part("body")
-    parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.1,
-            high=10.0,
-            doc="length over the model's",
-            example=1.1,
-        ),
-    )
+    parameters = (factor((0.1, 10.0), "length over the model's", example=1.1),)
 
     def edit(self, spec: Any) -> None:
         """See `BodyEffect.edit`."""
@@ -148,23 +131,14 @@ def _stretch(geom: Any, stretch: np.ndarray, along: np.ndarray, factor: float) -
 
 
 class GeomFriction(BodyEffect):
-    """A surface is more slippery, or less."""
+    """A surface slides more, or less, easily than the model says."""
 
     name = "geom_friction"
-    doc = "a surface slides more, or less, easily than the model says"
     source = "MuJoCo's contact model: the sliding coefficient is scaled"
     robots = ANY
     choices = parts.part("geom")
     parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.0,
-            high=WIDE,
-            doc="sliding friction over the model's",
-            example=0.5,
-        ),
+        factor((0.0, WIDE), "sliding friction over the model's", example=0.5),
     )
 
     def edit(self, spec: Any) -> None:

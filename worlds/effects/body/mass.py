@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from bns.worlds.effects import bodies
-from bns.worlds.effects.base import BodyEffect, Parameter
+from bns.worlds.effects.base import BodyEffect, Parameter, strength
 
 
 def _place(name: str, nominal: float, low: float, high: float, doc: str) -> Parameter:
@@ -23,20 +23,17 @@ def _place(name: str, nominal: float, low: float, high: float, doc: str) -> Para
 
 
 class Payload(BodyEffect):
-    """A point mass fixed to the base, added to its mass, centre and inertia."""
+    """The robot carries a mass that the model does not know."""
 
     name = "payload"
-    doc = "the robot carries a mass that the model does not know"
     source = "parallel-axis theorem; a point mass is assumed"
     robots = ("wheeled", "legged")
     parameters = (
-        Parameter(
+        strength(
             "mass",
-            unit="kg",
-            nominal=0.0,
-            low=0.0,
-            high=2.0,
-            doc="mass carried (the Khepera III itself: 0.69 kg); bounds assumed",
+            "kg",
+            (0.0, 2.0),
+            "mass carried (the Khepera III itself: 0.69 kg); bounds assumed",
             example=0.5,
         ),
         _place("x", 0.0, -0.065, 0.065, "ahead of the axle; bounds: the body's radius"),
@@ -55,16 +52,13 @@ class Payload(BodyEffect):
 
 
 def _shift(name: str, doc: str, example: float) -> Parameter:
-    return Parameter(
-        name, unit="m", nominal=0.0, low=-0.03, high=0.03, doc=doc, example=example
-    )
+    return strength(name, "m", (-0.03, 0.03), doc, example=example)
 
 
 class CentreOfMass(BodyEffect):
-    """The base's centre of mass is moved; mass and inertia about it stay."""
+    """The base's centre of mass lies elsewhere than in the model."""
 
     name = "centre_of_mass"
-    doc = "the base's centre of mass lies elsewhere than in the model"
     source = "the model's 11 mm ahead of the axle has one source; bounds assumed"
     robots = ("wheeled", "legged")
     parameters = (

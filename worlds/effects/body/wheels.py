@@ -6,24 +6,19 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.worlds.effects import bodies
-from bns.worlds.effects.base import BodyEffect, Parameter
+from bns.worlds.effects.base import BodyEffect, factor, strength
 from bns.worlds.effects.common import WHEEL
 
 
 class AxleLength(BodyEffect):
-    """Both wheels are moved along the axle, away from its middle or towards it."""
+    """The wheels are further apart or closer than in the model."""
 
     name = "axle_length"
-    doc = "the wheels are further apart or closer than in the model"
     source = "published lengths run from 87.4 to 91.6 mm (5 %)"
     parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.7,
-            high=1.3,
-            doc="true distance of the wheels over the model's; bounds assumed",
+        factor(
+            (0.7, 1.3),
+            "true distance of the wheels over the model's; bounds assumed",
             example=1.1,
         ),
     )
@@ -39,7 +34,7 @@ class AxleLength(BodyEffect):
 
 
 class WheelDiameter(BodyEffect):
-    """The wheel's rolling radius changes; the robot stays level.
+    """A wheel is larger or smaller than the model's.
 
     The wheel's axle is moved up on the body by as much as the radius grows, so that the
     wheel touches the floor where it did: the speed changes, the attitude does not (a
@@ -48,18 +43,11 @@ class WheelDiameter(BodyEffect):
     """
 
     name = "wheel_diameter"
-    doc = "a wheel is larger or smaller than the model's"
     source = "published diameters are 41, 42 and 42.4 mm (3 %); level attitude assumed"
     choices = (WHEEL,)
     parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.7,
-            high=1.3,
-            doc="true diameter over the model's; bounds assumed",
-            example=0.95,
+        factor(
+            (0.7, 1.3), "true diameter over the model's; bounds assumed", example=0.95
         ),
     )
 
@@ -76,29 +64,24 @@ class WheelDiameter(BodyEffect):
 
 
 class RollingDrag(BodyEffect):
-    """Dry and viscous friction is added to the wheel's joint."""
+    """A wheel turns against friction."""
 
     name = "rolling_drag"
-    doc = "a wheel turns against friction"
     source = "Coulomb and viscous model assumed; a wheel's motor gives up to 0.057 N m"
     choices = (WHEEL,)
     parameters = (
-        Parameter(
+        strength(
             "torque",
-            unit="N m",
-            nominal=0.0,
-            low=0.0,
-            high=0.057,
-            doc="dry friction; upper bound: the motor's torque (Webots Khepera3)",
+            "N m",
+            (0.0, 0.057),
+            "dry friction; upper bound: the motor's torque (Webots Khepera3)",
             example=0.002,
         ),
-        Parameter(
+        strength(
             "viscous",
-            unit="N m s/rad",
-            nominal=0.0,
-            low=0.0,
-            high=0.01,
-            doc="friction per wheel speed; bounds assumed",
+            "N m s/rad",
+            (0.0, 0.01),
+            "friction per wheel speed; bounds assumed",
             example=0.0002,
         ),
     )
@@ -117,23 +100,12 @@ LEAST = 1e-9  # of the torque; MuJoCo takes a range of nothing for no limit at a
 
 
 class TorqueLimit(BodyEffect):
-    """The largest torque of a wheel's motor is scaled."""
+    """A wheel's motor is weaker than in the model."""
 
     name = "torque_limit"
-    doc = "a wheel's motor is weaker than in the model"
     source = "nominal 0.057 N m: Webots Khepera3; bounds assumed"
     choices = (WHEEL,)
-    parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.0,
-            high=1.0,
-            doc="largest torque over the model's",
-            example=0.02,
-        ),
-    )
+    parameters = (factor((0.0, 1.0), "largest torque over the model's", example=0.02),)
 
     def edit(self, spec: Any) -> None:
         """See `BodyEffect.edit`.
@@ -155,7 +127,7 @@ class TorqueLimit(BodyEffect):
 
 
 class WheelEccentricity(BodyEffect):
-    """A wheel turns about an axle beside its centre: it drives by fits and starts.
+    """A wheel turns about an axle beside its centre.
 
     At a steady rate w of turning the robot's speed there is w (r + offset sin(a)), a
     being the wheel's angle plus the phase; over whole turns nothing is lost. The
@@ -163,26 +135,21 @@ class WheelEccentricity(BodyEffect):
     """
 
     name = "wheel_eccentricity"
-    doc = "a wheel turns about an axle beside its centre"
     source = "rolling without slip; bounds assumed"
     choices = (WHEEL,)
     parameters = (
-        Parameter(
+        strength(
             "offset",
-            unit="m",
-            nominal=0.0,
-            low=0.0,
-            high=0.005,
-            doc="from the axle to the wheel's centre; bounds assumed",
+            "m",
+            (0.0, 0.005),
+            "from the axle to the wheel's centre; bounds assumed",
             example=0.001,
         ),
-        Parameter(
+        strength(
             "phase",
-            unit="rad",
-            nominal=0.0,
-            low=-np.pi,
-            high=np.pi,
-            doc="where that is at a trial's start; 0 = ahead, in the sense of rolling",
+            "rad",
+            (-np.pi, np.pi),
+            "where that is at a trial's start; 0 = ahead, in the sense of rolling",
             example=0.5,
             scales=False,
         ),
@@ -202,19 +169,16 @@ class WheelEccentricity(BodyEffect):
 
 
 class CasterDrag(BodyEffect):
-    """What the body rests on beside its wheels rubs on the floor."""
+    """The casters drag on the floor instead of rolling."""
 
     name = "caster_drag"
-    doc = "the casters drag on the floor instead of rolling"
     source = "dry friction; the nominal casters have none; bounds assumed"
     parameters = (
-        Parameter(
+        strength(
             "friction",
-            unit="1",
-            nominal=0.0,
-            low=0.0,
-            high=1.0,
-            doc="friction coefficient added; bounds assumed",
+            "1",
+            (0.0, 1.0),
+            "friction coefficient added; bounds assumed",
             example=0.2,
         ),
     )

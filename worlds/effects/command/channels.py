@@ -50,10 +50,9 @@ class _Channel(CommandEffect):
 
 
 class CommandDelay(_Channel):
-    """Commands arrive late; before the signal begins its first value holds."""
+    """Commands reach the actuators late."""
 
     name = "command_delay"
-    doc = "commands reach the actuators late"
     parameters = _number(
         "delay", "s", 0.0, "from command to actuator; negative: early", 0.2, -WIDE
     )
@@ -65,10 +64,9 @@ class CommandDelay(_Channel):
 
 
 class CommandLag(_Channel):
-    """Commands are followed gradually: a first-order lag that starts settled."""
+    """Commands are followed gradually."""
 
     name = "command_lag"
-    doc = "commands are followed gradually"
     parameters = _number("time_constant", "s", 0.0, "of a first-order lag", 0.2)
 
     def change(self, told: np.ndarray, dt: float) -> np.ndarray:
@@ -80,10 +78,9 @@ class CommandLag(_Channel):
 
 
 class CommandGain(_Channel):
-    """A command means more, or less, than it should."""
+    """A command is scaled on its way."""
 
     name = "command_gain"
-    doc = "a command is scaled on its way"
     memoryless = True
     parameters = _number("factor", "1", 1.0, "what arrives over what was told", 0.8)
 
@@ -93,10 +90,9 @@ class CommandGain(_Channel):
 
 
 class CommandOffset(_Channel):
-    """A constant is added to a command."""
+    """A command is shifted by a constant on its way."""
 
     name = "command_offset"
-    doc = "a command is shifted by a constant on its way"
     memoryless = True
     parameters = _number(
         "added", "unit of the command", 0.0, "added to the command", 0.05, -WIDE
@@ -111,7 +107,6 @@ class CommandDeadZone(_Channel):
     """Small commands do nothing."""
 
     name = "command_dead_zone"
-    doc = "small commands do nothing"
     memoryless = True
     parameters = _number(
         "size", "unit of the command", 0.0, "largest magnitude of no effect", 0.05
@@ -123,10 +118,9 @@ class CommandDeadZone(_Channel):
 
 
 class CommandLimit(_Channel):
-    """Commands beyond a limit, either way, are cut to it."""
+    """A command is cut to a limit: a speed or torque limit of its drive."""
 
     name = "command_limit"
-    doc = "a command is cut to a limit: a speed or torque limit of its drive"
     memoryless = True
     parameters = _number(
         "limit", "unit of the command", WIDE, "largest magnitude; 1e9 is none", 0.06
@@ -144,10 +138,9 @@ class CommandLimit(_Channel):
 
 
 class CommandRate(_Channel):
-    """A command changes no faster than a limit: a speed limit of a position servo."""
+    """A command changes no faster than a limit: a servo's speed limit."""
 
     name = "command_rate"
-    doc = "a command changes no faster than a limit: a servo's speed limit"
     parameters = _number(
         "time_per_unit",
         "s per unit of the command",

@@ -2,30 +2,21 @@
 
 import numpy as np
 
-from bns.worlds.effects.base import CommandEffect, ControlSignal, Parameter
+from bns.worlds.effects.base import CommandEffect, ControlSignal, strength
 
 
 class CommandLatency(CommandEffect):
-    """The whole command signal arrives late; until then the robot stands still.
+    """Commands reach the motors late.
 
     A delay that is no multiple of the physics step is met on average: a step in which
     the command changes gets the time-weighted mean of the two.
     """
 
     name = "command_latency"
-    doc = "commands reach the motors late"
     source = "0.2 s fits the MRCLAM 6 robots best; bounds assumed"
     robots = ("wheeled", "legged")
     parameters = (
-        Parameter(
-            "delay",
-            unit="s",
-            nominal=0.0,
-            low=0.0,
-            high=2.0,
-            doc="time from command to motor",
-            example=0.2,
-        ),
+        strength("delay", "s", (0.0, 2.0), "time from command to motor", example=0.2),
     )
 
     def apply(

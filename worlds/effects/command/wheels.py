@@ -1,8 +1,17 @@
 """What wheels are told: gains, dead bands, limits, and wheels that are stuck."""
 
+from abc import abstractmethod
+
 import numpy as np
 
-from bns.worlds.effects.base import Choice, CommandEffect, ControlSignal, Parameter
+from bns.worlds.effects.base import (
+    Choice,
+    CommandEffect,
+    ControlSignal,
+    Parameter,
+    factor,
+    strength,
+)
 from bns.worlds.effects.common import (
     MAXIMUM_SPEED,
     MINIMUM_SPEED,
@@ -13,109 +22,85 @@ from bns.worlds.effects.common import (
 )
 
 
-class WheelGain(CommandEffect):
-    """The command of one or both wheels is scaled, hidden from the learner."""
+class _EachCommand(CommandEffect):
+    """A command of the chosen wheels becomes another one, whatever came before."""
 
-    name = "wheel_gain"
-    doc = "a wheel turns at a share of the speed it is told"
-    source = "thesis 4.2.3 and 6.2.1: a wheel slowed to a share of its intended speed"
     memoryless = True
     choices = (WHEEL,)
-    parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.0,
-            high=2.0,
-            doc="speed reached over speed told; bounds assumed",
-            example=0.8,
-        ),
-    )
 
     def apply(
         self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
         """See `CommandEffect.apply`."""
         values = signal.values.copy()
-        for column in columns(self, signal):
-            values[active, column] *= self["factor"]
+        if not self.is_nominal:
+            for column in columns(self, signal):
+                values[active, column] = self._turned(values[active, column])
         return values
 
+    @abstractmethod
+    def _turned(self, told: np.ndarray) -> np.ndarray:
+        """Speeds instead of those told [m/s], any shape."""
 
-class DeadBand(CommandEffect):
-    """Speeds of a magnitude below a threshold give a stop."""
+
+class WheelGain(_EachCommand):
+    """A wheel turns at a share of the speed it is told."""
+
+    name = "wheel_gain"
+    source = "thesis 4.2.3 and 6.2.1: a wheel slowed to a share of its intended speed"
+    parameters = (
+        factor(
+            (0.0, 2.0), "speed reached over speed told; bounds assumed", example=0.8
+        ),
+    )
+
+    def _turned(self, told: np.ndarray) -> np.ndarray:
+        return told * self["factor"]
+
+
+class DeadBand(_EachCommand):
+    """Speeds below a magnitude give a stop."""
 
     name = "dead_band"
-    doc = "speeds below a magnitude give a stop"
     source = "regulated minimum 2,000 units (13.9 mm/s): Khepera III manual 2.2 p. 14"
-    memoryless = True
-    choices = (WHEEL,)
     parameters = (
-        Parameter(
+        strength(
             "speed",
-            unit="m/s",
-            nominal=0.0,
-            low=0.0,
-            high=0.2,
-            doc="smallest magnitude that still moves the wheel; bounds assumed",
+            "m/s",
+            (0.0, 0.2),
+            "smallest magnitude that still moves the wheel; bounds assumed",
             example=0.08,
         ),
     )
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """See `CommandEffect.apply`."""
-        values = signal.values.copy()
-        for column in columns(self, signal):
-            slow = np.abs(values[:, column]) < self["speed"]
-            values[active & slow, column] = 0.0
-        return values
+    def _turned(self, told: np.ndarray) -> np.ndarray:
+        return np.where(np.abs(told) < self["speed"], 0.0, told)
 
 
-class DeadZone(CommandEffect):
-    """Speeds are reduced by a constant magnitude; slower ones give a stop."""
+class DeadZone(_EachCommand):
+    """A wheel turns slower than it is told by a constant."""
 
     name = "dead_zone"
-    doc = "a wheel turns slower than it is told by a constant"
     source = "the dead zone of control engineering; bounds assumed"
-    memoryless = True
-    choices = (WHEEL,)
     parameters = (
-        Parameter(
+        strength(
             "speed",
-            unit="m/s",
-            nominal=0.0,
-            low=0.0,
-            high=0.2,
-            doc="taken off every speed; bounds assumed",
+            "m/s",
+            (0.0, 0.2),
+            "taken off every speed; bounds assumed",
             example=0.02,
         ),
     )
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """See `CommandEffect.apply`."""
-        values = signal.values.copy()
-        if self.is_nominal:
-            return values
-        for column in columns(self, signal):
-            told = values[active, column]
-            left = np.maximum(np.abs(told) - self["speed"], 0.0)
-            values[active, column] = np.sign(told) * left
-        return values
+    def _turned(self, told: np.ndarray) -> np.ndarray:
+        return np.sign(told) * np.maximum(np.abs(told) - self["speed"], 0.0)
 
 
-class SpeedSaturation(CommandEffect):
-    """Speeds beyond a limit, forward or backward, are cut to it."""
+class SpeedSaturation(_EachCommand):
+    """A wheel turns no faster than a limit."""
 
     name = "speed_saturation"
-    doc = "a wheel turns no faster than a limit"
     source = "limits of 48,000 and 43,000 units: Khepera III manual 2.2 p. 14"
-    memoryless = True
-    choices = (WHEEL,)
     parameters = (
         Parameter(
             "limit",
@@ -128,24 +113,14 @@ class SpeedSaturation(CommandEffect):
         ),
     )
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """See `CommandEffect.apply`."""
-        values = signal.values.copy()
-        if self.is_nominal:
-            return values
-        limit = self["limit"]
-        for column in columns(self, signal):
-            values[active, column] = np.clip(values[active, column], -limit, limit)
-        return values
+    def _turned(self, told: np.ndarray) -> np.ndarray:
+        return np.clip(told, -self["limit"], self["limit"])
 
 
 class WheelIntermittent(CommandEffect):
-    """In every m-th command of a trial the wheel turns at its minimum instead."""
+    """A wheel stops (or slows to a minimum) in every m-th command."""
 
     name = "wheel_intermittent"
-    doc = "a wheel stops (or slows to a minimum) in every m-th command"
     source = "thesis 6.2.1 (stops spinning) and 6.3.1 (set to the minimum); m is silent"
     memoryless = True
     choices = (WHEEL,)
@@ -160,13 +135,11 @@ class WheelIntermittent(CommandEffect):
             example=3,
             integer=True,
         ),
-        Parameter(
+        strength(
             "speed",
-            unit="m/s",
-            nominal=0.0,
-            low=0.0,
-            high=TOP_SPEED,
-            doc="speed in the commands hit; 0 = stops, 0.0555 = 8,000 speed units",
+            "m/s",
+            (0.0, TOP_SPEED),
+            "speed in the commands hit; 0 = stops, 0.0555 = 8,000 speed units",
             example=0.0,
             scales=False,
         ),
@@ -198,13 +171,11 @@ DIRECTION = Choice(
     "which way the stuck wheel turns; commanded = the way it is told, or not at all",
 )
 
-BLEND = Parameter(
+BLEND = strength(
     "blend",
-    unit="1",
-    nominal=0.0,
-    low=0.0,
-    high=1.0,
-    doc="from the speed told (0) to the stuck speed (1)",
+    "1",
+    (0.0, 1.0),
+    "from the speed told (0) to the stuck speed (1)",
     example=1.0,
 )
 
@@ -246,10 +217,9 @@ class StuckWheel(CommandEffect):
 
 
 class WheelStuckMax(StuckWheel):
-    """A wheel is only able to turn at the maximum speed."""
+    """A wheel turns at the maximum speed whatever it is told."""
 
     name = "wheel_stuck_max"
-    doc = "a wheel turns at the maximum speed whatever it is told"
     source = "thesis 6.2.1; maximum of 17,500 speed units: the lab's controller files"
     parameters = (
         BLEND,
@@ -261,10 +231,9 @@ class WheelStuckMax(StuckWheel):
 
 
 class WheelStuckMin(StuckWheel):
-    """A wheel is only able to turn at the minimum speed."""
+    """A wheel turns at the minimum speed whatever it is told."""
 
     name = "wheel_stuck_min"
-    doc = "a wheel turns at the minimum speed whatever it is told"
     source = "thesis 6.2.1; minimum of 8,000 speed units: the lab's controller files"
     parameters = (
         BLEND,

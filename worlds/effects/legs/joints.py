@@ -2,31 +2,20 @@
 
 from typing import Any
 
-from bns.worlds.effects.base import BodyEffect, Parameter
+from bns.worlds.effects.base import BodyEffect, factor, strength
 from bns.worlds.effects.leg_sets import JOINT, chosen
 from bns.worlds.effects.parts import loosen
 from bns.worlds.physics import servo_joint
 
 
 class JointWeak(BodyEffect):
-    """At every error, and at most, the servo's torque is a share of what it was."""
+    """The servo of a joint gives a share of its torque."""
 
     name = "joint_weak"
-    doc = "the servo of a joint gives a share of its torque"
     source = "worn motor or gears; bounds assumed"
     robots = ("legged",)
     choices = (JOINT,)
-    parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.02,
-            high=1.0,
-            doc="torque left over torque before",
-            example=0.4,
-        ),
-    )
+    parameters = (factor((0.02, 1.0), "torque left over torque before", example=0.4),)
 
     def edit(self, spec: Any) -> None:
         """See `BodyEffect.edit`."""
@@ -42,33 +31,28 @@ SLACK = 1e-4  # [rad] by which the stops stay apart, as MuJoCo needs
 
 
 class JointLocked(BodyEffect):
-    """The joint's end stops close in on one angle, where a seized joint stands.
+    """A joint is seized at an angle, or moves in a part of its range.
 
     A trial starts with the joint there; setting in within a trial forces it there.
     """
 
     name = "joint_locked"
-    doc = "a joint is seized at an angle, or moves in a part of its range"
     source = "bounds: end stops of the maker's robot"
     robots = ("legged",)
     choices = (JOINT,)
     parameters = (
-        Parameter(
+        strength(
             "loss",
-            unit="1",
-            nominal=0.0,
-            low=0.0,
-            high=1.0,
-            doc="share of the range that is lost; 1 = locked",
+            "1",
+            (0.0, 1.0),
+            "share of the range that is lost; 1 = locked",
             example=1.0,
         ),
-        Parameter(
+        strength(
             "angle",
-            unit="rad",
-            nominal=0.0,
-            low=-1.5,
-            high=1.5,
-            doc="where it stands, from half-way; beyond an end stop: there",
+            "rad",
+            (-1.5, 1.5),
+            "where it stands, from half-way; beyond an end stop: there",
             example=0.3,
             scales=False,
         ),
@@ -92,28 +76,17 @@ DAMPING = 1e-3  # [N m s/rad] in the play; assumed
 
 
 class LooseHorn(BodyEffect):
-    """A second joint behind the servo's moves freely between two stops.
+    """A loose horn: play between a servo and the part that it moves.
 
     The servo reports its own shaft, not what the horn does.
     """
 
     name = "loose_horn"
-    doc = "a loose horn: play between a servo and the part that it moves"
     source = "backlash as a joint of its own with stops; bounds assumed"
     robots = ("legged",)
     choices = (JOINT,)
     resizes = True
-    parameters = (
-        Parameter(
-            "angle",
-            unit="rad",
-            nominal=0.0,
-            low=0.0,
-            high=0.6,
-            doc="full play",
-            example=0.15,
-        ),
-    )
+    parameters = (strength("angle", "rad", (0.0, 0.6), "full play", example=0.15),)
 
     def edit(self, spec: Any) -> None:
         """See `BodyEffect.edit`."""

@@ -3,7 +3,7 @@
 from typing import Any
 
 from bns.worlds.effects import bodies
-from bns.worlds.effects.base import BodyEffect, Choice, Parameter
+from bns.worlds.effects.base import BodyEffect, Choice, factor
 from bns.worlds.effects.leg_sets import LEGS_OR_ALL, shins
 from bns.worlds.effects.leg_sets import bodies as leg_bodies
 
@@ -11,24 +11,13 @@ PART = Choice("part", ("coxa", "femur", "tibia"), "tibia", "which part of the le
 
 
 class LinkLength(BodyEffect):
-    """Everything of the part is stretched along the leg; its mass stays."""
+    """A part of legs is longer or shorter than in the model."""
 
     name = "link_length"
-    doc = "a part of legs is longer or shorter than in the model"
     source = "sources give tibias of 130 to 140 mm (numbers.toml); bounds assumed"
     robots = ("legged",)
     choices = (PART, LEGS_OR_ALL)
-    parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.8,
-            high=1.25,
-            doc="length over the model's",
-            example=1.08,
-        ),
-    )
+    parameters = (factor((0.8, 1.25), "length over the model's", example=1.08),)
 
     def edit(self, spec: Any) -> None:
         """See `BodyEffect.edit`."""
@@ -45,23 +34,14 @@ class LinkLength(BodyEffect):
 
 
 class FootSlippery(BodyEffect):
-    """Sliding friction of foot and shin is scaled; it holds, not the floor's."""
+    """The feet of legs grip the floor less."""
 
     name = "foot_slippery"
-    doc = "the feet of legs grip the floor less"
     source = "a worn or lost rubber tip; bounds assumed"
     robots = ("legged",)
     choices = (LEGS_OR_ALL,)
     parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.02,
-            high=2.0,
-            doc="friction coefficient over the model's",
-            example=0.2,
-        ),
+        factor((0.02, 2.0), "friction coefficient over the model's", example=0.2),
     )
 
     def edit(self, spec: Any) -> None:

@@ -6,7 +6,12 @@ import numpy as np
 
 from bns.models.legs import LEGS, PARTS, parts
 from bns.worlds.effects import bodies
-from bns.worlds.effects.base import BodyEffect, CommandEffect, ControlSignal, Parameter
+from bns.worlds.effects.base import (
+    BodyEffect,
+    CommandEffect,
+    ControlSignal,
+    strength,
+)
 from bns.worlds.effects.leg_sets import LEG_SET, chosen, read
 from bns.worlds.effects.leg_sets import bodies as leg_bodies
 from bns.worlds.physics import servo_joint
@@ -15,24 +20,16 @@ LEFT = 1e-4  # share of mass and inertia that stays, so that the joints can be c
 
 
 class LegMissing(BodyEffect):
-    """Coxa, femur and tibia weigh nothing and touch nothing; their servos go on."""
+    """Legs have come off."""
 
     name = "leg_missing"
-    doc = "legs have come off"
     source = "masses of the model taken away; bounds by definition"
     robots = ("legged",)
     choices = (LEG_SET,)
     resizes = True  # its pairs of geoms go
     parameters = (
-        Parameter(
-            "loss",
-            unit="1",
-            nominal=0.0,
-            low=0.0,
-            high=1.0,
-            doc="whether it is off",
-            example=1.0,
-            integer=True,
+        strength(
+            "loss", "1", (0.0, 1.0), "whether it is off", example=1.0, integer=True
         ),
     )
 
@@ -58,22 +55,15 @@ class LegMissing(BodyEffect):
 
 
 class LegLimp(BodyEffect):
-    """The motors of a leg are off: nothing drives or brakes them but friction."""
+    """The servos of legs give no torque."""
 
     name = "leg_limp"
-    doc = "the servos of legs give no torque"
     source = "an unpowered bridge is open; friction of the gears stays"
     robots = ("legged",)
     choices = (LEG_SET,)
     parameters = (
-        Parameter(
-            "loss",
-            unit="1",
-            nominal=0.0,
-            low=0.0,
-            high=1.0,
-            doc="share of the motor that is off",
-            example=1.0,
+        strength(
+            "loss", "1", (0.0, 1.0), "share of the motor that is off", example=1.0
         ),
     )
 
@@ -96,21 +86,18 @@ RAISED = {"coxa": 0.0, "femur": 1.3, "tibia": 0.0}  # [rad] foot 0.1 m above the
 
 
 class LegRaised(CommandEffect):
-    """A raised pose replaces the legs' goals, before the first command as well."""
+    """Legs are held up where they cannot touch the ground."""
 
     name = "leg_raised"
-    doc = "legs are held up where they cannot touch the ground"
     source = "thesis 7.2.2: commands altered to raise the leg; the pose is assumed"
     robots = ("legged",)
     choices = (LEG_SET,)
     parameters = (
-        Parameter(
+        strength(
             "blend",
-            unit="1",
-            nominal=0.0,
-            low=0.0,
-            high=1.0,
-            doc="from the pose told (0) to the raised pose (1)",
+            "1",
+            (0.0, 1.0),
+            "from the pose told (0) to the raised pose (1)",
             example=1.0,
         ),
     )

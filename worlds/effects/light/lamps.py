@@ -4,23 +4,20 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from bns.worlds.effects.base import OpticsEffect, Parameter
+from bns.worlds.effects.base import OpticsEffect, Parameter, factor, strength
 
 
 class LightAmbient(OpticsEffect):
-    """Light is added that falls on all sensors alike."""
+    """The room is brighter everywhere."""
 
     name = "light_ambient"
-    doc = "the room is brighter everywhere"
     source = "assumed: a window or the room's lamps"
     parameters = (
-        Parameter(
+        strength(
             "added",
-            unit="W/m2",
-            nominal=0.0,
-            low=0.0,
-            high=100.0,
-            doc="irradiance added; bounds assumed",
+            "W/m2",
+            (0.0, 100.0),
+            "irradiance added; bounds assumed",
             example=0.3,
         ),
     )
@@ -33,20 +30,13 @@ class LightAmbient(OpticsEffect):
 
 
 class LightDimmed(OpticsEffect):
-    """The power of all lamps is scaled."""
+    """The lamps give less light."""
 
     name = "light_dimmed"
-    doc = "the lamps give less light"
     source = "assumed: a lamp that ages or a low supply"
     parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.0,
-            high=10.0,
-            doc="power after over power before; bounds assumed",
-            example=0.5,
+        factor(
+            (0.0, 10.0), "power after over power before; bounds assumed", example=0.5
         ),
     )
 
@@ -58,30 +48,13 @@ class LightDimmed(OpticsEffect):
 
 
 class LightDisplaced(OpticsEffect):
-    """All lamps are moved; the safety boundary and the task stay where they were."""
+    """The light stands elsewhere."""
 
     name = "light_displaced"
-    doc = "the light stands elsewhere"
     source = "assumed: a lamp that was pushed"
     parameters = (
-        Parameter(
-            "x",
-            unit="m",
-            nominal=0.0,
-            low=-3.0,
-            high=3.0,
-            doc="shift along x; bounds assumed",
-            example=0.2,
-        ),
-        Parameter(
-            "y",
-            unit="m",
-            nominal=0.0,
-            low=-3.0,
-            high=3.0,
-            doc="shift along y; bounds assumed",
-            example=-0.1,
-        ),
+        strength("x", "m", (-3.0, 3.0), "shift along x; bounds assumed", example=0.2),
+        strength("y", "m", (-3.0, 3.0), "shift along y; bounds assumed", example=-0.1),
     )
 
     def change(
@@ -93,21 +66,12 @@ class LightDisplaced(OpticsEffect):
 
 
 class LightFlicker(OpticsEffect):
-    """A share of the power of all lamps goes and comes as a sine does."""
+    """The lamps flicker."""
 
     name = "light_flicker"
-    doc = "the lamps flicker"
     source = "assumed: a lamp on mains, or a loose contact"
     parameters = (
-        Parameter(
-            "depth",
-            unit="1",
-            nominal=0.0,
-            low=0.0,
-            high=1.0,
-            doc="share of the power that goes",
-            example=0.5,
-        ),
+        strength("depth", "1", (0.0, 1.0), "share of the power that goes", example=0.5),
         Parameter(
             "frequency",
             unit="Hz",
@@ -135,28 +99,19 @@ class LightFlicker(OpticsEffect):
 
 
 class LightShadow(OpticsEffect):
-    """A sector seen from each lamp gets a share of its light less."""
+    """A part of the arena lies in shadow."""
 
     name = "light_shadow"
-    doc = "a part of the arena lies in shadow"
     source = "assumed: somebody or something stands beside the lamp"
     parameters = (
-        Parameter(
-            "loss",
-            unit="1",
-            nominal=0.0,
-            low=0.0,
-            high=1.0,
-            doc="share of the light that is kept off",
-            example=0.8,
+        strength(
+            "loss", "1", (0.0, 1.0), "share of the light that is kept off", example=0.8
         ),
-        Parameter(
+        strength(
             "azimuth",
-            unit="rad",
-            nominal=0.0,
-            low=-3.2,
-            high=3.2,
-            doc="middle of the sector, seen from the lamp; half a turn",
+            "rad",
+            (-3.2, 3.2),
+            "middle of the sector, seen from the lamp; half a turn",
             example=0.0,
             scales=False,
         ),

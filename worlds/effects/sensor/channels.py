@@ -9,7 +9,7 @@ from abc import abstractmethod
 import numpy as np
 
 from bns.worlds.effects import parts
-from bns.worlds.effects.base import Parameter, SensorEffect
+from bns.worlds.effects.base import SensorEffect, factor, strength
 from bns.worlds.effects.parts import WIDE
 
 
@@ -43,21 +43,10 @@ class _Channel(SensorEffect):
 
 
 class ReadingGain(_Channel):
-    """A sensor reads more, or less, than there is."""
+    """The readings of any sensor are scaled."""
 
     name = "reading_gain"
-    doc = "the readings of any sensor are scaled"
-    parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.0,
-            high=WIDE,
-            doc="reading over the true value",
-            example=0.8,
-        ),
-    )
+    parameters = (factor((0.0, WIDE), "reading over the true value", example=0.8),)
 
     def change(self, times: np.ndarray, readings: np.ndarray) -> np.ndarray:
         """The readings scaled, ``(T,)``."""
@@ -65,18 +54,15 @@ class ReadingGain(_Channel):
 
 
 class ReadingOffset(_Channel):
-    """A sensor's zero is off; nothing is controlled by what it reads."""
+    """The readings of any sensor are shifted by a constant."""
 
     name = "reading_offset"
-    doc = "the readings of any sensor are shifted by a constant"
     parameters = (
-        Parameter(
+        strength(
             "added",
-            unit="unit of the reading",
-            nominal=0.0,
-            low=-WIDE,
-            high=WIDE,
-            doc="added to the reading",
+            "unit of the reading",
+            (-WIDE, WIDE),
+            "added to the reading",
             example=0.1,
         ),
     )
@@ -87,20 +73,11 @@ class ReadingOffset(_Channel):
 
 
 class ReadingDelay(_Channel):
-    """What is observed is old."""
+    """The readings of any sensor are older than their time stamps."""
 
     name = "reading_delay"
-    doc = "the readings of any sensor are older than their time stamps"
     parameters = (
-        Parameter(
-            "delay",
-            unit="s",
-            nominal=0.0,
-            low=-WIDE,
-            high=WIDE,
-            doc="age of a reading",
-            example=0.5,
-        ),
+        strength("delay", "s", (-WIDE, WIDE), "age of a reading", example=0.5),
     )
 
     def change(self, times: np.ndarray, readings: np.ndarray) -> np.ndarray:

@@ -1,143 +1,80 @@
-"""Readings of light sensors, one at a time."""
-
-from abc import abstractmethod
+"""Readings of light sensors: changed one by one, or by those before."""
 
 import numpy as np
 
 from bns.models.light_sites import twin
-from bns.worlds.effects.base import Parameter, SensorEffect
+from bns.worlds.effects.base import Parameter, SensorEffect, factor, strength
 from bns.worlds.effects.common import rarer
-from bns.worlds.effects.sensors import FULL_SCALE, SENSOR, columns, limited
+from bns.worlds.effects.sensors import FULL_SCALE, ReadingEffect, limited
 
 
-class _EachReading(SensorEffect):
-    """A reading of the chosen sensors becomes another one, whatever came before."""
-
-    choices = (SENSOR,)
-
-    def apply(
-        self,
-        times: np.ndarray,
-        readings: np.ndarray,
-        channels: tuple[str, ...],
-        active: np.ndarray,
-        rng: np.random.Generator,
-    ) -> np.ndarray:
-        changed = readings.copy()
-        if self.is_nominal:
-            return changed
-        on = np.ix_(active, np.array(columns(self, channels), dtype=int))
-        changed[on] = self.read(readings, on)
-        return changed
-
-    @abstractmethod
-    def read(self, readings: np.ndarray, on: tuple[np.ndarray, ...]) -> np.ndarray:
-        """What is read instead of ``readings[on]``."""
-
-
-class SensorGain(_EachReading):
-    """A reading is multiplied by a factor, within the converter's range."""
+class SensorGain(ReadingEffect):
+    """A sensor's readings are scaled."""
 
     name = "sensor_gain"
-    doc = "a sensor's readings are scaled"
     source = "assumed: a supply or amplifier that has changed"
     parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.0,
-            high=4.0,
-            doc="reading after over reading before; bounds assumed",
-            example=0.8,
+        factor(
+            (0.0, 4.0), "reading after over reading before; bounds assumed", example=0.8
         ),
     )
 
-    def read(self, readings: np.ndarray, on: tuple[np.ndarray, ...]) -> np.ndarray:
-        """The readings that are on, scaled, within the converter's range.
-
-        Args:
-            readings: of all sensors, ``(T, S)`` [counts].
-            on: indices of the rows and columns in which the effect is on.
-
-        Returns:
-            like ``readings[on]``.
-        """
-        return limited(readings[on] * self["factor"])
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
+    ) -> np.ndarray:
+        return limited(readings[span, which] * self["factor"])
 
 
-class SensorOffset(_EachReading):
-    """A constant is added to a reading, within the converter's range."""
+class SensorOffset(ReadingEffect):
+    """A sensor's readings are shifted."""
 
     name = "sensor_offset"
-    doc = "a sensor's readings are shifted"
     source = "assumed: a dirty or heated sensor"
     parameters = (
-        Parameter(
+        strength(
             "counts",
-            unit="count",
-            nominal=0.0,
-            low=-4095.0,
-            high=4095.0,
-            doc="added to each reading; the whole range",
+            "count",
+            (-4095.0, 4095.0),
+            "added to each reading; the whole range",
             example=-500.0,
         ),
     )
 
-    def read(self, readings: np.ndarray, on: tuple[np.ndarray, ...]) -> np.ndarray:
-        """The readings that are on, shifted, within the converter's range.
-
-        Args:
-            readings: of all sensors, ``(T, S)`` [counts].
-            on: indices of the rows and columns in which the effect is on.
-
-        Returns:
-            like ``readings[on]``.
-        """
-        return limited(readings[on] + self["counts"])
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
+    ) -> np.ndarray:
+        return limited(readings[span, which] + self["counts"])
 
 
-class SensorSaturation(_EachReading):
-    """A sensor saturates early: no reading is below a level (bright is small)."""
+class SensorSaturation(ReadingEffect):
+    """A sensor saturates before full light."""
 
     name = "sensor_saturation"
-    doc = "a sensor saturates before full light"
     source = "assumed: a load resistor or supply that has changed"
     parameters = (
-        Parameter(
+        strength(
             "level",
-            unit="count",
-            nominal=0.0,
-            low=0.0,
-            high=FULL_SCALE,
-            doc="smallest reading; 0 = down to full light",
+            "count",
+            (0.0, FULL_SCALE),
+            "smallest reading; 0 = down to full light",
             example=1500.0,
         ),
     )
 
-    def read(self, readings: np.ndarray, on: tuple[np.ndarray, ...]) -> np.ndarray:
-        """The readings that are on, none below the level.
-
-        Args:
-            readings: of all sensors, ``(T, S)`` [counts].
-            on: indices of the rows and columns in which the effect is on.
-
-        Returns:
-            like ``readings[on]``.
-        """
-        return np.maximum(readings[on], self["level"])
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
+    ) -> np.ndarray:
+        return np.maximum(readings[span, which], self["level"])
 
 
 def _stuck(extreme: str, reading: float) -> tuple[Parameter, ...]:
     """The parameters of a sensor that is stuck at an extreme reading."""
     return (
-        Parameter(
+        strength(
             "blend",
-            unit="1",
-            nominal=0.0,
-            low=0.0,
-            high=1.0,
-            doc=f"from the reading (0) to the {extreme} (1)",
+            "1",
+            (0.0, 1.0),
+            f"from the reading (0) to the {extreme} (1)",
             example=1.0,
         ),
         Parameter(
@@ -153,68 +90,58 @@ def _stuck(extreme: str, reading: float) -> tuple[Parameter, ...]:
     )
 
 
-class _StuckSensor(_EachReading):
-    def read(self, readings: np.ndarray, on: tuple[np.ndarray, ...]) -> np.ndarray:
-        return readings[on] + self["blend"] * (self["reading"] - readings[on])
+class _StuckSensor(ReadingEffect):
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
+    ) -> np.ndarray:
+        before = readings[span, which]
+        return before + self["blend"] * (self["reading"] - before)
 
 
 class SensorStuckMax(_StuckSensor):
-    """A sensor always returns the maximum value (dark)."""
+    """A sensor always reads the maximum: it reads dark."""
 
     name = "sensor_stuck_max"
-    doc = "a sensor always reads the maximum: it reads dark"
     source = "thesis 6.2.1: always returns the maximum sensor value"
     parameters = _stuck("maximum", FULL_SCALE)
 
 
 class SensorStuckMin(_StuckSensor):
-    """A sensor always returns the minimum value (bright)."""
+    """A sensor always reads the minimum: it reads bright."""
 
     name = "sensor_stuck_min"
-    doc = "a sensor always reads the minimum: it reads bright"
     source = "thesis 6.2.1: always returns the minimum sensor value"
     parameters = _stuck("minimum", 0.0)
 
 
-class SensorCrosstalk(_EachReading):
-    """A share of a reading comes from the two sensors beside it on the ring."""
+class SensorCrosstalk(ReadingEffect):
+    """Neighbouring sensors leak into a reading."""
 
     name = "sensor_crosstalk"
-    doc = "neighbouring sensors leak into a reading"
     source = "assumed: one multiplexer serves all sensors"
     parameters = (
-        Parameter(
+        strength(
             "share",
-            unit="1",
-            nominal=0.0,
-            low=0.0,
-            high=0.5,
-            doc="of the reading that is the neighbours' mean; bounds assumed",
+            "1",
+            (0.0, 0.5),
+            "of the reading that is the neighbours' mean; bounds assumed",
             example=0.2,
         ),
     )
 
-    def read(self, readings: np.ndarray, on: tuple[np.ndarray, ...]) -> np.ndarray:
-        """The readings that are on, with a share of the mean of both sensors beside.
-
-        Args:
-            readings: of all sensors, ``(T, S)`` [counts].
-            on: indices of the rows and columns in which the effect is on.
-
-        Returns:
-            like ``readings[on]``.
-        """
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
+    ) -> np.ndarray:
         beside = (np.roll(readings, 1, axis=1) + np.roll(readings, -1, axis=1)) / 2
-        return readings[on] + self["share"] * (beside[on] - readings[on])
+        before = readings[span, which]
+        return before + self["share"] * (beside[span, which] - before)
 
 
-class SensorIntermittent(SensorEffect):
-    """Every m-th reading of a trial is the minimum value instead."""
+class SensorIntermittent(ReadingEffect):
+    """Every m-th reading of a sensor is the minimum."""
 
     name = "sensor_intermittent"
-    doc = "every m-th reading of a sensor is the minimum"
     source = "thesis 6.2.1 and 6.3.1: once every m readings; m is silent"
-    choices = (SENSOR,)
     parameters = (
         Parameter(
             "every",
@@ -226,34 +153,22 @@ class SensorIntermittent(SensorEffect):
             example=3,
             integer=True,
         ),
-        Parameter(
+        strength(
             "reading",
-            unit="count",
-            nominal=0.0,
-            low=0.0,
-            high=FULL_SCALE,
-            doc="what is read then",
+            "count",
+            (0.0, FULL_SCALE),
+            "what is read then",
             example=0.0,
             scales=False,
         ),
     )
 
-    def apply(
-        self,
-        times: np.ndarray,
-        readings: np.ndarray,
-        channels: tuple[str, ...],
-        active: np.ndarray,
-        rng: np.random.Generator,
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
     ) -> np.ndarray:
-        """See `SensorEffect.apply`."""
-        changed = readings.copy()
-        if self.is_nominal:
-            return changed
-        number = np.arange(1, len(times) + 1)
-        hit = np.flatnonzero(active & (number % int(self["every"]) == 0))
-        changed[hit[:, None], columns(self, channels)] = self["reading"]
-        return changed
+        number = np.arange(span.start + 1, span.stop + 1)
+        hit = number % int(self["every"]) == 0
+        return np.where(hit[:, None], self["reading"], readings[span, which])
 
     def scaled(self, severity: float) -> "SensorIntermittent":
         """Milder means rarer: half the severity hits half as many readings."""
@@ -262,19 +177,16 @@ class SensorIntermittent(SensorEffect):
 
 
 class SensorSwapped(SensorEffect):
-    """What the left sensors read is given for the right ones, and vice versa."""
+    """Left and right sensors are exchanged."""
 
     name = "sensor_swapped"
-    doc = "left and right sensors are exchanged"
     source = "assumed: a plug in the wrong socket"
     parameters = (
-        Parameter(
+        strength(
             "blend",
-            unit="1",
-            nominal=0.0,
-            low=0.0,
-            high=1.0,
-            doc="from their own reading (0) to that of their twin (1)",
+            "1",
+            (0.0, 1.0),
+            "from their own reading (0) to that of their twin (1)",
             example=1.0,
         ),
     )
@@ -296,3 +208,73 @@ class SensorSwapped(SensorEffect):
             readings[active][:, from_there] - readings[active]
         )
         return changed
+
+
+class SensorDrift(ReadingEffect):
+    """A sensor's readings drift with time."""
+
+    name = "sensor_drift"
+    source = "assumed: a sensor that warms up"
+    parameters = (
+        strength(
+            "rate",
+            "count/s",
+            (-1000.0, 1000.0),
+            "added for each second that it lasts; bounds assumed",
+            example=-40.0,
+        ),
+    )
+
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
+    ) -> np.ndarray:
+        since = (times[span] - times[max(span.start - 1, 0)])[:, None]
+        return limited(readings[span, which] + self["rate"] * since)
+
+
+class SensorFrozen(ReadingEffect):
+    """A sensor repeats one reading."""
+
+    name = "sensor_frozen"
+    source = "assumed: a converter that no longer updates"
+    parameters = (
+        strength(
+            "blend",
+            "1",
+            (0.0, 1.0),
+            "from the reading (0) to the frozen one (1)",
+            example=1.0,
+        ),
+    )
+
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
+    ) -> np.ndarray:
+        kept, before = readings[max(span.start - 1, 0), which], readings[span, which]
+        return before + self["blend"] * (kept - before)
+
+
+class SensorResponseTime(ReadingEffect):
+    """A sensor's readings lag behind."""
+
+    name = "sensor_response_time"
+    source = "thesis 5.2.2 gives 50 ms for an answer; a lag beyond that is assumed"
+    parameters = (
+        strength(
+            "time_constant",
+            "s",
+            (0.0, 10.0),
+            "of the filter; 0 = none; bounds assumed",
+            example=0.5,
+        ),
+    )
+
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
+    ) -> np.ndarray:
+        keep = np.exp(-np.diff(times, prepend=times[0]) / self["time_constant"])
+        read = readings[span, which]
+        last = readings[max(span.start - 1, 0), which]
+        for at, share in enumerate(keep[span]):
+            read[at] = last = read[at] + share * (last - read[at])
+        return read

@@ -4,73 +4,58 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from bns.worlds.effects.base import Parameter, ServoEffect
+from bns.worlds.effects.base import Parameter, ServoEffect, factor, strength
 from bns.worlds.physics.servo_law import NO_CURRENT_LIMIT, Law
 
 
 class ServoDelay(ServoEffect):
-    """Goals take effect later."""
+    """Goals take effect later than nominal."""
 
     name = "servo_delay"
     stage = "command"
     number = "delay"
-    doc = "goals take effect later than nominal"
     source = "time on the bus and in the firmware; bounds assumed"
     robots = ("servo", "legged")
     parameters = (
-        Parameter(
+        strength(
             "delay",
-            unit="s",
-            nominal=0.0,
-            low=-0.1,
-            high=0.5,
-            doc="time added, negative takes away; never below none",
+            "s",
+            (-0.1, 0.5),
+            "time added, negative takes away; never below none",
             example=0.05,
         ),
     )
 
 
 class ServoLag(ServoEffect):
-    """Goals are followed through a first-order filter."""
+    """Goals are followed with a first-order lag."""
 
     name = "servo_lag"
     stage = "command"
     number = "lag"
-    doc = "goals are followed with a first-order lag"
     source = "first-order model assumed; bounds assumed"
     robots = ("servo", "legged")
     parameters = (
-        Parameter(
+        strength(
             "time_constant",
-            unit="s",
-            nominal=0.0,
-            low=-0.2,
-            high=1.0,
-            doc="time to 63 % of a step, added",
+            "s",
+            (-0.2, 1.0),
+            "time to 63 % of a step, added",
             example=0.05,
         ),
     )
 
 
 class ServoGain(ServoEffect):
-    """The firmware's proportional gain differs."""
+    """The position gain differs from what is told."""
 
     name = "servo_gain"
     stage = "actuator"
     number = "gain"
-    doc = "the position gain differs from what is told"
     source = "the gain is a register of the servo that is easily misread"
     robots = ("servo", "legged")
     parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.05,
-            high=20.0,
-            doc="gain over gain told; bounds assumed",
-            example=0.7,
-        ),
+        factor((0.05, 20.0), "gain over gain told; bounds assumed", example=0.7),
     )
 
 
@@ -80,49 +65,36 @@ class ServoDeadZone(ServoEffect):
     name = "servo_dead_zone"
     stage = "actuator"
     number = "dead_zone"
-    doc = "the motor rests while the error is small"
     source = "compliance margin or dead zone register of servo firmware; bounds assumed"
     parameters = (
-        Parameter(
+        strength(
             "angle",
-            unit="rad",
-            nominal=0.0,
-            low=0.0,
-            high=0.3,
-            doc="error up to which it rests, added",
+            "rad",
+            (0.0, 0.3),
+            "error up to which it rests, added",
             example=0.02,
         ),
     )
 
 
 class ServoDutyLimit(ServoEffect):
-    """The drive gives a share of the supply at most."""
+    """The drive saturates below the full supply."""
 
     name = "servo_duty_limit"
     stage = "actuator"
     number = "duty_limit"
-    doc = "the drive saturates below the full supply"
     source = "overload protection and torque limits of servo firmware act on the duty"
     robots = ("servo", "legged")
     parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.02,
-            high=1.0,
-            doc="largest duty over nominal; bounds assumed",
-            example=0.3,
-        ),
+        factor((0.02, 1.0), "largest duty over nominal; bounds assumed", example=0.3),
     )
 
 
 class ServoCurrentLimit(ServoEffect):
-    """The drive limits its current."""
+    """The motor's current is limited."""
 
     name = "servo_current_limit"
     stage = "actuator"
-    doc = "the motor's current is limited"
     source = "current limits of servo firmware; bounds assumed"
     parameters = (
         Parameter(
@@ -143,44 +115,26 @@ class ServoCurrentLimit(ServoEffect):
 
 
 class ServoVoltage(ServoEffect):
-    """The supply differs."""
+    """The supply voltage differs from what is told."""
 
     name = "servo_voltage"
     stage = "actuator"
     number = "voltage"
-    doc = "the supply voltage differs from what is told"
     source = "duty times voltage drives the motor"
     robots = ("servo", "legged")
     parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.3,
-            high=3.0,
-            doc="voltage over voltage told; bounds assumed",
-            example=0.8,
-        ),
+        factor((0.3, 3.0), "voltage over voltage told; bounds assumed", example=0.8),
     )
 
 
 class ServoTorqueConstant(ServoEffect):
-    """The motor's torque per current differs."""
+    """The torque constant differs; the back-EMF follows it."""
 
     name = "servo_torque_constant"
     stage = "actuator"
     number = "torque_constant"
-    doc = "the torque constant differs; the back-EMF follows it"
     source = "motor equation: torque kt i, back-EMF kt w"
     robots = ("servo", "legged")
     parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.3,
-            high=3.0,
-            doc="torque constant over nominal; bounds assumed",
-            example=0.8,
-        ),
+        factor((0.3, 3.0), "torque constant over nominal; bounds assumed", example=0.8),
     )

@@ -1,25 +1,22 @@
 """Mechanics of a servo: friction, inertia, play and load."""
 
-from bns.worlds.effects.base import Parameter, ServoEffect
+from bns.worlds.effects.base import ServoEffect, factor, strength
 
 
 class ServoArmature(ServoEffect):
-    """Inertia of rotor and gears."""
+    """The rotor's inertia, seen at the output, differs."""
 
     name = "servo_armature"
     stage = "body"
     number = "armature"
-    doc = "the rotor's inertia, seen at the output, differs"
     source = "rotor inertia times gear ratio squared; bounds assumed"
     robots = ("servo", "legged")
     parameters = (
-        Parameter(
+        strength(
             "inertia",
-            unit="kg m2",
-            nominal=0.0,
-            low=-0.1,
-            high=0.5,
-            doc="inertia added, negative takes away",
+            "kg m2",
+            (-0.1, 0.5),
+            "inertia added, negative takes away",
             example=0.02,
         ),
     )
@@ -31,145 +28,112 @@ class ServoBacklash(ServoEffect):
     name = "servo_backlash"
     stage = "body"
     number = "backlash"
-    doc = "play between gears and lever"
     source = "two inertias that meet without a bounce; bounds assumed"
     parameters = (
-        Parameter(
-            "angle",
-            unit="rad",
-            nominal=0.0,
-            low=0.0,
-            high=0.3,
-            doc="full play added",
-            example=0.02,
-        ),
+        strength("angle", "rad", (0.0, 0.3), "full play added", example=0.02),
     )
 
 
 class ServoCoulomb(ServoEffect):
-    """Dry friction beside the nominal one."""
+    """Dry friction differs."""
 
     name = "servo_coulomb"
     stage = "body"
     number = "coulomb"
-    doc = "dry friction differs"
     source = "BAM (Duclusaud et al., ICRA 2025); bounds assumed"
     robots = ("servo", "legged")
     parameters = (
-        Parameter(
+        strength(
             "torque",
-            unit="N m",
-            nominal=0.0,
-            low=-0.5,
-            high=1.0,
-            doc="dry friction added, negative takes away",
+            "N m",
+            (-0.5, 1.0),
+            "dry friction added, negative takes away",
             example=0.1,
         ),
     )
 
 
 class ServoViscous(ServoEffect):
-    """Friction that grows with speed."""
+    """Viscous friction differs."""
 
     name = "servo_viscous"
     stage = "body"
     number = "viscous"
-    doc = "viscous friction differs"
     source = "BAM (Duclusaud et al., ICRA 2025); bounds assumed"
     robots = ("servo", "legged")
     parameters = (
-        Parameter(
+        strength(
             "coefficient",
-            unit="N m s/rad",
-            nominal=0.0,
-            low=-0.5,
-            high=2.0,
-            doc="viscous friction added, negative takes away",
+            "N m s/rad",
+            (-0.5, 2.0),
+            "viscous friction added, negative takes away",
             example=0.1,
         ),
     )
 
 
 class ServoStribeck(ServoEffect):
-    """Dry friction that fades with speed."""
+    """Extra dry friction at low speed (Stribeck)."""
 
     name = "servo_stribeck"
     stage = "body"
     number = "stribeck"
-    doc = "extra dry friction at low speed (Stribeck)"
     source = "BAM (Duclusaud et al., ICRA 2025); bounds assumed"
     parameters = (
-        Parameter(
+        strength(
             "torque",
-            unit="N m",
-            nominal=0.0,
-            low=-0.5,
-            high=1.0,
-            doc="friction added at speed 0, negative takes away",
+            "N m",
+            (-0.5, 1.0),
+            "friction added at speed 0, negative takes away",
             example=0.1,
         ),
     )
 
 
 class ServoLoadFriction(ServoEffect):
-    """Friction that grows with the torque that the gears carry."""
+    """Gear friction in proportion to the load."""
 
     name = "servo_load_friction"
     stage = "body"
     number = "load_friction"
-    doc = "gear friction in proportion to the load"
     source = "BAM (Duclusaud et al., ICRA 2025); bounds assumed"
     robots = ("servo", "legged")
     parameters = (
-        Parameter(
+        strength(
             "coefficient",
-            unit="1",
-            nominal=0.0,
-            low=-0.5,
-            high=0.8,
-            doc="friction per torque added, negative takes away",
+            "1",
+            (-0.5, 0.8),
+            "friction per torque added, negative takes away",
             example=0.1,
         ),
     )
 
 
 class ServoLever(ServoEffect):
-    """The mass sits nearer or further out."""
+    """The lever's length differs from what is told."""
 
     name = "servo_lever"
     stage = "body"
     number = "lever"
-    doc = "the lever's length differs from what is told"
     source = "the whole lever is scaled, its mass stays"
     parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.25,
-            high=4.0,
-            doc="length over length told; bounds assumed",
-            example=1.2,
-        ),
+        factor((0.25, 4.0), "length over length told; bounds assumed", example=1.2),
     )
 
 
 class ServoPayload(ServoEffect):
-    """The mass at the end of the lever differs."""
+    """The lifted mass differs from what is told."""
 
     name = "servo_payload"
     stage = "body"
     number = "mass"
-    doc = "the lifted mass differs from what is told"
     source = "a point mass at the end of the lever"
     parameters = (
-        Parameter(
+        strength(
             "mass",
-            unit="kg",
-            nominal=0.0,
-            low=-2.0,
-            high=5.0,
-            doc="mass added, negative takes away; bounds assumed",
+            "kg",
+            (-2.0, 5.0),
+            "mass added, negative takes away; bounds assumed",
             example=0.2,
         ),
     )

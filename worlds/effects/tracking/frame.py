@@ -2,24 +2,27 @@
 
 import numpy as np
 
-from bns.worlds.effects.base import Parameter, PoseSignal, TrackingEffect
+from bns.worlds.effects.base import (
+    Parameter,
+    PoseSignal,
+    TrackingEffect,
+    factor,
+    strength,
+)
 
 
 class TrackerRotation(TrackingEffect):
-    """Poses are turned about the middle of the board."""
+    """The tracker's frame is turned against the board's."""
 
     name = "tracker_rotation"
-    doc = "the tracker's frame is turned against the board's"
     source = "assumed: a camera mounted askew"
     robots = ("wheeled", "legged")
     parameters = (
-        Parameter(
+        strength(
             "angle",
-            unit="rad",
-            nominal=0.0,
-            low=-0.8,
-            high=0.8,
-            doc="turn of the reported poses, counter-clockwise; bounds assumed",
+            "rad",
+            (-0.8, 0.8),
+            "turn of the reported poses, counter-clockwise; bounds assumed",
             example=0.1,
         ),
     )
@@ -40,20 +43,15 @@ class TrackerRotation(TrackingEffect):
 
 
 class TrackerScale(TrackingEffect):
-    """Positions are scaled about the middle of the board; headings are right."""
+    """The tracker's unit of length is wrong."""
 
     name = "tracker_scale"
-    doc = "the tracker's unit of length is wrong"
     source = "assumed: wrong camera height or tag height"
     robots = ("wheeled", "legged")
     parameters = (
-        Parameter(
-            "factor",
-            unit="1",
-            nominal=1.0,
-            low=0.8,
-            high=1.25,
-            doc="length reported over true length; bounds assumed",
+        factor(
+            (0.8, 1.25),
+            "length reported over true length; bounds assumed",
             example=1.05,
         ),
     )
@@ -80,10 +78,9 @@ def _off(name: str, unit: str, high: float, doc: str, example: float) -> Paramet
 
 
 class TrackerShift(TrackingEffect):
-    """The camera's middle is not the board's: poses are shifted by a constant."""
+    """The tracker's frame lies beside the board's."""
 
     name = "tracker_shift"
-    doc = "the tracker's frame lies beside the board's"
     source = "assumed: a camera mounted off-centre"
     robots = ("wheeled", "legged")
     parameters = (
@@ -102,10 +99,9 @@ class TrackerShift(TrackingEffect):
 
 
 class MarkerMount(TrackingEffect):
-    """The marker sits elsewhere on the robot, or is turned; it is what is seen."""
+    """The marker on the robot is off its centre, or turned."""
 
     name = "marker_mount"
-    doc = "the marker on the robot is off its centre, or turned"
     source = "rigid-body kinematics; a marker glued askew"
     robots = ("wheeled", "legged")
     parameters = (

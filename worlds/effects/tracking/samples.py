@@ -2,34 +2,29 @@
 
 import numpy as np
 
-from bns.worlds.effects.base import Parameter, PoseSignal, TrackingEffect
+from bns.worlds.effects.base import Parameter, PoseSignal, TrackingEffect, strength
 
 
 class TrackerNoise(TrackingEffect):
-    """Independent normal noise on every sample of position and heading."""
+    """Reported poses scatter."""
 
     name = "tracker_noise"
-    doc = "reported poses scatter"
     source = "assumed: normal and independent; a tag tracker at 1080p reaches 0.2 mm"
     robots = ("wheeled", "legged")
     random = True
     parameters = (
-        Parameter(
+        strength(
             "position_sd",
-            unit="m",
-            nominal=0.0,
-            low=0.0,
-            high=0.1,
-            doc="standard deviation of x and of y; bounds assumed",
+            "m",
+            (0.0, 0.1),
+            "standard deviation of x and of y; bounds assumed",
             example=0.002,
         ),
-        Parameter(
+        strength(
             "heading_sd",
-            unit="rad",
-            nominal=0.0,
-            low=0.0,
-            high=0.5,
-            doc="standard deviation of the yaw; bounds assumed",
+            "rad",
+            (0.0, 0.5),
+            "standard deviation of the yaw; bounds assumed",
             example=0.01,
         ),
     )
@@ -48,21 +43,18 @@ class TrackerNoise(TrackingEffect):
 
 
 class TrackerDropouts(TrackingEffect):
-    """Samples are lost (NaN) in bursts of one length that may overlap."""
+    """Samples of the tracker are lost."""
 
     name = "tracker_dropouts"
-    doc = "samples of the tracker are lost"
     source = "assumed: independent starts of bursts of equal length"
     robots = ("wheeled", "legged")
     random = True
     parameters = (
-        Parameter(
+        strength(
             "probability",
-            unit="1",
-            nominal=0.0,
-            low=0.0,
-            high=0.99,
-            doc="share of the samples that are lost; bounds assumed",
+            "1",
+            (0.0, 0.99),
+            "share of the samples that are lost; bounds assumed",
             example=0.2,
         ),
         Parameter(
@@ -95,24 +87,21 @@ class TrackerDropouts(TrackingEffect):
 
 
 class TrackerLatency(TrackingEffect):
-    """A sample stamped t shows the pose at t - delay; before the start, the first.
+    """The tracker reports old poses under new time stamps.
 
     What other tracking effects did to the poses before is kept: the motion during the
     delay is taken away from them.
     """
 
     name = "tracker_latency"
-    doc = "the tracker reports old poses under new time stamps"
     source = "assumed: exposure, transfer and image processing of an overhead camera"
     robots = ("wheeled", "legged")
     parameters = (
-        Parameter(
+        strength(
             "delay",
-            unit="s",
-            nominal=0.0,
-            low=0.0,
-            high=2.0,
-            doc="age of a reported pose; bounds assumed",
+            "s",
+            (0.0, 2.0),
+            "age of a reported pose; bounds assumed",
             example=0.2,
         ),
     )
@@ -133,24 +122,21 @@ class TrackerLatency(TrackingEffect):
 
 
 class ClockDrift(TrackingEffect):
-    """Time stamps gain on true time while the effect is on, and keep what they gained.
+    """The tracker's clock is fast or slow.
 
     The clock is right at the start of each trial. List it after `tracker_latency`,
     which looks poses up by their time stamps.
     """
 
     name = "clock_drift"
-    doc = "the tracker's clock is fast or slow"
     source = "assumed: a constant rate; crystals reach 1e-4, the rest is software"
     robots = ("wheeled", "legged")
     parameters = (
-        Parameter(
+        strength(
             "rate",
-            unit="1",
-            nominal=0.0,
-            low=-0.1,
-            high=0.1,
-            doc="seconds gained per second; bounds assumed",
+            "1",
+            (-0.1, 0.1),
+            "seconds gained per second; bounds assumed",
             example=0.02,
         ),
     )

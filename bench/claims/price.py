@@ -1,0 +1,80 @@
+"""Processor time of a trial of a run in the claims, by learner: the rates of the plan.
+
+A batch of ten on one thread, as `bns claims run` makes them. Trials before evolution
+starts give what world and training take, those after it what evolution takes, and a
+late trial of navigation without a window what its patterns take. Compiled code is used
+where the claims use it; the time to compile is left out.
+"""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from bench.result import Result, bench
+from bns.claims import price, sides
+from bns.experiment.config import RunConfig
+
+RUNS = 10
+CASES = {
+    "navigation": ("A", "left-20"),
+    "light": ("B", "plain"),
+    "walk": ("D", "type-0"),
+}
+SOON, LATE = 8, {"navigation": 60}
+
+
+@bench(
+    "seconds of a processor for one trial of one run of the dearest learner",
+    bar="none: bns/claims/data/price.toml is to have these rates",
+)
+def claims_price(quick: bool) -> Result:
+    """Three learners; quick: navigation alone, and for a few trials."""
+    found = {
+        name: rates(name, trials=6 if quick else LATE.get(name, 2 * SOON))
+        for name in (["navigation"] if quick else CASES)
+    }
+    return Result(
+        figure=max(row["a trial"] for row in found.values()),
+        unit="s",
+        holds=None,
+        n=RUNS,
+        details={"measured": found, "price.toml": price.rates()},
+    )
+
+
+def rates(name: str, *, trials: int) -> dict[str, float]:
+    """The rates of a learner, each of one run [s]."""
+    letter, side = CASES[name]
+    whole = sides.member(letter, side, world="mujoco").config
+    config = replace(whole, trials=trials, replicates=RUNS)
+    config = replace(config, world=replace(config.world, damage=()))
+    idle = np.median(_times(replace(config, trials=4), whole, evolved=False)[1:])
+    times = _times(config, whole, evolved=True)
+    first = max(config.evolve_from, 1) + 3  # one more may compile
+    soon = np.median(times[first : first + SOON])
+    late = np.median(times[-SOON:])
+    evolution = config.evolution
+    work = evolution.population * evolution.generations
+    per_trial = price.rates()[name]["patterns"] * (trials - SOON - first)
+    grown = (late - soon) / per_trial if per_trial > 0 else 0.0
+    return {
+        "a trial": float(soon / RUNS),
+        "trial": float(idle / RUNS),
+        "evolution": float(max(0.0, soon - idle) / RUNS / work),
+        "pattern": float(max(0.0, grown) / RUNS),
+    }
+
+
+def _times(config: RunConfig, whole: RunConfig, *, evolved: bool) -> np.ndarray:
+    """Processor time of each trial of a batch [s]."""
+    from bns.experiment.batch import resolve
+    from bns.experiment.run import train_many
+
+    mode = resolve(replace(whole, replicates=RUNS))[1]
+    config = replace(config, compiled="yes" if mode == "compiled" else "no")
+    if not evolved:
+        config = replace(config, evolve_from=config.trials)
+    marks = [time.process_time()]
+    train_many([config], on_trial=lambda *_: marks.append(time.process_time()))
+    return np.diff(marks)

@@ -1,0 +1,1 @@
+"""The diagnosis, measured on made and real recordings."""

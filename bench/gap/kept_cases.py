@@ -1,0 +1,103 @@
+"""Cases of a gap bench, by kind and seed: diagnosed once, kept as JSON lines."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from bench.versions import ROOT
+
+DIRECTORY = ROOT / "runs" / "bench"
+
+Case = tuple[str, int]
+"""kind and seed"""
+
+
+def mixed(counts: Mapping[str, int], seed: Callable[[str, int], int]) -> list[Case]:
+    """Kinds and seeds, kinds mixed, should the work be cut short.
+
+    Args:
+        counts: how many of each kind.
+        seed: of a kind's case, by its number.
+    """
+    share = {
+        (kind, seed(kind, n)): n / count
+        for kind, count in counts.items()
+        for n in range(count)
+    }
+    return sorted(share, key=share.__getitem__)
+
+
+def kept(file: str) -> dict[Case, dict[str, Any]]:
+    """All results so far in `runs/bench/<file>_<part>.jsonl`."""
+    found = {}
+    for path in sorted(DIRECTORY.glob(f"{file}_*.jsonl")):
+        for line in path.read_text().splitlines():
+            row = json.loads(line)
+            found[row["kind"], row["seed"]] = row
+    return found
+
+
+def produce(
+    file: str,
+    one: Callable[[str, int], dict[str, Any]],
+    cases: Sequence[Case],
+    part: int = 0,
+) -> list[dict[str, Any]]:
+    """Diagnose the cases that are missing, appending as they come.
+
+    Args:
+        file: where results are kept, see `kept`.
+        one: makes and diagnoses a case.
+        cases: that are wanted.
+        part: of the work, where it is shared.
+
+    Returns:
+        results of the cases.
+    """
+    done = kept(file)
+    DIRECTORY.mkdir(parents=True, exist_ok=True)
+    for case in cases:
+        if case not in done:
+            done[case] = one(*case)
+            with (DIRECTORY / f"{file}_{part}.jsonl").open("a") as out:
+                out.write(json.dumps(done[case]) + "\n")
+    return [done[case] for case in cases]
+
+
+@dataclass(frozen=True)
+class Cases:
+    """The cases of a bench.
+
+    Attributes:
+        file: their results are kept in `runs/bench/<file>_<part>.jsonl`.
+        counts: how many of each kind.
+        first: seed of the first kind's first case.
+        span: seeds between kinds.
+    """
+
+    file: str
+    counts: Mapping[str, int]
+    first: int
+    span: int = 1_000
+
+    def wanted(self, counts: Mapping[str, int] | None = None) -> list[Case]:
+        """Kinds and seeds, kinds mixed, see `mixed`."""
+        kinds = list(self.counts)
+        return mixed(
+            counts or self.counts,
+            lambda kind, n: self.first + self.span * kinds.index(kind) + n,
+        )
+
+    def rows(self) -> dict[Case, dict[str, Any]]:
+        """All results so far."""
+        return kept(self.file)
+
+    def produce(
+        self,
+        one: Callable[[str, int], dict[str, Any]],
+        cases: Sequence[Case],
+        part: int = 0,
+    ) -> list[dict[str, Any]]:
+        """Diagnose the cases that are missing, see `produce`."""
+        return produce(self.file, one, cases, part)

@@ -1,0 +1,1 @@
+"""Hashes of tiny runs, diagnoses and reports, kept to be compared with."""

@@ -1,0 +1,1 @@
+"""The hardware mode, measured against emulated robots."""

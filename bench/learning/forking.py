@@ -1,0 +1,127 @@
+"""Runs that differ only from the damage on share the trials before it.
+
+Trials before the damage are trained once, undamaged (the *trunk*); each side goes on
+from a copy. It is, to the byte, what the side would be had it been trained from its
+first trial on, since all sides of a trunk have its seed.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from hashlib import sha256
+from itertools import count
+from pathlib import Path
+from shutil import copytree, rmtree
+
+from bench.learning import experiments
+from bns.experiment.config import AdaptationConfig, RunConfig
+from bns.experiment.record import RunRecord
+
+ON_DAMAGE = (
+    "population_reset",
+    "simulator_reset",
+    "simulator_reset_untrained",
+    "data_reset",
+    "restart",
+    "mutation_rate_after",
+    "mutation_magnitude_after",
+)
+"""fields of `AdaptationConfig` that do nothing until a damage is known"""
+
+
+def trunk(config: RunConfig) -> RunConfig:
+    """What a side is before its damage."""
+    plain = AdaptationConfig()
+    told = {name: getattr(plain, name) for name in ON_DAMAGE}
+    adaptation = config.adaptation
+    if not config.watch.detect:  # a false alarm sets them off as well
+        adaptation = replace(adaptation, **told)
+    return replace(
+        config,
+        preset="light-trunk",
+        trials=onset(config) + 1,
+        adaptation=adaptation,
+        world=replace(config.world, damage=()),
+    )
+
+
+def seed(config: RunConfig) -> int:
+    """The seed of all sides of a trunk."""
+    settings = experiments.known(replace(trunk(config), seed=0, replicates=0))
+    return int.from_bytes(sha256(repr(settings).encode()).digest()[:4], "little")
+
+
+def onset(config: RunConfig) -> int:
+    """First damaged trial of a side."""
+    from bns.worlds.damage import Damage
+
+    return Damage.parse(config.world.damage).first_trial
+
+
+def records(
+    configs: Iterable[RunConfig], *, quick: bool = False
+) -> Mapping[str, RunRecord]:
+    """Records by configuration name, training what is missing; all with a damage.
+
+    Args:
+        configs: made by `bench.learning.light_runs.damaged`.
+        quick: few replicates and trials, for a look that takes seconds.
+    """
+    wanted = [experiments.shortened(c) if quick else c for c in configs]
+    missing = [c for c in wanted if not (_place(c) / "run.json").exists()]
+    trunks = {_place(trunk(config)): config for config in missing}
+    experiments.RUNS.mkdir(parents=True, exist_ok=True)
+    with experiments.pool_of_workers() as pool:
+        list(pool.map(grow, trunks.values()))
+        list(pool.map(branch, wanted))
+    from bns.storage.store import load
+
+    return {config.preset: load(_place(config)) for config in wanted}
+
+
+def grow(config: RunConfig) -> None:
+    """Train the trunk of a side as far as its damage."""
+    from bns.experiment.run import train
+    from bns.storage.store import RunStore
+
+    base = trunk(config)
+    place = _place(base)
+    done = RunStore.open(place).read_state()[0] if place.exists() else 0
+    asked = count(done)
+    train(base, place, resume=True, stop=lambda: next(asked) >= onset(config))
+
+
+def branch(config: RunConfig) -> None:
+    """Train a side from its damage on."""
+    from bns.experiment.run import train
+
+    place = _place(config)
+    if not (place / "run.json").exists():
+        _copy(config, place)
+    train(config, place, resume=True)
+
+
+def _copy(config: RunConfig, place: Path) -> None:
+    """The trunk as the beginning of a side; the damage is known or is not."""
+    from bns.experiment.run import facts
+    from bns.storage.store import RunStore
+
+    source = RunStore.open(_place(trunk(config)))
+    known = facts(config, source.mode)
+    done, state = source.read_state()
+    state["onsets"][:] = -1 if config.watch.detect else known["damage_onset"]
+    part = place.with_name(f"{place.name}.part")
+    rmtree(part, ignore_errors=True)
+    store = RunStore(part, config, source.mode, source.versions, **_named(known))
+    store.create()
+    copytree(source.directory / "steps", part / "steps")
+    store.write_state(done, state)
+    store.close()
+    part.rename(place)
+
+
+def _named(known: Mapping[str, object]) -> dict[str, object]:
+    return {name: known[name] for name in ("conditions", "damage_onset")}
+
+
+def _place(config: RunConfig) -> Path:
+    return experiments.directory(config)

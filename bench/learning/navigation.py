@@ -1,0 +1,158 @@
+"""Navigation by the undamaged and the damaged Khepera III, in physics and as an SNN."""
+
+from bench.learning import ceiling, experiments, solving
+from bench.result import Result, bench
+from bns import stats
+
+LIMIT, FEWEST, MEDIAN = 70, 27, 16
+CLAIMS = dict(zip(experiments.DAMAGES, ("A15", "A16", "A17", "A18"), strict=True))
+LEVEL = 0.01
+
+
+@bench(
+    "median trials to solve the simple problem, undamaged",
+    bar="median <= 12 trials, >= 28 of 30 runs within 30",
+)
+def solve_simple(quick: bool) -> Result:
+    """30 runs of the preset `khepera-simple` without damage, 30 trials each."""
+    config = experiments.undamaged("simple")
+    record = experiments.records([config], quick=quick)[config.preset]
+    waits = solving.waits(stats.trials_to_solve(record))
+    median = waits["median"]
+    within = solving.solved_within(record, 30)
+    return Result(
+        figure=median if median is not None else float(record.trials + 1),
+        unit="trials",
+        holds=None if quick else median is not None and median <= 12 and within >= 28,
+        n=record.replicates,
+        details={"solved within 30": within, **waits},
+    )
+
+
+@bench(
+    "runs that solve the infinity problem within 60 trials, undamaged",
+    bar=">= 24 of 30 runs within 60 trials",
+)
+def solve_infinity(quick: bool) -> Result:
+    """30 runs of the preset `khepera-infinity`, 60 trials each."""
+    config = experiments.undamaged("infinity")
+    record = experiments.records([config], quick=quick)[config.preset]
+    within = solving.solved_within(record, 60)
+    return Result(
+        figure=within,
+        unit="runs",
+        holds=None if quick else within >= 24,
+        n=record.replicates,
+        details=solving.waits(stats.trials_to_solve(record)),
+    )
+
+
+@bench(
+    "window 150 and 300 against none on four damages (claims A15-A18): cells that hold",
+    bar="better in all 8 cells, p < 0.01 each",
+)
+def window_claims(quick: bool) -> Result:
+    """30 runs a side, damage at trial 30 of 100; O of eq 3.1, Mann-Whitney, A12."""
+    sides = {
+        (damage, window): experiments.damaged(damage, **_adaptation(window))
+        for damage in experiments.DAMAGES
+        for window in (0, 150, 300)
+    }
+    records = experiments.records(sides.values(), quick=quick)
+    cells: dict[str, dict[str, object]] = {}
+    for damage, claim in CLAIMS.items():
+        found = {w: records[sides[damage, w].preset] for w in (0, 150, 300)}
+        for window in (150, 300):
+            cell = solving.versus(found[window], found[0])
+            cells[f"{claim} {damage} {window} v none"] = cell
+        label = f"{claim} {damage} 150 v 300"
+        cells[label] = solving.versus(found[150], found[300])
+    adjusted = stats.holm([float(cell["p"]) for cell in cells.values()])
+    for cell, p in zip(cells.values(), adjusted, strict=True):
+        cell["p holm"] = float(p)
+    against_none = [cell for name, cell in cells.items() if name.endswith("none")]
+    hold = sum(cell["better"] > 0.5 and cell["p"] < LEVEL for cell in against_none)
+    return Result(
+        figure=hold,
+        unit="cells of 8",
+        holds=None if quick else hold == len(against_none),
+        n=next(iter(records.values())).replicates,
+        details=cells,
+    )
+
+
+def _adaptation(window: int) -> dict[str, int]:
+    return {"window": window} if window else {}
+
+
+@bench(
+    "fewest runs (over four damages) that recover within 70 trials, window 150",
+    bar=">= 27 of 30 in each; median <= 16 trials for 20 %; all four solvable at all",
+)
+def recover_window(quick: bool) -> Result:
+    """30 runs of each damage (from trial 30 of 100); quick: few and short.
+
+    Every run that recovers shows that the encoding leaves the damage solvable. Beside
+    it stands the ceiling (`python -m bench ceiling`), where it has been run: what
+    evolution *directly in the damaged world*, without any SNN, reaches.
+    """
+    configs = {d: experiments.damaged(d, window=150) for d in experiments.DAMAGES}
+    records = experiments.records(configs.values(), quick=quick)
+    found: dict[str, dict[str, object]] = {}
+    holds = True
+    for damage, config in configs.items():
+        record = records[config.preset]
+        waits = solving.waits(stats.trials_to_recover(record))
+        within = solving.recovered_within(record, LIMIT)
+        found[damage] = {"recovered within 70": within, **waits}
+        quickly = waits["median"] is not None and waits["median"] <= MEDIAN
+        holds = holds and within >= FEWEST and (quickly or damage.endswith("50"))
+        found[damage]["ceiling"] = ceiling.known(damage) or "not run"
+    return Result(
+        figure=min(int(row["recovered within 70"]) for row in found.values()),
+        unit="runs",
+        holds=None if quick else holds,
+        n=record.replicates,
+        details=found,
+    )
+
+
+@bench(
+    "the same experiments in the static-SNN world and in MuJoCo, side by side",
+    bar="none: printed beside the physics world's",
+)
+def static_snn_world(quick: bool) -> Result:
+    """Solving both problems and recovering from four damages with three windows."""
+    found: dict[str, object] = {}
+    for problem in ("simple", "infinity"):
+        found[f"solve {problem}"] = _both(
+            lambda world, problem=problem: experiments.undamaged(problem, world),
+            lambda record: solving.waits(stats.trials_to_solve(record)),
+            quick,
+        )
+    for damage in experiments.DAMAGES:
+        for window in (150, 300, 0):
+            adaptation = {"window": window} if window else {}
+            found[f"recover {damage}, window {window or 'none'}"] = _both(
+                lambda world, d=damage, a=adaptation: experiments.damaged(
+                    d, world=world, **a
+                ),
+                lambda record: solving.waits(stats.trials_to_recover(record)),
+                quick,
+            )
+    static = [row["static-snn"]["came"] for row in found.values()]
+    physics = [row["mujoco"]["came"] for row in found.values()]
+    agree = sum(abs(a - b) <= 3 for a, b in zip(static, physics, strict=True))
+    return Result(
+        figure=agree,
+        unit=f"of {len(static)} rows within 3 runs of the physics world",
+        holds=None,
+        n=6 if quick else experiments.REPLICATES,
+        details=found,
+    )
+
+
+def _both(config, summary, quick: bool) -> dict[str, dict[str, object]]:
+    configs = {world: config(world) for world in ("mujoco", "static-snn")}
+    records = experiments.records(configs.values(), quick=quick)
+    return {world: summary(records[c.preset]) for world, c in configs.items()}

@@ -1,0 +1,125 @@
+"""What a closed loop costs beside the bare physics of the same cycles."""
+
+import os
+import time
+from typing import Any
+
+import numpy as np
+
+from bench.result import Result, bench
+
+LIMIT = 1.25
+ROBOTS, CYCLES, THREADS = 30, 50, 2
+
+
+class Networks:
+    """Thirty feedforward networks, 2-5-2, evaluated as one batch."""
+
+    def __init__(self):
+        rng = np.random.default_rng(0)
+        self.hidden = rng.uniform(-5, 5, (ROBOTS, 2, 5))
+        self.bias = rng.uniform(-5, 5, (ROBOTS, 5))
+        self.out = rng.uniform(-1, 1, (ROBOTS, 5, 2))
+
+    def memory(self, n: int) -> np.ndarray:
+        return np.zeros((n, 0))
+
+    def act(self, readings: np.ndarray, memory: np.ndarray) -> tuple:
+        inner = np.einsum("ns,nsh->nh", readings / 4095, self.hidden) + self.bias
+        speeds = np.einsum("nh,nhc->nc", np.tanh(inner), self.out)
+        return 0.12 * np.tanh(speeds), memory
+
+
+@bench(
+    "closed-loop World.drive of 30 robots against bare mujoco.rollout of its cycles",
+    bar="<= 1.25 x",
+)
+def closed_loop_overhead(quick: bool) -> Result:
+    """Median of interleaved ratios, in one process, over several kinds of damage.
+
+    The bare call gets the controls that the closed loop sent, cycle by cycle, all
+    robots that were not stopped in one call of `mujoco.rollout`, each from the state
+    that the cycle before left it in. The figure is the worst case. Beside it stands
+    the ratio of processor times, which says what is worked in addition; the wall clock
+    also has the waiting of threads for each other, once a cycle, which a busy machine
+    multiplies.
+    """
+    repeats = 2 if quick else 5
+    cases = {
+        "undamaged": [()] * ROBOTS,
+        "wheel_gain each": [
+            (f"wheel_gain:wheel=left,factor={0.5 + 0.01 * i}",) for i in range(ROBOTS)
+        ],
+        "sensor_gain each": [
+            (f"sensor_gain:factor={0.5 + 0.01 * i}",) for i in range(ROBOTS)
+        ],
+        "sensor_noise each": [
+            (f"sensor_noise:factor={1.5 + 0.1 * i}",) for i in range(ROBOTS)
+        ],
+        "payload each": [(f"payload:mass={0.01 * (i + 1)}",) for i in range(ROBOTS)],
+    }
+    details: dict[str, object] = {}
+    worst = 0.0
+    for name, damage in cases.items():
+        wall, processor = np.median(_ratios(damage, repeats), axis=0)
+        details[name] = round(float(wall), 4)
+        details[f"{name}, processor time"] = round(float(processor), 4)
+        worst = max(worst, float(wall))
+    details["load of the machine"] = round(os.getloadavg()[0], 1)
+    return Result(
+        figure=round(worst, 4),
+        unit="x",
+        holds=worst <= LIMIT,
+        n=repeats,
+        details=details,
+    )
+
+
+def _ratios(damage: list, repeats: int) -> list[tuple[float, float]]:
+    """Closed loop over bare call: wall clock and processor time, of each repeat."""
+    from bns.worlds import registry
+
+    world: Any = registry.make("light", damage=damage, threads=THREADS)
+    policy, seeds = Networks(), range(ROBOTS)
+    bare = _bare(world, policy, seeds)
+    bare()
+    ratios = []
+    for _ in range(repeats):
+        begin = _clocks()
+        bare()
+        middle = _clocks()
+        world.drive(policy, cycles=CYCLES, seeds=seeds)
+        wall, processor = (_clocks() - middle) / (middle - begin)
+        ratios.append((wall, processor))
+    return ratios
+
+
+def _clocks() -> np.ndarray:
+    return np.array([time.perf_counter(), time.process_time()])
+
+
+def _bare(world: Any, policy: Networks, seeds: range) -> Any:
+    """Cycles of all robots at once, states kept."""
+    import mujoco
+    from mujoco.rollout import Rollout
+
+    session = world.session(cycles=CYCLES, seeds=seeds)
+    start = session.states[:, 0].copy()
+    cycles = []
+    while session.cycle < CYCLES:
+        session.step(policy.act(session.readings, policy.memory(ROBOTS))[0])
+        moved = session.segments.values()
+        models = [segments[0].compiled.model for segments in moved]
+        controls = np.stack([segments[0].control for segments in moved])
+        cycles.append((list(session.segments), models, controls))
+    data = [mujoco.MjData(models[0]) for _ in range(THREADS)]
+    roller = Rollout(nthread=THREADS)
+
+    def loop() -> None:
+        states, kept = start.copy(), []
+        for robots, models, control in cycles:
+            moved, _ = roller.rollout(models, data, states[robots], control)
+            states[robots] = moved[:, -1]
+            kept.append(moved)
+
+    return loop

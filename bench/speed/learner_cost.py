@@ -1,0 +1,95 @@
+"""What learning costs beside the physics it learns from."""
+
+import time
+from dataclasses import replace
+from statistics import median
+
+from bench.result import Result, bench
+from bns.experiment.config import RunConfig
+
+LIMIT = 1.5
+THREADS = 2
+
+
+@bench(
+    "learner time against bare physics time of the same trials, window 150",
+    bar="<= 1.5 x",
+)
+def learner_cost(quick: bool) -> Result:
+    """30 runs x 100 trials of `khepera-simple`, start-up and compilation included.
+
+    The bare physics are the rollouts of the very same trials, trial by trial in
+    between, each robot to its own end (no padding); quick: 30 runs x 8 trials, without
+    the start-up, which would need the 100 to pay.
+    """
+    trials = 8 if quick else 100
+    with_window = measure(_config(150, trials), after=2 if quick else 0)
+    print(f"window 150: {with_window}")  # the rest takes long
+    details = {"window 150": with_window}
+    if not quick:
+        details["no window"] = measure(_config(0, trials))
+    ratio = with_window["ratio without start-up" if quick else "ratio"]
+    return Result(
+        figure=ratio,
+        unit="x",
+        holds=None if quick else ratio <= LIMIT,
+        n=trials * 30,
+        details=details,
+    )
+
+
+def _config(window: int, trials: int) -> RunConfig:
+    from bns import presets
+
+    config = presets.load("khepera-simple")
+    return replace(
+        config,
+        trials=trials,
+        threads=THREADS,
+        compiled="yes",
+        adaptation=replace(config.adaptation, window=window),
+    )
+
+
+def measure(config: RunConfig, after: int = 0) -> dict[str, float]:
+    """Seconds of learner, of bare physics, and their ratio.
+
+    Args:
+        config: the batch.
+        after: trials not counted in "without start-up" beside the first one.
+    """
+    from bns.experiment.batch import Batch, resolve
+    from bns.experiment.world_factory import make_world
+    from bns.worlds.physics.rollout import Pool
+
+    begin = time.perf_counter()
+    config, _ = resolve(config)
+    world = make_world(config)
+    batch = Batch([config], [world])
+    learner, starting = batch.learner, time.perf_counter() - begin
+    pool = Pool(config.threads)
+    learning, physics = [], []
+    for trial in range(config.trials):
+        marks = [time.perf_counter()]
+        tried = learner.propose(trial).tried
+        marks.append(time.perf_counter())
+        jobs = [plan.job for plan in world.plan(tried, trial=trial)]
+        marks.append(time.perf_counter())
+        pool.map(jobs)
+        marks.append(time.perf_counter())
+        seen = world.run(tried, trial=trial)
+        marks.append(time.perf_counter())
+        learner.observe(trial, seen, None)
+        marks.append(time.perf_counter())
+        learning.append(marks[1] - marks[0] + marks[5] - marks[4])
+        physics.append(marks[3] - marks[2])
+    steady = [
+        a / b for a, b in zip(learning[1 + after :], physics[1 + after :], strict=True)
+    ]
+    total = starting + sum(learning)
+    return {
+        "learner [s]": round(total, 2),
+        "physics [s]": round(sum(physics), 2),
+        "ratio": round(total / sum(physics), 3),
+        "ratio without start-up": round(median(steady), 3),
+    }

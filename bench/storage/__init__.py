@@ -1,0 +1,1 @@
+"""Files, stores and campaigns under kills, full disks and damaged bytes."""

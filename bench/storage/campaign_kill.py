@@ -1,0 +1,147 @@
+"""A campaign whose workers, and then whose driver, are killed."""
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+from bench.result import Result, bench
+from bench.storage.campaigns import held, text
+from bns import seeding
+from bns.campaign.store import CampaignStore
+
+WORKERS = 2
+
+
+@bench(
+    "200 batches, 30 workers killed at random, then the driver, resumed: batches kept",
+    bar="200 of 200, none twice, the bytes of an undisturbed campaign",
+)
+def campaign_kill(quick: bool) -> Result:
+    """Kill (SIGKILL) workers while the first 150 batches run, the driver after 160."""
+    batches, kills = (20, 3) if quick else (200, 30)
+    rng = seeding.generator(0, "bench", "campaign-kill")
+    with tempfile.TemporaryDirectory() as name:
+        home = Path(name)
+        file = home / "tiny.toml"
+        file.write_text(text(batches, trials=2, replicates=2))
+        clean = _finish(_start(file, home / "clean"))
+        moments = np.sort(rng.integers(1, int(0.75 * batches), kills))
+        driver = _start(file, home / "out")
+        struck = _strike(driver, home / "out", moments, rng)
+        kept = _end_driver(driver, home / "out", int(0.8 * batches))
+        changed, last = _resume(file, home / "out", kept)
+        store = CampaignStore.open(home / "out")
+        done = [part.key for part in store.read()]
+        logged = Counter(e["batch"] for e in store.log() if "batch" in e)
+        same = held(home / "out") == held(home / "clean")
+        details = {
+            "workers killed": struck,
+            "batches restarted": sum(e.get("attempts", 1) > 1 for e in store.log()),
+            "batches kept when the driver was killed": len(kept),
+            "of those changed since": changed,
+            "batches run twice": sum(count > 1 for count in logged.values()),
+            "failed": len(store.failures()),
+            "same bytes as undisturbed": same,
+            "seconds undisturbed": round(clean, 1),
+            "seconds after the driver's death": round(last, 1),
+        }
+    whole = len(set(done)) == len(done) == batches and same
+    clean_log = details["batches run twice"] == changed == details["failed"] == 0
+    return Result(
+        figure=len(set(done)),
+        unit=f"of {batches}",
+        holds=None if quick else whole and clean_log and struck == kills,
+        n=batches,
+        details=details,
+    )
+
+
+def _start(file: Path, out: Path) -> subprocess.Popen:
+    words = ["campaign", "run", str(file), "--out", str(out), "--resume"]
+    return subprocess.Popen(
+        [sys.executable, "-m", "bns", *words, "--workers", str(WORKERS)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
+    )
+
+
+def _finish(driver: subprocess.Popen) -> float:
+    began = time.monotonic()
+    if driver.wait() != 0:
+        raise RuntimeError(f"the campaign exited with {driver.returncode}")
+    return time.monotonic() - began
+
+
+def _parts(out: Path) -> dict[str, bytes]:
+    """Bytes of the batches that are stored one by one; they may go meanwhile."""
+    found = {}
+    for path in (out / "parts").glob("[0-9a-f]*.parquet"):
+        with suppress(FileNotFoundError):
+            found[path.name] = path.read_bytes()
+    return found
+
+
+def _strike(
+    driver: subprocess.Popen, out: Path, moments: np.ndarray, rng: np.random.Generator
+) -> int:
+    """Kill a random worker whenever so many batches are done."""
+    struck = 0
+    for moment in moments:
+        while len(list((out / "parts").glob("[0-9a-f]*.parquet"))) < moment:
+            if driver.poll() is not None:
+                return struck
+            time.sleep(0.01)
+        time.sleep(float(rng.uniform(0, 0.5)))
+        workers: list[int] = []
+        while len(workers) < WORKERS and driver.poll() is None:
+            workers = _children(driver.pid)
+        os.kill(int(rng.choice(workers)), signal.SIGKILL)
+        struck += 1
+    return struck
+
+
+def _end_driver(driver: subprocess.Popen, out: Path, after: int) -> dict[str, bytes]:
+    """Kill the driver once so many batches are done; gives what is stored then."""
+    while len(list((out / "parts").glob("[0-9a-f]*.parquet"))) < after:
+        if driver.poll() is not None:
+            raise RuntimeError("the campaign ended before its driver was killed")
+        time.sleep(0.01)
+    driver.send_signal(signal.SIGKILL)
+    driver.wait()
+    return _parts(out)
+
+
+def _resume(file: Path, out: Path, kept: dict[str, bytes]) -> tuple[int, float]:
+    """Go on; gives how many stored batches changed meanwhile, and the time it took."""
+    driver = _start(file, out)
+    began, changed = time.monotonic(), set()
+    while driver.poll() is None:
+        time.sleep(0.2)
+        for name, data in _parts(out).items():  # at the end they are compacted
+            if kept.get(name, data) != data:
+                changed.add(name)
+    if driver.returncode != 0:
+        raise RuntimeError(f"the resumed campaign exited with {driver.returncode}")
+    return len(changed), time.monotonic() - began
+
+
+def _children(pid: int) -> list[int]:
+    """Living processes that this one started."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = stat.read_text().rpartition(")")[2].split()
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+        if int(fields[1]) == pid and fields[0] not in "ZX":
+            found.append(int(stat.parent.name))
+    return sorted(found)

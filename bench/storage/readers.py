@@ -1,0 +1,498 @@
+"""A small file of each kind that is read, what reads it, and what it may hold."""
+
+import gzip
+import json
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bench.storage.campaigns import text, tiny
+from bench.versions import ROOT
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A kind of file.
+
+    Attributes:
+        name: of the kind.
+        file: where it lies, below the directory that `make` filled.
+        read: reads it; given that directory.
+        sane: what is wrong with content that was accepted, one line; "" = nothing.
+        stored: whether the project wrote it, and so notices a flipped bit.
+    """
+
+    name: str
+    file: str
+    read: Callable[[Path], Any]
+    sane: Callable[[Any], str] = lambda found: ""
+    stored: bool = False
+
+
+def make(home: Path) -> None:
+    """Write all the files."""
+    from bns.campaign import drive
+    from bns.campaign.engines.inline import InlineEngine
+    from bns.campaign.file import Campaign
+    from bns.experiment.run import train
+
+    campaign = tiny(2, trials=2)
+    config = campaign.members[0].config
+    from dataclasses import replace
+
+    config = replace(config, replicates=2, record_replicates=1, trials=3, threads=1)
+    train(config, home / "run")
+    asked = iter([False, False, True])
+    train(config, home / "begun", stop=lambda: next(asked))
+    file = home / "campaign.toml"
+    file.write_text(text(2, trials=2, replicates=2))
+    whole = Campaign(
+        campaign.name,
+        campaign.members,
+        campaign.replicates,
+        campaign.seed,
+        campaign.batch_runs,
+        text=file.read_text(),
+    )
+    drive.run(whole, home / "store", InlineEngine())
+    _parts(home)
+    _calibrations(home)
+    _robots(home)
+    _logs(home)
+    _recordings(home)
+
+
+def _parts(home: Path) -> None:
+    """A part that is not compacted, a failure, nets, a diagnosis, answers, commands."""
+    from bns.campaign.part import encode
+    from bns.campaign.store import CampaignStore
+    from bns.gap.planning import command_file
+    from bns.storage import files
+    from bns.worlds.static_snn.nets import kinematic_nets
+    from bns.worlds.trial import Commands
+
+    store = CampaignStore.open(home / "store")
+    loose = CampaignStore.create(home / "loose", "tiny", store.seed)
+    for part in list(store.read())[:1]:
+        loose.add(part.key, encode(part))
+        (home / "part.parquet").write_bytes(encode(part))
+    loose.fail("00ff", reason="it did not", attempts=2)
+    kinematic_nets(hidden=5, patterns=60).save(home / "nets.npz")
+    from bns.gap import store as gap_store
+
+    gap_store.save(_diagnosis(), home / "gap")
+    answer = {"kind": "none", "names": [], "aliases": {}}
+    content = {"schema": "bns-gap-answers", "version": 1, "cases": {"a": answer}}
+    files.write_json(home / "answers.json", content)
+    commands = Commands([[0.1, 0.05], [-0.1, 0.2]], [0.5, 1.0])
+    command_file.write(commands, home / "commands.csv")
+
+
+def _diagnosis() -> Any:
+    from bns.gap.records import Diagnosis, Fit, Verdict
+
+    fit = Fit(("a",), ("b",), (1.0,), ((0.5, 1.5),), ("m",), 1.0, 2.0, 0.1, 3.0)
+    none = Fit((), (), (), (), (), 1.0, 2.0, 0.1, 3.0)
+    verdict = Verdict(
+        "effect", (("a",),), (("a",),), 1.0, 0.01, 0.5, (), 2.0, "a it is"
+    )
+    parts: list[Mapping[str, Any]] = [{"share": [1.0, None]}, {}, {}, {"closed": 0.5}]
+    return Diagnosis("khepera3", 3, ("one",), verdict, (fit, none), *parts)
+
+
+def _calibrations(home: Path) -> None:
+    from bns.hardware.dynamixel import joints
+    from bns.hardware.odometry import Wheels
+    from bns.hardware.tracking.camera import Camera
+    from bns.worlds.corrected import Corrected, _table
+
+    Camera.overhead((1280, 720)).write(home / "camera.json")
+    Wheels(left=0.0411, right=0.0409, axle=0.0885).write(home / "wheels.json")
+    joints.write(home / "servos.toml", joints.read(), said="Zeros of a test.")
+    import tomli_w
+
+    world = Corrected("kitchen", "mujoco", "khepera3", ("wheel_gain:factor=0.9",), "x")
+    text = tomli_w.dumps({"worlds": {"kitchen": _table(world)}})
+    (home / "worlds.toml").write_text(text)
+
+
+def _robots(home: Path) -> None:
+    for name in ("burger", "arm"):
+        shutil.copytree(ROOT / "examples" / name, home / name)
+    (home / "law").mkdir()
+    shutil.copy(ROOT / "models" / "ax12a" / "law.toml", home / "law" / "law.toml")
+
+
+MAP = """robot = "khepera3"
+[columns]
+time = {column = "t", unit = "ms"}
+x = {column = "px", unit = "mm"}
+y = "py"
+yaw = "heading"
+left_speed = "vl"
+right_speed = "vr"
+"""
+FIELDS = {
+    "time": "log_time", "x": "/pose:x", "y": "/pose:y", "yaw": "/pose:yaw",
+    "left_speed": "/speed:left", "right_speed": "/speed:right",
+}  # fmt: skip
+
+
+def _logs(home: Path) -> None:
+    (home / "map.toml").write_text(MAP)
+    rows = [
+        f"{100 * k},{k},{k / 10},{k / 20},0.1,{0.1 + (k > 3) / 10}" for k in range(8)
+    ]
+    (home / "log.csv").write_text("t,px,py,heading,vl,vr\n" + "\n".join(rows) + "\n")
+    head = "time,shoulder_goal,elbow_goal,shoulder,elbow\n"
+    rows = [f"{k / 10},0.1,{0.1 * (k > 3)},{k / 50},{k / 60}" for k in range(8)]
+    (home / "own.csv").write_text(head + "\n".join(rows) + "\n")
+    from mcap.writer import Writer
+
+    with (home / "log.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = writer.register_schema("any", "jsonschema", b"{}")
+        pose = writer.register_channel("/pose", "json", schema)
+        speed = writer.register_channel("/speed", "json", schema)
+        for k in range(6):
+            stamp = 1_700_000_000_000_000_000 + k * 100_000_000
+            seen = json.dumps({"x": k, "y": 2 * k, "yaw": k / 10}).encode()
+            told = json.dumps({"left": 0.1, "right": 0.1 * (k > 2)}).encode()
+            writer.add_message(pose, stamp, seen, stamp)
+            writer.add_message(speed, stamp, told, stamp)
+        writer.finish()
+
+
+def _recordings(home: Path) -> None:
+    from bns.gap.importers import kscale_sts3215, xl330
+
+    for name in ("khepera", "kscale", "xl330", "mrclam"):
+        (home / name).mkdir()
+    items = [{"T": 0.5, "phi_l": 1.0, "phi_r": 2.0, "sm": [0.01, 0.0, 0.1]}] * 5
+    lines = "\n".join(map(json.dumps, items))
+    (home / "khepera" / "lstraight.tuple").write_text(lines)
+    known = dict.fromkeys(("axle", "l_diam", "r_diam", "l_x", "l_y", "l_theta"), 0.04)
+    known |= {"covariance": (np.eye(6) * 1e-6).tolist()}
+    (home / "khepera" / "lstraight_results.json").write_text(json.dumps(known))
+    columns = list(kscale_sts3215.SOURCES.values())
+    table = np.zeros((20, len(columns)), np.float32)
+    table[:, 0], table[:, 1] = np.arange(20) / 100, np.sin(np.arange(20) / 10)
+    np.savez(home / "kscale" / "runs.npz", _columns=np.array(columns), a=table)
+    head = "file,kp,length,mass,trajectory,vin\n"
+    (home / "kscale" / "index.csv").write_text(head + "a,16,0.15,0.741,sin,15.0\n")
+    entry = dict.fromkeys(xl330.ENTRIES.values(), 1.0)
+    entries = [entry | {"timestamp": k / 100, "position": k / 50} for k in range(9)]
+    told = {"mass": 0.5, "length": 0.1, "kp": 200, "vin": 7.4, "trajectory": "sin"}
+    (home / "xl330" / "a.json").write_text(json.dumps(told | {"entries": entries}))
+    times = np.arange(0, 6, 0.1)
+    seen = np.column_stack([1e9 + times, times / 10, times / 20, times / 30])
+    sent = np.column_stack([1e9 + times, 0 * times + 0.1, np.sin(times)])
+    np.savetxt(home / "mrclam" / "Robot2_Groundtruth.dat", seen)
+    packed = home / "mrclam" / "Robot2_Odometry.dat.gz"
+    with gzip.open(packed, "wt") as out:
+        np.savetxt(out, sent)
+
+
+def readers() -> list[Reader]:
+    """All of them."""
+    return [*_stored(), *_made(), *_given(), *_recorded()]
+
+
+def _stored() -> Iterator[Reader]:
+    from bns.campaign import results
+    from bns.campaign.store import CampaignStore
+    from bns.storage.store import RunStore, load
+    from bns.worlds.data import dataset
+
+    yield Reader(
+        "run.json", "run/run.json", lambda h: RunStore.open(h / "run"), stored=True
+    )
+    for name in ("arrays.npz", "record.parquet"):
+        yield Reader(name, f"run/{name}", lambda h: load(h / "run"), run, True)
+    step = "begun/steps/00001.npz"
+    yield Reader("step.npz", step, lambda h: load(h / "begun"), run, True)
+    yield Reader(
+        "state.npz", "begun/state.npz", lambda h: _state(h / "begun"), state, True
+    )
+    for name in ("dataset.json", "trials.parquet", "commands.parquet"):
+        file = f"run/dataset/{name}"
+        yield Reader(
+            name, file, lambda h: dataset.read(h / "run" / "dataset"), trials, True
+        )
+    stores = {
+        "campaign.json": lambda h: CampaignStore.open(h / "store"),
+        "campaign.toml": lambda h: results.wanted(CampaignStore.open(h / "store")),
+        "results.parquet": lambda h: list(CampaignStore.open(h / "store").read()),
+    }
+    for name, read in stores.items():
+        yield Reader(name, f"store/{name}", read, stored=True)
+
+
+def _made() -> Iterator[Reader]:
+    from bns.campaign.part import decode
+    from bns.campaign.store import CampaignStore
+    from bns.gap import store as gap_store
+    from bns.gap.bench.benchmark_io import read_answers
+    from bns.hardware.dynamixel import joints
+    from bns.hardware.odometry import Wheels
+    from bns.hardware.tracking.camera import Camera
+    from bns.storage import reading
+    from bns.worlds.static_snn.nets import StaticNets
+
+    yield Reader(
+        "part.parquet", "part.parquet",
+        lambda h: decode(
+            reading.read_bytes(h / "part.parquet", most=reading.DATA), "part"
+        ), stored=True,
+    )  # fmt: skip
+    yield Reader(
+        "failed.json", "loose/failed/00ff.json",
+        lambda h: CampaignStore.open(h / "loose").failures(), stored=True,
+    )  # fmt: skip
+    yield Reader(
+        "diagnosis.json", "gap/diagnosis.json", lambda h: gap_store.load(h / "gap"),
+        stored=True,
+    )  # fmt: skip
+    yield Reader(
+        "answers.json", "answers.json", lambda h: read_answers(h / "answers.json"),
+        stored=True,
+    )  # fmt: skip
+    yield Reader(
+        "nets.npz", "nets.npz", lambda h: StaticNets.load(h / "nets.npz"), finite, True
+    )
+    yield Reader(
+        "camera.json", "camera.json", lambda h: Camera.read(h / "camera.json"),
+        camera, True,
+    )  # fmt: skip
+    yield Reader(
+        "wheels.json", "wheels.json", lambda h: Wheels.read(h / "wheels.json"),
+        wheels, True,
+    )  # fmt: skip
+    yield Reader(
+        "servos.toml", "servos.toml", lambda h: joints.read(h / "servos.toml"),
+        servos, True,
+    )  # fmt: skip
+
+
+def _state(directory: Path) -> dict[str, np.ndarray]:
+    """The state of a learner, as it is checked before it goes on."""
+    from bns.experiment.batch import Batch, resolve
+    from bns.experiment.run import restored
+    from bns.storage.store import RunStore
+
+    store = RunStore.open(directory)
+    known = _LEARNERS.get(directory)
+    if known is None:
+        from bns.experiment.world_factory import make_world
+
+        config, _ = resolve(store.config, store.mode)
+        known = _LEARNERS[directory] = Batch([config], [make_world(config)])
+        known.fresh = known.learner.state()
+    _, arrays = store.read_state()
+    restored(known.learner, known.fresh, arrays, directory / "state.npz")
+    return arrays
+
+
+_LEARNERS: dict[Path, Any] = {}
+
+
+def _given() -> Iterator[Reader]:
+    from bns.campaign import file as campaign_file
+    from bns.experiment import loading
+    from bns.gap.models.mjcf import log
+    from bns.gap.models.mjcf.config import OwnConfig
+    from bns.gap.planning import command_file
+    from bns.models import mjcf, numbers, robot_model, servo_numbers
+    from bns.storage import journal
+    from bns.worlds import corrected
+    from bns.worlds.data import importing
+    from bns.worlds.data.column_map import ColumnMap
+
+    def own(home: Path) -> Any:
+        arm = OwnConfig.read(ROOT / "examples" / "arm" / "arm.toml")
+        return log.read(str(home / "own.csv"), arm)
+
+    def law(home: Path) -> Any:
+        servo_numbers._tables.cache_clear()
+        return servo_numbers.law(home / "law")
+
+    listed = [
+        ("config.toml", "run/config.toml",
+         lambda h: loading.from_file(h / "run" / "config.toml"), finite),
+        ("timing.jsonl", "run/timing.jsonl",
+         lambda h: journal.entries(h / "run" / "timing.jsonl"), _fine),
+        ("campaign file", "campaign.toml",
+         lambda h: campaign_file.read(h / "campaign.toml"), _fine),
+        ("worlds.toml", "worlds.toml",
+         lambda h: corrected._read(h / "worlds.toml"), _fine),
+        ("column map", "map.toml", lambda h: ColumnMap.read(h / "map.toml"), _fine),
+        ("CSV log", "log.csv",
+         lambda h: importing.from_csv(h / "log.csv", ROOT_MAP), trials),
+        ("MCAP log", "log.mcap", lambda h: importing.from_mcap(
+            h / "log.mcap", FIELDS, units={"time": "ns"}), trials),
+        ("own log", "own.csv", own, trials),
+        ("own model", "arm/arm.toml", lambda h: OwnConfig.read(h / "arm" / "arm.toml"),
+         own_model),
+        ("MJCF", "arm/arm.xml",
+         lambda h: mjcf.compiled(mjcf.load(h / "arm" / "arm.xml"), "arm.xml"), _fine),
+        ("robot.toml", "burger/robot.toml", lambda h: robot_model.read(h / "burger"),
+         finite),
+        ("numbers.toml", "burger/numbers.toml", lambda h: numbers.read(h / "burger"),
+         finite),
+        ("law.toml", "law/law.toml", law, finite),
+        ("commands.csv", "commands.csv",
+         lambda h: command_file.read(h / "commands.csv"), finite),
+    ]  # fmt: skip
+    for name, file, read, sane in listed:
+        yield Reader(name, file, read, sane)
+
+
+def _recorded() -> Iterator[Reader]:
+    from bns.gap.importers import khepera3_odometry, kscale_sts3215, mrclam6, xl330
+
+    listed = [
+        ("lstraight.tuple", "khepera/lstraight.tuple",
+         lambda h: khepera3_odometry.read(h / "khepera"), trials),
+        ("lstraight_results.json", "khepera/lstraight_results.json",
+         lambda h: khepera3_odometry.published(h / "khepera"), finite),
+        ("index.csv", "kscale/index.csv", lambda h: kscale_sts3215.read(h / "kscale"),
+         trials),
+        ("runs.npz", "kscale/runs.npz", lambda h: kscale_sts3215.read(h / "kscale"),
+         trials),
+        ("xl330.json", "xl330/a.json", lambda h: xl330.read(h / "xl330"), trials),
+        ("Groundtruth.dat", "mrclam/Robot2_Groundtruth.dat",
+         lambda h: mrclam6.read(h / "mrclam", 2, seconds=2.0), trials),
+        ("Odometry.dat.gz", "mrclam/Robot2_Odometry.dat.gz",
+         lambda h: mrclam6.read(h / "mrclam", 2, seconds=2.0), trials),
+    ]  # fmt: skip
+    for name, file, read, sane in listed:
+        yield Reader(name, file, read, sane)
+
+
+ROOT_MAP = {
+    "time": "t", "x": "px", "y": "py", "yaw": "heading", "left_speed": "vl",
+    "right_speed": "vr",
+}  # fmt: skip
+
+
+def _fine(found: Any) -> str:
+    return ""
+
+
+def numbers_in(value: Any) -> Iterator[np.ndarray]:
+    """All numbers of some content, as arrays of doubles."""
+    if isinstance(value, Mapping):
+        for item in value.values():
+            yield from numbers_in(item)
+    elif isinstance(value, list | tuple):
+        for item in value:
+            yield from numbers_in(item)
+    elif is_dataclass(value) and not isinstance(value, type):
+        for item in fields(value):
+            yield from numbers_in(getattr(value, item.name))
+    elif isinstance(value, int | float | np.ndarray | np.generic):
+        array = np.asarray(value)
+        if array.dtype.kind in "iuf":
+            yield array.astype(float)
+
+
+def finite(found: Any) -> str:
+    """No NaN, and nothing beyond what is real."""
+    for array in numbers_in(found):
+        if not (np.abs(array) <= 1e12).all():
+            return f"holds {array.ravel()[:3]}"
+    return ""
+
+
+def own_model(found: Any) -> str:
+    """Numbers as `finite` has them; a loop without a limit of torque has infinity."""
+    loose = [item.torque for item in found.told]
+    if any(torque != np.inf and not 0 < torque <= 1e12 for torque in loose):
+        return f"holds torques {loose}"
+    return finite(replace(found, told=[replace(t, torque=1.0) for t in found.told]))
+
+
+def run(found: Any) -> str:
+    """A record whose parts fit each other."""
+    shape = (found.replicates, found.trials)
+    for name, column in found.columns.items():
+        if column.shape != shape or column.dtype != np.float64:
+            return f"{name} is {column.dtype} of {column.shape}, not {shape}"
+    if found.replicates != found.config.replicates:
+        return "replicates differ"
+    return ""
+
+
+def state(found: Mapping[str, np.ndarray]) -> str:
+    """Weights that are numbers."""
+    names = [name for name in found if name.rpartition(".")[2] == "theta"]
+    bad = [name for name in names if not np.isfinite(found[name]).all()]
+    if not names:
+        return "no weights"
+    return f"{bad[0]} holds NaN" if bad else ""
+
+
+def trials(found: Any) -> str:
+    """Trials of something that moves."""
+    listed = getattr(found, "trials", found)
+    for trial in listed if isinstance(listed, list | tuple) else [listed]:
+        names = [channel.name for channel in trial.channels]
+        if len(set(names)) < len(names):
+            return f"channels {names}"
+        if np.nanmax(np.abs(trial.observed), initial=0) > 1e39:
+            return "observed beyond 1e39"
+        if not (np.abs(trial.commands.values) <= 1e6).all():
+            return "commands beyond 1e6"
+        if not np.isfinite(trial.times).all() or (np.diff(trial.times) < 0).any():
+            return "times are not in order"
+        held = np.diff(trial.times[trial.boundaries])
+        if (np.abs(held - trial.commands.durations) > 1 + 0.5 * held + held).any():
+            return "times unlike durations"
+    return ""
+
+
+def camera(found: Any) -> str:
+    """A camera that can see."""
+    if not (np.linalg.cond(found.matrix) < 1e12 and 0 <= found.latency <= 10):
+        return f"matrix {found.matrix.tolist()}, latency {found.latency}"
+    return finite(found) if min(found.size) > 0 else f"size {found.size}"
+
+
+def wheels(found: Any) -> str:
+    """Wheels that can roll."""
+    sizes = found.left / 0.041, found.right / 0.041, found.axle / 0.0884
+    return "" if all(0.8 < size < 1.2 for size in sizes) else f"{sizes} of nominal"
+
+
+def servos(found: Any) -> str:
+    """Servos that can be told."""
+    for joint in found:
+        places = joint.zero, joint.low, joint.high
+        whole = all(type(place) is int and 0 <= place <= 1023 for place in places)
+        if not whole or joint.low >= joint.high or joint.sign not in (-1, 1):
+            return str(joint)
+    return ""
+
+
+def fingerprint(value: Any) -> Any:
+    """Content by which two readings are compared: every number and word."""
+    if isinstance(value, Mapping):
+        return tuple(
+            (str(k), fingerprint(v)) for k, v in sorted(value.items(), key=str)
+        )
+    if isinstance(value, list | tuple):
+        return tuple(fingerprint(item) for item in value)
+    if is_dataclass(value) and not isinstance(value, type):
+        return tuple(
+            fingerprint(getattr(value, item.name))
+            for item in fields(value)
+            if item.name not in ("lock", "text", "directory")
+        )
+    if isinstance(value, np.ndarray):
+        return (str(value.dtype), value.shape, value.tobytes())
+    return repr(value)

@@ -1,0 +1,1 @@
+"""The walking robot: what it learns, regains, and could do at best."""

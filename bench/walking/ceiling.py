@@ -1,0 +1,166 @@
+"""The ceiling of walking: CMA-ES in the damaged world itself, no SNN in between.
+
+It starts from the farthest walk that BNS found on that damage or undamaged, and goes on
+for `BUDGET` trials, a thousand times cheaper to have than a robot's. What is learned in
+the world with a hundred trials is then a share of what is possible.
+"""
+
+import json
+from collections.abc import Sequence
+
+import numpy as np
+
+from bench.learning import experiments
+from bench.result import Result, bench
+from bench.runner import write
+from bench.walking import runs
+from bns import seeding
+from bns.experiment.record import RunRecord
+
+NONE = "none"  # no damage
+WANTED = (NONE, "type0", "type1", "type2", "type3", "type5", "type14")
+OTHERS = tuple(f"type{n}" for n in range(16) if f"type{n}" not in WANTED)
+POPULATION, STAGE = 20, 10  # generations of a stage
+BUDGET = 50 * POPULATION  # trials
+STEP = 0.1  # [rad] first standard deviation of a goal
+
+
+@bench(
+    "farthest walk that CMA-ES finds in the world itself, undamaged, and "
+    "by damage type",
+    bar="none: printed beside hexapod-gait and recover-hexapod",
+)
+def hexapod_ceiling(quick: bool) -> Result:
+    """One search a damage; quick: those known already, and none anew."""
+    found = {
+        legs: known(legs) if quick else reached(legs) for legs in (*WANTED, *OTHERS)
+    }
+    ways = {legs: way for legs, way in found.items() if way is not None}
+    return Result(
+        figure=ways.get(NONE, 0.0),
+        unit="m",
+        holds=None,
+        n=len(ways),
+        details={"farthest [m]": ways, "trials of a search": BUDGET},
+    )
+
+
+def known(legs: str) -> float | None:
+    """The farthest walk found on one damage [m], if it has been searched."""
+    place = _place(legs)
+    row = json.loads(place.read_text()) if place.exists() else {"trials": 0}
+    return float(row["farthest [m]"]) if row["trials"] >= BUDGET else None
+
+
+def share(ways: np.ndarray, legs: str) -> np.ndarray | None:
+    """Distances [m] as shares of the ceiling, where that is known."""
+    ceiling = known(legs)
+    return None if ceiling is None else ways / ceiling
+
+
+def reached(legs: str) -> float:
+    """The farthest walk found on one damage [m]; kept stage by stage, as it is dear.
+
+    Args:
+        legs: as the effect `leg_raised` takes them, or `NONE`.
+    """
+    place = _place(legs)
+    row = json.loads(place.read_text()) if place.exists() else _begun(legs)
+    while row["trials"] < BUDGET:
+        goals, farthest, step = search(
+            np.array(row["goals [rad]"]),
+            legs,
+            step=row["step [rad]"],
+            seed=seeding.integer(row["trials"], "hexapod-ceiling", legs),
+        )
+        if farthest > row["farthest [m]"]:
+            row |= {"farthest [m]": round(farthest, 4), "goals [rad]": goals.tolist()}
+        row |= {"trials": row["trials"] + POPULATION * STAGE, "step [rad]": step}
+        place.parent.mkdir(parents=True, exist_ok=True)
+        write(place, json.dumps(row))
+    return float(row["farthest [m]"])
+
+
+def _begun(legs: str) -> dict:
+    start, begun = _start(legs)
+    return {
+        "farthest [m]": begun,
+        "started from [m]": round(begun, 4),
+        "trials": 0,
+        "step [rad]": STEP,
+        "goals [rad]": start.tolist(),
+    }
+
+
+def search(
+    start: np.ndarray, legs: str, *, step: float, seed: int, generations: int = STAGE
+) -> tuple[np.ndarray, float, float]:
+    """CMA-ES, its covariance diagonal, on goals within the servos' end stops.
+
+    Args:
+        start: goals to begin with, ``(K, 18)`` [rad].
+        legs: the damage.
+        step: first standard deviation [rad].
+        seed: of the search.
+        generations: of `POPULATION` trials.
+
+    Returns:
+        the goals that got farthest, how far [m], and the last step [rad].
+    """
+    import cma
+
+    from bns import models
+
+    low, high = (
+        np.tile(side, len(start)) for side in models.robot("phantomx").ranges.T
+    )
+    options = {
+        "popsize": POPULATION,
+        "bounds": [low.tolist(), high.tolist()],
+        "seed": seed % 2**31 + 1,  # 0 would be the clock
+        "CMA_diagonal": True,
+        "verbose": -9,
+    }
+    engine = cma.CMAEvolutionStrategy(start.ravel(), step, options)
+    best, farthest = start, 0.0
+    for _ in range(generations):
+        tried = engine.ask()
+        lists = [np.reshape(item, start.shape) for item in tried]
+        ways = distances(lists, legs)
+        engine.tell(tried, (-ways).tolist())
+        if ways.max() > farthest:
+            best, farthest = lists[int(ways.argmax())], float(ways.max())
+    return best, farthest, float(engine.sigma)
+
+
+def distances(lists: Sequence[np.ndarray], legs: str) -> np.ndarray:
+    """How far lists of goals carry the robot, ``(N,)`` [m]."""
+    damage = "" if legs == NONE else f"leg_raised:legs={legs},blend=1"
+    return runs.ways(runs.walked(lists, damage=damage))
+
+
+def _start(legs: str) -> tuple[np.ndarray, float]:
+    """The farthest of what is known to walk: by hand, or found by BNS."""
+    from bns.models.phantomx import gait
+
+    lists = [
+        gait.tripod(),
+        *_found(runs.kept(legs)),
+        *_found(runs.kept(NONE)),
+    ]
+    ways = distances(lists, legs)
+    return lists[int(ways.argmax())], float(ways.max())
+
+
+def _found(records: Sequence[RunRecord]) -> list[np.ndarray]:
+    """The farthest walk of each run since the damage, if any."""
+    lists = []
+    for record in records:
+        onset = max(int(record.damage_onset[0]), 0)
+        for sent, ways in zip(record.sent, record["distance"], strict=True):
+            lists.append(sent[onset + int(ways[onset:].argmax())])
+    return lists
+
+
+def _place(legs: str):
+    return experiments.RUNS / f"hexapod-ceiling-{legs}.json"

@@ -1,0 +1,260 @@
+"""The walking experiments that several benches share (investigation D).
+
+Undamaged runs come in groups of ten; the runs of each damage begin as copies of such a
+group after its last trial, since up to there nothing differs (`branching`).
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import Literal, NamedTuple, get_args
+
+import numpy as np
+
+from bench.learning import branching, experiments, solving
+from bench.walking import evidence
+from bns import presets
+from bns.errors import BnsError
+from bns.experiment.config import RunConfig
+from bns.experiment.record import RunRecord
+from bns.storage.store import RunStore
+from bns.worlds.trial import Trial
+
+Kind = Literal["window", "forget", "own"]  # of recovering, see `damaged`
+ONSET = 100  # trial of the damage (dissertation, table 7.4)
+AFTER = 50  # trials from the damage on: more than the latest bar
+GROUPS = ("a", "b", "c")
+GROUP = 10  # runs of a batch
+RECOVERING: Mapping[Kind, Sequence[str]] = {
+    "window": GROUPS[:1],
+    "forget": GROUPS[:1],
+    "own": GROUPS,
+}
+"""groups that are damaged"""
+WINDOW = 300
+TYPES = ("type0", "type1", "type3", "type2", "type5")
+BEFORE = 10  # trials whose median distance is what the robot did before the damage
+SHARE = 0.9  # of that distance = recovered
+QUICK = {"replicates": 1, "trials": 12}
+
+
+class Hand(NamedTuple):
+    """What the best tripod gait made by hand does in eleven commands.
+
+    Attributes:
+        distance: how far it gets [m].
+        seconds: how long that takes.
+    """
+
+    distance: float
+    seconds: float
+
+
+def undamaged(group: str = "", *, trials: int = ONSET, **walk: object) -> RunConfig:
+    """A batch of the preset without damage.
+
+    Args:
+        group: one of `GROUPS`, or another name for other seeds.
+        trials: of each run.
+        walk: settings of the section `walk` that differ.
+    """
+    config = presets.load("hexapod-walk")
+    config = replace(
+        config,
+        trials=trials,
+        adaptation=replace(config.adaptation, window=WINDOW),
+        walk=replace(config.walk, **walk),
+        world=replace(config.world, damage=()),
+    )
+    words = [f"{key}={value}" for key, value in sorted(walk.items())]
+    named = experiments.named(config, "-".join(["walk", group, *words]))
+    return replace(named, replicates=GROUP)
+
+
+def damaged(legs: str, group: str = "a", *, kind: Kind = "window") -> RunConfig:
+    """A batch of the preset whose legs are raised from trial `ONSET` on.
+
+    Args:
+        legs: as the effect `leg_raised` takes them.
+        group: of which undamaged batch it is the continuation.
+        kind: with the window alone, forgetting by evidence besides, or as the preset
+            `hexapod-recover` does (which forgets as well).
+    """
+    trunk = undamaged(group)
+    damage = (f"leg_raised:legs={legs},blend=1@{ONSET}",)
+    config = replace(
+        trunk,
+        preset=f"walk-{'' if kind == 'window' else f'{kind}-'}{legs}-{group}",
+        trials=ONSET + AFTER,
+        world=replace(trunk.world, damage=damage),
+        watch=replace(trunk.watch, forget=kind != "window"),
+    )
+    if kind == "own":
+        return replace(config, walk=presets.load("hexapod-recover").walk)
+    return config
+
+
+def records(
+    configs: Iterable[RunConfig], *, quick: bool = False
+) -> Mapping[str, RunRecord]:
+    """As `experiments.records`, with a look of its own that takes seconds."""
+    return experiments.records([small(c) if quick else c for c in configs])
+
+
+def walking(*, quick: bool = False) -> RunRecord:
+    """All undamaged runs, trained where they are missing; quick: one small run."""
+    groups = GROUPS[:1] if quick else GROUPS
+    found = records(map(undamaged, groups), quick=quick)
+    return joined(list(found.values()))
+
+
+def adequate(record: RunRecord, hand: Hand) -> np.ndarray:
+    """Trials that got as far as the tripod gait in the time it takes, ``(R, T)``."""
+    return in_time(record, hand.seconds) >= hand.distance
+
+
+def recovering(*, quick: bool = False) -> Mapping[Kind, Mapping[str, RunRecord]]:
+    """The runs of each kind and each damage of `TYPES`; quick: one small run of each.
+
+    Raises:
+        BnsError: to forget by evidence would have changed the undamaged runs.
+    """
+    kinds: tuple[Kind, ...] = get_args(Kind)
+    configs = {
+        (kind, legs, group): damaged(legs, group, kind=kind)
+        for kind, legs in product(kinds, TYPES)
+        for group in RECOVERING[kind]
+    }
+    if not quick:
+        trunks = records(map(undamaged, GROUPS))
+        if any(evidence.forgets(trunk).any() for trunk in trunks.values()):
+            raise BnsError("Run the undamaged runs with watch.forget, too.")
+        for (_, _, group), config in configs.items():
+            branching.begin(undamaged(group), config, idle=("watch", "walk"))
+    found = records(configs.values(), quick=quick)
+
+    def of(kind: Kind, legs: str) -> RunRecord:
+        """All groups of a kind and a damage."""
+        names = [configs[kind, legs, group].preset for group in RECOVERING[kind]]
+        return joined([found[name] for name in names])
+
+    return {kind: {legs: of(kind, legs) for legs in TYPES} for kind in kinds}
+
+
+def kept(legs: str) -> list[RunRecord]:
+    """Finished runs of one damage, or of none (`"none"`); nothing is trained."""
+    if legs == "none":
+        configs = [undamaged(group) for group in GROUPS]
+    else:
+        configs = [damaged(legs, group) for group in RECOVERING["window"]]
+    places = [_place(config) for config in configs]
+    stores = [RunStore.open(place) for place in places if (place / "run.json").exists()]
+    return [store.record() for store in stores if store.finished]
+
+
+def joined(parts: list[RunRecord]) -> RunRecord:
+    """Batches of one experiment as one record, in order."""
+    first = parts[0]
+    many = sum(part.replicates for part in parts)
+
+    def together(name: str) -> np.ndarray:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    names = ("sent", "poses", "predicted", "damage_onset")
+    return replace(
+        first,
+        config=replace(first.config, replicates=many),
+        columns={
+            n: np.concatenate([p.columns[n] for p in parts]) for n in first.columns
+        },
+        **{name: together(name) for name in names},
+    )
+
+
+def small(config: RunConfig) -> RunConfig:
+    """One run of few trials with a small population and short training."""
+    onset = QUICK["trials"] // 2
+    damage = tuple(f"{text.rpartition('@')[0]}@{onset}" for text in config.world.damage)
+    evolution = replace(config.evolution, population=60, generations=10, tournament=6)
+    return replace(
+        config,
+        **QUICK,
+        evolution=evolution,
+        snn=replace(config.snn, epochs=60),
+        world=replace(config.world, damage=damage),
+        compiled="no",
+    )
+
+
+def trials_to_regain(record: RunRecord) -> np.ndarray:
+    """Trials from the damage until the robot got as far as `SHARE` of before.
+
+    Counted from 1 (the onset trial itself); before is the median of the last `BEFORE`
+    undamaged trials. Shape ``(R,)``; inf = never.
+    """
+    onset = int(record.damage_onset[0])
+    enough = SHARE * before(record)
+    return solving.first(record["distance"][:, onset:] >= enough[:, None])
+
+
+def before(record: RunRecord) -> np.ndarray:
+    """How far robots got before their damage, ``(R,)`` [m]; see `trials_to_regain`."""
+    onset = int(record.damage_onset[0])
+    return np.median(record["distance"][:, max(onset - BEFORE, 0) : onset], axis=1)
+
+
+def by_hand() -> Hand:
+    """The tripod gait in the undamaged world."""
+    from bns.models.phantomx import gait
+
+    trials = walked([gait.tripod()])
+    return Hand(float(ways(trials)[0]), float(trials[0].times[-1]))
+
+
+def walked(lists: Iterable[np.ndarray], *, damage: str = "") -> list[Trial]:
+    """Trials of lists of goals, each ``(K, 18)`` [rad]; `damage`: an effect as text."""
+    world, commands = standing_by(lists, damage=damage)
+    return world.run(commands)
+
+
+def standing_by(lists: Iterable[np.ndarray], *, damage: str = ""):
+    """The world of `walked`, and its commands."""
+    from bns import models
+    from bns.worlds import registry
+    from bns.worlds.trial import Channel, Commands
+
+    world = registry.make("hexapod", damage=(f"{damage}@0",) if damage else ())
+    channels = tuple(Channel(*item) for item in models.robot("phantomx").channels)
+    limit = presets.load("hexapod-walk").walk.limit
+    return world, [
+        Commands(item, np.full(len(item), limit), channels) for item in lists
+    ]
+
+
+def ways(trials: Sequence[Trial]) -> np.ndarray:
+    """How far trials got, as the learner counts it, ``(N,)`` [m]."""
+    from bns.tasks import walk
+
+    return walk.of_trials(trials)
+
+
+def in_time(record: RunRecord, seconds: float) -> np.ndarray:
+    """How far each trial got within a time, ``(R, T)`` [m].
+
+    A trial that took longer counts in proportion, one that took less as it is.
+    """
+    return record["distance"] * np.minimum(1.0, seconds / record["seconds"])
+
+
+def spread(values: np.ndarray) -> dict[str, float]:
+    """Median and range over runs."""
+    return {
+        "median": round(float(np.median(values)), 4),
+        "least": round(float(values.min()), 4),
+        "most": round(float(values.max()), 4),
+    }
+
+
+def _place(config: RunConfig) -> Path:
+    return experiments.directory(config)

@@ -1,0 +1,216 @@
+"""A stranger's robot: planted effects are named; what is wrong with a file is said."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from bns.errors import BnsError, FormatError
+from bns.gap.bench import mjcf_cases
+from bns.gap.candidates import mjcf
+from bns.gap.diagnose import diagnose
+from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.models.mjcf.effects import CLASSES, OWNERS
+from bns.gap.models.mjcf.model import OwnModel
+from bns.worlds.data import dataset
+from tests.sources import ROOT
+
+ARM = ROOT / "examples" / "arm" / "arm.toml"
+KEPT = (
+    "joint_damping[elbow]",
+    "body_mass[forearm]",
+    "actuator_gain[shoulder_servo]",
+    "command_delay[all]",
+)
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return OwnModel.read(ARM, threads=1)
+
+
+@pytest.fixture(scope="module")
+def told(arm):
+    return mjcf_cases.commands(arm, np.random.default_rng(0), 4, seconds=2.0)
+
+
+@pytest.fixture(scope="module")
+def find(arm, told):
+    def run(*texts):
+        trials = mjcf_cases.record(arm, told, [arm.parse(t) for t in texts], seed=1)
+        return diagnose(trials, arm, rows=KEPT, full=False)
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "value", "tolerance"),
+    [
+        ("joint_damping:part=elbow,added=0.06", KEPT[0], 0.06, 0.004),
+        ("body_mass:part=forearm,added=0.1", KEPT[1], 0.1, 0.003),
+        ("actuator_gain:part=shoulder_servo,factor=0.8", KEPT[2], 0.8, 0.005),
+        ("command_delay:part=all,delay=0.04", KEPT[3], 0.04, 0.001),
+    ],
+)
+def test_a_planted_effect_is_named_with_its_value(find, text, name, value, tolerance):
+    found = find(text)
+    assert found.verdict.kind == "effect"
+    assert found.verdict.named == ((name,),)
+    assert found.best.magnitudes[0] == pytest.approx(value, abs=tolerance)
+
+
+def test_nothing_planted_is_no_gap(find):
+    assert find().verdict.kind == "no gap"
+
+
+def test_it_rests_at_home_and_follows(arm, told):
+    ((seen,),) = arm.simulate(mjcf_cases.record(arm, told[:1], []), [()])
+    home = np.array([0.6, 0.9])
+    assert np.abs(seen[0] - home).max() < 0.1  # gravity makes the servos give way
+    assert np.ptp(seen, axis=0).min() > 0.2
+
+
+@pytest.mark.parametrize("name", sorted(CLASSES))
+def test_every_effect_is_nothing_at_its_nominal_value_and_reads_back(name):
+    effect = CLASSES[name]({})
+    assert effect.is_nominal
+    assert (
+        effect.doc
+        and effect.source
+        and effect.stage
+        in (
+            "command",
+            "body",
+            "sensor",
+        )
+    )
+    changed = CLASSES[name]({"part": "elbow", effect.parameters[0].name: 0.25})
+    assert OwnModel.parse(str(changed)) == changed
+    with pytest.raises(BnsError, match="names no part"):
+        CLASSES[name]({"part": "a,b"})
+
+
+def test_effects_act_on_their_part_alone(arm):
+    plain = arm.compiled(()).model
+    doubled = arm.compiled([arm.parse("joint_damping:part=elbow,added=0.06")]).model
+    np.testing.assert_allclose(plain.dof_damping.ravel()[:2], [0.15, 0.06])
+    np.testing.assert_allclose(doubled.dof_damping.ravel()[:2], [0.15, 0.12])
+    heavy = arm.compiled([arm.parse("body_mass:part=forearm,added=0.1")]).model
+    np.testing.assert_allclose(heavy.body_mass, plain.body_mass + np.eye(3)[2] / 10)
+    weak = arm.compiled([arm.parse("actuator_gain:part=elbow_servo,factor=0.5")])
+    np.testing.assert_allclose(weak.model.actuator_gainprm[:, 0], [30, 6])
+
+
+def test_a_corrected_model_is_written(arm, tmp_path):
+    texts = ["joint_damping:part=elbow,added=0.06", "command_delay:part=all,delay=0.1"]
+    left = arm.write_corrected(texts, tmp_path / "arm.xml")
+    assert left == ["command_delay:part=all,delay=0.1"]
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
+    assert model.dof_damping.ravel()[1] == pytest.approx(0.12)
+
+
+def test_logs_and_datasets_give_the_same_trials(arm, told, tmp_path):
+    (trial,) = mjcf_cases.record(arm, told[:1], [])
+    dataset.write(tmp_path / "data", [trial])
+    (kept,) = dataset.read(tmp_path / "data").trials
+    np.testing.assert_array_equal(kept.observed, trial.observed)
+    ends = np.searchsorted(np.cumsum(trial.commands.durations), trial.times, "right")
+    rows = trial.commands.values[np.minimum(ends, len(trial.commands) - 1)]
+    lines = ["time,shoulder_goal,elbow_goal,shoulder,elbow"]
+    for time, goal, seen in zip(trial.times, rows, trial.observed, strict=True):
+        lines.append(",".join(map(repr, map(float, (time, *goal, *seen)))))
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    (read,) = arm.read_log(str(tmp_path / "log.csv"))
+    np.testing.assert_allclose(read.observed, trial.observed)
+    np.testing.assert_allclose(read.commands.values, trial.commands.values)
+    np.testing.assert_allclose(read.commands.durations, trial.commands.durations)
+
+
+WRONG = {
+    "no file": (("arm.xml", "leg.xml"), "There is no model file"),
+    "no actuator": (("shoulder_servo", "shoulder_motor"), "actuator of the model"),
+    "no joint": (('joint = "elbow"', 'joint = "knee"'), "joint of the model 'knee'"),
+    "no keyframe": (('keyframe = "home"', 'keyframe = "rest"'), "'rest'"),
+    "no part": (
+        ('["upper_arm", "forearm"]', '["hand"]'),
+        "body in .effects. body_mass",
+    ),
+    "no effect": (("joint_friction =", "joint_fiction ="), "Did you mean 'joint_fr"),
+    "unknown key": (("[start]", "[begin]"), "Unknown key"),
+    "no noise": (("noise = 0.002\n", ""), "positive noise"),
+    "limits": (("low = -0.5", "low = 5"), "low < high"),
+}
+
+
+@pytest.mark.parametrize("kind", sorted(WRONG))
+def test_what_is_wrong_with_a_description_is_said(kind, tmp_path):
+    (old, new), said = WRONG[kind]
+    text = ARM.read_text()
+    assert old in text
+    (tmp_path / "arm.toml").write_text(text.replace(old, new))
+    (tmp_path / "arm.xml").write_text(ARM.with_suffix(".xml").read_text())
+    with pytest.raises(BnsError, match=said) as caught:
+        OwnModel.read(tmp_path / "arm.toml", threads=1)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_is_wrong_with_a_log_is_said(arm, tmp_path):
+    (tmp_path / "log.csv").write_text(
+        "time,shoulder_goal,elbow_goal,shoulder\n1,2,3,4\n"
+    )
+    with pytest.raises(FormatError, match="no column 'elbow'"):
+        arm.read_log(str(tmp_path / "log.csv"))
+
+
+def test_effects_are_considered_where_none_are_listed(arm):
+    config = replace(OwnConfig.read(ARM), effects=None)
+    names = {item.name for item in OwnModel(config, threads=1).listed}
+    assert {
+        "joint_damping[elbow]",
+        "reading_gain[shoulder]",
+        "command_delay[all]",
+    } < names
+
+
+PARTS = {"joint": "elbow", "body": "forearm", "actuator": "elbow_servo"}
+
+
+@pytest.mark.parametrize("name", sorted(set(CLASSES) - {"geom_friction"}))
+def test_every_effect_can_be_a_candidate(arm, name):
+    channel = "elbow" if name.startswith("reading") else "elbow_goal"
+    part = PARTS.get(OWNERS.get(name, ""), channel)
+    config = replace(OwnConfig.read(ARM), effects={name: (part,)}, bounds={})
+    made = mjcf.candidates(config, arm.compiled(()).model)
+    strengths = [item.name for item in CLASSES[name].parameters if item.scales]
+    assert [item.parameter for item in made] == strengths
+    for item in made:
+        assert item.low <= item.nominal <= item.high and item.excite
+        for magnitude in (item.low, *item.levels, item.high):
+            assert item.make(magnitude)["part"] == part
+
+
+def test_former_names_in_a_description_are_read(arm):
+    config = replace(
+        OwnConfig.read(ARM),
+        effects={"sensor_gain": ("elbow",)},
+        bounds={"sensor_gain[elbow]": {"high": 1.5}},
+    )
+    (made,) = mjcf.candidates(config, arm.compiled(()).model)
+    assert (made.name, made.high) == ("sensor_gain[elbow]", 1.5)  # as it was written
+    assert str(made.make(1.2)) == "reading_gain:part=elbow,factor=1.2"
+
+
+def test_the_description_in_the_documentation_is_one(tmp_path):
+    page = (ARM.parents[2] / "docs" / "gap_your_robot.md").read_text()
+    (tmp_path / "arm.toml").write_text(page.split("```")[1])
+    (tmp_path / "arm.xml").write_text(ARM.with_suffix(".xml").read_text())
+    text = (tmp_path / "arm.toml").read_text()
+    assert "[log]" in text and "[bounds]" in text
+    elbow = '[commands.elbow_goal]\nactuator = "elbow_servo"\nunit = "rad"\n'
+    (tmp_path / "arm.toml").write_text(text + elbow + "low = 0\nhigh = 2\n")
+    made = OwnModel.read(tmp_path / "arm.toml", threads=1)
+    bounds = {item.name: item for item in made.listed}
+    assert bounds["joint_damping[elbow]"].high == 0.5
+    assert bounds["body_mass[forearm]"].slack == 0.01
+    assert made.config.log["shoulder"] == ("q1", "deg")

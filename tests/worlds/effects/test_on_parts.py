@@ -1,0 +1,217 @@
+"""Effects on parts of any model, against answers that are known beforehand."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from bns.errors import BnsError, UnknownNameError
+from bns.worlds.effects import registry
+from tests.worlds.effects.subjects import ARM, told
+
+G = 9.81  # [m/s2]
+ROD = """
+<mujoco><option timestep="0.001"/><worldbody><body name="rod">
+  <joint name="pivot" axis="0 1 0"/>
+  <inertial pos="0.2 0 0" mass="0.6" diaginertia="1e-9 8e-3 8e-3"/>
+  <site name="end" pos="0.4 0 0"/>
+</body></worldbody>
+<actuator><position name="servo" joint="pivot" kp="20" kv="2"/></actuator></mujoco>
+"""
+"""A thin rod of 0.6 kg and 0.4 m that hangs on one end; inertia m L^2 / 12."""
+
+
+def compiled(*texts, xml=ARM, gravity=True) -> mujoco.MjModel:
+    spec = mujoco.MjSpec.from_string(xml)
+    if not gravity:
+        spec.option.gravity = [0, 0, 0]
+    for text in texts:
+        registry.parse(text).edit(spec)
+    return spec.compile()
+
+
+def at_rest(model, ctrl=(0.5, 0.3), seconds=4.0) -> mujoco.MjData:
+    """After servos have been told angles [rad] for a while."""
+    data = mujoco.MjData(model)
+    data.ctrl[: len(ctrl)] = ctrl[: model.nu]
+    mujoco.mj_step(model, data, nstep=round(seconds / model.opt.timestep))
+    return data
+
+
+def moving(model, speed, seconds=1.0) -> mujoco.MjData:
+    """While every joint is kept at a speed [rad/s]."""
+    data = mujoco.MjData(model)
+    for _ in range(round(seconds / model.opt.timestep)):
+        data.qvel[:] = speed
+        mujoco.mj_step(model, data)
+    data.qvel[:] = speed
+    mujoco.mj_forward(model, data)
+    return data
+
+
+class TestJoints:
+    def test_a_spring_shares_the_servos_angle(self):
+        model = compiled("joint_stiffness:part=elbow,added=4", gravity=False)
+        assert at_rest(model).qpos == pytest.approx(
+            [0.5, 0.3 * 12 / (12 + 4)], abs=1e-3
+        )
+
+    def test_stribeck_friction_fades_with_speed(self):
+        model = compiled("joint_stribeck:part=pivot,torque=0.5,speed=0.2", xml=ROD)
+        for speed in (0.02, 0.1, 0.2, 0.4):
+            force = moving(model, speed).actuator_force[-1]
+            expected = 0.5 * (1e-3 + (1 - 1e-3) * np.exp(-((speed / 0.2) ** 2)))
+            assert force == pytest.approx(-expected, rel=0.01)
+
+    def test_stribeck_friction_holds_until_it_breaks_away(self):
+        model = compiled(
+            "joint_stribeck:part=pivot,torque=0.5,speed=0.2", xml=ROD, gravity=False
+        )
+        model.actuator_gainprm[0] = model.actuator_biasprm[0] = 0
+        for share, moves in ((0.95, False), (1.05, True)):
+            data = mujoco.MjData(model)
+            for step in range(2000):
+                data.qfrc_applied[0] = share * 0.5 * min(1.0, step / 1000)
+                mujoco.mj_step(model, data)
+            assert (data.qpos[0] > 0.1) == moves
+
+    def test_a_keyframe_still_fits_a_model_with_more_joints_and_actuators(self):
+        model = compiled(
+            "joint_backlash:part=shoulder,play=0.1", "joint_stribeck:torque=1"
+        )
+        assert model.key_qpos[0] == pytest.approx([0.6, 0, 0.9])
+        assert model.key_ctrl[0][:2] == pytest.approx([0.6, 0.9])
+        assert model.nu == model.key_ctrl.shape[1] > 2
+
+    def test_backlash_lets_the_load_hang_on_its_stop(self):
+        model = compiled("joint_backlash:part=elbow,play=0.1")
+        data = at_rest(model, seconds=6.0)
+        shaft, play = data.joint("elbow").qpos[0], data.joint("elbow_play").qpos[0]
+        assert play == pytest.approx(0.05, abs=2e-3)  # down is positive
+        plain = at_rest(compiled(), seconds=6.0)
+        assert shaft == pytest.approx(plain.joint("elbow").qpos[0], abs=5e-3)
+        assert model.joint("elbow_play").range == pytest.approx([-0.05, 0.05])
+
+    def test_an_encoder_that_reads_too_much_stops_the_arm_short(self):
+        off = compiled("encoder_offset:part=elbow,added=0.1", gravity=False)
+        plain = compiled(gravity=False)
+        there = at_rest(off, (0.5, 0.4))
+        assert there.qpos == pytest.approx([0.5, 0.4], abs=1e-3)  # what it reports
+        short = at_rest(plain, (0.5, 0.3))  # where it is
+        assert there.site("hand").xpos == pytest.approx(
+            short.site("hand").xpos, abs=1e-3
+        )
+
+    def test_end_stops_stay_on_the_robot_in_a_file_in_degrees(self):
+        off = compiled("encoder_offset:part=shoulder,added=0.1")
+        stops = np.deg2rad([-170, 170]) + 0.1
+        assert off.joint("shoulder").range == pytest.approx(stops)
+
+
+class TestBodies:
+    def test_a_longer_rod_is_harder_to_turn_by_the_square(self):
+        plain, long = (
+            compiled(*texts, xml=ROD)
+            for texts in ([], ["body_length:part=rod,factor=1.2"])
+        )
+        assert plain.dof_M0[0] == pytest.approx(0.6 * 0.4**2 / 3)
+        assert long.dof_M0[0] == pytest.approx(0.6 * 0.48**2 / 3)
+        assert long.site("end").pos == pytest.approx([0.48, 0, 0])
+        assert long.body("rod").mass == plain.body("rod").mass
+
+    def test_a_longer_upper_arm_carries_the_forearm_further_out(self):
+        long = compiled("body_length:part=upper_arm,factor=1.1")
+        assert long.body("forearm").pos == pytest.approx([0.33, 0, 0])
+        capsule = long.geom("upper_arm")
+        assert capsule.size[1] == pytest.approx(0.165)
+        assert capsule.pos == pytest.approx([0.165, 0, 0])
+
+    def test_a_centre_of_mass_further_out_pulls_harder(self):
+        def pull(*texts):
+            model = compiled(*texts, xml=ROD)
+            data = mujoco.MjData(model)
+            mujoco.mj_forward(model, data)
+            return abs(data.qfrc_bias[0])
+
+        assert pull() == pytest.approx(0.6 * G * 0.2)
+        assert pull("body_centre:part=rod,dx=0.05") == pytest.approx(0.6 * G * 0.25)
+        assert pull("body_centre:part=rod,dy=0.05") == pytest.approx(0.6 * G * 0.2)
+
+    def test_mass_pulls_and_friction_scales(self):
+        model = compiled("body_mass:part=forearm,added=0.1", "geom_friction:factor=0.5")
+        assert model.body("forearm").mass == pytest.approx(0.5)
+        assert model.geom_friction[:, 0] == pytest.approx(0.5)  # of 1
+
+
+class TestActuators:
+    def test_a_softer_servo_gives_way_more(self):
+        droop = [
+            at_rest(compiled(*texts, xml=ROD), (0.0,)).qpos[0]
+            for texts in ([], ["actuator_kp:factor=0.5"])
+        ]
+        for angle, kp in zip(droop, (20, 10), strict=True):
+            assert kp * angle == pytest.approx(0.6 * G * 0.2 * np.cos(angle), rel=1e-3)
+
+    def test_the_gain_on_speed_is_scaled_alone(self):
+        for texts, kd in (([], 2.0), (["actuator_kd:part=servo,factor=0.5"], 1.0)):
+            model = compiled(*texts, xml=ROD)
+            data = mujoco.MjData(model)
+            data.qvel[0], data.qpos[0], data.ctrl[0] = 3.0, 0.1, 0.1
+            mujoco.mj_forward(model, data)
+            assert data.actuator_force[0] == pytest.approx(-3 * kd)
+
+    def test_a_limited_servo_pushes_no_harder(self):
+        model = compiled("actuator_torque_limit:part=shoulder_servo,factor=0.25")
+        data = mujoco.MjData(model)
+        data.ctrl[:] = 2.5
+        mujoco.mj_forward(model, data)
+        assert data.actuator_force == pytest.approx([2.0, 4.0])
+
+    def test_what_an_actuator_lacks_is_said(self):
+        bare = ROD.replace(' kv="2"', "")
+        with pytest.raises(BnsError, match=r"'servo' has no damping gain"):
+            compiled("actuator_kd:factor=2", xml=bare)
+        with pytest.raises(BnsError, match="no force range"):
+            compiled("actuator_torque_limit:factor=0.5", xml=bare)
+
+
+class TestParts:
+    def test_all_a_pattern_and_a_name(self):
+        gains = [
+            compiled(f"actuator_gain:part={part},factor=0.5").actuator_gainprm[:, 0]
+            for part in ("all", "*_servo", "elbow_*", "elbow_servo")
+        ]
+        assert np.array(gains).tolist() == [[15, 6], [15, 6], [30, 6], [30, 6]]
+
+    def test_an_unknown_one_gets_a_suggestion(self):
+        with pytest.raises(UnknownNameError, match="Did you mean 'elbow'"):
+            compiled("joint_damping:part=elbwo,added=1")
+
+    def test_former_names_are_read_and_light_sensors_keep_theirs(self):
+        old = registry.parse("sensor_gain:part=elbow,factor=1.5")
+        assert str(old) == "reading_gain:part=elbow,factor=1.5"
+        light = registry.parse("sensor_gain:sensor=left,factor=0.5")
+        assert str(light) == "sensor_gain:sensor=left,factor=0.5"
+
+
+class TestCommands:
+    @pytest.mark.parametrize("name, channel", [("left_speed", 0), ("right_speed", 1)])
+    def test_a_limit_cuts_one_channel(self, name, channel):
+        signal = told(("left_speed", "right_speed"))
+        effect = registry.make("command_limit", part=name, limit=0.05)
+        on = np.ones(len(signal.times), bool)
+        made = effect.apply(signal, on, np.random.default_rng(0))
+        other = 1 - channel
+        assert np.abs(made[:, channel]).max() == 0.05
+        assert (made[:, other] == signal.values[:, other]).all()
+
+    def test_a_milder_limit_is_wider(self):
+        limit = registry.make("command_limit", limit=0.1)
+        assert limit.scaled(0.5)["limit"] == pytest.approx(0.2)
+        assert limit.scaled(0.0).is_nominal
+
+    def test_a_rate_limit_takes_its_time(self):
+        effect = registry.make("command_rate", time_per_unit=0.5)  # 2 rad/s
+        step = np.r_[np.zeros(10), np.ones(90)]
+        made = effect.change(step, 0.01)
+        assert made[9] == 0 and made[10] == pytest.approx(0.02)
+        assert made[58] == pytest.approx(0.98) and made[59] == 1.0
