@@ -112,7 +112,7 @@ class Linear:
             low=(low - middle) / unit,
             high=(high - middle) / unit,
             lam=lam,
-            penalty=dict.fromkeys(free, KAPPA),
+            penalty=dict.fromkeys(free, problem.model.odds),
             design=matrix,
             target=target,
             weight=weight,

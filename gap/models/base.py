@@ -66,6 +66,8 @@ class GapModel(ABC):
             at once a tangent at the nominal misleads.
         singles: explanations from which alone fits are started as well; more where a
             tangent at the nominal says little of which it is.
+        odds: log odds against each explanation, by how many there are: with 3 about one
+            of twenty is expected.
         singly: whether fits are started from single explanations alone: where there
             are more rows than a tangent at the nominal can tell apart.
     """
@@ -83,6 +85,7 @@ class GapModel(ABC):
     many: bool = False
     singles: int = 4
     singly: bool = False
+    odds: float = 3.0
 
     @property
     @abstractmethod

@@ -49,8 +49,9 @@ class Compared:
         Args:
             trials: checked recording.
             model: nominal model.
-            sigma: what measuring scatters, by observed channel.
+            sigma: what measuring scatters, by observed channel; 0 = as the model has it.
         """
+        known = np.nan_to_num(np.asarray(sigma, dtype=float))
         trials = tuple(narrowed(trial, model.channels) for trial in trials)
         (predicted,) = model.simulate(trials, [()])
         windows = tuple(model.windows(trial) for trial in trials)
@@ -60,7 +61,7 @@ class Compared:
             windows,
             tuple(map(model.compare, trials, (t.observed for t in trials), windows)),
             tuple(map(model.compare, trials, predicted, windows)),
-            np.maximum(np.asarray(sigma, dtype=float), model.resolution),
+            np.where(known > 0, known, model.resolution),
             np.asarray(model.process, dtype=float),
         )
 
@@ -70,7 +71,7 @@ class Compared:
     ) -> "Compared":
         """With the scatter that a diagnosis measured."""
         sigma = np.array(found.floor["sigma"][: len(model.channels)], dtype=float)
-        return cls.of(trials, model, np.nan_to_num(sigma))
+        return cls.of(trials, model, sigma)
 
     def noise(self, trial: int, windows: Windows) -> np.ndarray:
         """Mean square that scatter alone gives in windows of a trial, ``(W, C)``."""

@@ -45,8 +45,9 @@ class WalkModel(LibraryModel):
     """
 
     timed = False
-    singles = 10
+    singles = 8
     singly = True
+    odds = 12.0  # what walking scatters is alike in all servos, hardly independent
     """commands last until the robot rests, not as long as they are told"""
 
     def __init__(self, robot: str = "phantomx", *, pose_sd: Sequence[float] = TRACKER):

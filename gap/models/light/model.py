@@ -66,6 +66,10 @@ class SightModel(LibraryModel):
         headings: which way the sensors look, see `light_sensors.of`.
     """
 
+    singles = 6
+    singly = True
+    odds = 5.0  # against each of some two hundred
+
     def __init__(
         self,
         trials: Sequence[Trial],
