@@ -270,7 +270,7 @@ def drawn(rng, problem: Problem, point: Point, pool, length: float) -> Hidden | 
         return None
     sizes = np.sign(edge) * np.array(tried)
     made = [problem.model.effect(row.term, values(float(s))) for s in sizes]
-    lengths = np.linalg.norm(_whitened(problem, point, made), axis=1)
+    lengths = _lengths(problem, point, made)
     lengths = np.where(np.isfinite(lengths), lengths, 0.0)
     if lengths.max() < 0.7 * length:
         return None
@@ -282,7 +282,7 @@ def drawn(rng, problem: Problem, point: Point, pool, length: float) -> Hidden | 
         size *= np.sign(edge)
     chosen = values(size)
     hidden = problem.model.effect(row.term, chosen)
-    (reached,) = np.linalg.norm(_whitened(problem, point, [hidden]), axis=1)
+    (reached,) = _lengths(problem, point, [hidden])
     if not LEAST * SEEN < reached < 3 * max(length, SEEN):
         return None
     magnitude = abs(size) if plane else row.nominal + size
@@ -308,19 +308,31 @@ def _features(problem: Problem, effects: Sequence[Effect]) -> np.ndarray:
     )
 
 
-def _whitened(problem: Problem, point: Point, effects) -> np.ndarray:
-    """What effects change, in deviations of independent residuals, ``(E, M)``."""
+def _lengths(problem: Problem, point: Point, effects: Sequence[Effect]) -> np.ndarray:
+    """What effects change, in deviations of independent residuals, ``(E,)``; what
+    slack and nuisances could as well be is left out."""
     base, *made = _features(problem, effects)
-    scale = point.noise.sd * np.sqrt(point.noise.lam)
-    change = [((path - base) / scale)[problem.seen] for path in made]
-    return np.array(change)
+    linear = point.linear
+    prior = linear.prior(())
+    used = np.flatnonzero(prior)
+    design = linear.design[..., used].reshape(-1, len(used)) * prior[used]
+    weight = linear.weight.ravel() / linear.lam
+    heavy = design * weight[:, None]
+    curvature = heavy.T @ design + np.eye(len(used))
+    found = []
+    for path in made:
+        change = np.where(problem.seen, path - base, 0.0).ravel()
+        pull = heavy.T @ change
+        square = weight @ change**2 - pull @ np.linalg.solve(curvature, pull)
+        found.append(np.sqrt(max(square, 0.0)))
+    return np.array(found)
 
 
 def _answered(
     answer: Answer, problem: Problem, point: Point, found: Sequence[Hidden]
 ) -> Answer:
     effects = [item.effect for item in found]
-    lengths = np.linalg.norm(_whitened(problem, point, effects), axis=1)
+    lengths = _lengths(problem, point, effects)
     return replace(
         answer,
         names=tuple(item.term for item in found),

@@ -49,7 +49,7 @@ class Compared:
         Args:
             trials: checked recording.
             model: nominal model.
-            sigma: what measuring scatters, by observed channel; 0 = as the model has it.
+            sigma: what measuring scatters, by observed channel; 0 = as the model says.
         """
         known = np.nan_to_num(np.asarray(sigma, dtype=float))
         trials = tuple(narrowed(trial, model.channels) for trial in trials)
