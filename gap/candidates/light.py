@@ -19,7 +19,8 @@ AZIMUTHS, WIDTHS = np.arange(-6, 6) * np.pi / 6, (0.7, 1.5, 3.0)  # [rad] of a s
 # effect, parameter, plausible departure (standard deviation), low, high, slack of a
 # single sensor (what sensors of one kind differ by), settings; all assumed.
 _SENSORS: tuple[tuple[str, str, float, float, float, float, dict[str, Any]], ...] = (
-    ("sensor_gain", "factor", 0.3, 0.0, 3.0, 0.0, {"levels": (0.3, 2.0)}),
+    ("sensor_gain", "factor", 0.3, 0.0, 3.0, 0.0,
+     {"step": -0.03, "levels": (0.3, 2.0)}),  # upwards, dark readings saturate
     ("sensor_offset", "counts", 500, -4095, 4095, 0.0,
      {"step": 20.0, "levels": (-2000, -600, 600, 2000)}),
     ("sensor_stuck_max", "blend", 0.3, 0, 1, 0.0, {"levels": (0.5, 1.0)}),

@@ -160,7 +160,7 @@ def _singles(problem: Problem, start: Point, known: Noise) -> list[tuple]:
     few = problem.sample(fit.ROUGH)
     few = None if len(few) == len(problem.trials) else few
     tried = []
-    for name in order[: problem.model.singles]:
+    for name in order[: problem.model.starts]:
         values = placed(problem, linear, {name}, start.values)
         fitted = _fitted(problem, {name})
         values, rest = newton(problem, values, fitted, start.noise, turns=4, only=few)

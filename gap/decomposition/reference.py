@@ -37,7 +37,7 @@ class Corrected(GapModel):
         self.resolution, self.limits = model.resolution, model.limits
         self.dt, self.timed, self.logs = model.dt, model.timed, model.logs
         self.memory, self.many = model.memory, model.many
-        self.singles, self.singly, self.odds = model.singles, model.singly, model.odds
+        self.starts, self.singly, self.odds = model.starts, model.singly, model.odds
 
     @classmethod
     def of(cls, trials: Sequence[Trial], model: GapModel) -> "Corrected":

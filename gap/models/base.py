@@ -64,7 +64,7 @@ class GapModel(ABC):
         memory: order of the autoregression that residuals may have; 0 = none.
         many: whether fits are also started from all rows at once: where many depart
             at once a tangent at the nominal misleads.
-        singles: explanations from which alone fits are started as well; more where a
+        starts: explanations from which alone fits are started as well; more where a
             tangent at the nominal says little of which it is.
         odds: log odds against each explanation, by how many there are: with 3 about one
             of twenty is expected.
@@ -83,7 +83,7 @@ class GapModel(ABC):
     logs: bool = False
     memory: int = 0
     many: bool = False
-    singles: int = 4
+    starts: int = 4
     singly: bool = False
     odds: float = 3.0
 

@@ -45,7 +45,7 @@ class WalkModel(LibraryModel):
     """
 
     timed = False
-    singles = 8
+    starts = 8
     singly = True
     odds = 12.0  # what walking scatters is alike in all servos, hardly independent
     """commands last until the robot rests, not as long as they are told"""

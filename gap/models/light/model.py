@@ -66,7 +66,7 @@ class SightModel(LibraryModel):
         headings: which way the sensors look, see `light_sensors.of`.
     """
 
-    singles = 6
+    starts = 6
     singly = True
     odds = 5.0  # against each of some two hundred
 
