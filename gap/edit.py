@@ -11,12 +11,13 @@ import numpy as np
 
 from bns.errors import UnknownNameError
 from bns.gap import store
-from bns.gap.core import residuals
-from bns.gap.core.problem import Problem
-from bns.gap.core.whitening import loss
+from bns.gap.decomposition import descent
+from bns.gap.decomposition.problem import Problem
 from bns.gap.models.base import GapModel
 from bns.gap.recordings import check
 from bns.gap.records import Diagnosis
+from bns.gap.where import horizons
+from bns.gap.where.compared import Compared, terms
 from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Channel, Trial
 
@@ -77,26 +78,43 @@ def edit(
     pairs = list(zip(fit.names, fit.effects, strict=True))
     kept = tuple(store.parse(text, model) for _, text in pairs)
     left = tuple(store.parse(text, model) for name, text in pairs if name not in gone)
-    problem = Problem.of(usable, model, candidates=model.candidates())
     sets: dict[str, tuple[Effect, ...]] = {"edited": left, "kept": kept, "nominal": ()}
-    rests = problem.rests(list(sets.values()))
-    losses = {
-        name: float(loss(rest)) / len(rest)
-        for name, rest in zip(sets, rests, strict=True)
-    }
+    losses = errors(usable, model, sets)
+    compared = Compared.diagnosed(found, usable, model)
     return Edited(
         tuple(gone),
         tuple(str(item) for item in left),
         losses,
-        {name: _rms(problem, items) for name, items in sets.items()},
+        {name: _rms(compared, items) for name, items in sets.items()},
         tuple(model.features),
         HORIZON,
         _sentence(gone, left, losses),
     )
 
 
-def _rms(problem: Problem, effects: Sequence[Effect]) -> tuple[float, ...]:
-    squares = residuals.by_trial(problem, effects, HORIZON)
+def errors(
+    trials: Sequence[Trial], model: GapModel, sets: Mapping[str, Sequence[Effect]]
+) -> dict[str, float]:
+    """Loss per residual of sets of effects; 1 = what no row of the model explains.
+
+    Args:
+        trials: a checked recording.
+        model: nominal model.
+        sets: of effects, by name.
+    """
+    problem = Problem.of(trials, model)
+    sd = descent.nothing(problem).noise.sd
+    made = {}
+    paths = model.simulate(problem.trials, list(sets.values()))
+    for name, predicted in zip(sets, paths, strict=True):
+        features = map(model.compare, problem.trials, predicted, problem.windows)
+        rest = (problem.recorded - np.concatenate(list(features))) / sd
+        made[name] = float(terms(rest[problem.seen]).mean())
+    return made
+
+
+def _rms(compared: Compared, effects: Sequence[Effect]) -> tuple[float, ...]:
+    squares = horizons.by_trial(compared, effects, HORIZON)
     return tuple(np.sqrt(np.nanmean(squares, axis=0)).tolist())
 
 

@@ -14,103 +14,9 @@ import numpy as np
 
 from bns.errors import BnsError, FormatError
 from bns.storage import reading
-from bns.worlds.effects import registry
-from bns.worlds.effects.base import Effect, Parameter
 
 SCHEMA, VERSION = "bns-diagnosis", 1
 KINDS = ("no gap", "effect", "either", "together", "none of the library")
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """One explanation that the diagnosis may give: an effect, one parameter free.
-
-    Attributes:
-        name: as in verdicts, "wheel_gain[left]"; the part before "[" is the effect.
-        effect: name in the registry of effects.
-        parameter: the one that says how strong it is.
-        unit: of the parameter.
-        nominal, low, high: the value that changes nothing, and the bounds of a fit.
-        grid: magnitudes to simulate before any fit, increasing, over the whole
-            range; the nominal may be left out.
-        fixed: values of the effect's other parameters and choices.
-        branches: alternatives to `fixed` entries that are tried one by one (headings
-            of a slope, ways in which a wheel is stuck); empty = one, as in `fixed`.
-        extras: names of continuous parameters that a fit adjusts as well, starting
-            from the best branch.
-        slack: how far the nominal model itself may be off in this direction (one
-            standard deviation, in units of the parameter); 0 = it is exact there.
-        scale: "log" where magnitudes span decades, else "linear".
-        aliases: names of candidates known to look alike whatever is commanded.
-        excite: which commands make it felt, in words.
-        stepped: whether the motion changes in steps with the magnitude (a dead band
-            between two speeds told), so that only a search on a grid fits it.
-    """
-
-    name: str
-    effect: str
-    parameter: str
-    unit: str
-    nominal: float
-    low: float
-    high: float
-    grid: tuple[float, ...]
-    fixed: Mapping[str, Any] = field(default_factory=dict)
-    branches: tuple[Mapping[str, Any], ...] = ({},)
-    extras: tuple[str, ...] = ()
-    slack: float = 0.0
-    scale: str = "linear"
-    aliases: tuple[str, ...] = ()
-    excite: str = ""
-    stepped: bool = False
-
-    def __post_init__(self):
-        inside = all(self.low <= value <= self.high for value in self.grid)
-        if not (self.grid and inside and self.low <= self.nominal <= self.high):
-            raise BnsError(
-                f"Candidate {self.name!r}: grid and nominal have to lie in "
-                f"[{self.low}, {self.high}] and the grid may not be empty."
-            )
-        if self.scale not in ("linear", "log") or not self.branches:
-            raise BnsError(
-                f"Candidate {self.name!r}: scale is 'linear' or 'log', and one branch "
-                "at least is needed (an empty mapping)."
-            )
-
-    @property
-    def whole(self) -> bool:
-        """Whether only whole magnitudes make sense."""
-        parameters = registry.get(self.effect).parameters
-        return next(p.integer for p in parameters if p.name == self.parameter)
-
-    def make(
-        self,
-        magnitude: float,
-        branch: int = 0,
-        extras: Mapping[str, float] | None = None,
-    ) -> Effect:
-        """The effect at a magnitude, clipped to the bounds.
-
-        Args:
-            magnitude: of `parameter`.
-            branch: index into `branches`.
-            extras: values of the extra parameters; None = as in the branch.
-        """
-        value = min(max(float(magnitude), self.low), self.high)
-        values = {**self.fixed, **self.branches[branch], **(extras or {})}
-        parameters = {p.name: p for p in registry.get(self.effect).parameters}
-        if parameters[self.parameter].integer:
-            value = round(value)
-        for name in self.extras:
-            values[name] = _inside(float(values[name]), parameters[name])
-        return registry.make(self.effect, **{**values, self.parameter: value})
-
-
-def _inside(value: float, parameter: Parameter) -> float:
-    """The value in the parameter's bounds; a heading comes round instead."""
-    if parameter.unit == "rad" and parameter.high - parameter.low > 6:
-        value = math.remainder(value, 2 * math.pi)
-    return min(max(value, parameter.low), parameter.high)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +50,7 @@ class Fit:
         intervals: 90 % interval of each magnitude.
         units: of the magnitudes.
         loss: minus twice the log-likelihood on all trials, the noise's constant left
-            out (robust; see `gap/core/whitening.py`).
+            out (robust).
         held_out: the same on trials that were not fitted, all folds together.
         held_out_se: standard error over trials of the improvement on nothing.
         evidence: minus twice the log marginal likelihood (Laplace).

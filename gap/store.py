@@ -5,9 +5,8 @@ from pathlib import Path
 
 from bns.errors import BnsError, FormatError, UnknownNameError
 from bns.gap.models.base import GapModel
-from bns.gap.records import Candidate, Diagnosis, Fit
+from bns.gap.records import Diagnosis, Fit
 from bns.storage import files, reading, seal
-from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect
 
 FILE = "diagnosis.json"
@@ -45,20 +44,7 @@ def load(directory: str | Path) -> Diagnosis:
 
 def parse(text: str, model: GapModel) -> Effect:
     """An effect as a diagnosis with this model writes it."""
-    own = getattr(model, "parse", None)
-    return own(text) if own else registry.parse(text)
-
-
-def candidate(name: str, model: GapModel) -> Candidate:
-    """The model's candidate of that name.
-
-    Raises:
-        UnknownNameError: it has none.
-    """
-    known = {item.name: item for item in model.candidates()}
-    if name not in known:
-        raise UnknownNameError("effect", name, known)
-    return known[name]
+    return model.parse(text)
 
 
 def chosen(found: Diagnosis, names: str = "") -> Fit:

@@ -9,8 +9,6 @@ one, to share the work.
 
 import sys
 import time
-from collections.abc import Iterable
-from dataclasses import asdict
 from typing import Any
 
 from bench.gap.kept_cases import Cases
@@ -19,43 +17,38 @@ from bench.result import Result, bench
 COUNTS = {"single": 160, "none": 60, "motion": 12, "off-library": 40}
 # Seeds from 60 000, from 160 000 and from 180 000 on were scored once each, with the
 # diagnosis as it was then. Those from 280 000 on: planned first, scored once.
-CASES = Cases("gap_sensors4", COUNTS, first=280_000)
+# Those from 380 000 on, by the joint fit.
+CASES = Cases("gap_sensors5", COUNTS, first=380_000)
 WHOLE = 16  # single and no-effect cases of which one is diagnosed with motion
 QUICK = {"single": 2, "none": 1}
 
 
 def one(kind: str, seed: int) -> dict[str, Any]:
     """One case: what is true, what was said, and how long it took."""
-    from bns.gap.bench import light_cases
+    from bns.gap.bench import cases, scoring
+    from bns.gap.bench.light_cases import LightStand
+    from bns.gap.diagnose import diagnose, single
     from bns.gap.models.light import diagnosis
     from bns.gap.models.light.model import SightModel
     from bns.gap.models.wheeled import WheeledModel
     from bns.gap.records import plain
 
     model = WheeledModel("khepera3", threads=1)
-    case = light_cases.build(
-        seed, kind, model, singles=_singles(seed), off_library=off_library()
-    )
+    stand = LightStand(model, singles=_singles(seed), wheels=kind == "motion")
+    hidden = "single" if kind == "motion" else kind
+    case = cases.build(seed, hidden, stand, off_library=off_library())
     begin, busy = time.perf_counter(), time.process_time()
     whole = kind == "motion" or seed % WHOLE == 0
     if whole:
-        parts = diagnosis.analyse(case.trials, model, seed=seed)
+        found = diagnose(case.trials, model, seed=seed, full=False)
     else:
-        sight = SightModel(case.trials, pose_sd=light_cases.pose_sd(case.reality))
-        parts = (diagnosis.look(case.trials, sight, seed=seed),)
-    answer = parts[0].verdict
-    if whole:
-        answer = diagnosis.merged(*(part.verdict for part in parts))
-    said = asdict(answer) | {"verdict": answer.kind, "whole": whole}
-    choice = parts[-1].choice
-    said |= {"worth": choice.worth, "rungs": [rung.as_dict() for rung in choice.rungs]}
-    row = {
-        "kind": kind,
-        "seed": seed,
-        "seconds": time.perf_counter() - begin,
-        "cpu": time.process_time() - busy,
-    }
-    return plain({**row, "answer": case.answer.as_dict(), "said": said})
+        sight = SightModel(case.trials, pose_sd=stand.pose_sd)
+        found = diagnosis.look(case.trials, sight, single, seed=seed, full=False)
+    row = scoring.row(kind, seed, case, found)
+    row["said"]["whole"] = whole
+    row["seconds"] = time.perf_counter() - begin
+    row["cpu"] = time.process_time() - busy
+    return plain(row)
 
 
 def _singles(seed: int) -> bool:
@@ -77,8 +70,7 @@ def gap_sensors(quick: bool) -> Result:
     """Score the cases; the missing ones are made and diagnosed first."""
     from bns.gap.bench import scoring
 
-    kept = CASES.produce(one, CASES.wanted(QUICK if quick else None))
-    found = list(map(_twinned, map(_likened, kept)))
+    found = CASES.produce(one, CASES.wanted(QUICK if quick else None))
     every = scoring.of(found, "single")
     large = scoring.of(found, "single", scoring.LARGE)
     none, off = scoring.of(found, "none"), scoring.of(found, "off-library")
@@ -93,8 +85,6 @@ def gap_sensors(quick: bool) -> Result:
             "diagnosed with motion": sum(row["said"]["whole"] for row in found),
             "single sensors recorded": _of_recording(large, True),
             "virtual sensors alone": _of_recording(large, False),
-            "merged by their signatures alone": _named(map(_twinned, kept)),
-            "nothing merged but what each signature lists": _named(kept),
             "among those named": scoring.share(large, scoring.among),
             "strict": scoring.share(large, scoring.strict),
             "named as one of several": scoring.share(
@@ -118,39 +108,6 @@ def gap_sensors(quick: bool) -> Result:
             ],
         },
     )
-
-
-def _named(rows: Iterable[dict]) -> float:
-    """Share of large effects that are named."""
-    from bns.gap.bench import scoring
-
-    return scoring.share(scoring.of(list(rows), "single", scoring.LARGE), scoring.right)
-
-
-def _likened(row: dict) -> dict:
-    """A row whose aliases hold what the likelihood of its readings cannot tell."""
-    from bns.gap.core.aliases import ALIKE
-
-    answer = row["answer"]
-    near = answer["near"] or [()] * len(answer["aliases"])
-    aliases = [
-        sorted({*names, *(name for name, far, _ in found if far < ALIKE)})
-        for names, found in zip(answer["aliases"], near, strict=True)
-    ]
-    return {**row, "answer": {**answer, "aliases": aliases}}
-
-
-def _twinned(row: dict) -> dict:
-    """A row whose aliases hold what always looks alike as well."""
-    from bns.gap.candidates import light
-
-    always = {item.name: item.aliases for item in light.candidates(singles=True)}
-    answer = row["answer"]
-    aliases = [
-        sorted({*names, *(twin for name in names for twin in always.get(name, ()))})
-        for names in answer["aliases"]
-    ]
-    return {**row, "answer": {**answer, "aliases": aliases}}
 
 
 def _of_recording(found: list[dict], singles: bool) -> dict[str, float]:

@@ -66,7 +66,7 @@ def _case(number: int, text: str, quick: bool) -> dict:
 
     from bns import seeding
     from bns.gap import store
-    from bns.gap.bench import cases
+    from bns.gap.bench import wheeled_cases as cases
     from bns.gap.diagnose import diagnose
     from bns.gap.models.wheeled import WheeledModel
     from bns.worlds.effects import registry

@@ -1,10 +1,9 @@
 """Cases of the gap benches: made, diagnosed once, kept as JSON lines, scored many ways.
 
-    python -m bench.gap.wheeled_cases scored|calibrate [PART PARTS]
+    python -m bench.gap.wheeled_cases scored|sets [PART PARTS]
 
 diagnoses the missing cases of a set (every PARTS-th, from PART on) and keeps the
-results in `runs/bench/`, one file per part. Thresholds play no role in that: verdicts
-are taken from what was kept, with the package's calibration, when it is read.
+results in `runs/bench/`, one file per part.
 """
 
 import sys
@@ -12,13 +11,10 @@ import time
 
 from bench.gap import kept_cases
 
-ROUND = 2  # of the plans
-ROUNDS = {"scored": (4,), "calibrate": (2, 3), "sets": (4,)}
+ROUNDS = {"scored": (5,), "sets": (5,)}
 """of diagnoses, those of a later one count; each has scored cases of its own, see
 docs/decisions.md"""
-SEEN = 1_000_000  # seeds from here on were scored once, calibration uses lower ones
-SEALED = 8_000_000  # seeds of the scored cases begin here
-CALIBRATION = 400_000  # seeds of the calibration cases begin here
+SEALED = 9_000_000  # seeds of the scored cases begin here; lower ones were scored once
 SPAN = 10_000  # seeds between the scored kinds
 SETS = {
     "scored": {
@@ -29,7 +25,6 @@ SETS = {
         "fault": 16,
         "alias": 16,
     },
-    "calibrate": {"single": 140, "none": 60, "off-library": 16, "pair": 40},
 }
 # Planted for "alias": two delays that no command parts, and what a short one is like.
 ALIKE = ("command_latency", "tracker_latency", "wheel_stuck_max[both]")
@@ -38,8 +33,6 @@ QUICK = {"single": 2, "none": 1}
 
 def seed_of(name: str, kind: str, number: int) -> int:
     """Seed of the case `number` of a kind in a set."""
-    if name == "calibrate":
-        return CALIBRATION + number
     return SEALED + SPAN * list(SETS[name]).index(kind) + number
 
 
@@ -64,19 +57,10 @@ def _file(name: str, number: int) -> str:
 
 
 def ensure(quick: bool = False) -> list[dict]:
-    """Run what is missing of the scored cases; their results, judged."""
+    """Run what is missing of the scored cases; their results."""
     cases = wanted("scored", QUICK if quick else None)
     produce(cases, "scored")
-    return judged([r for r in rows() if (r["kind"], r["seed"]) in set(cases)])
-
-
-def judged(found: list[dict]) -> list[dict]:
-    """Rows with the verdicts that the package's calibration gives."""
-    from bns.gap.bench import scoring
-    from bns.gap.core import verdict
-
-    rules = verdict.calibration()
-    return [scoring.judged(row, rules) for row in found]
+    return [r for r in rows() if (r["kind"], r["seed"]) in set(cases)]
 
 
 def produce(cases: list[tuple[str, int]], name: str, part: int = 0) -> None:
@@ -89,7 +73,8 @@ def one(kind: str, seed: int) -> dict:
     from bench.gap.strange_effects import off_library, other_solver
     from bns.errors import BnsError
     from bns.gap.bench import cases, scoring
-    from bns.gap.diagnose import analyse
+    from bns.gap.bench.wheeled_cases import WheeledStand
+    from bns.gap.diagnose import diagnose
     from bns.gap.models.wheeled import WheeledModel
     from bns.gap.records import plain
 
@@ -97,24 +82,27 @@ def one(kind: str, seed: int) -> dict:
     case = cases.build(
         seed,
         "single" if kind == "alias" else kind,
-        model,
+        WheeledStand(model, other_solver()),
         off_library=off_library(),
-        extra=other_solver(),
         wanted=ALIKE[seed % len(ALIKE)] if kind == "alias" else "",
     )
     begin, busy = time.perf_counter(), time.process_time()
     try:
-        made = analyse(case.trials, model, seed=seed)
-        said = scoring.said(made, case, model)
+        found = diagnose(case.trials, model, seed=seed, full=False)
+        row = scoring.row(kind, seed, case, found)
+        if kind == "pair":
+            row["said"]["edit"] = scoring.edited(found, case, model)
     except BnsError as error:
         said = {"error": str(error)}
-    row = {
-        "kind": kind,
-        "seed": seed,
-        "seconds": time.perf_counter() - begin,
-        "cpu": time.process_time() - busy,
-    }
-    return plain({**row, "answer": case.answer.as_dict(), "said": said})
+        row = {
+            "kind": kind,
+            "seed": seed,
+            "answer": case.answer.as_dict(),
+            "said": said,
+        }
+    row["seconds"] = time.perf_counter() - begin
+    row["cpu"] = time.process_time() - busy
+    return plain(row)
 
 
 if __name__ == "__main__":

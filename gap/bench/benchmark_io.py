@@ -9,11 +9,12 @@ diagnosis.
 """
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from bns.errors import BnsError, FormatError
+from bns.gap.bench import scoring
 from bns.gap.bench.cases import Answer, Case
 from bns.gap.diagnose import diagnose
 from bns.gap.models.base import GapModel
@@ -106,21 +107,10 @@ def score(said: Path, answers: Path) -> list[dict[str, Any]]:
             raise FormatError(f"{answers} has no answer for {line['name']!r}.")
         answer, found = known[line["name"]], line["diagnosis"]
         row = {"kind": answer["kind"], "seed": line["name"], "answer": answer}
-        row["said"] = found if "error" in found else _said(found)
+        row["said"] = found if "error" in found else scoring.said_of(found)
         row["seconds"] = sum(found.get("seconds", {}).values())
         rows.append(row)
     return rows
-
-
-def _said(found: Mapping[str, Any]) -> dict[str, Any]:
-    verdict = found["verdict"]
-    keys = ("named", "sets", "p_gap", "p_misfit")
-    made = {key: verdict[key] for key in keys}
-    made["verdict"] = verdict["kind"]
-    made["ranked"] = found["signatures"].get("ranked", [])
-    for key in ("closed", "before", "after"):
-        made[key] = found["closed"].get(key)
-    return made
 
 
 def read_answers(answers: Path) -> dict[str, Any]:

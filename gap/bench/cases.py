@@ -1,40 +1,42 @@
 """Cases of the withheld-effect bench: recordings with an answer kept apart.
 
-A case is a recording of the "real" robot: the nominal model, itself slightly wrong,
-with a hidden effect (or two, or none, or one that the library lacks), seen by a noisy
-tracker with drop-outs and jitter. How strong the effect is, is drawn relative to what
-the recording can show.
+A case is a recording of a "real" robot (`Stand`): the nominal model, itself slightly
+wrong, with a hidden effect (or two, or none, or one that the library lacks). How strong
+the effect is, is drawn relative to what the recording can show.
 
 On disk a case is a dataset directory (`worlds/data/dataset.py`) called by its name; all
 answers lie in one `answers.json` elsewhere, by name: the attributes of `Answer`.
 """
 
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from bns import models, seeding
-from bns.gap.core import fit, signatures
-from bns.gap.core.aliases import accepted, likeness
-from bns.gap.core.null import Null
-from bns.gap.core.problem import Problem
-from bns.gap.core.signatures import Curves
-from bns.gap.models.base import GapModel
-from bns.gap.planning import excitation
+from bns import seeding
+from bns.errors import BnsError
+from bns.gap.decomposition import descent, fit, levels
+from bns.gap.decomposition.fit import Point
+from bns.gap.decomposition.linear import KAPPA
+from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.row import Row
+from bns.gap.models.base import PLANE, GapModel
 from bns.gap.recordings.recording_faults import faulty
-from bns.gap.records import Candidate
-from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect
-from bns.worlds.physics.wheeled_world import MujocoWorld
 from bns.worlds.trial import Commands, Trial
 
-KINDS = ("single", "pair", "none", "off-library", "fault")
-TRIALS, LENGTH = 5, 8.0  # recordings of a case, and how long each is [s]
-SIZES = 0.5, 8.0  # magnitudes over what is detected, drawn evenly in the logarithm
+SIZES = 0.5, 8.0  # of a single effect over what is detected, drawn evenly in the log
 PAIR_SIZES = 2.0, 8.0  # of each of two
 LEAST = 0.4  # size below which an effect counts as not excited, and is drawn again
+TRIES = 60
+SHARES = (0.01, 0.03, 0.1, 0.2, 0.35, 0.6, 1.0)  # of the largest departure, tried
+SEEN = float(np.sqrt(2 * (KAPPA + 3.0)) + 1.28)
+"""whitened length of what is found nine times in ten: its evidence pays for itself"""
+ALIKE = 1.68
+"""noise units between what two do at which they are confused in a fifth of the cases"""
+NEAREST = 6  # explanations that are fitted to what a hidden one does
 
 
 @dataclass(frozen=True)
@@ -42,19 +44,15 @@ class Answer:
     """What is true of a case.
 
     Attributes:
-        kind: one of `KINDS`.
-        names: candidates of the hidden effects.
+        kind: of case, one of its stand's.
+        names: explanations of the hidden effects.
         effects: as text.
         magnitudes: of each.
-        sizes: whitened length of each effect's signature over the detected length.
-        aliases: per hidden effect, the candidates that this recording cannot tell
+        sizes: whitened length of what each does over the detected length.
+        aliases: per hidden effect, the explanations that this recording cannot tell
             from it (itself included).
-        near: per hidden effect, the candidates that come nearest to it with their
-            whitened distances and angles [deg], see `aliases.Likeness`.
         nominal: how the robot departs from its model besides, as text.
         fault: of the data.
-        detected: whitened length of a signature that is found with 90 % power.
-        oracle: held-out loss with the true effects fitted.
     """
 
     kind: str
@@ -63,11 +61,8 @@ class Answer:
     magnitudes: tuple[float, ...] = ()
     sizes: tuple[float, ...] = ()
     aliases: tuple[tuple[str, ...], ...] = ()
-    near: tuple[tuple[tuple[str, float, float], ...], ...] = ()
     nominal: tuple[str, ...] = ()
     fault: str = ""
-    detected: float = 0.0
-    oracle: float = float("nan")
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -76,7 +71,7 @@ class Answer:
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A recording with its answer, and one without the effect for the edit test."""
+    """A recording with its answer, and what is needed for one without the effect."""
 
     trials: tuple[Trial, ...]
     answer: Answer
@@ -84,210 +79,330 @@ class Case:
     commands: tuple[Commands, ...]
 
 
-def commands(
-    rng: np.random.Generator, count: int = TRIALS, *, robot: str = "khepera3"
-) -> list[Commands]:
-    """Random wheel speeds that a robot takes, each held for 0.4 to 1.6 s.
+@dataclass(frozen=True)
+class Hidden:
+    """An explanation with its values.
 
-    Args:
-        rng: source of the speeds and times.
-        count: number of lists of commands, one for each trial.
-        robot: a wheeled robot, by name; its speed limit counts.
+    Attributes:
+        term: its name.
+        values: of its rows, by name.
+        effect: that it is.
+        magnitude: the value, or the length of several.
     """
-    fastest = excitation.fastest(float(models.robot(robot).limits.min()))
-    made = []
-    for _ in range(count):
-        number = int(rng.integers(5, 10))
-        held = rng.uniform(0.4, 1.6, number)
-        held = np.maximum(np.rint(held * LENGTH / held.sum() / 0.005), 20) * 0.005
-        values = rng.uniform(-fastest, fastest, (number, 2))
-        straight = rng.random(number) < 0.2
-        values[straight, 1] = values[straight, 0]
-        made.append(Commands(values, held))
-    return made
+
+    term: str
+    values: Mapping[str, float]
+    effect: Effect
+    magnitude: float
 
 
-def imperfection(rng: np.random.Generator) -> list[Effect]:
-    """How a real robot departs from its model although nothing is wrong with it."""
-    values = {
-        "wheel_diameter": [
-            {"wheel": side, "factor": float(np.clip(rng.normal(1, 0.002), 0.99, 1.01))}
-            for side in ("left", "right")
-        ],
-        "axle_length": [{"factor": float(np.clip(rng.normal(1, 0.004), 0.98, 1.02))}],
-        "floor_friction": [{"factor": float(rng.uniform(0.8, 1.2))}],
-        "centre_of_mass": [{"dx": float(rng.normal(0, 3e-4))}],
-    }
-    return [registry.make(name, **row) for name, rows in values.items() for row in rows]
+class Stand(ABC):
+    """A robot that cases are made of.
 
-
-def tracker(rng: np.random.Generator) -> list[Effect]:
-    """Noise and drop-outs of an overhead tracker."""
-    position = float(np.exp(rng.uniform(np.log(0.5e-3), np.log(2e-3))))
-    heading = float(np.exp(rng.uniform(np.log(4e-3), np.log(15e-3))))
-    noise = {"position_sd": position, "heading_sd": heading}
-    made = [registry.make("tracker_noise", **noise)]
-    if rng.random() < 0.5:
-        share = float(rng.uniform(0.005, 0.05))
-        made.append(registry.make("tracker_dropouts", probability=share))
-    return made
-
-
-def record(
-    told: Sequence[Commands], effects: Sequence[Effect], seed: int, robot: str
-) -> tuple[Trial, ...]:
-    """Run the robot; time stamps jitter by a few milliseconds.
-
-    Args:
-        told: commands of each trial.
-        effects: what the robot departs by.
-        seed: of the world and of the jitter.
-        robot: a wheeled robot, by name.
+    Attributes:
+        model: its nominal model.
+        kinds: of cases that can be made.
     """
-    world = MujocoWorld(robot, reality=effects, threads=2, name="real")
-    seeds = [seeding.integer(seed, "case", "world", n) for n in range(len(told))]
-    made = []
-    for number, trial in enumerate(world.run(told, seeds=seeds)):
-        rng = seeding.generator(seed, "case", "jitter", number)
-        times = trial.times + rng.normal(0, 1.5e-3, len(trial.times))
-        times[0] = trial.times[0]
-        observed = trial.observed.copy()
-        lost = ~np.isfinite(observed[0])
-        observed[0, lost] = 0.0  # the start is known
-        made.append(
-            trial.replace(
-                times=np.maximum.accumulate(times), observed=observed, conditions={}
-            )
-        )
-    return tuple(made)
+
+    kinds: tuple[str, ...] = ("single", "pair", "none", "fault")
+
+    def __init__(self, model: GapModel):
+        self.model = model
+
+    @abstractmethod
+    def commands(self, rng: np.random.Generator) -> list[Commands]:
+        """What it is told in each trial."""
+
+    @abstractmethod
+    def imperfection(self, rng: np.random.Generator) -> list[Effect]:
+        """How it departs from its model although nothing is wrong with it."""
+
+    @abstractmethod
+    def record(
+        self, told: Sequence[Commands], effects: Sequence[Effect], seed: int
+    ) -> tuple[Trial, ...]:
+        """Run it.
+
+        Args:
+            told: commands of each trial.
+            effects: what it departs by, in any order.
+            seed: of noise.
+
+        Raises:
+            BnsError: it cannot run with these effects.
+        """
+
+    def problem(self, plain: Sequence[Trial]) -> Problem:
+        """A recording without an effect, as it is compared."""
+        return Problem.of(plain, self.model)
+
+    def unlisted(self, rng: np.random.Generator) -> Effect:
+        """An effect that its model lacks, clearly felt.
+
+        Raises:
+            BnsError: none is known.
+        """
+        del rng
+        raise BnsError(f"No effect is known that {self.model.name!r} lacks.")
+
+    def pool(
+        self, rng: np.random.Generator, problem: Problem, kind: str
+    ) -> Sequence[Row]:
+        """Rows to draw from."""
+        del rng, kind
+        return [row for row in problem.rows if not row.nuisance]
 
 
 def build(
     seed: int,
     kind: str,
-    model: GapModel,
+    stand: Stand,
     *,
     off_library: Sequence[Effect] = (),
-    extra: Sequence[Effect] = (),
     wanted: str = "",
+    sizes: tuple[float, float] | None = None,
 ) -> Case:
     """Make a case.
 
     Args:
         seed: of everything in it.
-        kind: one of `KINDS`.
-        model: nominal model.
-        off_library: effects to draw from for "off-library"; outside the registry.
-        extra: further departures of reality (another solver).
-        wanted: name of the candidate to plant; "" = drawn.
+        kind: one of the stand's.
+        stand: robot.
+        off_library: effects to draw from for "off-library"; outside the registry;
+            none = one that the stand knows.
+        wanted: name of the explanation to plant; "" = drawn.
+        sizes: of the effects over what is detected; None = the usual.
+
+    Raises:
+        BnsError: no effect of the kind was found that the robot can run with.
     """
     rng = seeding.generator(seed, "case", kind)
-    told = commands(rng, robot=model.name)
-    reality = (*imperfection(rng), *extra)
-    noise = tracker(rng)
-    plain = record(told, [*reality, *noise], seed, model.name)
-    answer = Answer(kind, nominal=tuple(str(e) for e in reality))
-    hidden: list[Effect] = []
-    if kind in ("single", "pair"):
-        answer, hidden = _hide(rng, plain, model, answer, 1 + (kind == "pair"), wanted)
-    elif kind == "off-library":
-        hidden = [off_library[int(rng.integers(len(off_library)))]]
-        answer = replace(answer, effects=tuple(str(e) for e in hidden))
-    order = {"command": 0, "actuator": 1, "body": 2, "tracking": 3}
-    effects = sorted([*reality, *hidden], key=lambda e: order[e.stage])
-    trials = record(told, [*effects, *noise], seed, model.name) if hidden else plain
-    if kind == "fault":
-        trials, name = faulty(rng, trials)
-        answer = replace(answer, fault=name)
-    return Case(tuple(trials), answer, (*reality, *noise), tuple(told))
+    told = stand.commands(rng)
+    reality = tuple(stand.imperfection(rng))
+    answer = Answer(kind, nominal=tuple(str(effect) for effect in reality))
+    if kind in ("none", "fault"):
+        trials = stand.record(told, reality, seed)
+        if kind == "fault":
+            trials, name = faulty(rng, trials)
+            answer = replace(answer, fault=name)
+        return Case(tuple(trials), answer, reality, tuple(told))
+    if kind == "off-library":
+        hidden = (
+            off_library[int(rng.integers(len(off_library)))]
+            if off_library
+            else stand.unlisted(rng)
+        )
+        answer = replace(answer, effects=(str(hidden),))
+        trials = stand.record(told, [*reality, hidden], seed)
+        return Case(tuple(trials), answer, reality, tuple(told))
+    problem = stand.problem(stand.record(told, reality, seed))
+    point = descent.nothing(problem)
+    count = 2 if kind == "pair" else 1
+    span = sizes or (PAIR_SIZES if count == 2 else SIZES)
+    for _ in range(TRIES):
+        found = _hidden(rng, stand, problem, point, kind, count, span, wanted)
+        if len(found) < count:
+            continue
+        try:
+            effects = [item.effect for item in found]
+            trials = stand.record(told, [*reality, *effects], seed)
+        except BnsError:  # it cannot stand with that
+            continue
+        answer = _answered(answer, problem, point, found)
+        return Case(tuple(trials), answer, reality, tuple(told))
+    raise BnsError(f"No effect could be hidden in case {seed}.")
 
 
-def _hide(
-    rng: np.random.Generator,
-    plain: Sequence[Trial],
-    model: GapModel,
-    answer: Answer,
-    count: int,
-    wanted: str,
-) -> tuple[Answer, list[Effect]]:
-    candidates = model.candidates()
-    problem = Problem.of(plain, model, candidates=candidates)
-    curves = signatures.trace(problem, candidates)
-    seen = Null.of(problem, curves).seen
-    low, high = SIZES if count == 1 else PAIR_SIZES
-    terms: list[fit.Term] = []
-    while len(terms) < count:
-        size = float(np.exp(rng.uniform(np.log(low), np.log(high))))
-        taken = {t.candidate.effect for t in terms}
-        taken |= {name for t in terms for name in t.candidate.aliases}
-        term = _draw(rng, curves, size * seen, taken, wanted)
-        reached = _length(problem, term) / seen if term else 0.0
-        least = LEAST if count == 1 else 0.9 * low
-        if least < reached < 3 * high:
-            terms.append(term)
-    effects = [term.effect() for term in terms]
-    lengths = np.linalg.norm(problem.signatures([[e] for e in effects]), axis=1)
-    found = [likeness(problem, curves, term) for term in terms]
-    made = replace(
-        answer,
-        names=tuple(term.candidate.name for term in terms),
-        effects=tuple(str(effect) for effect in effects),
-        magnitudes=tuple(term.magnitude for term in terms),
-        sizes=tuple((lengths / seen).tolist()),
-        aliases=tuple(map(accepted, terms, found)),
-        near=tuple(
-            tuple((o.name, round(o.distance, 3), round(o.angle, 2)) for o in row)
-            for row in found
-        ),
-        detected=seen,
-    )
-    return made, effects
+def _hidden(rng, stand, problem, point, kind, count, span, wanted) -> list[Hidden]:
+    """Effects of different kinds, each about as strong as drawn."""
+    found: list[Hidden] = []
+    for _ in range(TRIES):
+        pool = stand.pool(rng, problem, kind)
+        taken = {item.effect.name for item in found}
+        taken |= {name for item in found for name in _aliases(problem, item.term)}
+        pool = [row for row in pool if _stem(row.term) not in taken]
+        pool = [row for row in pool if row.term == wanted] or pool
+        size = float(np.exp(rng.uniform(*np.log(span))))
+        made = drawn(rng, problem, point, pool, size * SEEN)
+        if made is not None:
+            found.append(made)
+        if len(found) == count:
+            break
+    return found
 
 
-def _length(problem: Problem, term: fit.Term) -> float:
-    """Whitened length of what an effect does; the curves only estimate it."""
-    return float(np.linalg.norm(problem.signatures([[term.effect()]])[0]))
+def _aliases(problem: Problem, term: str) -> set[str]:
+    rows = [row for row in problem.rows if row.term == term]
+    return {_stem(name) for row in rows for name in row.aliases}
 
 
-def _draw(
-    rng: np.random.Generator,
-    curves: Curves,
-    length: float,
-    taken: set[str],
-    wanted: str,
-) -> fit.Term | None:
-    """A candidate, evenly over effects, at the level nearest to a length."""
-    pool = [item for item in curves.candidates if item.effect not in taken]
-    pool = [item for item in pool if item.name == wanted] or pool
-    effects = sorted({item.effect for item in pool})
+def _stem(name: str) -> str:
+    """The effect that a name begins with."""
+    return name.partition("[")[0].partition(".")[0].partition("@")[0]
+
+
+def drawn(rng, problem: Problem, point: Point, pool, length: float) -> Hidden | None:
+    """A row, evenly over effects, with about a whitened length; None = not excited."""
+    effects = sorted({_stem(row.term) for row in pool})
     effect = effects[int(rng.integers(len(effects)))]
-    pool = [item for item in pool if item.effect == effect]
-    item = pool[int(rng.integers(len(pool)))]
-    branch = int(rng.integers(len(item.branches)))
-    number = curves.index(item.name)
-    mine = np.flatnonzero((curves.owner == number) & (curves.branch == branch))
-    side = curves.magnitude[mine] > item.nominal
-    mine = mine[side == (rng.random() < 0.5)] if 0 < side.sum() < len(side) else mine
-    lengths = signatures.strength(curves)[mine]
-    if not len(mine) or lengths.max() < 0.5 * length:
-        return None  # not excited by these commands
-    if signatures.integer(item):
-        fitting = np.abs(np.log(np.maximum(lengths, 1e-9) / length)).argmin()
-        return fit.Term.at(item, branch, float(curves.magnitude[mine][fitting]))
-    magnitude = _level(item, curves.magnitude[mine], lengths, length)
-    term = fit.Term.at(item, branch, magnitude)
-    turned = tuple(value + float(rng.uniform(-0.8, 0.8)) for value in term.extras)
-    return replace(term, extras=tuple(np.clip(turned, -np.pi, np.pi).tolist()))
+    rows = [row for row in pool if _stem(row.term) == effect]
+    row = rows[int(rng.integers(len(rows)))]
+    up = row.high > row.nominal and (row.low >= row.nominal or rng.random() < 0.5)
+    edge = (row.high if up else row.low) - row.nominal
+    others = [item for item in rows if item.term == row.term and item is not row]
+    turn = float(rng.uniform(-np.pi, np.pi))
+    plane = others and row.name.rpartition(".")[2] in PLANE
+
+    def values(size: float) -> dict[str, float]:
+        if not plane:
+            return {row.name: row.nominal + size}
+        return {
+            item.name: abs(size) * way
+            for item, way in zip(
+                (row, others[0]), (np.cos(turn), np.sin(turn)), strict=True
+            )
+        }
+
+    steps = [v - row.nominal for v in row.levels if (v > row.nominal) == up]
+    tried = sorted({abs(v) for v in steps} if row.stepped else
+                   {abs(edge) * share for share in SHARES})  # fmt: skip
+    if not tried:
+        return None
+    sizes = np.sign(edge) * np.array(tried)
+    made = [problem.model.effect(row.term, values(float(s))) for s in sizes]
+    lengths = _lengths(problem, point, made)
+    lengths = np.where(np.isfinite(lengths), lengths, 0.0)
+    if lengths.max() < 0.7 * length:
+        return None
+    if row.stepped:
+        size = float(sizes[np.abs(np.log(np.maximum(lengths, 1e-9) / length)).argmin()])
+    else:
+        grown = np.append(0.0, np.maximum.accumulate(lengths))
+        size = float(np.interp(length, grown, np.append(0.0, np.abs(sizes))))
+        size *= np.sign(edge)
+    chosen = values(size)
+    hidden = problem.model.effect(row.term, chosen)
+    (reached,) = _lengths(problem, point, [hidden])
+    if not LEAST * SEEN < reached < 3 * max(length, SEEN):
+        return None
+    magnitude = abs(size) if plane else row.nominal + size
+    return Hidden(row.term, chosen, hidden, float(magnitude))
 
 
-def _level(item: Candidate, magnitude, lengths, length: float) -> float:
-    """Magnitude at which the signature first has a length, going from nominal."""
-    order = np.argsort(np.abs(magnitude - item.nominal))
-    at = np.append(item.nominal, magnitude[order])
-    grown = np.append(0.0, lengths[order])
-    over = np.flatnonzero(grown >= length)
-    if not len(over):
-        return float(at[-1])
-    i = over[0]
-    share = (length - grown[i - 1]) / max(grown[i] - grown[i - 1], 1e-12)
-    return float(at[i - 1] + share * (at[i] - at[i - 1]))
+def _features(problem: Problem, effects: Sequence[Effect]) -> np.ndarray:
+    """Features of effects, the nominal model's first, ``(E + 1, N, C)``."""
+    sets = [(), *((effect,) for effect in effects)]
+    made = problem.model.simulate(problem.trials, sets)
+    return np.stack(
+        [
+            np.concatenate(
+                [
+                    problem.model.compare(trial, path, windows)
+                    for trial, path, windows in zip(
+                        problem.trials, paths, problem.windows, strict=True
+                    )
+                ]
+            )
+            for paths in made
+        ]
+    )
+
+
+def _lengths(problem: Problem, point: Point, effects: Sequence[Effect]) -> np.ndarray:
+    """What effects change, in deviations of independent residuals, ``(E,)``; what
+    slack and nuisances could as well be is left out."""
+    base, *made = _features(problem, effects)
+    linear = point.linear
+    prior = linear.prior(())
+    used = np.flatnonzero(prior)
+    design = linear.design[..., used].reshape(-1, len(used)) * prior[used]
+    weight = linear.weight.ravel() / linear.lam
+    heavy = design * weight[:, None]
+    curvature = heavy.T @ design + np.eye(len(used))
+    found = []
+    for path in made:
+        change = np.where(problem.seen, path - base, 0.0).ravel()
+        pull = heavy.T @ change
+        square = weight @ change**2 - pull @ np.linalg.solve(curvature, pull)
+        found.append(np.sqrt(max(square, 0.0)))
+    return np.array(found)
+
+
+def _answered(
+    answer: Answer, problem: Problem, point: Point, found: Sequence[Hidden]
+) -> Answer:
+    effects = [item.effect for item in found]
+    lengths = _lengths(problem, point, effects)
+    return replace(
+        answer,
+        names=tuple(item.term for item in found),
+        effects=tuple(str(effect) for effect in effects),
+        magnitudes=tuple(item.magnitude for item in found),
+        sizes=tuple((lengths / SEEN).tolist()),
+        aliases=tuple(alike(problem, point, item) for item in found),
+    )
+
+
+def alike(problem: Problem, point: Point, item: Hidden) -> tuple[str, ...]:
+    """The explanations that a recording cannot tell from a hidden one, itself included.
+
+    Each of those that come near in a tangent, or by one of their levels, is fitted to
+    what the hidden one alone would do.
+
+    Args:
+        problem: a recording; its commands and its noise count.
+        point: the nominal model on it.
+        item: the hidden effect.
+    """
+    base, shown = _features(problem, [item.effect])
+    clean = replace(problem, recorded=np.where(problem.seen, shown, np.nan))
+    found = {item.term, *_always(problem, item.term)}
+    near = []
+    weight = point.linear.weight
+    change = np.where(problem.seen, np.nan_to_num(shown - base), 0.0)
+    for name in point.linear.free:
+        columns = [point.linear.columns[at] for at in point.linear.terms[name]]
+        slopes = np.stack([point.slopes[k].ravel() for k in columns], axis=1)
+        heavy = slopes * weight.ravel()[:, None]
+        values = np.linalg.lstsq(heavy.T @ slopes, heavy.T @ change.ravel(), rcond=None)
+        left = change.ravel() - slopes @ values[0]
+        near.append((float(weight.ravel() @ left**2), name, columns, values[0]))
+    near = [entry for entry in near if entry[1] != item.term]
+    for _, name, columns, departures in sorted(near, key=lambda e: e[:2])[:NEAREST]:
+        values = problem.nominal.copy()
+        values[columns] += departures
+        values = np.clip(values, *problem.bounds)
+        _, rest = fit.newton(clean, values, {name}, point.noise)
+        if point.noise.loss(rest) / point.noise.lam < ALIKE**2:
+            found.add(name)
+    return tuple(sorted(found | _by_level(problem, clean, point, item)))
+
+
+def _by_level(problem, clean, point: Point, item: Hidden) -> set[str]:
+    """Explanations without a slope one of whose values does the same."""
+    sets, rows = [], []
+    for number, row in enumerate(problem.rows):
+        for value in () if row.smooth or row.term == item.term else row.levels:
+            values = problem.nominal.copy()
+            values[number] = value
+            sets.append(values)
+            rows.append(row)
+    found: set[str] = set()
+    if not sets:
+        return found
+    made = problem.predict(sets, fine=False)
+    losses = [point.noise.loss(clean.recorded - path) for path in made]
+    for at in np.argsort(losses)[:NEAREST]:
+        values, rest = sets[at], clean.recorded - made[at]
+        if rows[at].term in found or not np.isfinite(made[at][problem.seen]).all():
+            continue
+        values, rest = levels.zoomed(clean, values, rest, {rows[at].term}, point.noise)
+        if point.noise.loss(rest) / point.noise.lam < ALIKE**2:
+            found.add(rows[at].term)
+    return found
+
+
+def _always(problem: Problem, term: str) -> set[str]:
+    """Explanations known to look like one whatever is commanded."""
+    rows = [row for row in problem.rows if row.term == term]
+    return {name for row in rows for name in row.aliases}

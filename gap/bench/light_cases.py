@@ -1,41 +1,71 @@
-"""Withheld-effect cases with light: recordings of robots that see, one effect hidden.
+"""Recordings of robots that see, whose sensors depart from their model.
 
 Robots drive by what they see, and at random, in the light world. The sensors of the
-"real" robot differ a little from the nominal ones, the tracker is noisy, and how strong
-the hidden effect is, is drawn relative to what the recording can show.
+"real" robot differ a little from the nominal ones, and the tracker is noisy.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from bns import seeding
-from bns.gap.bench import cases
-from bns.gap.bench.cases import Answer, Case
-from bns.gap.core import signatures
-from bns.gap.core.aliases import ALIKE, likeness
-from bns.gap.core.fit import Term
-from bns.gap.core.null import Null
-from bns.gap.core.problem import Problem
-from bns.gap.core.signatures import Curves
+from bns.gap.bench import wheeled_cases
+from bns.gap.bench.cases import Stand
+from bns.gap.decomposition.problem import Problem
 from bns.gap.models.base import GapModel
 from bns.gap.models.light.diagnosis import unhandled
 from bns.gap.models.light.model import SightModel
-from bns.gap.models.light.weighing import apart
-from bns.gap.models.wheeled import WheeledModel
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect
 from bns.worlds.effects.sensors import SINGLE
 from bns.worlds.light.world import LightWorld
-from bns.worlds.trial import Trial
+from bns.worlds.trial import Commands, Trial
 
-KINDS = ("single", "motion", "none", "off-library")
 TRIALS, CYCLES = 3, 40  # recordings of a case, and commands of 0.4 s in each
-SIZES = 0.5, 8.0  # of an effect over what is detected, drawn evenly in the logarithm
-LEAST = 0.4  # size below which an effect counts as not excited, and is drawn again
-TRIES = 100
-NEAREST = 16  # candidates whose likelihood is compared with an effect's
+
+
+class LightStand(Stand):
+    """A robot that sees, of which cases are made, see `Stand`.
+
+    Args:
+        model: nominal model of its motion.
+        singles: whether single sensors are recorded, else the virtual two.
+        wheels: whether effects on the wheels are hidden, not on what it sees.
+    """
+
+    kinds = ("single", "none", "off-library")
+
+    def __init__(self, model: GapModel, *, singles: bool, wheels: bool = False):
+        super().__init__(model)
+        self.motion, self.singles, self.wheels = model, singles, wheels
+        self.pose_sd = (0.0, 0.0, 0.0)
+
+    def commands(self, rng: np.random.Generator) -> list[Commands]:
+        """None: it drives by what it sees."""
+        del rng
+        return []
+
+    def imperfection(self, rng: np.random.Generator) -> list[Effect]:
+        """See `Stand.imperfection`; the tracker's noise included."""
+        noise = wheeled_cases.tracker(rng)[0]
+        self.pose_sd = pose_sd([noise])
+        return [*imperfection(rng), *wheeled_cases.imperfection(rng), noise]
+
+    def record(
+        self, told: Sequence[Commands], effects: Sequence[Effect], seed: int
+    ) -> tuple[Trial, ...]:
+        """See `Stand.record`; what it is told is its own."""
+        del told
+        return record(seed, effects, singles=self.singles)
+
+    def problem(self, plain: Sequence[Trial]) -> Problem:
+        """See `Stand.problem`."""
+        if self.wheels:
+            self.model = self.motion
+            return Problem.of(unhandled(plain, self.motion), self.motion)
+        sight = SightModel(plain, pose_sd=self.pose_sd)
+        self.model = sight
+        return Problem.of(sight.ready(plain)[0], sight)
 
 
 class Wanderer:
@@ -103,139 +133,3 @@ def record(seed: int, effects: Sequence[Effect], *, singles: bool) -> tuple[Tria
     seeds = [seeding.integer(seed, "light case", n) for n in range(TRIALS)]
     trials = world.drive(policy, cycles=CYCLES, seeds=seeds)
     return tuple(trial.replace(conditions={}) for trial in trials)
-
-
-def build(
-    seed: int,
-    kind: str,
-    model: WheeledModel,
-    *,
-    singles: bool,
-    off_library: Sequence[Effect] = (),
-) -> Case:
-    """Make a case.
-
-    Args:
-        seed: of everything in it.
-        kind: one of `KINDS`; "motion" hides an effect on the wheels.
-        model: nominal model of the robot's motion.
-        singles: whether single sensors are recorded, else the virtual two.
-        off_library: effects to draw from for "off-library"; outside the registry.
-    """
-    rng = seeding.generator(seed, "light case", kind)
-    noise = cases.tracker(rng)[:1]
-    reality = [*imperfection(rng), *cases.imperfection(rng), *noise]
-    answer = Answer(kind, nominal=tuple(str(effect) for effect in reality))
-    hidden: list[Effect] = []
-    if kind in ("single", "motion"):
-        plain = record(seed, reality, singles=singles)
-        seen: GapModel = model
-        if kind == "single":
-            seen = SightModel(plain, pose_sd=pose_sd(noise))
-            plain, _ = seen.check(plain)
-        else:
-            plain = tuple(unhandled(plain, model))
-        answer, hidden = _hide(rng, plain, seen, answer)
-    elif kind == "off-library":
-        hidden = [off_library[int(rng.integers(len(off_library)))]]
-        answer = replace(answer, effects=tuple(map(str, hidden)))
-    trials = record(seed, [*reality, *hidden], singles=singles)
-    return Case(trials, answer, tuple(reality), tuple(t.commands for t in trials))
-
-
-def _hide(
-    rng: np.random.Generator, plain: Sequence[Trial], model: GapModel, answer: Answer
-) -> tuple[Answer, list[Effect]]:
-    """An effect, drawn evenly over effects, as strong as drawn."""
-    candidates = model.candidates()
-    problem = Problem.of(plain, model, candidates=candidates)
-    curves = signatures.trace(problem, candidates)
-    seen = Null.of(problem, curves).seen
-    for _ in range(TRIES):
-        size = float(np.exp(rng.uniform(*np.log(SIZES))))
-        term = _draw(rng, curves, size * seen)
-        if term is None:
-            continue
-        (shown,) = problem.signatures([[term.effect()]])
-        reached = float(np.linalg.norm(shown)) / seen
-        if LEAST < reached < 3 * SIZES[1]:
-            break
-    made = replace(
-        answer,
-        names=(term.candidate.name,),
-        effects=(str(term.effect()),),
-        magnitudes=(term.magnitude,),
-        sizes=(reached,),
-        aliases=(_alike(problem, curves, term),),
-        near=(_near(problem, curves, term),) if isinstance(model, SightModel) else (),
-        detected=seen,
-    )
-    return made, [term.effect()]
-
-
-def _alike(problem: Problem, curves: Curves, term: Term) -> tuple[str, ...]:
-    """Candidates that the recording cannot tell from an effect, itself included."""
-    (shown,) = problem.signatures([[term.effect()]])
-    gaps, _ = signatures.nearest(curves, shown)
-    near = {curves.candidates[c].name for c in np.flatnonzero(gaps < ALIKE**2)}
-    near |= {other.name for other in likeness(problem, curves, term) if other.alike}
-    return tuple(sorted(near | {term.candidate.name}))
-
-
-def _near(
-    problem: Problem, curves: Curves, term: Term
-) -> tuple[tuple[str, float, float], ...]:
-    """Candidates near an effect by the likelihood of readings: name, distance, angle.
-
-    The signatures count a reading twice, as departure and as scatter, and are limited;
-    they say who may be near, the likelihood how near. See `light_weighing.apart`.
-    """
-    (shown,) = problem.signatures([[term.effect()]])
-    gaps, levels = signatures.nearest(curves, shown)
-    mine = curves.candidates.index(term.candidate)
-    order = [c for c in np.argsort(gaps) if c != mine and np.isfinite(gaps[c])]
-    order = order[:NEAREST]
-    starts = [
-        Term.at(
-            curves.candidates[c],
-            int(curves.branch[levels[c]]),
-            float(curves.magnitude[levels[c]]),
-        )
-        for c in order
-    ]
-    distances = apart(problem, term, starts)
-    angles = {
-        curves.candidates[c].name: signatures.angle(
-            shown, curves.signature[levels[c]].astype(float)
-        )
-        for c in order
-    }
-    found = [(name, far, float(angles[name])) for name, far in distances.items()]
-    return tuple(sorted(found, key=lambda item: item[1]))
-
-
-def _draw(rng: np.random.Generator, curves: Curves, length: float) -> Term | None:
-    """A candidate near the level whose signature has about a length, or None."""
-    effects = sorted({item.effect for item in curves.candidates})
-    effect = effects[int(rng.integers(len(effects)))]
-    pool = [item for item in curves.candidates if item.effect == effect]
-    item = pool[int(rng.integers(len(pool)))]
-    branch = int(rng.integers(len(item.branches)))
-    mine = np.flatnonzero(
-        (curves.owner == curves.index(item.name)) & (curves.branch == branch)
-    )
-    if not len(mine):
-        return None
-    side = curves.magnitude[mine] > item.nominal
-    if 0 < side.sum() < len(side):
-        mine = mine[side == (rng.random() < 0.5)]
-    lengths = signatures.strength(curves)[mine]
-    if lengths.max() < 0.7 * length:
-        return None  # not excited by these drives
-    level = mine[np.abs(np.log(np.maximum(lengths, 1e-9) / length)).argmin()]
-    magnitude = float(curves.magnitude[level])
-    if not signatures.integer(item):
-        magnitude += float(rng.uniform(-0.1, 0.1)) * (magnitude - item.nominal)
-    term = Term.at(item, branch, float(np.clip(magnitude, item.low, item.high)))
-    moved = tuple(value + float(rng.uniform(-0.3, 0.3)) for value in term.extras)
-    return replace(term, extras=moved)

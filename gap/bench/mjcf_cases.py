@@ -5,6 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from bns import seeding
+from bns.gap.bench.cases import Stand
+from bns.gap.models.mjcf import effects as own_effects
 from bns.gap.models.mjcf.model import OwnModel
 from bns.gap.planning import excitation
 from bns.worlds.effects.base import Effect
@@ -12,6 +14,54 @@ from bns.worlds.trial import Channel, Commands, Trial
 
 SAMPLE = 0.02  # [s] between two samples
 COUNT = 6  # trials
+FELT = {
+    "command_gain": ("factor", 0.7),
+    "command_delay": ("delay", 0.1),
+    "command_lag": ("time_constant", 0.1),
+    "reading_gain": ("factor", 0.8),
+    "reading_delay": ("delay", 0.1),
+}
+"""effects that are clearly felt"""
+
+
+class OwnStand(Stand):
+    """A user's own robot that cases are made of, see `Stand`.
+
+    Args:
+        model: nominal model.
+    """
+
+    kinds = ("single", "pair", "none", "fault", "off-library")
+
+    def __init__(self, model: OwnModel):
+        super().__init__(model)
+        self.own = model
+
+    def commands(self, rng: np.random.Generator) -> list[Commands]:
+        """See `Stand.commands`."""
+        return commands(self.own, rng)
+
+    def imperfection(self, rng: np.random.Generator) -> list[Effect]:
+        """See `Stand.imperfection`: as far off as the description's slack says."""
+        return [
+            row.make(row.nominal + row.slack * rng.standard_normal())
+            for row in self.own.listed
+            if row.slack > 0
+        ]
+
+    def record(
+        self, told: Sequence[Commands], effects: Sequence[Effect], seed: int
+    ) -> tuple[Trial, ...]:
+        """See `Stand.record`."""
+        return tuple(record(self.own, told, effects, seed=seed))
+
+    def unlisted(self, rng: np.random.Generator) -> Effect:
+        """See `Stand.unlisted`: on signals, and not in the description."""
+        listed = {row.effect for row in self.own.listed}
+        names = [name for name in FELT if name not in listed] or list(FELT)
+        name = names[int(rng.integers(len(names)))]
+        parameter, value = FELT[name]
+        return own_effects.make(name, {parameter: value})
 
 
 def commands(

@@ -1,172 +1,86 @@
 """Scores of the withheld-effect bench, from the rows that its runner writes."""
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import replace
-from functools import cache
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from itertools import pairwise, permutations
 from typing import Any
 
 import numpy as np
 
-from bns.gap.bench import baselines
-from bns.gap.bench.cases import Case, record
-from bns.gap.candidates import wheeled
-from bns.gap.core import fit, model_order, select, verdict
-from bns.gap.core.gap_closure import edit_error
-from bns.gap.core.problem import Problem
-from bns.gap.core.uncertainty import half_width, spreads, standard_error
-from bns.gap.diagnose import Analysis, report
+from bns.gap.bench.cases import Case
+from bns.gap.bench.wheeled_cases import WheeledStand
+from bns.gap.edit import errors
 from bns.gap.models.base import GapModel
+from bns.gap.records import Diagnosis
 from bns.worlds.effects import registry
 
 LARGE = 3.0  # sizes from which effects have to be named
 
 
-def said(made: Analysis, case: Case, model: GapModel) -> dict[str, Any]:
-    """What a diagnosis said of a case, the oracle and the baselines, as plain data.
+def row(kind: str, seed: int, case: Case, found: Diagnosis) -> dict[str, Any]:
+    """A case and what was said of it, as plain data.
 
     Args:
-        made: analysis of the case.
+        kind: of case.
+        seed: of it.
         case: with the true answer.
-        model: nominal model that was diagnosed with.
+        found: the diagnosis.
     """
-    answer, problem = case.answer, made.problem
-    found = report(made)
-    choice = made.choice
-    row = {
-        "verdict": found.verdict.kind,
-        "named": found.verdict.named,
-        "sets": found.verdict.sets,
-        "p_gap": found.verdict.p_gap,
-        "left": choice.left,
-        "rungs": [rung.as_dict() for rung in choice.rungs],
-        "size": choice.rung.size,
-        "residuals": len(problem.rest),
-        "worth": choice.worth,
-        "ranked": found.signatures["ranked"],
-        "faults": found.faults,
-        "closed": found.closed.get("closed"),
-        "before": found.closed.get("before"),
-        "after": found.closed.get("after"),
-        "best": found.signatures["best"],
-        "loss": {"+".join(fit.names): fit.loss for fit in found.fits},
-        "held_out": {"+".join(fit.names): fit.held_out for fit in found.fits},
-        "magnitudes": _magnitudes(made, answer.names),
-        "seconds": found.seconds,
-    }
-    if answer.kind in ("single", "pair"):
-        row["oracle"] = _oracle(problem, case, model.candidates())
-    if answer.kind == "pair" and choice.rung.size:
-        row["edit"] = _edit(choice.best, case, model)
-    if answer.kind in ("single", "none"):
-        row["baselines"] = baselines.name(problem, made.curves)
-    return row
+    said = said_of(asdict(found))
+    said["intervals"] = _intervals(found, case.answer.names)
+    return {"kind": kind, "seed": seed, "answer": case.answer.as_dict(), "said": said}
 
 
-def _oracle(problem: Problem, case: Case, candidates) -> float:
-    by_name = {item.name: item for item in candidates}
-    terms = []
-    for name, text, magnitude in zip(
-        case.answer.names, case.answer.effects, case.answer.magnitudes, strict=True
-    ):
-        item, values = by_name[name], registry.parse(text).values
-        term = fit.Term.at(item, _branch(item, values), magnitude)
-        extras = tuple(float(values[extra]) for extra in item.extras)
-        terms.append(replace(term, extras=extras))
-    held_out = select.held_out(problem, fit.refine(problem, terms))[0]
-    return held_out / len(problem.rest)
-
-
-def _branch(item, values) -> int:
-    for number, branch in enumerate(item.branches):
-        if all(values[k] == v for k, v in branch.items() if isinstance(v, str)):
-            return number
-    return 0
-
-
-def judged(row: dict[str, Any], rules: verdict.Calibration) -> dict[str, Any]:
-    """A row with the verdict that a calibration gives."""
-    said = row["said"]
-    if "rungs" not in said:
-        return row
-    rungs = [model_order.Rung.from_dict(content) for content in said["rungs"]]
-    rung = model_order.climb(rungs, said["worth"], rules)
-    kind, named, sets = verdict.judge(rung, said["p_gap"], rules)
-    spans = intervals(said, row["answer"]["names"], rules)
-    changed = {"verdict": kind, "named": named, "sets": sets, "size": rung.size}
-    return {**row, "said": {**said, **changed, "intervals": spans}}
-
-
-def intervals(
-    said: dict[str, Any], names: Sequence[str], rules: verdict.Calibration
-) -> list[list[float]]:
-    """Value, half interval and nominal value of each true effect that was fitted.
+def edited(found: Diagnosis, case: Case, model: GapModel) -> dict[str, float]:
+    """Take the first true effect away; predict a recording with the second alone.
 
     Args:
-        said: what was said of the case, as `said` gives it.
-        names: true effects, in the answer's order.
-        rules: thresholds and widths of intervals.
+        found: the diagnosis of a pair.
+        case: with the true answer.
+        model: nominal model, of a wheeled robot.
     """
-    made = []
-    for name, found in zip(names, errors(said, rules), strict=False):
-        value, error, nominal = found
-        half = half_width(error, *described(name), rules)
-        made.append([value, half, nominal])
-    return made
+    first, second = (registry.parse(text) for text in case.answer.effects)
+    alone = WheeledStand(model).record(case.commands, [*case.reality, second], 7)
+    best = [model.parse(text) for text in found.best.effects]
+    sets = {
+        "ours": [effect for effect in best if effect.name != first.name],
+        "oracle": [second],
+    }
+    return errors(alone, model, sets)
 
 
-def errors(
-    said: dict[str, Any], rules: verdict.Calibration
-) -> list[tuple[float, float, float]]:
-    """Value, standard error and nominal value of each true effect that was fitted."""
-    return [
-        (value, standard_error(deviation, value - nominal, rules), nominal)
-        for value, deviation, nominal in said["magnitudes"]
-    ]
+def said_of(found: Mapping[str, Any]) -> dict[str, Any]:
+    """What a diagnosis says, without its fits.
+
+    Args:
+        found: the diagnosis as plain data; what it leaves out is not scored.
+    """
+    verdict = found["verdict"]
+    made = {key: verdict[key] for key in ("named", "sets", "p_gap", "p_misfit")}
+    parts = found.get("decomposition", {}).get("parts", ())
+    return {
+        **made,
+        "verdict": verdict["kind"],
+        "ranked": found["signatures"].get("ranked", []),
+        "faults": found.get("faults", ()),
+        **{key: found["closed"].get(key) for key in ("closed", "before", "after")},
+        "parts": [part["name"] for part in parts],
+        "left": found.get("decomposition", {}).get("left"),
+        "seconds": dict(found.get("seconds", {})),
+    }
 
 
-@cache
-def described(name: str) -> tuple[str, str]:
-    """Effect and unit of a wheeled candidate; of another one the effect alone."""
-    units = {item.name: item.unit for item in wheeled.candidates()}
-    return name.split("[")[0].split(".")[0], units.get(name, "")
-
-
-def _magnitudes(made: Analysis, names: Sequence[str]) -> list[list[float]]:
-    """Of the support that is true, where it was fitted, in the answer's order."""
-    for points in made.search.sizes:
-        for point in points:
-            if set(point.names) == set(names):
-                found = [
-                    [term.magnitude, deviation, term.candidate.nominal]
-                    for term, deviation in zip(
-                        point.terms, spreads(made.problem, point)[0], strict=True
-                    )
-                ]
-                return [found[point.names.index(name)] for name in names]
+def _intervals(found: Diagnosis, names: Sequence[str]) -> list[list[float]]:
+    """Value and 90 % interval of each true effect, where just these were fitted."""
+    for fit in found.fits:
+        if set(fit.names) == set(names) and names:
+            order = [fit.names.index(name) for name in names]
+            return [[fit.magnitudes[at], *fit.intervals[at]] for at in order]
     return []
 
 
-def _edit(best: fit.Point, case: Case, model: GapModel) -> dict[str, float]:
-    """Take the first true effect away; predict a recording with the second alone."""
-    first, second = (registry.parse(text) for text in case.answer.effects)
-    alone = record(case.commands, [*case.reality, second], 7, model.name)
-    effects = [term.effect() for term in best.terms]
-    ours = edit_error(alone, model, effects, first.name)["edited"]
-    oracle = edit_error(alone, model, [first, second], first.name)["edited"]
-    return {"ours": ours, "oracle": oracle}
-
-
-@cache
-def _always() -> dict[str, tuple[str, ...]]:
-    """Wheeled candidates that look alike whatever is commanded."""
-    return {item.name: item.aliases for item in wheeled.candidates()}
-
-
-def matches(
-    names: Sequence[str], answer: dict[str, Any], *, angle: float = 0.0
-) -> bool:
+def matches(names: Sequence[str], answer: dict[str, Any]) -> bool:
     """Whether a support is the true one, effects that look alike merged.
 
     Merged are those that the recording cannot tell apart, and those that none can.
@@ -174,15 +88,8 @@ def matches(
     Args:
         names: of the support.
         answer: see `cases.Answer`.
-        angle: between whitened signatures [deg] below which effects are merged, too.
     """
-    always = _always()
-    classes = [
-        {*row, *(other for name in row for other in always.get(name, ()))}
-        for row in answer["aliases"]
-    ]
-    for near, found in zip(answer.get("near", ()), classes, strict=False):
-        found.update(name for name, _, apart in near if apart < angle)
+    classes = [set(row) for row in answer["aliases"]]
     if len(names) != len(classes):
         return False
     return any(
@@ -288,17 +195,20 @@ def parameter(rows: Sequence[dict]) -> dict[str, float]:
     """Error of the true effect's magnitude where it was fitted.
 
     Returns:
-        median error over the true departure from nominal; share of 90 % intervals
-        that hold the truth.
+        median error over the true magnitude's departure from the middle of nothing,
+        which is the magnitude itself but for ratios, of which 1 is nothing; share of
+        90 % intervals that hold the truth.
     """
     errors, held = [], []
     for row in rows:
         truth, found = row["answer"]["magnitudes"], row["said"]["intervals"]
+        names = row["answer"]["effects"]
         if len(truth) != len(found):
             continue
-        for true, (value, half, nominal) in zip(truth, found, strict=True):
+        for true, (value, low, high), text in zip(truth, found, names, strict=True):
+            nominal = 1.0 if "factor=" in text else 0.0
             errors.append(abs(value - true) / max(abs(true - nominal), 1e-12))
-            held.append(abs(value - true) <= half)
+            held.append(low <= true <= high)
     if not errors:
         return {"median relative error": float("nan"), "intervals that hold": 0.0}
     return {

@@ -1,24 +1,21 @@
-"""Withheld-effect cases of a walking robot: recordings with one effect hidden.
+"""Recordings of a walking robot that departs from its model, for blind cases.
 
 The robot walks short stretches of tripod gaits that are drawn for each case. It is
 itself a little different from its model; the tracker is noisy and servos report in
-steps. How strong the effect is, is drawn by how far it moves the recording.
+steps.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
 from bns import seeding
 from bns.errors import BnsError
+from bns.gap.bench.cases import Stand
 from bns.gap.candidates import legged
-from bns.gap.core import signatures
-from bns.gap.core.aliases import ALIKE, likeness
-from bns.gap.core.problem import Problem
-from bns.gap.core.support import Term
-from bns.gap.diagnose import Analysis
+from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.row import Row
 from bns.gap.models.legged.model import TRACKER, WalkModel
 from bns.gap.models.legged.signs import Signs
 from bns.gap.models.legged.where import Suspects
@@ -32,22 +29,69 @@ from bns.worlds.trial import Channel, Commands, Trial
 TRIALS, COMMANDS = 2, 2  # recordings of a case, and commands in each
 LIMIT = 1.0  # [s] of a command
 SAMPLE = 0.04  # [s] between samples
-SEEN = 5.5  # whitened length that is found nine times in ten, about
-# Of an effect over that, drawn evenly in the logarithm: of all sizes, and of those that
-# have to be named.
-SIZES = {"single": (0.7, 10.0), "large": (3.3, 10.0)}
-TRIES = 40
+LARGE = (3.3, 10.0)  # sizes of effects that have to be named
 POSTURE = 0.4  # [rad] from the middle that joints are told at random; assumed
 REST = (-0.4, 0.4)  # [rad] where a joint is locked
 
 
-@dataclass(frozen=True, eq=False)
-class WalkCase:
-    """A recording, what is hidden in it (None = nothing), how else it departs."""
+class WalkStand(Stand):
+    """A walking robot that cases are made of, see `Stand`.
 
-    trials: tuple[Trial, ...]
-    term: Term | None
-    nominal: tuple[Effect, ...]
+    Args:
+        model: nominal model.
+    """
+
+    kinds = ("single", "large", "lost", "none")
+
+    def __init__(self, model: WalkModel):
+        super().__init__(model)
+        self.walker = model
+
+    def commands(self, rng: np.random.Generator) -> list[Commands]:
+        """See `Stand.commands`."""
+        return commands(rng, self.walker)
+
+    def imperfection(self, rng: np.random.Generator) -> list[Effect]:
+        """See `Stand.imperfection`."""
+        return imperfection(rng, parts(self.walker.joints)[-1])
+
+    def record(
+        self, told: Sequence[Commands], effects: Sequence[Effect], seed: int
+    ) -> tuple[Trial, ...]:
+        """See `Stand.record`.
+
+        Raises:
+            BnsError: it does not stand, or falls.
+        """
+        trials = record(told, effects, seed, self.model.name)
+        if any(trial.outcome.diverged or trial.outcome.fell for trial in trials):
+            raise BnsError("The robot falls.")
+        return trials
+
+    def pool(
+        self, rng: np.random.Generator, problem: Problem, kind: str
+    ) -> Sequence[Row]:
+        """Rows on a joint and a leg that are drawn, and on all; or losses."""
+        joints = self.walker.joints
+        legs = names(joints)
+        joint = joints[int(rng.integers(len(joints)))]
+        leg = legs[int(rng.integers(len(legs)))]
+        if kind == "lost":
+            held = {name: float(rng.uniform(*REST)) for name in joints_of(leg, joints)}
+            return self._whole(Signs(held, (leg,), (leg,), (leg,)))
+        found = legged.rows(Suspects((joint,), (leg,), True), joints)
+        mine = [
+            row
+            for row in found
+            if not any(other in row.name for other in LEGS if other != leg)
+            or joint in row.name
+        ]
+        return self.walker.remembered(mine)
+
+    def _whole(self, signs: Signs) -> Sequence[Row]:
+        """Losses of a whole leg or joint."""
+        lost = self.walker.remembered(legged.lost(signs))
+        return [replace(row, stepped=True, levels=(1.0,)) for row in lost]
 
 
 def commands(rng: np.random.Generator, model: WalkModel) -> list[Commands]:
@@ -113,111 +157,3 @@ def record(
     seeds = [seeding.integer(seed, "walk case", n) for n in range(len(told))]
     made = world.run(told, seeds=seeds)
     return tuple(trial.replace(conditions={}) for trial in made)
-
-
-def build(seed: int, kind: str, model: WalkModel) -> WalkCase:
-    """Make a case.
-
-    Args:
-        seed: of everything in it.
-        kind: of `SIZES`; "lost" (a leg, or a joint, as a whole); or "none".
-        model: nominal model.
-
-    Raises:
-        BnsError: no effect of the kind was found that the robot can walk with.
-    """
-    rng = seeding.generator(seed, "walk case", kind)
-    told = commands(rng, model)
-    reality = imperfection(rng, parts(model.joints)[-1])
-    if kind == "none":
-        return WalkCase(record(told, reality, seed, model.name), None, tuple(reality))
-    plain = record(told, reality, seed, model.name)
-    problem = Problem.of(plain, model, candidates=model.candidates())
-    for _ in range(TRIES):
-        if kind == "lost":
-            term = _lost(rng, model.joints)
-        else:
-            term = _drawn(rng, problem, SIZES[kind])
-        if term is None:
-            continue
-        try:
-            trials = record(told, [*reality, term.effect()], seed, model.name)
-        except BnsError:  # it cannot stand with that
-            continue
-        if not any(trial.outcome.diverged or trial.outcome.fell for trial in trials):
-            return WalkCase(trials, term, tuple(reality))
-    raise BnsError(f"No effect could be hidden in case {seed}.")
-
-
-def _lost(rng: np.random.Generator, joints: Sequence[str]) -> Term:
-    """A leg that is held up, limp or gone, or a joint that is locked, as a whole."""
-    legs = names(joints)
-    leg = legs[int(rng.integers(len(legs)))]
-    held = {joint: float(rng.uniform(*REST)) for joint in joints_of(leg, joints)}
-    pool = legged.lost(Signs(held, (leg,), (leg,), (leg,)))
-    effects = sorted({item.effect for item in pool})
-    effect = effects[int(rng.integers(len(effects)))]
-    pool = [item for item in pool if item.effect == effect]
-    return Term.at(pool[int(rng.integers(len(pool)))], 0, 1.0)
-
-
-def _drawn(
-    rng: np.random.Generator, problem: Problem, sizes: tuple[float, float]
-) -> Term | None:
-    """A candidate, drawn evenly over effects, about as strong as drawn."""
-    joints = problem.model.joints
-    legs = names(joints)
-    joint = joints[int(rng.integers(len(joints)))]
-    leg = legs[int(rng.integers(len(legs)))]
-    pool = tuple(
-        item
-        for item in legged.candidates(Suspects((joint,), (leg,), True), joints)
-        if not any(other in item.name for other in LEGS if other != leg)
-        or joint in item.name
-    )
-    effects = sorted({item.effect for item in pool})
-    effect = effects[int(rng.integers(len(effects)))]
-    pool = tuple(item for item in pool if item.effect == effect)
-    item = pool[int(rng.integers(len(pool)))]
-    branch = int(rng.integers(len(item.branches)))
-    up = rng.random() < 0.5
-    marks = [v for v in item.grid if (v > item.nominal) == up] or list(item.grid)
-    marks = sorted(marks, key=lambda value: abs(value - item.nominal))
-    wanted = SEEN * float(np.exp(rng.uniform(*np.log(sizes))))
-    found = problem.signatures([[item.make(value, branch)] for value in marks])
-    lengths = np.linalg.norm(found, axis=1)
-    if not np.isfinite(lengths).all() or lengths.max() < 0.7 * wanted:
-        return None
-    reached = np.append(0.0, np.maximum.accumulate(lengths))
-    magnitude = float(np.interp(wanted, reached, [item.nominal, *marks]))
-    return Term.at(item, branch, magnitude)
-
-
-def answer(case: WalkCase, made: Analysis) -> dict[str, Any]:
-    """What is true of a case, as far as its diagnosis can tell it.
-
-    Returns:
-        name: of the candidate, effect: as text, size: whitened length of what it does
-        over what is found nine times in ten, leg: it acts on ("" = several), aliases:
-        candidates that the recording cannot tell from it, itself included.
-    """
-    term = case.term
-    if term is None:
-        return {"name": "", "effect": "", "size": 0.0, "leg": "", "aliases": []}
-    name = term.candidate.name
-    (shown,) = made.problem.signatures([[term.effect()]])
-    gaps, _ = signatures.nearest(made.curves, shown)
-    names = [item.name for item in made.curves.candidates]
-    near = {names[number] for number in np.flatnonzero(gaps < ALIKE**2)}
-    near |= {name, *term.candidate.aliases}
-    said = made.verdict.named
-    if said and said[0][0] not in near:  # curves are coarse: fits are surer
-        found = likeness(made.problem, made.curves, term)
-        near |= {other.name for other in found if other.alike}
-    return {
-        "name": name,
-        "effect": str(term.effect()),
-        "size": float(np.linalg.norm(shown)) / made.seen,
-        "leg": next((leg for leg in LEGS if leg in name), ""),
-        "aliases": sorted(near),
-    }

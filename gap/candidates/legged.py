@@ -1,37 +1,46 @@
-"""Candidate explanations for a walking robot, from the library of effects."""
+"""Numbers of a walking robot that may be off, and how far they plausibly are."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from bns.gap.decomposition.row import Row
 from bns.gap.models.legged.signs import Signs
 from bns.gap.models.legged.where import Suspects
-from bns.gap.records import Candidate
 from bns.models.legs import JOINTS, LEGS, names, parts
 from bns.worlds.effects import registry
 
+SHARE = 0.05  # slack of a number over its plausible departure; assumed
+STEP = 0.25  # of a plausible departure, for differences: feet come down in steps
 NO_SIGNS = Signs()
-UPHILL = tuple({"direction": k * np.pi / 2} for k in (-1, 0, 1, 2))
+SERVO_SLACK = 0.03  # of a gain or a voltage, how well all servos are known together
 
-# effect, parameter, grid, low, high, slack if on all legs. Bounds narrower than the
-# effect's own are assumed. Load-dependent friction is left out: in a joint of MuJoCo it
-# is dry friction by another name; quantisation moves nothing.
-_SERVOS = (
-    ("servo_gain", "factor", (0.3, 0.6, 1.6, 3.0), 0.1, 5, 0.03),
-    ("servo_voltage", "factor", (0.4, 0.75, 1.3), 0.3, 2, 0.03),
-    ("servo_torque_constant", "factor", (0.5, 0.8, 1.3), 0.3, 2, 0.0),
-    ("servo_coulomb", "torque", (-0.04, 0.08, 0.3), -0.05, 0.8, 0.0),
-    ("servo_viscous", "coefficient", (0.05, 0.2, 0.6), 0, 1, 0.0),
-    ("servo_armature", "inertia", (0.01, 0.04), 0, 0.1, 0.0),
-    ("servo_delay", "delay", (0.02, 0.06, 0.15), 0, 0.4, 0.0),
-    ("servo_lag", "time_constant", (0.02, 0.06, 0.2), 0, 0.5, 0.0),
-    ("servo_duty_limit", "factor", (0.08, 0.2, 0.4), 0.02, 1, 0.0),
-    ("servo_offset", "angle", (-0.1, 0.1), -0.3, 0.3, 0.0),
-)
+# effect, parameter, plausible departure (standard deviation), low, high, settings; all
+# assumed. Slack is that of all legs together. Load-dependent friction is left out: in a
+# joint of MuJoCo it is dry friction by another name; quantisation moves nothing.
+_SERVOS: tuple[tuple[str, str, float, float, float, dict[str, Any]], ...] = (
+    ("servo_gain", "factor", 0.4, 0.1, 5, {"slack": SERVO_SLACK, "levels": (0.4,)}),
+    ("servo_voltage", "factor", 0.25, 0.3, 2, {"slack": SERVO_SLACK}),
+    ("servo_torque_constant", "factor", 0.25, 0.3, 2, {}),
+    ("servo_coulomb", "torque", 0.15, -0.05, 0.8, {}),
+    ("servo_viscous", "coefficient", 0.2, 0, 1, {}),
+    ("servo_armature", "inertia", 0.02, 0, 0.1, {}),
+    ("servo_delay", "delay", 0.06, 0, 0.4, {"step": 0.012}),
+    ("servo_lag", "time_constant", 0.08, 0, 0.5, {"step": 0.012}),
+    ("servo_duty_limit", "factor", 0.3, 0.02, 1, {"smooth": False,
+     "levels": (0.08, 0.2, 0.4)}),
+    ("servo_offset", "angle", 0.1, -0.3, 0.3, {}),
+)  # fmt: skip
 HIDDEN = ("servo_offset",)
 """what a servo's own reading does not show, but its leg's place: every joint counts"""
-
+_BODY: tuple[tuple[str, str, float, float, float, dict[str, Any]], ...] = (
+    ("payload", "mass", 0.5, 0, 2, {"slack": 0.02}),
+    ("centre_of_mass", "dx", 0.015, -0.03, 0.03, {}),
+    ("centre_of_mass", "dy", 0.015, -0.03, 0.03, {}),
+    ("floor_compliance", "factor", 1.5, 1, 5, {}),
+    ("command_latency", "delay", 0.06, 0, 0.4, {"step": 0.012}),
+)
 _ALIASES = {
     "servo_delay[all]": ("command_latency",),
     "command_latency": ("servo_delay[all]",),
@@ -46,12 +55,12 @@ EXCITE = {
 }
 
 
-def candidates(
+def rows(
     found: Suspects,
     joints: Sequence[str] = JOINTS,
     signs: Signs = NO_SIGNS,
-) -> tuple[Candidate, ...]:
-    """All candidates, in a fixed order.
+) -> tuple[Row, ...]:
+    """All numbers that may be off, in a fixed order.
 
     Args:
         found: joints and legs that are suspected beside all of them.
@@ -62,12 +71,21 @@ def candidates(
         *_servos(found, joints),
         *_legs(joints),
         *_horns(joints),
-        *_body(),
+        *(_row(*entry[:5], **entry[5]) for entry in _BODY),
+        *_slope(),
         *lost(signs),
     )
 
 
-def lost(signs: Signs) -> tuple[Candidate, ...]:
+def unsure(joints: Sequence[str] = JOINTS) -> tuple[Row, ...]:
+    """Numbers of all legs together that even a sound robot's model is unsure of."""
+    shin = f"link_length[{parts(joints)[-1]},all]"
+    names_ = ("servo_gain[all]", "servo_voltage[all]", "foot_slippery[all]", "payload")
+    every = rows(Suspects((), (), True), joints)
+    return tuple(row for row in every if row.name in (*names_, shin))
+
+
+def lost(signs: Signs) -> tuple[Row, ...]:
     """Legs and joints that may be lost, by what servos say of them."""
     return (
         *_legwise("leg_raised", "blend", (0.5, 1.0), signs.raised),
@@ -77,131 +95,98 @@ def lost(signs: Signs) -> tuple[Candidate, ...]:
     )
 
 
-def _servos(found: Suspects, joints: Sequence[str]) -> Iterable[Candidate]:
-    for effect, parameter, grid, low, high, slack in _SERVOS:
+def _servos(found: Suspects, joints: Sequence[str]) -> Iterable[Row]:
+    for effect, parameter, sd, low, high, settings in _SERVOS:
+        more = dict(settings)
+        slack = more.pop("slack", 0.0)
         everywhere = ("all",) if found.all or slack else ()
         near = joints if effect in HIDDEN else found.joints
         for servo in (*everywhere, *found.legs, *near):
-            yield _candidate(
-                effect,
-                parameter,
-                grid,
-                low,
-                high,
-                part=servo,
-                fixed={"servo": servo},
-                slack=slack if servo == "all" else 0.0,
-            )
+            yield _row(
+                effect, parameter, sd, low, high, part=servo, fixed={"servo": servo},
+                slack=slack if servo == "all" else 0.0, **more,
+            )  # fmt: skip
 
 
-def _legs(joints: Sequence[str]) -> Iterable[Candidate]:
+def _legs(joints: Sequence[str]) -> Iterable[Row]:
     moved = parts(joints)
     for leg in ("all", *names(joints)):
         number = "all" if leg == "all" else str(LEGS.index(leg) + 1)
         for part in moved:
-            yield _candidate(
-                "link_length",
-                "factor",
-                (0.88, 1.12),
-                0.8,
-                1.25,
-                part=f"{part},{leg}",
+            yield _row(
+                "link_length", "factor", 0.06, 0.8, 1.25, part=f"{part},{leg}",
                 fixed={"part": part, "legs": number},
                 slack=0.005 if (part, leg) == (moved[-1], "all") else 0.0,
-            )
-        yield _candidate(
-            "foot_slippery",
-            "factor",
-            (0.1, 1.7),
-            0.02,
-            2,
-            part=leg,
-            fixed={"legs": number},
-            slack=0.1 if leg == "all" else 0.0,
-        )
+            )  # fmt: skip
+        yield _row(
+            "foot_slippery", "factor", 0.4, 0.02, 2, part=leg, fixed={"legs": number},
+            slack=0.1 if leg == "all" else 0.0, levels=(0.1, 0.3),
+        )  # fmt: skip
 
 
-def _horns(joints: Sequence[str]) -> Iterable[Candidate]:
+def _horns(joints: Sequence[str]) -> Iterable[Row]:
     for joint in joints:
-        yield _candidate(
-            "loose_horn",
-            "angle",
-            (0.1, 0.3),
-            0,
-            0.6,
-            part=joint,
-            fixed={"joint": joint},
-        )
+        yield _row(
+            "loose_horn", "angle", 0.15, 0, 0.6, part=joint, fixed={"joint": joint},
+            smooth=False, levels=(0.2,),
+        )  # fmt: skip
 
 
-def _locked(held: Mapping[str, float]) -> Iterable[Candidate]:
+def _slope() -> Iterable[Row]:
+    for axis in "xy":
+        yield Row(
+            f"floor_slope.{axis}", 0.0, 0.07, -0.35, 0.35, unit="rad",
+            group="floor_slope", excite=EXCITE["floor_slope"], effect="floor_slope",
+            parameter=axis,
+        )  # fmt: skip
+
+
+def _locked(held: Mapping[str, float]) -> Iterable[Row]:
     for joint, angle in held.items():
-        yield _candidate(
-            "joint_locked",
-            "loss",
-            (0.5, 1.0),
-            0,
-            1,
-            part=joint,
-            fixed={"joint": joint, "angle": float(np.clip(angle, -1.5, 1.5))},
-        )
+        fixed = {"joint": joint, "angle": float(np.clip(angle, -1.5, 1.5))}
+        yield _whole("joint_locked", "loss", (0.5, 1.0), joint, fixed)
 
 
 def _legwise(
-    effect: str, parameter: str, grid: tuple[float, ...], legs: Sequence[str]
-) -> Iterable[Candidate]:
+    effect: str, parameter: str, levels: tuple[float, ...], legs: Sequence[str]
+) -> Iterable[Row]:
     for leg in legs:
         fixed = {"legs": str(LEGS.index(leg) + 1)}
-        yield _candidate(effect, parameter, grid, 0, 1, part=leg, fixed=fixed)
+        yield _whole(effect, parameter, levels, leg, fixed)
 
 
-def _body() -> Iterable[Candidate]:
-    yield _candidate("payload", "mass", (0.1, 0.4, 1.2), 0, 2, slack=0.02)
-    for parameter in ("dx", "dy"):
-        yield _candidate(
-            "centre_of_mass",
-            parameter,
-            (-0.03, -0.01, 0.01, 0.03),
-            -0.03,
-            0.03,
-            stem=f"centre_of_mass.{parameter}",
-        )
-    yield _candidate(
-        "floor_slope",
-        "angle",
-        (0.05, 0.2),
-        0,
-        0.35,
-        branches=UPHILL,
-        extras=("direction",),
-    )
-    yield _candidate("floor_compliance", "factor", (2.0, 4.0), 1, 5)
-    yield _candidate("command_latency", "delay", (0.02, 0.06, 0.15), 0, 0.4)
+def _whole(effect: str, parameter: str, levels: tuple[float, ...], part: str, fixed):
+    """A loss, which has no slope: a leg stands or it does not."""
+    return _row(
+        effect, parameter, 0.5, 0, 1, part=part, fixed=fixed, smooth=False,
+        stepped=len(levels) == 1, levels=levels,
+    )  # fmt: skip
 
 
-def _candidate(
+def _row(
     effect: str,
     parameter: str,
-    grid: tuple[float, ...],
+    sd: float,
     low: float,
     high: float,
     *,
     part: str = "",
-    stem: str = "",
     **more: Any,
-) -> Candidate:
-    about = next(p for p in registry.get(effect).parameters if p.name == parameter)
-    name = f"{stem or effect}[{part}]" if part else stem or effect
-    return Candidate(
+) -> Row:
+    known = registry.get(effect).parameters
+    about = next(p for p in known if p.name == parameter)
+    stem = f"{effect}.{parameter}" if effect == "centre_of_mass" else effect
+    name = f"{stem}[{part}]" if part else stem
+    return Row(
         name=name,
-        effect=effect,
-        parameter=parameter,
-        unit=about.unit,
-        nominal=about.nominal,
+        nominal=float(about.nominal),
+        sd=sd,
         low=low,
         high=high,
-        grid=grid,
+        unit=about.unit,
         aliases=_ALIASES.get(name, ()),
         excite=EXCITE.get(effect, "walking"),
-        **more,
+        effect=effect,
+        parameter=parameter,
+        **{"step": STEP * sd, **more, "slack": more.get("slack") or SHARE * sd},
     )

@@ -5,24 +5,24 @@ it is not zero, else from the inertia that the joint moves, so that the largest 
 matters within a second.
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from bns.errors import BnsError, UnknownNameError
+from bns.gap.decomposition.row import Row
 from bns.gap.models.mjcf import effects
 from bns.gap.models.mjcf.config import OwnConfig
-from bns.gap.records import Candidate
-from bns.worlds.effects.base import Effect
 from bns.worlds.effects.parts import ALL
 
 RATIOS = (0.4, 0.6, 0.8, 0.9, 1.1, 1.25, 1.6, 2.5)
 SHARES = (0.02, 0.05, 0.12, 0.3, 1.0)  # of the largest value, beyond the nominal
 LOWER = (0.9, 0.5, 0.2)  # of the nominal value, taken off
 LATE = (0.01, 0.03, 0.08, 0.2, 0.5)  # [s]
+EIGHTH = 0.125  # of a range: a plausible departure where nothing else is known
 PLAY = 0.3  # [rad or m] largest play, or offset of an encoder
 EXCITE = {
     "joint_damping": "fast motion of that joint",
@@ -64,35 +64,7 @@ USUAL = (
 """considered where the user does not say which"""
 
 
-@dataclass(frozen=True)
-class OwnCandidate(Candidate):
-    """A candidate whose effect acts on a named part."""
-
-    @property
-    def whole(self) -> bool:
-        """Whether only whole magnitudes make sense: never."""
-        return False
-
-    def make(
-        self,
-        magnitude: float,
-        branch: int = 0,
-        extras: Mapping[str, float] | None = None,
-    ) -> Effect:
-        """The effect at a magnitude, clipped to the bounds.
-
-        Args:
-            magnitude: in the candidate's unit; clipped to its bounds.
-            branch: index into `branches`.
-            extras: not used; such effects have none.
-        """
-        del extras
-        value = min(max(float(magnitude), self.low), self.high)
-        values = {**self.fixed, **self.branches[branch], self.parameter: value}
-        return effects.make(self.effect, values)
-
-
-def candidates(config: OwnConfig, model: mujoco.MjModel) -> tuple[OwnCandidate, ...]:
+def candidates(config: OwnConfig, model: mujoco.MjModel) -> tuple[Row, ...]:
     """All candidates, in a fixed order.
 
     Args:
@@ -123,7 +95,7 @@ def candidates(config: OwnConfig, model: mujoco.MjModel) -> tuple[OwnCandidate, 
     return tuple(made)
 
 
-def _called(item: OwnCandidate, given: str) -> OwnCandidate:
+def _called(item: Row, given: str) -> Row:
     """A candidate under the name that the user gave its effect."""
     return replace(item, name=given + item.name.removeprefix(item.effect))
 
@@ -153,7 +125,7 @@ def _hinged(model: mujoco.MjModel, joint: int) -> bool:
 
 def _candidates(
     name: str, part: str, config: OwnConfig, model: mujoco.MjModel
-) -> Iterable[OwnCandidate]:
+) -> Iterable[Row]:
     """One for each strength that the effect has."""
     strengths = [item for item in effects.CLASSES[name].parameters if item.scales]
     for about in strengths:
@@ -162,7 +134,7 @@ def _candidates(
         given = config.bounds.get(f"{stem}[{part}]", {})
         low, high = given.get("low", low), given.get("high", high)
         nominal = high if name == "command_limit" else about.nominal
-        yield OwnCandidate(
+        yield Row(
             name=f"{stem}[{part}]",
             effect=name,
             parameter=about.name,
@@ -170,7 +142,8 @@ def _candidates(
             nominal=nominal,
             low=min(low, nominal),
             high=max(high, nominal),
-            grid=_grid(nominal, low, high),
+            sd=max(EIGHTH * (high - low), 1e-12),
+            levels=_grid(nominal, low, high),
             fixed={"part": part},
             slack=given.get("slack", 0.0),
             excite=EXCITE[name],

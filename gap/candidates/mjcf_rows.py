@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bns.gap.candidates.mjcf import EXCITE, OwnCandidate
+from bns.gap.candidates.mjcf import EXCITE
 from bns.gap.decomposition.row import Row
 from bns.worlds.effects.parts import ALL
 from bns.worlds.trial import Trial
@@ -39,7 +39,7 @@ SHARE = 0.02  # slack of a number over its plausible departure
 
 
 def rows(
-    candidates: Sequence[OwnCandidate], trials: Sequence[Trial], dt: float
+    candidates: Sequence[Row], trials: Sequence[Trial], dt: float
 ) -> tuple[Row, ...]:
     """All numbers that may be off, with those of all joints alike.
 
@@ -54,7 +54,7 @@ def rows(
     return tuple(made)
 
 
-def grouped(candidates: Sequence[OwnCandidate]) -> list[OwnCandidate]:
+def grouped(candidates: Sequence[Row]) -> list[Row]:
     """Further candidates: an effect alike on all joints that are considered singly."""
     made = []
     for name in GROUPED:
@@ -62,14 +62,14 @@ def grouped(candidates: Sequence[OwnCandidate]) -> list[OwnCandidate]:
         if len(parts) > 1 and all(item.fixed["part"] != ALL for item in parts):
             low = max(item.low for item in parts)
             high = max(item.high for item in parts)
-            grid = tuple(value for value in parts[0].grid if low <= value <= high)
+            grid = tuple(value for value in parts[0].levels if low <= value <= high)
             made.append(
                 replace(
                     parts[0],
                     name=f"{name}[{ALL}]",
                     low=low,
                     high=high,
-                    grid=grid or (high,),
+                    levels=grid or (high,),
                     fixed={"part": ALL},
                     slack=0.0,
                 )
@@ -77,7 +77,7 @@ def grouped(candidates: Sequence[OwnCandidate]) -> list[OwnCandidate]:
     return made
 
 
-def _of(item: OwnCandidate, trials: Sequence[Trial], lead: float) -> Iterable[Row]:
+def _of(item: Row, trials: Sequence[Trial], lead: float) -> Iterable[Row]:
     excite = EXCITE.get(item.effect, "any command")
     edges = {"low": item.low, "high": item.high, "unit": item.unit, "excite": excite}
     third = (item.high - item.low) / 3
@@ -87,7 +87,7 @@ def _of(item: OwnCandidate, trials: Sequence[Trial], lead: float) -> Iterable[Ro
                       levels=levels, **edges)  # fmt: skip
         return
     if item.effect == "command_limit":
-        levels = tuple(v for v in item.grid if item.low < v < item.high)
+        levels = tuple(v for v in item.levels if item.low < v < item.high)
         yield Row(item.name, item.nominal, third, smooth=False, levels=levels, **edges)
         return
     sd, slack = _plausible(item)
@@ -103,7 +103,7 @@ def _of(item: OwnCandidate, trials: Sequence[Trial], lead: float) -> Iterable[Ro
     )
 
 
-def _plausible(item: OwnCandidate) -> tuple[float, float]:
+def _plausible(item: Row) -> tuple[float, float]:
     """Plausible departure of a number, and how well it is known."""
     sd, slack = PLAUSIBLE.get(item.effect, (0.0, 0.0))
     if item.effect.startswith("joint_"):
@@ -117,7 +117,7 @@ def _plausible(item: OwnCandidate) -> tuple[float, float]:
     return sd or EIGHTH * (item.high - item.low), slack
 
 
-def _levels(item: OwnCandidate, trials: Sequence[Trial]) -> tuple[float, ...]:
+def _levels(item: Row, trials: Sequence[Trial]) -> tuple[float, ...]:
     """Sizes of a dead zone between the magnitudes that were told."""
     names = [channel.name for channel in trials[0].commands.channels]
     part = item.fixed["part"]

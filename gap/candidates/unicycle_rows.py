@@ -6,7 +6,6 @@ from typing import Any
 
 from bns.gap.candidates.mjcf import EXCITE
 from bns.gap.decomposition.row import Row
-from bns.gap.records import Candidate
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect, Parameter
 from bns.worlds.effects.command.twist import TWIST
@@ -15,7 +14,6 @@ LATE = (0.1, 0.2, 0.4)  # [s] delays and lags that fits are started from
 ZONES = (0.05, 0.15, 0.4)  # dead zones, likewise, of the largest
 LARGEST = {TWIST[0]: (0.1, "m/s"), TWIST[1]: (0.3, "rad/s")}
 """offset and dead zone of each channel; assumed"""
-GRID = (0.03, 0.1, 0.3, 1.0)  # of the way to a bound: magnitudes tried one by one
 
 
 @cache
@@ -48,10 +46,20 @@ def _rows() -> Iterator[Row]:
 
 
 def _row(name: str, sd: float, low: float, high: float, **more: Any) -> Row:
-    effect, _, about = _parts(name)
+    effect, fixed, about = _parts(name)
     more.setdefault("unit", about.unit)
-    excite = EXCITE.get(effect, "arcs and turns")
-    return Row(name, float(about.nominal), sd, low, high, excite=excite, **more)
+    return Row(
+        name,
+        float(about.nominal),
+        sd,
+        low,
+        high,
+        excite=EXCITE.get(effect, "arcs and turns"),
+        effect=effect,
+        parameter=about.name,
+        fixed=fixed,
+        **more,
+    )
 
 
 def _parts(name: str) -> tuple[str, dict[str, str], Parameter]:
@@ -63,35 +71,10 @@ def _parts(name: str) -> tuple[str, dict[str, str], Parameter]:
     return effect, {"part": part.rstrip("]")} if part else {}, about
 
 
-@cache
-def candidates() -> tuple[Candidate, ...]:
-    """The rows as explanations that are tried one by one."""
-    return tuple(_candidate(row) for row in rows())
-
-
-def _candidate(row: Row) -> Candidate:
-    effect, fixed, about = _parts(row.name)
-    ends = [end for end in (row.low, row.high) if end != row.nominal]
-    grid = {row.nominal + share * (end - row.nominal) for end in ends for share in GRID}
-    return Candidate(
-        name=row.name,
-        effect=effect,
-        parameter=about.name,
-        unit=row.unit,
-        nominal=row.nominal,
-        low=row.low,
-        high=row.high,
-        grid=tuple(sorted(grid)),
-        fixed=fixed,
-        slack=row.slack,
-        excite=row.excite,
-    )
-
-
 def effects(values: Mapping[str, float]) -> list[Effect]:
     """The effects of rows, in the order in which they act.
 
     Args:
         values: of the rows that are not nominal, by name.
     """
-    return [c.make(values[c.name]) for c in candidates() if c.name in values]
+    return [row.make(values[row.name]) for row in rows() if row.name in values]

@@ -5,16 +5,31 @@ from dataclasses import replace
 
 import numpy as np
 
-from bns.gap.candidates.wheeled import EXCITE, SIDES
 from bns.gap.decomposition.row import Row
 from bns.worlds.effects import registry
 from bns.worlds.effects.common import TOP_SPEED
 from bns.worlds.trial import Trial
 
+SIDES = ("left", "right", "both")
+TURNS = "turns in place and arcs"
 LEAD = "step_lead"
 """shift of the simulation in time that no effect is: its own steps lead or lag"""
 BANDS = 10  # widths of a dead band that are tried
 WAYS = ("forward", "backward", "commanded")
+
+EXCITE = {
+    "floor_slope": "long drives in several headings",
+    "axle_length": TURNS,
+    "dead_band": "slow commands",
+    "speed_saturation": "fast commands",
+    "torque_limit": "large, sudden changes of speed",
+    "floor_friction": "large, sudden changes of speed",
+    "payload": "large, sudden changes of speed",
+    "centre_of_mass": "fast arcs and sudden changes of speed",
+    "motor_lag": "steps in speed",
+    "command_latency": "steps in speed",
+    "tracker_latency": "steps in speed",
+}
 
 # name, plausible departure (standard deviation), low, high, per wheel?, settings. The
 # departures are what published figures and repairs of such robots show; slack is how

@@ -13,7 +13,6 @@ from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.shares import HeldOut
 
 TURNS = 4  # of fitting and searching
-SINGLES = 4  # explanations that are tried alone
 ROUNDS = 2  # of levels
 MARGIN = 1.02  # of the held-out error that an autoregression may cost
 WEAK = 0.05  # of what a set explains: so little may be left to the others
@@ -132,7 +131,9 @@ def decompose(problem: Problem, start: Point | None = None) -> Point:
     start = start or nothing(problem)
     found = start.linear.search()[1]
     best = start
-    if found:
+    if found and problem.model.singly:
+        best = _alone(problem, start)
+    elif found:
         values = placed(problem, start.linear, found, start.values)
         best = descend(problem, values, found, start.noise)
         if len(best.support) > 1:
@@ -219,17 +220,7 @@ def _fitted_at(problem: Problem, point: Point, support: Support) -> Point:
 
 def _others(problem: Problem, start: Point, first: Point) -> list[Point]:
     """Points from the best single explanation and from all at once."""
-    linear = start.linear
-    order = sorted(linear.free, key=lambda name: linear.cost({name}))[:SINGLES]
-    few = problem.sample(fit.ROUGH)
-    few = None if len(few) == len(problem.trials) else few
-    starts = [(n, placed(problem, linear, {n}, start.values)) for n in order]
-    starts += levels.alone(problem, start, SINGLES)
-    tried = []
-    for name, values in starts:
-        fitted = _fitted(problem, {name})
-        values, rest = newton(problem, values, fitted, start.noise, turns=6, only=few)
-        tried.append((first.noise.loss(rest), name, values))
+    tried = _singles(problem, start, first.noise)
     _, name, values = min(tried, key=lambda item: item[0])
     made = [descend(problem, values, {name}, first.noise)]
     if len(made[0].support) > 1 and (both := _with_level(problem, name, values, first)):
@@ -237,6 +228,47 @@ def _others(problem: Problem, start: Point, first: Point) -> list[Point]:
     if problem.model.many:
         made.append(_from_all(problem, start))
     return made
+
+
+def _singles(problem: Problem, start: Point, known: Noise) -> list[tuple]:
+    """Loss, name and values of the single explanations that come first in a tangent or
+    by a level, each fitted to a part of the recording."""
+    linear, most = start.linear, problem.model.starts
+    order = sorted(linear.free, key=lambda name: linear.cost({name}))[:most]
+    few = problem.sample(fit.ROUGH)
+    few = None if len(few) == len(problem.trials) else few
+    starts = [(n, placed(problem, linear, {n}, start.values)) for n in order]
+    starts += levels.alone(problem, start, most)
+    tried = []
+    for name, values in starts:
+        fitted = _fitted(problem, {name})
+        values, rest = newton(problem, values, fitted, start.noise, turns=6, only=few)
+        tried.append((known.loss(rest), name, values))
+    return tried
+
+
+def _alone(problem: Problem, start: Point) -> Point:
+    """From the single explanation that leaves least, those without a slope included."""
+    tried = _singles(problem, start, start.noise)
+    sets = [
+        (row.term, number, value)
+        for number, row in enumerate(problem.rows)
+        for value in row.levels
+        if not row.smooth and value != row.nominal
+    ]
+    moved = []
+    for _, number, value in sets:
+        values = start.values.copy()
+        values[number] = value
+        moved.append(values)
+    if moved:
+        made = problem.predict(moved, fine=False)
+        for (name, _, _), values, path in zip(sets, moved, made, strict=True):
+            if np.isfinite(path[problem.seen]).all():
+                left = start.noise.loss(problem.recorded - path)
+                tried.append((left, name, values))
+    _, name, values = min(tried, key=lambda item: item[0])
+    return descend(problem, values, {name}, start.noise)
 
 
 def _with_level(problem: Problem, name: str, values, first: Point) -> Point | None:

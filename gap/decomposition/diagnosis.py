@@ -5,16 +5,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from bns.gap.decomposition.decomposition import decompose
-from bns.gap.decomposition.model import DecomposableModel
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.record import recorded
+from bns.gap.models.base import GapModel
 from bns.gap.records import Diagnosis
 from bns.worlds.trial import Trial
 
 
 def diagnose(
     trials: Sequence[Trial],
-    model: DecomposableModel,
+    model: GapModel,
     *,
     seed: int = 0,
     faults: Sequence[str] = (),

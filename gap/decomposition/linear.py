@@ -114,7 +114,7 @@ class Linear:
             low=(low - middle) / unit,
             high=(high - middle) / unit,
             lam=lam,
-            penalty=dict.fromkeys(free, KAPPA),
+            penalty=dict.fromkeys(free, problem.model.odds),
             family={row.term: row.family or row.term for row in rows},
             design=matrix,
             target=target,

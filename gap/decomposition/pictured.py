@@ -2,12 +2,8 @@
 
 from typing import Any
 
-import numpy as np
-
-from bns.gap.core import where as core_where
-from bns.gap.core.fit import Point
-from bns.gap.core.gap_closure import plain_gap
-from bns.gap.core.problem import Problem
+from bns.gap.where import horizons, localised
+from bns.gap.where.compared import Compared
 
 
 def where(made: Any, *, seed: int) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -17,15 +13,12 @@ def where(made: Any, *, seed: int) -> tuple[dict[str, Any], dict[str, Any]]:
         made: a decomposition.
         seed: of the bootstraps.
     """
-    decomposed = made.problem
-    problem = Problem.of(decomposed.trials, decomposed.model)
+    problem = made.problem
+    compared = Compared.of(problem.trials, problem.model, made.floor.sigma)
     effects = [
         effect
         for part in made.parts
-        if (effect := decomposed.model.effect(part.name, part.values)) is not None
+        if (effect := problem.model.effect(part.name, part.values)) is not None
     ]
-    (left,) = problem.rests([effects])
-    point = Point((), left, float((left**2).sum()), np.zeros((0, len(left))))
-    found = core_where.where(problem, point, seed=seed)
-    found["change"] = {}
-    return found, plain_gap(problem, effects)
+    found = localised.where(compared, effects, seed=seed)
+    return found, horizons.plain_gap(compared, effects)

@@ -6,9 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from bns.gap.decomposition.model import DecomposableModel
 from bns.gap.decomposition.row import Row
-from bns.gap.models.base import Windows
+from bns.gap.models.base import GapModel, Windows
 from bns.gap.recordings import stretches, trial_labels
 from bns.worlds.trial import Trial
 
@@ -27,11 +26,11 @@ class Problem:
         windows: of each trial.
         recorded: features, ``(N, C)``; NaN = not seen.
         trial: number of the trial of each window, ``(N,)``.
-        block: number of its stretch, ``(N,)``, see `DecomposableModel.blocks`.
+        block: number of its stretch, ``(N,)``, see `GapModel.blocks`.
         numbers: number of each trial in the recording.
     """
 
-    model: DecomposableModel
+    model: GapModel
     trials: tuple[Trial, ...]
     rows: tuple[Row, ...]
     windows: tuple[Windows, ...]
@@ -43,7 +42,7 @@ class Problem:
     """first trial of the rows that set in later, by name"""
 
     @classmethod
-    def of(cls, trials: Sequence[Trial], model: DecomposableModel) -> "Problem":
+    def of(cls, trials: Sequence[Trial], model: GapModel) -> "Problem":
         """Features of a checked recording, and the model's rows."""
         kept = stretches.shortened(trials, model.longest, model.before)
         trials = [trial for trial, _ in kept]

@@ -61,6 +61,8 @@ def recorded(
             "sigma": made.floor.sigma.tolist(),
             "process": np.asarray(model.process).tolist(),
             "channels": [channel.name for channel in model.channels],
+            "features": np.median(made.point.noise.sd, axis=0).tolist(),
+            "counted": made.point.noise.lam,
         },
         closed=closed,
         warnings=(),

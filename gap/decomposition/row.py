@@ -1,8 +1,12 @@
 """Rows: the numbers of a model that may differ from what it says."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 from bns.errors import BnsError
+from bns.worlds.effects import registry
+from bns.worlds.effects.base import Effect
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,11 @@ class Row:
             much. "" = its own.
         joins: explanations that are this one where they hold alike.
         excite: which commands make it felt, in words.
+        effect: name of the effect in the library that it is a number of; "" = the
+            model knows.
+        parameter: which number of the effect it is.
+        fixed: values of the effect's other parameters and choices.
+        aliases: names of rows known to look alike whatever is commanded.
     """
 
     name: str
@@ -49,6 +58,10 @@ class Row:
     family: str = ""
     joins: tuple[str, ...] = ()
     excite: str = ""
+    effect: str = ""
+    parameter: str = ""
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+    aliases: tuple[str, ...] = ()
 
     def __post_init__(self):
         if not (self.low <= self.nominal <= self.high and self.sd > 0):
@@ -61,6 +74,18 @@ class Row:
     def term(self) -> str:
         """Name of the explanation it belongs to."""
         return self.group or self.name
+
+    def make(self, value: float) -> Effect:
+        """The effect of the library at a value, clipped to the bounds.
+
+        Raises:
+            UnknownNameError: the row is of no effect of the library.
+        """
+        about = {p.name: p for p in registry.get(self.effect).parameters}
+        value = min(max(float(value), self.low), self.high)
+        whole = about[self.parameter].integer
+        given = {**self.fixed, self.parameter: round(value) if whole else value}
+        return registry.make(self.effect, **given)
 
     @property
     def difference(self) -> float:

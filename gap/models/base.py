@@ -1,20 +1,28 @@
 """What the diagnosis needs of a nominal model: `GapModel`.
 
-The diagnosis knows nothing of robots. A model re-executes recorded commands with
-candidate effects and says how observations become features: small pieces of relative
+The diagnosis knows nothing of robots. A model re-executes recorded commands with any of
+its numbers changed and says how observations become features: small pieces of relative
 motion, each over one window between two samples, so that an early error does not
 spoil all that follows.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
-from bns.gap.records import Candidate
+from bns.errors import BnsError
+from bns.gap.decomposition.row import Row
+from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Channel, Trial
+
+BLOCK = 2.0  # [s] of one long recording that count as one trial
+FEW = 4  # trials, below which recordings are cut into blocks
+PLANE = "xy"
+"""parameters of rows that together are the size and the direction of an effect"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,19 +45,34 @@ class Windows:
         return len(self.first)
 
 
-class GapModel(Protocol):
-    """A nominal model that can be simulated with candidate effects.
+class GapModel(ABC):
+    """A nominal model all of whose doubtful numbers can be changed at once.
 
     Attributes:
         name: of the model.
         channels: what is observed, as in `Trial.channels`.
         features: what is compared, C channels (for a planar robot forward [m], left
             [m], turn [rad] over a window).
-        process: standard deviation of what a nominal robot scatters by itself in one
-            second of motion, by feature channel, shape ``(C,)``; grows with the square
-            root of time. Used until repeats tell better.
+        process: what a nominal robot scatters by itself in one second of motion, by
+            feature, ``(C,)``; for plans.
         resolution: smallest standard deviation of the measurement of each observed
-            channel that is believed, shape ``(n_channels,)``.
+            channel that is believed, ``(n_channels,)``.
+        limits: lowest and highest command and its unit, by channel; empty = not known.
+        dt: physics step [s]; 0 = none.
+        timed: whether commands last as long as they are told.
+        logs: whether `read_log` reads logs.
+        memory: order of the autoregression that residuals may have; 0 = none.
+        many: whether fits are also started from all rows at once: where many depart
+            at once a tangent at the nominal misleads.
+        starts: explanations from which alone fits are started as well; more where a
+            tangent at the nominal says little of which it is.
+        odds: log odds against each explanation, by how many there are: with 3 about one
+            of twenty is expected.
+        longest: seconds of a recording that are fitted; of a longer one each trial is
+            shortened (`bns.gap.recordings.stretches`).
+        before: seconds after which a simulation begun at rest moves as the robot.
+        singly: whether fits are started from single explanations alone: where there
+            are more rows than a tangent at the nominal can tell apart.
     """
 
     name: str
@@ -57,19 +80,36 @@ class GapModel(Protocol):
     features: tuple[Channel, ...]
     process: np.ndarray
     resolution: np.ndarray
+    limits: Mapping[str, tuple[float, float, str]] = {}
+    dt: float = 0.0
+    timed: bool = True
+    logs: bool = False
+    memory: int = 0
+    many: bool = False
+    longest: float = float("inf")
+    before: float = 0.0
+    starts: int = 4
+    singly: bool = False
+    odds: float = 3.0
 
-    def candidates(self) -> tuple[Candidate, ...]:
-        """All explanations that may be given, in a fixed order."""
-        ...
+    @property
+    @abstractmethod
+    def least(self) -> np.ndarray:
+        """Smallest believed standard deviation of each feature, ``(C,)``."""
 
+    @abstractmethod
+    def rows(self, trials: Sequence[Trial]) -> tuple[Row, ...]:
+        """All numbers that may be off, in a fixed order; they may depend on what was
+        told (a dead band is tried between the speeds told)."""
+
+    @abstractmethod
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
         """What would have been observed, had these effects held.
 
-        The recorded commands are executed again from the observed start of each trial
-        (or of each short segment of it), all sets of effects in one batch. Nothing is
-        random: noise effects have none here.
+        The recorded commands are executed again from the observed start of each trial,
+        all sets of effects in one batch. Nothing is random.
 
         Args:
             trials: N recorded trials.
@@ -79,31 +119,207 @@ class GapModel(Protocol):
             Per set, per trial: ``(T, n_channels)`` at the trial's own samples; NaN
             from where the simulation diverged.
         """
-        ...
 
-    def windows(self, trial: Trial) -> Windows:
-        """The windows of a trial, one short horizon, tiling it."""
-        ...
+    @abstractmethod
+    def paths(
+        self,
+        trials: Sequence[Trial],
+        sets: Sequence[Sequence[Mapping[str, float]]],
+        *,
+        fine: bool = True,
+    ) -> list[list[np.ndarray]]:
+        """Predicted observations with rows changed.
 
+        Args:
+            trials: N recorded trials.
+            sets: E sets; of each, by trial, the values of the rows that are not
+                nominal.
+            fine: at the fine step; False = at the coarse one, which is for differences.
+
+        Returns:
+            Per set, per trial ``(T, n_channels)``; NaN from where it diverged.
+        """
+
+    @abstractmethod
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """Features of observations or predictions of a trial.
+        """Features of observations or predictions, ``(..., W, C)``.
 
         Args:
             trial: recorded trial.
             observed: ``(..., T, n_channels)``, recorded or simulated.
-            windows: any windows into the trial, also longer ones.
-
-        Returns:
-            ``(..., W, C)``.
+            windows: W windows into the trial, also longer ones.
         """
-        ...
+
+    @abstractmethod
+    def windows(self, trial: Trial) -> Windows:
+        """The windows of a trial, one short horizon, tiling it."""
+
+    def joint_windows(self, trial: Trial) -> Windows:
+        """Windows over which motion is compared in the fit; they may overlap."""
+        return self.windows(trial)
+
+    @abstractmethod
+    def effect(self, term: str, values: Mapping[str, float]) -> Effect | None:
+        """The effect of an explanation; None for a nuisance.
+
+        Args:
+            term: name of the explanation.
+            values: of its rows.
+        """
+
+    def parse(self, text: str) -> Effect:
+        """An effect as a diagnosis with this model writes it."""
+        return registry.parse(text)
 
     def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
         """What went on in each window, by name in words, each ``(W,)``.
 
-        For localising in which regime a gap sits and for the flexible ceiling:
-        commands, their signs and changes, heading, position, time.
+        For localising in which regime a gap sits: commands, their signs and changes,
+        heading, position, time.
         """
-        ...
+        del trial, windows
+        return {}
+
+    def motion(self, features: np.ndarray) -> np.ndarray:
+        """How fast each feature moved, ``(N, C)``: noise may grow with it."""
+        return np.abs(features)
+
+    def blocks(self, trials: Sequence[Trial], windows: Sequence[Windows]) -> np.ndarray:
+        """Number of the stretch that each window belongs to, ``(N,)``.
+
+        Stretches are what is resampled and left out. A trial is one; where there are
+        few trials, each `BLOCK` seconds.
+        """
+        made, first = [], 0
+        for trial, parts in zip(trials, windows, strict=True):
+            number = np.zeros(len(parts), dtype=int)
+            if len(trials) < FEW:
+                number = ((parts.times - trial.times[0]) / BLOCK).astype(int)
+            made.append(first + number)
+            first += int(number.max(initial=0)) + 1
+        return np.concatenate(made)
+
+    def read_log(self, path: str) -> list[Trial]:
+        """Trials of a log as the model describes it, where `logs` says that it does.
+
+        Raises:
+            BnsError: it does not.
+        """
+        raise BnsError(f"{path}: model {self.name!r} describes no logs.")
+
+    def excitations(
+        self, *, seed: int = 0, told: Mapping[str, float] | None = None
+    ) -> tuple[Any, ...]:
+        """Commands for plans (`gap/planning/excitation.py`); empty = by its limits.
+
+        Args:
+            seed: of random ones.
+            told: settings of the robot that all recordings share.
+        """
+        del seed, told
+        return ()
+
+    def at_rest(self, trial: Trial, predicted: np.ndarray) -> frozenset[str]:
+        """Observed channels that stand still because of what they measure does.
+
+        Args:
+            trial: recorded trial.
+            predicted: by the nominal model, ``(T, n_channels)``.
+        """
+        del trial, predicted
+        return frozenset()
+
+
+class LibraryModel(GapModel):
+    """A model whose rows say which effect of the library they are, and which is
+    simulated with effects.
+
+    Attributes:
+        known: its rows by explanation, as `rows` gave them last.
+    """
+
+    known: Mapping[str, tuple[Row, ...]] = {}
+
+    def remembered(self, rows: Sequence[Row]) -> tuple[Row, ...]:
+        """Rows, kept so that effects can be made of them."""
+        made: dict[str, tuple[Row, ...]] = {}
+        for row in rows:
+            made[row.term] = (*made.get(row.term, ()), row)
+        self.known = {**self.known, **made}
+        return tuple(rows)
+
+    def effect(self, term: str, values: Mapping[str, float]) -> Effect | None:
+        """See `GapModel.effect`."""
+        found = effects_of([r for r in self.known[term] if r.name in values], values)
+        return found[0] if found else None
+
+    def paths(
+        self,
+        trials: Sequence[Trial],
+        sets: Sequence[Sequence[Mapping[str, float]]],
+        *,
+        fine: bool = True,
+    ) -> list[list[np.ndarray]]:
+        """See `GapModel.paths`; there is one step alone."""
+        del fine
+        wanted: dict[tuple[Effect, ...], list[tuple[int, int]]] = {}
+        made: list[list[np.ndarray]] = [[np.empty(0)] * len(trials) for _ in sets]
+        for place, row in enumerate(sets):
+            for number, values in enumerate(row):
+                wanted.setdefault(self._effects(values), []).append((place, number))
+        alike: dict[tuple[int, ...], list[tuple[Effect, ...]]] = {}
+        for effects, places in wanted.items():
+            needed = tuple(sorted({number for _, number in places}))
+            alike.setdefault(needed, []).append(effects)
+        for needed, groups in alike.items():
+            found = self.simulate([trials[number] for number in needed], groups)
+            for effects, paths in zip(groups, found, strict=True):
+                for place, number in wanted[effects]:
+                    made[place][number] = paths[needed.index(number)]
+        return made
+
+    def _effects(self, values: Mapping[str, float]) -> tuple[Effect, ...]:
+        terms: dict[str, dict[str, float]] = {}
+        owner = {row.name: term for term, rows in self.known.items() for row in rows}
+        for name, value in values.items():
+            terms.setdefault(owner[name], {})[name] = value
+        return tuple(
+            effect
+            for term, rows in terms.items()
+            for effect in effects_of(
+                [r for r in self.known[term] if r.name in rows], rows
+            )
+        )
+
+
+def effects_of(rows: Sequence[Row], values: Mapping[str, float]) -> list[Effect]:
+    """The effects that rows of one explanation make, one for each way in which it may
+    act; none for a nuisance.
+
+    Args:
+        rows: of the explanation.
+        values: of them, by name.
+    """
+    moved = [row for row in rows if values[row.name] != row.nominal] or list(rows[:1])
+    ways: dict[str, list[Row]] = {}
+    for row in moved:
+        if row.effect:
+            ways.setdefault(str(sorted(row.fixed.items())), []).append(row)
+    return [_made(group, values) for group in ways.values()]
+
+
+def _made(rows: Sequence[Row], values: Mapping[str, float]) -> Effect:
+    first = rows[0]
+    given: dict[str, float | str] = {**first.fixed}
+    about = {p.name: p for p in registry.get(first.effect).parameters}
+    numbers = {row.parameter: float(values[row.name]) for row in rows}
+    if not set(numbers) <= set(about) and set(numbers) <= set(PLANE):
+        size, way = list(about)[:2]
+        x, y = (numbers.get(axis, 0.0) for axis in PLANE)
+        numbers = {size: float(np.hypot(x, y)), way: float(np.arctan2(y, x))}
+    for name, value in numbers.items():
+        value = min(max(value, about[name].low), about[name].high)
+        given[name] = round(value) if about[name].integer else value
+    return registry.make(first.effect, **given)

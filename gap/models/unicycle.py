@@ -10,11 +10,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bns.gap.candidates import unicycle_rows
-from bns.gap.core import segments
-from bns.gap.decomposition.model import DecomposableModel
 from bns.gap.decomposition.row import Row
-from bns.gap.models.base import Windows
-from bns.gap.records import Candidate
+from bns.gap.models.base import GapModel, Windows
+from bns.gap.recordings import segments
 from bns.worlds.effects.base import ControlSignal, Effect, PoseSignal
 from bns.worlds.effects.command.twist import TWIST
 from bns.worlds.physics import control
@@ -27,7 +25,7 @@ FASTEST, QUICKEST = 0.5, 2.0  # [m/s], [rad/s] limits of plans; assumed
 LEAST = (5e-4, 5e-4, 2e-3)  # [m, m, rad] smallest believed deviations; assumed
 
 
-class UnicycleModel(DecomposableModel):
+class UnicycleModel(GapModel):
     """Kinematics of a robot told forward speed and turning rate.
 
     Args:
@@ -55,10 +53,6 @@ class UnicycleModel(DecomposableModel):
 
     dt = STEP
 
-    def candidates(self) -> tuple[Candidate, ...]:
-        """All explanations, in a fixed order."""
-        return unicycle_rows.candidates()
-
     @property
     def least(self) -> np.ndarray:
         """Smallest believed standard deviation of each feature [m, m, rad]."""
@@ -81,7 +75,7 @@ class UnicycleModel(DecomposableModel):
         *,
         fine: bool = True,
     ) -> list[list[np.ndarray]]:
-        """See `DecomposableModel.paths`: poses, each ``(T, 3)``; there is one step."""
+        """See `GapModel.paths`: poses, each ``(T, 3)``; there is one step."""
         del fine
         return [
             [

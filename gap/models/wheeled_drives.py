@@ -10,7 +10,8 @@ import numpy as np
 
 from bns import models
 from bns.gap.candidates.wheeled_rows import LEAD, parameter
-from bns.gap.core.segments import moved
+from bns.gap.recordings import trial_labels
+from bns.gap.recordings.segments import moved
 from bns.worlds.effects import bodies, registry
 from bns.worlds.effects.base import BodyEffect, ControlSignal, Effect
 from bns.worlds.physics import compile, observe, servo_joint
@@ -82,6 +83,33 @@ class Changes:
         told = [item for item in made if item.stage != "body"]
         told.sort(key=lambda item: ORDER.index(item.name))
         return cls(body, tuple(told), late, lost, seen)
+
+    @classmethod
+    def by_effects(cls, effects: Sequence[Effect], number: int) -> "Changes":
+        """Sort the effects on a drive.
+
+        Args:
+            effects: of the library; those that only add noise change nothing.
+            number: of the trial, for what grows with it.
+        """
+        held = [item.in_trial(number) for item in effects if not item.is_nominal]
+        told = [item for item in held if item.stage in ("command", "actuator")]
+        late = sum(item["delay"] for item in told if item.name == LATENCY)
+        told = [item for item in told if item.name != LATENCY]
+        told.sort(key=lambda item: _place(item.name))
+        seen = {}
+        for item in held:
+            strengths = [p.name for p in item.parameters if p.scales]
+            for name in strengths if item.name in TRACKING else ():
+                full = f"{item.name}.{name}" if len(strengths) > 1 else item.name
+                seen[full] = item[name]
+        body = tuple(item for item in held if item.stage == "body")
+        return cls(body, tuple(told), late, 0.0, seen)
+
+
+def _place(name: str) -> int:
+    """Where in the order of effects on commands one acts; last what is not listed."""
+    return ORDER.index(name) if name in ORDER else len(ORDER)
 
 
 def term(name: str) -> str:
@@ -219,16 +247,29 @@ class Drives:
         *,
         fine: bool = True,
     ) -> list[list[np.ndarray]]:
-        """See `DecomposableModel.paths`: poses, each ``(T, 3)`` [m, m, rad]."""
-        dt = FINE if fine else COARSE
-        starts = [start(trial) for trial in trials]
-        drives = [
-            [
-                (trial, Changes.of(values, self.robot), begin)
-                for trial, values, begin in zip(trials, row, starts, strict=True)
-            ]
-            for row in sets
+        """See `GapModel.paths`: poses, each ``(T, 3)`` [m, m, rad]."""
+        changes = [[Changes.of(values, self.robot) for values in row] for row in sets]
+        return self._driven(trials, changes, FINE if fine else COARSE)
+
+    def with_effects(
+        self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
+    ) -> list[list[np.ndarray]]:
+        """See `GapModel.simulate`: poses, each ``(T, 3)`` [m, m, rad]."""
+        numbers = trial_labels.numbers(trials)
+        changes = [
+            [Changes.by_effects(items, number) for number in numbers]
+            for items in effects
         ]
+        return self._driven(trials, changes, FINE)
+
+    def _driven(
+        self,
+        trials: Sequence[Trial],
+        changes: Sequence[Sequence[Changes]],
+        dt: float,
+    ) -> list[list[np.ndarray]]:
+        starts = [start(trial) for trial in trials]
+        drives = [list(zip(trials, row, starts, strict=True)) for row in changes]
         keys = [[_key(*drive, dt) for drive in row] for row in drives]
         wanted = {
             key: drive

@@ -17,8 +17,6 @@ from scipy.stats import norm
 
 from bns.errors import BnsError
 from bns.gap import store
-from bns.gap.core.floor import Floor
-from bns.gap.core.problem import Problem
 from bns.gap.models.base import GapModel
 from bns.gap.planning import excitation as excite
 from bns.gap.planning import plan_words
@@ -26,7 +24,8 @@ from bns.gap.planning.excitation import Excitation
 from bns.gap.planning.plan_runs import repeats, runs
 from bns.gap.recordings import load_recordings
 from bns.gap.records import Diagnosis, Fit
-from bns.worlds.effects.base import Effect
+from bns.gap.where.compared import Compared
+from bns.worlds.effects.base import Effect, Parameter
 from bns.worlds.trial import Commands, Trial
 
 SAMPLE = 0.1  # [s] between the samples that a recording is assumed to have
@@ -174,8 +173,8 @@ def blank(
 def _family(
     model: GapModel, seed: int, told: Mapping[str, float]
 ) -> tuple[Excitation, ...]:
-    if hasattr(model, "excitations"):
-        return tuple(model.excitations(seed=seed, told=told))
+    if own := tuple(model.excitations(seed=seed, told=told)):
+        return own
     limits = load_recordings.limits(model)
     if not limits:
         raise BnsError(
@@ -216,18 +215,16 @@ def _option(
     effects: Sequence[Sequence[Effect]],
 ) -> Option:
     trial = blank(item.commands, model, "", item.conditions)
-    problem = Problem.of(
-        [trial], model, candidates=model.candidates(), floor=_floor(found, model)
-    )
     moved = [_moved(fit, model) for fit in fits]
-    sets = [*effects, *(row for rows, _ in moved for row in rows)]
-    made = problem.signatures(sets)
+    unsure = _unsure(trial, model)
+    sets = [*effects, *(row for rows in moved for row in rows)]
+    made = _whitened(found, trial, model, sets, unsure)
     shapes, slopes, at = made[: len(fits)], [], len(fits)
-    for rows, spreads in moved:
-        slopes.append(
-            np.array([made[at + k] - shapes[len(slopes)] for k in range(len(rows))])
-        )
-        at += len(spreads)
+    slack = made[len(sets) :] - made[-1]
+    for rows in moved:
+        own = [made[at + k] - shapes[len(slopes)] for k in range(len(rows))]
+        slopes.append(np.array([*own, *slack[:-1]]))
+        at += len(rows)
     distances = np.array(
         [
             min(_apart(shapes, slopes, i, j), _apart(shapes, slopes, j, i))
@@ -235,6 +232,36 @@ def _option(
         ]
     )
     return Option(item, distances, float(norm.sf(distances / 2).mean()))
+
+
+def _unsure(trial: Trial, model: GapModel) -> list[dict[str, float]]:
+    """Rows by which the nominal model may be off, one standard deviation each."""
+    return [
+        {row.name: row.nominal + row.slack}
+        for row in model.rows([trial])
+        if row.slack > 0 and row.smooth
+    ]
+
+
+def _whitened(
+    found: Diagnosis,
+    trial: Trial,
+    model: GapModel,
+    sets: Sequence[Sequence[Effect]],
+    unsure: Sequence[Mapping[str, float]],
+) -> np.ndarray:
+    """Features in deviations: of sets of effects, of rows changed, and of the nominal
+    model, ``(E + R + 1, N)``."""
+    paths = model.simulate([trial], sets)
+    paths += model.paths([trial], [[row] for row in (*unsure, {})])
+    windows = model.joint_windows(trial)
+    features = model.compare(trial, np.stack([path for (path,) in paths]), windows)
+    known = found.floor
+    if "features" in known:
+        sd = np.array(known["features"], dtype=float) * np.sqrt(known["counted"])
+    else:  # an earlier diagnosis
+        sd = np.sqrt(Compared.diagnosed(found, [trial], model).noise(0, windows))
+    return (features / sd).reshape(len(features), -1)
 
 
 def _apart(shapes, slopes, i: int, j: int) -> float:
@@ -249,32 +276,29 @@ def _apart(shapes, slopes, i: int, j: int) -> float:
     return float(np.sqrt(max(gap @ gap - left @ np.linalg.solve(normal, left), 0.0)))
 
 
-def _moved(fit: Fit, model: GapModel) -> tuple[list[list[Effect]], list[float]]:
+def _moved(fit: Fit, model: GapModel) -> list[list[Effect]]:
     """The fit with each magnitude one standard deviation further."""
     effects = [store.parse(text, model) for text in fit.effects]
-    rows, spreads = [], []
+    rows = []
     for at, (name, interval) in enumerate(zip(fit.names, fit.intervals, strict=True)):
-        item = store.candidate(name, model)
-        if item.whole:
+        about = _strength(name, effects[at])
+        if about.integer:
             continue
         spread = (interval[1] - interval[0]) / 2 / LEVEL
-        magnitude = fit.magnitudes[at]
+        magnitude = float(effects[at][about.name])
         if spread <= 0:
-            spread = FREE * max(abs(magnitude - item.nominal), 1e-9)
+            spread = FREE * max(abs(magnitude - about.nominal), 1e-9)
         value = magnitude + spread
-        if value > item.high:
+        if value > about.high:
             value = magnitude - spread
-        values = {**effects[at].values, item.parameter: max(value, item.low)}
+        values = {**effects[at].values, about.name: max(value, about.low)}
         rows.append([*effects[:at], type(effects[at])(values), *effects[at + 1 :]])
-        spreads.append(spread)
-    return rows, spreads
+    return rows
 
 
-def _floor(found: Diagnosis, model: GapModel) -> Floor:
-    given = found.floor
-    return Floor(
-        np.array(given["sigma"][: len(model.channels)], dtype=float),
-        np.array(given["process"], dtype=float),
-        str(given["source"]),
-        int(given["repeats"]),
-    )
+def _strength(name: str, effect: Effect) -> Parameter:
+    """The parameter of an effect that an explanation's name stands for."""
+    stem = name.partition("[")[0].partition("@")[0]
+    strengths = [item for item in effect.parameters if item.scales]
+    said = [item for item in strengths if item.name == stem.rpartition(".")[2]]
+    return (said or strengths)[0]

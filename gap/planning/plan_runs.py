@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.stats import norm
 
-from bns.gap.core import verdict
+from bns.gap.decomposition.ties import TIED
 
 MOST, POWER = 10, 1.2816  # runs that may be asked for; standard normal: 90 % power
 
@@ -31,7 +31,7 @@ def parts(distance: float, *, tie: float | None = None) -> bool:
         distance: whitened, of all runs together.
         tie: difference of losses up to which two explanations count as tied.
     """
-    tie = verdict.calibration().sure if tie is None else tie
+    tie = 4 * TIED if tie is None else tie
     return bool(distance**2 - 2 * POWER * distance >= tie)
 
 
@@ -83,4 +83,4 @@ def _best(squares: np.ndarray, *, alone: bool) -> tuple[int, float, int, int]:
 
 def _needed() -> float:
     """Distance from which recordings decide, see `parts`."""
-    return POWER + float(np.sqrt(POWER**2 + verdict.calibration().sure))
+    return POWER + float(np.sqrt(POWER**2 + 4 * TIED))

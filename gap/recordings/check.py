@@ -26,7 +26,7 @@ FAR = 1e3  # [m] beyond it a position is a slip of a unit
 def check(
     trials: Sequence[Trial], model: GapModel
 ) -> tuple[tuple[Trial, ...], tuple[str, ...]]:
-    """Repair what can be repaired; by the model's own `check` if it has one.
+    """Repair what can be repaired.
 
     Args:
         trials: recorded trials.
@@ -38,14 +38,11 @@ def check(
     Raises:
         FormatError: channels that the model lacks or needs, or no usable trial.
     """
-    own = getattr(model, "check", None)
-    if own is not None:
-        return own(trials)
     wanted = tuple(channel.name for channel in model.channels)
     notes: list[str] = []
     kept: list[Trial] = []
     seen: dict[bytes, str] = {}
-    timed = getattr(model, "timed", True)  # else commands end by themselves
+    timed = model.timed  # else commands end by themselves
     odd = _odd_clocks(trials) if timed else {}
     for number, trial in enumerate(trials):
         label = trial_labels.of(trial, number)

@@ -117,7 +117,7 @@ def trials(
             "No trial is left: nothing was recorded, or --only and --trials drop all."
         )
     _of_robot(found, model)
-    step = getattr(model, "dt", 0.0)
+    step = model.dt
     return [on_grid(thinned(_fitting(trial, model)), step) for trial in found]
 
 
@@ -127,7 +127,7 @@ def _read(
     """Trials of a recording with their run, where there are several, and number."""
     from bns.worlds.data import dataset
 
-    own = hasattr(model, "read_log") and tables.reader(path) is not None
+    own = model.logs and tables.reader(path) is not None
     if Path(path).is_dir() and not importer and not own:
         inside = Path(path) / RUN
         found = dataset.read(inside if inside.is_dir() else path)
@@ -136,7 +136,7 @@ def _read(
         return zip(runs, found.numbers, found.trials, strict=True)
     if importer:
         listed = _imported(importer, path)
-    elif hasattr(model, "read_log"):
+    elif model.logs:
         listed = model.read_log(path)
     else:
         listed = _log(path, columns)
@@ -277,9 +277,8 @@ def tellable(found: Sequence[Trial], model: GapModel) -> None:
 
 def limits(model: GapModel) -> dict[str, tuple[float, float, str]]:
     """Lowest and highest command and its unit by channel; empty if not known."""
-    own = getattr(model, "limits", None)
-    if own is not None:
-        return dict(own)
+    if model.limits:
+        return dict(model.limits)
     if not models.known(model.name):
         return {}
     robot = models.robot(model.name)

@@ -29,7 +29,7 @@ def dropped(trial: Trial, model: GapModel) -> tuple[Trial, list[str]]:
     if not runs:
         return trial, []
     ((predicted,),) = model.simulate([trial], [()])
-    explained = _explained(trial, predicted, model)
+    explained = model.at_rest(trial, predicted)
     observed, notes = trial.observed.copy(), []
     for column, found in runs.items():
         if model.channels[column].name in explained:
@@ -49,13 +49,6 @@ def dropped(trial: Trial, model: GapModel) -> tuple[Trial, list[str]]:
                 f"by {moved:.2g} {unit}; these samples dropped"
             )
     return (trial.replace(observed=observed) if notes else trial), notes
-
-
-def _explained(trial: Trial, predicted: np.ndarray, model: GapModel) -> set[str]:
-    """Channels that stand still because of what they measure does."""
-    if not hasattr(model, "signs"):
-        return set()
-    return {f"{name}_position" for name in model.signs([trial], [predicted]).joints}
 
 
 def _others_move(values: np.ndarray, column: int, model: GapModel) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from bns.errors import BnsError, UnknownNameError
-from bns.worlds.trial import Trial
+from bns.worlds.trial import Channel, Trial
 
 SHOWN = 12  # values of a condition that an error lists
 
@@ -66,3 +66,18 @@ def _same(given: object, wanted: str) -> bool:
         except ValueError:
             return False
     return str(given) == wanted
+
+
+def narrowed(trial: Trial, channels: Sequence[Channel]) -> Trial:
+    """A trial with the first channels alone.
+
+    Args:
+        trial: recorded trial.
+        channels: those that come first.
+    """
+    count = len(channels)
+    if len(trial.channels) == count:
+        return trial
+    return trial.replace(
+        observed=trial.observed[:, :count], channels=trial.channels[:count]
+    )

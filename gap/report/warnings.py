@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bns.errors import BnsError
+from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel
 from bns.gap.recordings import trial_labels
 from bns.gap.records import Diagnosis
@@ -43,8 +44,13 @@ def _travel(observed: np.ndarray) -> float:
     return float(np.ptp(seen, axis=0).max()) if len(seen) else 0.0
 
 
-def warnings(found: Diagnosis, model: GapModel) -> tuple[str, ...]:
-    """Further warnings on a diagnosis, one line each."""
+def warnings(found: Diagnosis, rows: Sequence[Row]) -> tuple[str, ...]:
+    """Further warnings on a diagnosis, one line each.
+
+    Args:
+        found: the diagnosis.
+        rows: of its model.
+    """
     made = []
     if change := found.change:
         made.append(
@@ -58,7 +64,7 @@ def warnings(found: Diagnosis, model: GapModel) -> tuple[str, ...]:
             "Every fitted effect ends at a bound: the ranges are too narrow, or the "
             "model is of another robot."
         )
-    items = {item.name: item for item in model.candidates()}
+    items = {row.term: row for row in rows}
     least = found.signatures.get("detectability", {})
     quiet = [name for name, size in least.items() if size is None and name in items]
     shown = [f"{name} ({items[name].excite})" for name in quiet[:LISTED]]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bns.gap.bench.cases import commands
+from bns.gap.bench.wheeled_cases import commands
 from bns.gap.models.wheeled import WheeledModel
 
 

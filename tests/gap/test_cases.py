@@ -1,13 +1,13 @@
 """Cases of the withheld-effect bench, and how they are scored."""
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 
 from bns.errors import BnsError
 from bns.gap.bench import benchmark_io, cases, scoring
-from bns.gap.core import model_order, verdict
+from bns.gap.bench.wheeled_cases import WheeledStand
 from bns.gap.models.wheeled import WheeledModel
 from bns.gap.recordings import check
 
@@ -41,8 +41,8 @@ def test_silence_is_not_counted_as_right():
 
 
 def test_a_case_is_the_same_for_the_same_seed(model):
-    first = cases.build(5, "none", model)
-    second = cases.build(5, "none", model)
+    first = cases.build(5, "none", WheeledStand(model))
+    second = cases.build(5, "none", WheeledStand(model))
     np.testing.assert_equal(asdict(first.answer), asdict(second.answer))  # nan too
     for a, b in zip(first.trials, second.trials, strict=True):
         assert np.array_equal(a.observed, b.observed, equal_nan=True)
@@ -51,7 +51,7 @@ def test_a_case_is_the_same_for_the_same_seed(model):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_faults_are_noticed(model, seed):
-    case = cases.build(seed, "fault", model)
+    case = cases.build(seed, "fault", WheeledStand(model))
     _, notes = check.check(case.trials, model)
     words = {
         "wrap": "wrapped",
@@ -66,7 +66,7 @@ def test_faults_are_noticed(model, seed):
 
 
 def test_a_casebook_keeps_its_answers_apart(model, tmp_path):
-    case = cases.build(5, "none", model)
+    case = cases.build(5, "none", WheeledStand(model))
     with pytest.raises(BnsError, match="see the answers"):
         benchmark_io.make(tmp_path / "book", tmp_path / "book" / "a.json", [])
     made = benchmark_io.make(
@@ -75,7 +75,7 @@ def test_a_casebook_keeps_its_answers_apart(model, tmp_path):
     assert made == 1
     assert "wheel_diameter" not in (tmp_path / "book/c1/dataset.json").read_text()
     said = tmp_path / "said.jsonl"
-    few = FewCandidates(threads=1)
+    few = FewRows(threads=1)
     assert benchmark_io.run(tmp_path / "book", few, said) == 1
     assert benchmark_io.run(tmp_path / "book", few, said) == 0
     (row,) = benchmark_io.score(said, tmp_path / "answers.json")
@@ -83,38 +83,25 @@ def test_a_casebook_keeps_its_answers_apart(model, tmp_path):
     assert row["said"]["verdict"] == "no gap"
 
 
-class FewCandidates(WheeledModel):
-    def candidates(self):
-        return tuple(c for c in super().candidates() if c.slack)
+class FewRows(WheeledModel):
+    def rows(self, trials):
+        return tuple(row for row in super().rows(trials) if row.slack or row.nuisance)
 
 
-def rungs():
-    nothing = model_order.Rung(0, 190.0, (95.0, 95.0), (((), 0.0),), 0.0, 80.0, 0.0)
-    scores = ((("a",), 0.0), (("b",), 4.0))
-    one = model_order.Rung(1, 100.0, (50.0, 51.0), scores, 0.5, 0.0, 90.0)
-    two = model_order.Rung(2, 80.0, (41.0, 42.0), ((("a", "c"), 0.0),), 0.5, 0.0, 110.0)
-    return [nothing, one, two]
+def test_a_case_hides_what_its_answer_says(model):
+    case = cases.build(3, "single", WheeledStand(model), wanted="wheel_gain[left]")
+    (name,), (text,) = case.answer.names, case.answer.effects
+    assert name == "wheel_gain[left]" and text.startswith("wheel_gain:wheel=left")
+    assert name in case.answer.aliases[0]
+    low, high = cases.SIZES
+    assert 0.5 * low < case.answer.sizes[0] < 2 * high
 
 
-def test_thresholds_are_applied_to_what_was_kept():
+def test_an_interval_holds_the_truth_or_does_not():
     kept = row([["a"]])
-    kept["said"] |= {"p_gap": 1e-9, "worth": 13.0, "magnitudes": [[2.0, 0.1, 1.0]]}
-    kept["said"]["rungs"] = [rung.as_dict() for rung in rungs()]
-    narrow = verdict.Calibration(tie=3.0, sure=3.5, more=25.0, model_error=0.0)
-    wide = verdict.Calibration(tie=5.0, sure=5.0, more=25.0, widen=2.0)
-    assert scoring.judged(kept, narrow)["said"]["verdict"] == "effect"
-    assert scoring.judged(kept, wide)["said"]["verdict"] == "either"
-    assert scoring.judged(kept, wide)["said"]["sets"] == (("a",), ("b",))
-    kept["answer"]["magnitudes"] = [2.2]
-    assert scoring.parameter([scoring.judged(kept, narrow)])["intervals that hold"] == 0
-    assert scoring.parameter([scoring.judged(kept, wide)])["intervals that hold"] == 1
-
-
-def test_a_further_effect_has_to_explain_its_share():
-    of = verdict.Calibration
-    assert model_order.climb(rungs(), 13.0, of(more=15.0, minor=0.1)).size == 2
-    assert model_order.climb(rungs(), 13.0, of(more=25.0, minor=0.1)).size == 1
-    assert model_order.climb(rungs(), 13.0, of(more=15.0, minor=0.2)).size == 1
-    assert model_order.climb(rungs(), 200.0, of(more=15.0, minor=0.1)).size == 0
-    worse = replace(rungs()[2], held_out=(52.0, 53.0))
-    assert model_order.climb([*rungs()[:2], worse], 13.0, of(more=15.0)).size == 1
+    kept["answer"] |= {"magnitudes": [2.2], "effects": ["a:factor=2.2"]}
+    kept["said"]["intervals"] = [[2.0, 1.9, 2.1]]
+    assert scoring.parameter([kept])["intervals that hold"] == 0
+    assert scoring.parameter([kept])["median relative error"] == pytest.approx(1 / 6)
+    kept["said"]["intervals"] = [[2.0, 1.7, 2.3]]
+    assert scoring.parameter([kept])["intervals that hold"] == 1

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bns.gap.bench.cases import commands
+from bns.gap.bench.wheeled_cases import commands
 from bns.gap.decomposition import diagnosis, rest
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
@@ -30,8 +30,7 @@ def recorded(model):
 
 
 def kept(trials, model):
-    few = [item for item in model.candidates() if item.name in KEPT]
-    return diagnose(trials, model, candidates=few, full=False)
+    return diagnose(trials, model, rows=KEPT, full=False)
 
 
 def test_damage_that_sets_in_is_dated_and_named(recorded, model):

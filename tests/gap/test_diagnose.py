@@ -1,17 +1,14 @@
 """Known answers: planted effects are named, nothing is "no gap", aliases are sets."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from bns.errors import BnsError, FormatError
-from bns.gap.core import fit, segments, select, signatures, verdict
-from bns.gap.core.problem import Problem
-from bns.gap.core.reference import Reference
+from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.reference import Corrected
 from bns.gap.diagnose import diagnose
 from bns.gap.recordings import check
-from bns.gap.records import Candidate, Diagnosis
+from bns.gap.records import Diagnosis
 from bns.worlds.effects.base import CommandEffect, Parameter
 from bns.worlds.physics.wheeled_world import MujocoWorld
 from bns.worlds.trial import Channel, Commands
@@ -31,12 +28,10 @@ KEPT = (
 
 @pytest.fixture(scope="module")
 def find(model, told):
-    few = tuple(item for item in model.candidates() if item.name in KEPT)
-
     def run(*effects, full=False):
         world = MujocoWorld(reality=[*effects, NOISE], threads=1)
         trials = world.run(told, seeds=range(len(told)))
-        return diagnose(trials, model, candidates=few, full=full)
+        return diagnose(trials, model, rows=KEPT, full=full)
 
     return run
 
@@ -65,9 +60,8 @@ def test_one_effect_is_named_with_its_value(find, text, name, value, tolerance):
 
 
 def test_a_simulated_recording_without_noise_is_named(model, told):
-    few = tuple(item for item in model.candidates() if item.name in KEPT)
     world = MujocoWorld(reality=["wheel_gain:wheel=left,factor=0.85"], threads=1)
-    found = diagnose(world.run(told), model, candidates=few, full=False)
+    found = diagnose(world.run(told), model, rows=KEPT, full=False)
     assert found.verdict.kind == "effect"
     assert found.verdict.named == (("wheel_gain[left]",),)
 
@@ -107,23 +101,18 @@ def test_an_effect_outside_the_library_is_none_of_it(find):
 
 
 def test_recordings_without_a_change_make_the_nominal_model_surer(model, told):
-    few = tuple(item for item in model.candidates() if item.slack)
-    off = ["axle_length:factor=1.006", NOISE]
+    off = ["axle_length:factor=1.03", NOISE]
     before = MujocoWorld(reality=off, threads=1).run(told, seeds=range(4))
-    planted = ["axle_length:factor=0.993", NOISE]
+    known = Corrected.of(check.check(before, model)[0], model)
+    assert known.moved["axle_length"] == pytest.approx(0.03, abs=0.005)
+    # what was off before is no gap, and what came since is
+    planted = ["axle_length:factor=1.03", "wheel_gain:wheel=left,factor=0.85", NOISE]
     after = MujocoWorld(reality=planted, threads=1).run(told, seeds=range(4, 8))
-    known = Reference.of(before, model, few)
-    place = [item.name for item in few].index("axle_length")
-    assert known.mean[place] * few[place].slack == pytest.approx(0.006, abs=0.001)
-    alone = Problem.of(after, model, candidates=few)
-    better = known.problem(after, model)
-    effect = [[few[place].make(0.987)]]  # 0.993 / 1.006
-    seen = [np.linalg.norm(p.signatures(effect)) for p in (alone, better)]
-    assert seen[1] > 2 * seen[0]
-    # the empty recording fits: what was off before is no gap
+    found = diagnose(after, model, rows=KEPT, reference=before, full=False)
+    assert found.verdict.named == (("wheel_gain[left]",),)
     same = MujocoWorld(reality=off, threads=1).run(told, seeds=range(8, 12))
-    rest = known.problem(same, model).rest
-    assert (rest**2).mean() == pytest.approx(1.0, abs=0.25)
+    found = diagnose(same, model, rows=KEPT, reference=before, full=False)
+    assert found.verdict.kind == "no gap"
 
 
 def test_where_and_how_far(find):
@@ -163,78 +152,25 @@ def test_further_channels_do_not_count(model, told):
         for trial in trials
     ]
     plain, wide = (Problem.of(which, model) for which in (trials, more))
-    assert np.array_equal(plain.rest, wide.rest)
-    assert np.array_equal(plain.floor.sigma, wide.floor.sigma)
+    assert np.array_equal(plain.recorded, wide.recorded)
+    assert np.array_equal(plain.gap, wide.gap)
 
 
-def test_the_distance_to_a_curve_is_taken_along_it(model):
-    curves = signatures.Curves(
-        model.candidates()[:1],
-        np.zeros(1, dtype=int),
-        np.zeros(1, dtype=int),
-        np.array([1.1]),
-        np.array([[3.0, 0.0]]),
-        (),
-    )
-    gaps, at = signatures.nearest(curves, np.array([1.5, 2.0]))
-    assert gaps[0] == pytest.approx(4.0)
-    assert at[0] == 0
-
-
-def test_fits_end_on_the_simulation_itself(model, told):
-    drag = "rolling_drag:wheel=left,torque=0.0002"
-    trials = MujocoWorld(reality=[drag, NOISE], threads=1).run(told, seeds=range(4))
-    problem = Problem.of(trials, model)
-    item = next(c for c in model.candidates() if c.name == "rolling_drag.torque[left]")
-    point = fit.refine(problem, [fit.Term.at(item, 0, 0.0003)])
-    (true,) = fit.evaluate(problem, [point.terms])
-    (rough,) = fit.evaluate(problem, [point.terms], rough=True)
-    assert point.loss == pytest.approx(true.loss)
-    assert abs(rough.loss - true.loss) > 1.0  # else the test shows nothing
-    around = [point.terms[0].magnitude * share for share in (0.99, 1.01)]
-    near = fit.evaluate(problem, [[fit.Term.at(item, 0, value)] for value in around])
-    assert point.loss < min(other.loss for other in near) + 0.5
-
-
-def test_stitched_pieces_keep_the_path():
-    path = np.cumsum(np.random.default_rng(0).normal(size=(30, 3)), axis=0)
-    parts = [path[:11], segments.moved(path[10:], np.array([5.0, -1.0, 2.0]))]
-    assert np.allclose(segments.stitched(parts), path)
-
-
-def test_every_candidate_makes_its_effect(model):
-    names = [item.name for item in model.candidates()]
-    assert len(set(names)) == len(names)
-    for item in model.candidates():
-        for branch in range(len(item.branches)):
-            for value in item.grid:
-                assert not item.make(value, branch).is_nominal
-    with pytest.raises(BnsError, match="grid"):
-        Candidate("x", "wheel_gain", "factor", "1", 1.0, 0.0, 2.0, grid=(3.0,))
-
-
-def test_no_support_fits_worse_than_one_it_contains(model):
-    items = {item.name: item for item in model.candidates()}
-    gain, lag = items["wheel_gain[left]"], items["motor_lag[both]"]
-    one = fit.Point((fit.Term.at(gain, 0, 0.9),), np.ones(3), 3.0, np.ones((1, 3)))
-    worse = (fit.Term.at(lag, 0, 0.3), fit.Term.at(gain, 0, 0.8))
-    two = fit.Point(worse, np.full(3, 2.0), 12.0, np.ones((2, 3)))
-    (made,) = select.nested([two], [one])
-    assert made.loss == 3.0
-    assert set(made.names) == {"wheel_gain[left]", "motor_lag[both]"}
-    assert [term.magnitude for term in made.terms] == [0.9, lag.nominal]
-    assert made.slopes.shape == (2, 3)
-    better = replace(two, loss=2.0)
-    assert select.nested([better], [one]) == (better,)
-
-
-def test_dead_bands_are_tried_between_the_speeds_told(model):
-    items = {item.name: item for item in model.candidates()}
-    there = Commands([[0.02, 0.05], [-0.04, 0.1]], [1.0, 1.0])
-    trials = MujocoWorld(threads=1).run([there])
-    steps = model.steps(items["dead_band[left]"], trials)
-    assert steps[:2] == pytest.approx((0.03, 0.12))
-    assert model.steps(items["dead_band[both]"], trials)[0] == pytest.approx(0.03)
+def test_an_effect_is_simulated_as_its_row_is(model, told):
+    """What a diagnosis names is what its fit simulated."""
+    trials = MujocoWorld(reality=[NOISE], threads=1).run(told[:1], seeds=[1])
+    rows = model.rows(trials)
+    for name, value in (
+        ("motor_lag[left]", 0.12),
+        ("marker_mount.dx", 0.02),
+        ("tracker_latency", 0.05),
+        ("axle_length", 0.95),
+    ):
+        (row,) = [row for row in rows if row.name == name]
+        ((by_row,),) = model.paths(trials, [[{name: value}]])
+        effect = model.effect(row.term, {name: value})
+        ((by_effect,),) = model.simulate(trials, [[effect]])
+        assert np.abs(by_row - by_effect).max() < 1e-9, name
 
 
 def test_channels_have_to_fit(model, told):
@@ -245,16 +181,6 @@ def test_channels_have_to_fit(model, told):
     (short,) = MujocoWorld(threads=1).run([Commands([[0.1, 0.1]], [3.0])])
     with pytest.raises(BnsError, match="needs 2"):
         diagnose([short], model)
-
-
-def test_conformal_quantile_covers():
-    rng = np.random.default_rng(0)
-    scores = rng.exponential(size=199)
-    threshold = verdict.quantile(scores, 0.9)
-    assert (scores <= threshold).mean() >= 0.9
-    assert (rng.exponential(size=20_000) <= threshold).mean() == pytest.approx(
-        0.9, abs=0.06
-    )
 
 
 def test_a_small_rest_beside_a_large_effect_takes_no_name_away(find):

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from bns import models
-from bns.gap.bench import cases
-from bns.gap.models import surrogate
+from bns.gap.bench import wheeled_cases as cases
 from bns.models import check, new, numbers
 from bns.worlds import registry
 from bns.worlds.light import sensors as light_sensors
@@ -88,10 +87,6 @@ def test_light_sensors_sit_on_the_body_and_look_out(tmp_path):
 
 def test_a_slow_robot_is_diagnosed_within_its_speeds(tmp_path):
     place, known = made(tmp_path, "epuck")
-    per_command = models.robot(place).ctrl_per_command
-    assert surrogate.reduced(
-        place, (), per_command
-    ).rough  # else each fit takes minutes
     told = cases.commands(np.random.default_rng(0), 20, robot=place)
     most = max(np.abs(item.values).max() for item in told)
     assert 0.8 * known.top_speed < most <= known.top_speed

@@ -9,8 +9,11 @@ import pytest
 
 from bns import models
 from bns.errors import BnsError
-from bns.gap.bench import walk_cases
+from bns.gap.bench import cases
+from bns.gap.bench.walk_cases import WalkStand
+from bns.gap.candidates import legged
 from bns.gap.models.legged.model import WalkModel
+from bns.gap.models.legged.where import Suspects
 from bns.models import check, legs
 from bns.models.legs import PARTS
 from bns.worlds import registry
@@ -101,11 +104,11 @@ def test_joints_that_it_lacks_are_refused(robot):
 
 def test_a_leg_that_is_held_up_is_seen_in_its_recordings(robot):
     model = WalkModel(str(robot))
-    listed = [item.name for item in model.candidates()]
+    listed = [row.name for row in legged.rows(Suspects((), (), True), model.joints)]
     (absent,) = set(PARTS) - set(legs.parts(model.joints))
     assert not [name for name in listed if absent in name]
-    case = walk_cases.build(2, "lost", model)
+    case = cases.build(2, "lost", WalkStand(model))
     predicted = model.simulate(case.trials, [()])[0]
-    named = [item.name for item in model.suspected(case.trials)]
-    assert case.term.candidate.name in named
+    named = [row.name for row in model.rows(case.trials)]
+    assert case.answer.names[0] in named
     assert model.signs(case.trials, predicted).joints

@@ -7,8 +7,8 @@ import pytest
 
 from bns.__main__ import main
 from bns.gap import store
-from bns.gap.bench.cases import commands
-from bns.gap.candidates import wheeled
+from bns.gap.bench.wheeled_cases import commands
+from bns.gap.candidates import wheeled_rows
 from bns.worlds import corrected
 from bns.worlds.data import dataset
 from bns.worlds.physics.wheeled_world import MujocoWorld
@@ -31,9 +31,13 @@ def home(tmp_path_factory):
     here = tmp_path_factory.mktemp("gap")
     recorded(here / "data", GAIN)
     words = ["gap", "diagnose", str(here / "data"), "--out", str(here / "out")]
-    few = tuple(i for i in wheeled.candidates() if i.name in KEPT)
-    with pytest.MonkeyPatch.context() as patch:  # few candidates take less time
-        patch.setattr(wheeled, "candidates", lambda: few)
+    every = wheeled_rows.rows
+
+    def few(trials):
+        return tuple(r for r in every(trials) if r.name in KEPT or r.nuisance)
+
+    with pytest.MonkeyPatch.context() as patch:  # few rows take less time
+        patch.setattr(wheeled_rows, "rows", few)
         assert main([*words, "--threads", "1"]) == 0
     return here
 

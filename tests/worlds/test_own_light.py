@@ -140,9 +140,5 @@ def test_a_weak_sensor_is_named(robot, request):
     trials = world.drive(roams, cycles=40, seeds=[1, 2, 3])
     names = ("wheel_gain[left]", "sensor_gain[left]", "sensor_gain[right]")
     model = WheeledModel(place)
-    from bns.gap.candidates import light
-
-    library = (*model.candidates(), *light.candidates(singles=False))
-    few = [item for item in library if item.name in names]
-    found = diagnose.diagnose(trials, model, candidates=few, full=False).verdict
+    found = diagnose.diagnose(trials, model, rows=names, full=False).verdict
     assert found.named == (("sensor_gain[left]",),)

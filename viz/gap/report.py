@@ -62,13 +62,14 @@ def write(
 
 def _context(found: Diagnosis, trials: Sequence[Trial], model: GapModel | None) -> dict:
     about = found.provenance
+    rows = model.rows(trials) if model is not None else ()
     return {
         "found": found,
         "title": gap_words.title(found),
         "answers": gap_words.answers(found),
         "explanations": gap_words.explanations(found),
-        "detectable": gap_words.detectable(found, model),
-        "steps": gap_words.next_steps(found, model),
+        "detectable": gap_words.detectable(found, rows),
+        "steps": gap_words.next_steps(found, rows),
         "figures": _figures(found, trials, model),
         "data": about.get("data", ()),
         "command": _command(found),

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns.gap import store
-from bns.gap.core import residuals
-from bns.gap.core.floor import derivative
-from bns.gap.core.problem import Problem
-from bns.gap.core.whitening import terms
 from bns.gap.models.base import GapModel
 from bns.gap.recordings import check
 from bns.gap.records import Diagnosis, Residuals
+from bns.gap.where import horizons
+from bns.gap.where.compared import Compared, terms
 from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Trial
 
@@ -25,7 +23,7 @@ class View:
     """A recording beside its predictions.
 
     Attributes:
-        problem: the recording and the nominal model.
+        problem: the recording beside the nominal model.
         effects: of the corrected model; empty where nothing explains the gap.
         nominal, corrected: predicted samples of each trial, ``(T, n_channels)``.
         left: features of recorded minus corrected motion of each trial, ``(W, C)``.
@@ -33,7 +31,7 @@ class View:
         after: residuals of the corrected model by horizon.
     """
 
-    problem: Problem
+    problem: Compared
     effects: tuple[Effect, ...]
     nominal: tuple[np.ndarray, ...]
     corrected: tuple[np.ndarray, ...]
@@ -52,11 +50,7 @@ class View:
 
     def scatter(self, trial: int) -> np.ndarray:
         """Standard deviation of the floor in each window of a trial, ``(W, C)``."""
-        floor, windows = self.problem.floor, self.problem.windows[trial]
-        model = self.problem.model
-        jacobian = derivative(model, self.trials[trial], windows) * floor.sigma
-        own = (jacobian**2).sum(axis=(1, 2)).reshape(len(windows), -1)
-        return np.sqrt(own + np.outer(windows.durations, floor.process**2))
+        return self.problem.scatter[trial]
 
     def largest(self, most: int = MOST) -> list[int]:
         """The features with the largest gaps, by the floor; all where there are few.
@@ -64,15 +58,13 @@ class View:
         Returns:
             Their numbers, in order.
         """
-        sizes = [(self.gap(n) / self.scatter(n)) ** 2 for n in range(len(self.trials))]
+        sizes = [gap**2 for gap in self.problem.gap]
         size = np.nanmean(np.concatenate(sizes), axis=0)
         return sorted(np.argsort(-size, kind="stable")[:most].tolist())
 
     def energy(self, trial: int) -> np.ndarray:
         """Loss of the nominal model in each window of a trial; 1 = the floor."""
-        rows = self.problem.whiten.rows[trial]
-        channels = len(self.problem.model.features)
-        return terms(self.problem.rest[rows]).reshape(-1, channels).mean(axis=1)
+        return terms(self.problem.gap[trial]).mean(axis=1)
 
 
 def view(found: Diagnosis, trials: Sequence[Trial], model: GapModel) -> View:
@@ -85,7 +77,7 @@ def view(found: Diagnosis, trials: Sequence[Trial], model: GapModel) -> View:
     """
     usable, _ = check.check(trials, model)
     effects = tuple(store.parse(text, model) for text in corrections(found))
-    problem = Problem.of(usable, model, candidates=model.candidates())
+    problem = Compared.diagnosed(found, usable, model)
     nominal, corrected = model.simulate(usable, [(), effects])
     left = tuple(
         recorded - model.compare(trial, made, windows)
@@ -93,7 +85,7 @@ def view(found: Diagnosis, trials: Sequence[Trial], model: GapModel) -> View:
             problem.recorded, usable, corrected, problem.windows, strict=True
         )
     )
-    losses = [terms(problem.rest[rows]).mean() for rows in problem.whiten.rows]
+    losses = [terms(gap).mean() for gap in problem.gap]
     return View(
         problem,
         effects,
@@ -101,7 +93,7 @@ def view(found: Diagnosis, trials: Sequence[Trial], model: GapModel) -> View:
         tuple(corrected),
         left,
         int(np.argmax(losses)),
-        residuals.residuals(problem, effects, seed=found.seed),
+        horizons.residuals(problem, effects, seed=found.seed),
     )
 
 

@@ -1,10 +1,10 @@
 """A diagnosis in words and tables, for its report."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from bns.gap.models.base import GapModel
+from bns.gap.decomposition.row import Row
 from bns.gap.records import Diagnosis, Fit
 
 LISTED = 12  # rows of the table of explanations
@@ -173,9 +173,14 @@ def _row(found: Diagnosis, fit: Fit, nothing: Fit | None, count: float) -> list[
     ]
 
 
-def detectable(found: Diagnosis, model: GapModel | None) -> dict[str, Any]:
-    """The smallest effect of each kind that this recording shows."""
-    items = {item.name: item for item in model.candidates()} if model else {}
+def detectable(found: Diagnosis, known: Sequence[Row]) -> dict[str, Any]:
+    """The smallest effect of each kind that this recording shows.
+
+    Args:
+        found: the diagnosis.
+        known: rows of its model; none = units are not said.
+    """
+    items = {row.term: row for row in known}
     rows = []
     for name, least in found.signatures.get("detectability", {}).items():
         item = items.get(name)
@@ -188,8 +193,8 @@ def detectable(found: Diagnosis, model: GapModel | None) -> dict[str, Any]:
     return {"header": head, "rows": rows}
 
 
-def next_steps(found: Diagnosis, model: GapModel | None) -> list[str]:
-    """What to do now, one line each."""
+def next_steps(found: Diagnosis, known: Sequence[Row]) -> list[str]:
+    """What to do now, one line each; `known` as for `detectable`."""
     steps = [found.verdict.change] if found.verdict.change else []
     if found.verdict.kind == "either":
         steps.append("bns gap plan DIR writes the command that separates them best.")
@@ -199,7 +204,7 @@ def next_steps(found: Diagnosis, model: GapModel | None) -> list[str]:
             "a recording without the effect."
         )
         steps.append("bns gap apply DIR --world NAME keeps the corrected world.")
-    quiet = [row for row in detectable(found, model)["rows"] if row[1] == "not excited"]
+    quiet = [row for row in detectable(found, known)["rows"] if row[1] == "not excited"]
     for name, _, excite in quiet[:4]:
         steps.append(f"{name} could not have been seen; it would take {excite}.")
     return steps

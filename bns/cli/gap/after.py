@@ -117,12 +117,20 @@ def _plan(given: Planned) -> int:
 
 
 def _plannable(found: Any, model: Any) -> None:
-    known = {item.name for item in model.candidates()}
-    tied = {name for names in found.verdict.named for name in names}
-    unknown = sorted(tied - known) if len(found.verdict.named) > 1 else []
-    if unknown:
+    from bns.gap import store
+    from bns.gap.planning import plan
+    from bns.worlds.effects.base import OpticsEffect, SensorEffect
+
+    light = [
+        name
+        for fit in plan.tied(found)
+        for name, text in zip(fit.names, fit.effects, strict=True)
+        if "light" in found.floor
+        and isinstance(store.parse(text, model), OpticsEffect | SensorEffect)
+    ]
+    if light and len(found.verdict.named) > 1:
         raise BnsError(
-            f"No safe commands are known that part {', '.join(unknown)}. "
+            f"No safe commands are known that part {', '.join(sorted({*light}))}. "
             f"{found.verdict.change}"
         )
 
@@ -161,7 +169,9 @@ def _apply(given: Apply) -> int:
     if found.verdict.kind == "either" and not given.effect:
         others = " or ".join(" + ".join(names) for names in found.verdict.named)
         print(f"note: tied are {others}; the first is taken, --effect chooses another.")
-    own = hasattr(model, "parse")
+    from bns.gap.models.mjcf.model import OwnModel
+
+    own = isinstance(model, OwnModel)
     if own or given.xml:
         if not (own and given.xml):
             raise BnsError(

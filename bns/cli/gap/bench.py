@@ -1,6 +1,6 @@
 """`bns gap bench`: blind cases made, diagnosed, and scored against sealed answers."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -75,36 +75,40 @@ def _make(given: Make) -> int:
     from bns.gap.recordings import load_recordings
 
     model = load_recordings.model(given.model, threads=2)
-    build, allowed = _builder(model)
+    stand = _stand(model)
     for kind in given.kinds:
-        if kind not in allowed:
-            raise UnknownNameError(f"kind of case of {model.name}", kind, allowed)
+        if kind not in stand.kinds:
+            raise UnknownNameError(f"kind of case of {model.name}", kind, stand.kinds)
     made = benchmark_io.make(
-        Path(given.cases), Path(given.answers), _cases(given, model, build)
+        Path(given.cases), Path(given.answers), _cases(given, stand)
     )
     print(f"{made} cases in {given.cases}, answers in {given.answers}")
     return 0
 
 
-def _builder(model: Any) -> tuple[Callable[..., Any], tuple[str, ...]]:
-    """What makes cases of a model, and the kinds that it can make."""
-    from bns.gap.bench import cases, mjcf_bench, walk_bench
+def _stand(model: Any) -> Any:
+    """The robot of a model that cases are made of."""
+    from bns.gap.bench import mjcf_cases, walk_cases, wheeled_cases
+    from bns.gap.models.legged.model import WalkModel
+    from bns.gap.models.mjcf.model import OwnModel
+    from bns.gap.models.wheeled import WheeledModel
 
-    wheeled = ("single", "pair", "none", "fault")
-    if hasattr(model, "parse"):
-        return mjcf_bench.build, (*wheeled, "off-library")
-    if getattr(model, "winding", False):
-        return walk_bench.build, walk_bench.KINDS
-    return cases.build, wheeled
+    if isinstance(model, OwnModel):
+        return mjcf_cases.OwnStand(model)
+    if isinstance(model, WalkModel):
+        return walk_cases.WalkStand(model)
+    if isinstance(model, WheeledModel):
+        return wheeled_cases.WheeledStand(model)
+    raise BnsError(f"No cases can be made of {model.name!r}; take a robot that moves.")
 
 
-def _cases(
-    given: Make, model: Any, build: Callable[..., Any]
-) -> Iterator[tuple[str, Any]]:
+def _cases(given: Make, stand: Any) -> Iterator[tuple[str, Any]]:
+    from bns.gap.bench import cases
+
     for place, kind in enumerate(given.kinds):
         for number in range(given.count):
             seed = given.seed + 1000 * place + number
-            yield f"case_{seed:06d}", build(seed, kind, model)
+            yield f"case_{seed:06d}", cases.build(seed, kind, stand)
 
 
 def _run(given: Run) -> int:

@@ -55,9 +55,7 @@ class Diagnose(Check):
     """recordings of the same robot in which nothing was changed: they tell how far the
     nominal model is off anyway"""
     seed: int = 0
-    """of what is drawn (null distributions, bootstraps)"""
-    most: int = 3
-    """largest number of effects at once, of servos, legs and light; else no limit"""
+    """of what is drawn (bootstraps)"""
     threads: int = 2
     """threads of the physics"""
 
@@ -198,10 +196,8 @@ def _general(given: Diagnose, model: Any, trials: list[Any], out: Path | None) -
             return _servo(given, model, usable)
         warnings.reproducible(usable, model)
         unchanged = recorded(replace(given, data=given.reference, trials=""), model)
-        found = diagnose(
-            trials, model, seed=given.seed, most=given.most, reference=unchanged
-        )
-        more = warnings.warnings(found, model)
+        found = diagnose(trials, model, seed=given.seed, reference=unchanged)
+        more = warnings.warnings(found, model.rows(usable))
         return replace(found, warnings=(*found.warnings, *more))
     except BnsError as error:
         if out and not isinstance(error, StorageError):

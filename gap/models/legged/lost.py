@@ -1,14 +1,14 @@
 """What a walking robot has probably lost, so that its scatter is found without it.
 
 Robots that lack a leg stumble where whole ones walk: what such a recording may depart
-by is found by the walks of robots that lack it as well, see `walk_floor`.
+by is found by the walks of robots that lack it as well, see `scatter`.
 """
 
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from bns.gap.records import Candidate
+from bns.gap.decomposition.row import Row
 from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Trial
 
@@ -18,7 +18,7 @@ Simulate = Callable[[Sequence[Trial], Sequence[Sequence[Effect]]], list]
 
 
 def likely(
-    trials: Sequence[Trial], candidates: Sequence[Candidate], simulate: Simulate
+    trials: Sequence[Trial], candidates: Sequence[Row], simulate: Simulate
 ) -> tuple[Effect, ...]:
     """Losses that explain the servos' positions best, one after the other.
 

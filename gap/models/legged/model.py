@@ -10,18 +10,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bns.gap.candidates import legged
-from bns.gap.core import segments
-from bns.gap.core.floor import Floor
-from bns.gap.core.problem import Problem
-from bns.gap.core.whitening import Whitener
-from bns.gap.models.base import Windows
-from bns.gap.models.legged import floor, where
+from bns.gap.decomposition.row import Row
+from bns.gap.models.base import LibraryModel, Windows
 from bns.gap.models.legged import lost as walk_lost
+from bns.gap.models.legged import scatter, where
 from bns.gap.models.legged import signs as walk_signs
 from bns.gap.models.legged.signs import Signs
-from bns.gap.models.legged.where import Suspects
-from bns.gap.records import Candidate
-from bns.models.legs import names as legs_of
+from bns.gap.recordings import segments
 from bns.worlds.active import Stages, as_damage
 from bns.worlds.damage import Damage
 from bns.worlds.effects.base import Effect
@@ -34,10 +29,11 @@ WINDOW = 0.12  # [s] over which the body's motion is compared
 TRACKER = (1e-3, 1e-3, 1e-2)  # [m, m, rad] noise of the tracker; assumed
 READING = 2e-3  # [rad] of a servo's reading, which comes in steps of 5.1 mrad
 SCATTER = (2e-3, 2e-3, 0.01)  # [m, m, rad per root second] of a walking body; assumed
+SLIPS = (1e-3, 1e-3, 5e-3)  # [m, m, rad] of a step although all is as told; assumed
 WOBBLE = 3e-3  # [rad per root second] of a joint; assumed
 
 
-class WalkModel:
+class WalkModel(LibraryModel):
     """A hexapod in MuJoCo whose servos report their positions, see `GapModel`.
 
     Args:
@@ -49,9 +45,10 @@ class WalkModel:
     """
 
     timed = False
+    starts = 8
+    singly = True
+    odds = 12.0  # what walking scatters is alike in all servos, hardly independent
     """commands last until the robot rests, not as long as they are told"""
-    winding = True
-    """signatures turn as effects grow, see `winding`"""
 
     def __init__(self, robot: str = "phantomx", *, pose_sd: Sequence[float] = TRACKER):
         world = HexapodWorld(robot, threads=1)
@@ -72,65 +69,80 @@ class WalkModel:
             *joints,
         )
         self.process = np.array([*SCATTER, *[WOBBLE] * len(joints)])
+        self._walks: dict[bytes, np.ndarray] = {}
         self.resolution = np.array([*pose_sd, *[READING] * len(joints)])
-        self.floor = Floor(self.resolution, self.process, "model", 0)
-        self._walks: tuple[bytes, list[list[np.ndarray]]] = b"", []
 
-    def candidates(self) -> tuple[Candidate, ...]:
-        """Effects on all legs together; `suspected` has those of single ones."""
-        return legged.candidates(Suspects((), (), True), self.joints)
+    @property
+    def least(self) -> np.ndarray:
+        """Smallest believed standard deviation of each feature."""
+        moved = np.hypot(self.resolution[:3], SLIPS)
+        return np.concatenate([moved, self.resolution[3:]])
 
-    def suspected(
-        self, trials: Sequence[Trial], *, everywhere: bool = False
-    ) -> tuple[Candidate, ...]:
-        """Candidates on the joints and legs in which recordings depart, and on all.
-
-        Args:
-            trials: recordings.
-            everywhere: on every joint and leg; a push that the body passes on shows
-                where it does not act.
-        """
+    def rows(self, trials: Sequence[Trial]) -> tuple[Row, ...]:
+        """Numbers of the joints and legs in which recordings depart, and of all."""
         (predicted,) = self.simulate(trials, [()])
         signs = self.signs(trials, predicted)
-        if everywhere:
-            every = Suspects(self.joints, legs_of(self.joints), True)
-            return legged.candidates(every, self.joints, signs)
-        walks = self._robots(trials)
-        rests = []
-        for number, (trial, path) in enumerate(zip(trials, predicted, strict=True)):
-            scatter = np.mean([(w[number] - path)[:, 3:] ** 2 for w in walks], axis=0)
-            rest = trial.observed[:, 3:] - path[:, 3:]
-            rests.append(rest / np.sqrt(1 + np.nan_to_num(scatter) / READING**2))
+        rests = [
+            trial.observed[:, 3:] - path[:, 3:]
+            for trial, path in zip(trials, predicted, strict=True)
+        ]
         found = where.suspects(rests, self.joints, READING)
-        return legged.candidates(found, self.joints, signs)
+        lost = walk_lost.likely(trials, legged.lost(signs), self.simulate)
+        self._scatter(trials, lost)
+        listed = legged.rows(found, self.joints, signs)
+        return self.remembered((*listed, *scatter.rows()))
+
+    def _scatter(self, trials: Sequence[Trial], lost: Sequence[Effect]) -> None:
+        """Simulate the robots that this one may be, see `scatter`."""
+        drawn = scatter.robots(legged.unsure(self.joints))
+        sets = [lost, *((*robot, *lost) for robot in drawn)]
+        midst, *walks = self.simulate(trials, sets)
+        for number, trial in enumerate(trials):
+            made = np.stack([walk[number] - midst[number] for walk in walks])
+            self._walks[_key(trial)] = np.nan_to_num(made)
+
+    def paths(
+        self,
+        trials: Sequence[Trial],
+        sets: Sequence[Sequence[Mapping[str, float]]],
+        *,
+        fine: bool = True,
+    ) -> list[list[np.ndarray]]:
+        """See `GapModel.paths`: what walks scatter is added to what effects do."""
+        own = [
+            [{n: v for n, v in row.items() if scatter.number(n) < 0} for row in values]
+            for values in sets
+        ]
+        made = super().paths(trials, own, fine=fine)
+        for paths, values in zip(made, sets, strict=True):
+            for at, (trial, row) in enumerate(zip(trials, values, strict=True)):
+                shares = {scatter.number(n): v for n, v in row.items()}
+                shares.pop(-1, None)
+                if shares:
+                    walks = self._walks[_key(trial)][list(shares)]
+                    off = np.tensordot(list(shares.values()), walks, axes=1)
+                    paths[at] = paths[at] + off
+        return made
 
     def signs(self, trials: Sequence[Trial], predicted: Sequence[np.ndarray]) -> Signs:
         """What the servos say of joints and legs that hold, hang or are gone."""
         return walk_signs.signs(trials, predicted, self.joints)
 
-    def unsure(self, problem: Problem, uncertain: Sequence[Candidate]) -> Whitener:
-        """The whitener that knows what walking scatters, see `walk_floor`."""
-        trials = problem.trials
-        (nominal,) = self.simulate(trials, [()])
-        losses = legged.lost(self.signs(trials, nominal))
-        lost = walk_lost.likely(trials, losses, self.simulate)
-        (centre,) = self.simulate(trials, [lost]) if lost else (nominal,)
-        return floor.whitener(problem, self._robots(trials, lost), centre)
+    def at_rest(self, trial: Trial, predicted: np.ndarray) -> frozenset[str]:
+        """See `GapModel.at_rest`: joints that hold, hang or are gone."""
+        joints = self.signs([trial], [predicted]).joints
+        return frozenset(f"{name}_position" for name in joints)
 
-    def _robots(
-        self, trials: Sequence[Trial], lost: Sequence[Effect] = ()
-    ) -> list[list[np.ndarray]]:
-        """What would have been observed of each of the robots this one may be."""
-        key = "".join(map(str, lost)).encode() + b"".join(
-            t.commands.values.tobytes() + t.times.tobytes() + t.boundaries.tobytes()
-            for t in trials
-        )
-        if key != self._walks[0]:
-            uncertain = [item for item in self.candidates() if item.slack > 0]
-            drawn = floor.robots(uncertain)
-            made = self.simulate(trials, [(*robot, *lost) for robot in drawn])
-            self._walks = key, made
-        return self._walks[1]
+    def blocks(self, trials: Sequence[Trial], windows: Sequence[Windows]) -> np.ndarray:
+        """Commands of each trial: a robot rests between them, so that what it scatters
+        in one does not go on into the next."""
+        made, first = [], 0
+        for trial, parts in zip(trials, windows, strict=True):
+            ends = trial.times[trial.boundaries[1:]]
+            number = np.minimum(np.searchsorted(ends, parts.times), len(ends) - 1)
+            made.append(first + number)
+            first += len(ends)
+        return np.unique(np.concatenate(made), return_inverse=True)[1]
 
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
@@ -180,6 +192,11 @@ class WalkModel:
             "time since the command changed": windows.times - times[at],
             "time in the trial": windows.times - times[0],
         }
+
+
+def _key(trial: Trial) -> bytes:
+    told = trial.commands.values.tobytes() + trial.times.tobytes()
+    return told + trial.boundaries.tobytes()
 
 
 def _sloping(effects: Sequence[Effect]) -> bool:

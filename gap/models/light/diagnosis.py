@@ -6,109 +6,78 @@ likelihood of a recording falls into two parts, which are diagnosed apart and pu
 together: losses add, supports join.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from bns.gap import diagnose as single
-from bns.gap.core.cross_trial_check import confirmed
-from bns.gap.core.problem import narrowed
-from bns.gap.core.verdict import Calibration, calibration
-from bns.gap.diagnose import Analysis
 from bns.gap.models.base import GapModel
 from bns.gap.models.light.model import SightModel
-from bns.gap.models.light.ranking import weighed
-from bns.gap.records import Candidate, Diagnosis, Fit, Verdict
+from bns.gap.recordings.trial_selection import narrowed
+from bns.gap.records import Diagnosis, Fit, Verdict
 from bns.worlds.trial import Commands, Trial
 
-MORE, MINOR = 40.0, 0.08  # see `light_rules`; found on cases that are not scored
 LEAST = 5  # commands between two in which the robot was handled, to be of use
 
+Single = Callable[..., Diagnosis]
+"""diagnosis of recordings by one model, see `bns.gap.diagnose.single`"""
 
-def analyse(
+
+def diagnose(
     trials: Sequence[Trial],
     model: GapModel,
+    single: Single,
     *,
-    seed: int = 0,
-    candidates: Sequence[Candidate] | None = None,
-    rules: Calibration | None = None,
-    most: int = 3,
     reference: Sequence[Trial] = (),
-) -> tuple[Analysis, Analysis]:
-    """Motion and readings of recordings with light, each analysed by itself.
+    **given: Any,
+) -> Diagnosis:
+    """Motion and readings of recordings with light, as one diagnosis.
 
     Args:
         trials: recordings with light.
         model: nominal model of the motion.
-        seed: of what is drawn.
-        candidates: explanations to consider, of motion and light; None = all.
-        rules: thresholds, None = those of the package.
-        most: largest number of effects at once.
+        single: diagnoses one of the two.
         reference: recordings of the same robot in which nothing was changed.
+        **given: further arguments of `single`.
     """
-    given = {"seed": seed, "most": most}
-    names = {item.name for item in model.candidates()}
-    split: list = [None, None]
-    if candidates is not None:
-        split[0] = tuple(item for item in candidates if item.name in names)
-        split[1] = tuple(item for item in candidates if item.name not in names)
-    motion = single.analyse(
-        unhandled(trials, model),
-        model,
-        candidates=split[0],
-        reference=unhandled(reference, model),
-        rules=rules,
-        **given,
-    )
-    sight = SightModel(trials, robot=model.name, pose_sd=motion.problem.floor.sigma)
-    seen = look(
-        trials,
-        sight,
-        candidates=split[1],
-        reference=reference,
-        rules=rules,
-        **given,
-    )
-    return motion, seen
+    before = unhandled(reference, model)
+    motion = single(unhandled(trials, model), model, reference=before, **given)
+    deviations = motion.floor["sigma"]
+    sight = SightModel(trials, robot=model.name, pose_sd=deviations)
+    seen = look(trials, sight, single, reference=reference, **given)
+    return joined(motion, seen)
 
 
 def look(
     trials: Sequence[Trial],
     sight: SightModel,
+    single: Single,
     *,
-    rules: Calibration | None = None,
+    reference: Sequence[Trial] = (),
     **given: Any,
-) -> Analysis:
-    """What readings say by themselves; arguments as `diagnose.analyse`.
+) -> Diagnosis:
+    """What readings say by themselves.
 
     Args:
         trials: recordings with light.
         sight: model of the readings.
-        rules: thresholds, None = those of the package.
-        **given: further arguments of `diagnose.analyse`.
+        single: diagnoses them.
+        reference: recordings of the same robot in which nothing was changed.
+        **given: further arguments of `single`.
     """
-    made = single.analyse(trials, sight, rules=light_rules(rules), **given)
-    return confirmed(weighed(made))
-
-
-def light_rules(rules: Calibration | None = None) -> Calibration:
-    """Thresholds on readings: a further effect has to explain more than on motion.
-
-    Where a sensor became noisy its readings scatter more than they are whitened for,
-    and improvements by chance are as much larger.
-    """
-    rules = rules or calibration()
-    return replace(rules, more=max(rules.more, MORE), minor=max(rules.minor, MINOR))
+    ready, notes = sight.ready(trials)
+    before = sight.ready(reference)[0] if reference else ()
+    found = single(ready, sight, reference=before, checked=True, **given)
+    return replace(found, faults=(*notes, *found.faults))
 
 
 def unhandled(trials: Sequence[Trial], model: GapModel) -> list[Trial]:
     """Stretches in which the robot was left to itself, with its pose alone."""
     made = []
     for trial in trials:
-        trial = narrowed(trial, model)
+        trial = narrowed(trial, model.channels)
         free = np.concatenate([[False], ~trial.handled, [False]])
         edges = np.flatnonzero(np.diff(free.astype(int)))
         if len(edges) == 2 and edges[1] - edges[0] == len(trial.commands):
@@ -135,16 +104,13 @@ def _stretch(trial: Trial, begin: int, end: int) -> Trial:
     )
 
 
-def report(motion: Analysis, seen: Analysis, *, full: bool = True) -> Diagnosis:
-    """Both analyses written down as one.
+def joined(first: Diagnosis, second: Diagnosis) -> Diagnosis:
+    """Both diagnoses written down as one.
 
     Args:
-        motion: analysis of the motion.
-        seen: analysis of the readings.
-        full: with localisation and closed fractions.
+        first: of the motion.
+        second: of the readings.
     """
-    first, second = (single.report(part, full=full) for part in (motion, seen))
-    answer = merged(first.verdict, second.verdict)
     main = second if first.verdict.kind == "no gap" else first
     found = {
         **first.signatures["detectability"],
@@ -156,7 +122,7 @@ def report(motion: Analysis, seen: Analysis, *, full: bool = True) -> Diagnosis:
         model=first.model,
         trials=second.trials,
         faults=(*first.faults, *second.faults),
-        verdict=answer,
+        verdict=merged(first.verdict, second.verdict),
         fits=_fits(first, second),
         signatures={**main.signatures, "detectability": found, "best": best},
         floor={**first.floor, "light": second.floor},
@@ -165,7 +131,20 @@ def report(motion: Analysis, seen: Analysis, *, full: bool = True) -> Diagnosis:
             key: first.seconds.get(key, 0.0) + second.seconds.get(key, 0.0)
             for key in {**first.seconds, **second.seconds}
         },
+        decomposition=_parts(main, first, second),
     )
+
+
+def _parts(main: Diagnosis, first: Diagnosis, second: Diagnosis) -> dict[str, Any]:
+    """Parts and statements of both; each share is one of its own gap."""
+    words = [
+        f"{name}: {line}"
+        for name, part in (("Motion", first), ("Light", second))
+        for line in part.decomposition["statements"]
+    ]
+    parts = [part for made in (first, second) for part in made.decomposition["parts"]]
+    onset = first.decomposition["onset"] or second.decomposition["onset"]
+    return {**main.decomposition, "parts": parts, "statements": words, "onset": onset}
 
 
 def merged(motion: Verdict, seen: Verdict) -> Verdict:

@@ -6,18 +6,14 @@ rather than shift, how large that departure is whatever its sign.
 """
 
 from collections.abc import Mapping, Sequence
-from copy import copy
 
 import numpy as np
 
 from bns.gap.candidates import light
-from bns.gap.core.floor import Floor
-from bns.gap.core.problem import Problem
-from bns.gap.core.whitening import Whitener
-from bns.gap.models.base import GapModel, Windows
+from bns.gap.decomposition.row import Row
+from bns.gap.models.base import GapModel, LibraryModel, Windows
 from bns.gap.models.light.reader import Reader, Reads, extra
 from bns.gap.recordings import trial_labels
-from bns.gap.records import Candidate
 from bns.worlds.effects.base import Effect
 from bns.worlds.light import sensors
 from bns.worlds.light.field import Lamp, LightField
@@ -28,7 +24,7 @@ from bns.worlds.trial import POSE_CHANNELS, Channel, Trial
 
 FEWEST = 8  # readings of a trial
 WIDTH = 1.5  # departures beyond some of these look alike to the scatter
-FAR = 3.0  # standard deviations at which what sensors differ by is looked at
+LEAST = 0.9  # smallest believed deviation of what is 1 by design
 SQUEEZED = 0.915  # standard deviation of `squeezed` of a normal number, not divided
 SCATTER = 0.188  # standard deviation of `unlikely` of a normal number
 
@@ -39,11 +35,6 @@ def squeezed(departure: np.ndarray) -> np.ndarray:
     A noisy sensor has many of them.
     """
     return 2 * np.arcsinh(departure / 2) / SQUEEZED
-
-
-def stretched(seen: np.ndarray) -> np.ndarray:
-    """Departures from what `squeezed` made of each of them."""
-    return 2 * np.sinh(seen * SQUEEZED / 2)
 
 
 def unlikely(departure: np.ndarray) -> np.ndarray:
@@ -64,7 +55,7 @@ def sees(trials: Sequence[Trial]) -> bool:
     )
 
 
-class SightModel:
+class SightModel(LibraryModel):
     """The light sensors of a robot, as `GapModel`.
 
     Args:
@@ -74,6 +65,10 @@ class SightModel:
         robot: its name or directory; default: that of the first recording.
         headings: which way the sensors look, see `light_sensors.of`.
     """
+
+    starts = 6
+    singly = True
+    odds = 5.0  # against each of some two hundred
 
     def __init__(
         self,
@@ -110,27 +105,24 @@ class SightModel:
         count = len(self.features)
         self.process = np.zeros(count)
         self.resolution = np.ones(3 + count)
-        self.floor = Floor(np.ones(3 + count), self.process, "model", 0)
         self._nominal: dict[bytes, tuple] = {}
 
-    def candidates(self) -> tuple[Candidate, ...]:
-        """All effects on sensors and lamps."""
-        return light.candidates(singles=self.singles, sensors=self.reader.sensors.names)
+    @property
+    def least(self) -> np.ndarray:
+        """Smallest believed standard deviation of each feature."""
+        return np.full(len(self.features), LEAST)
 
-    def unsure(self, problem: Problem, uncertain: Sequence[Candidate]) -> Whitener:
-        """The whitener that knows how sensors may differ, see `problem.Problem`.
+    def rows(self, trials: Sequence[Trial]) -> tuple[Row, ...]:
+        """All numbers of sensors and lamps that may be off."""
+        del trials
+        names = self.reader.sensors.names
+        return self.remembered(light.rows(singles=self.singles, sensors=names))
 
-        Both ways and far out: what a sensor that looks askew does to a reading that
-        hardly sees the lamp grows faster than the angle.
-        """
-        sets = [
-            [item.make(item.nominal + way * item.slack)]
-            for item in uncertain
-            for way in (FAR, -FAR)
-        ]
-        return problem.whiten.uncertain(problem.signatures(sets) / (FAR * np.sqrt(2)))
+    def motion(self, features: np.ndarray) -> np.ndarray:
+        """See `GapModel.motion`: noise is 1 whatever is read."""
+        return np.zeros_like(features)
 
-    def check(
+    def ready(
         self, trials: Sequence[Trial]
     ) -> tuple[tuple[Trial, ...], tuple[str, ...]]:
         """Recordings as this model compares them; those without readings left out."""
@@ -218,12 +210,6 @@ class SightModel:
             self._nominal[key] = mean[:, None], spread[:, None], noise
         mean, spread, noise = self._nominal[key]
         return (self.reader.samples(reads, effects) + noise - mean) / spread
-
-    def finer(self, draws: int) -> "SightModel":
-        """The same with other draws of each reading's noise."""
-        made = copy(self)
-        made.reader, made._nominal = self.reader.finer(draws), {}
-        return made
 
     def windows(self, trial: Trial) -> Windows:
         """One per reading: from the one before that was not lost."""

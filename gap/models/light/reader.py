@@ -8,7 +8,6 @@ are known also where readings saturate.
 """
 
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,12 +68,6 @@ class Reader:
         self.pose_sd = np.array(pose_sd, dtype=float)
         self._plain: dict[bytes, np.ndarray] = {}  # draws without an effect
         self._unsure: dict[bytes, np.ndarray] = {}
-
-    def finer(self, draws: int) -> "Reader":
-        """The same with other draws of each reading's noise."""
-        made = copy(self)
-        made.draws, made._plain = draws, {}
-        return made
 
     def expected(self, reads: Reads) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Nominal readings, ``(T, R)`` [counts] each.

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import mujoco
 import numpy as np
 
-from bns.gap.core.floor import NORMAL, THIRD
+from bns.gap.decomposition.rest import NORMAL, THIRD
 from bns.worlds.data.column_map import FACTORS
 
 RATES = (4.0, 5000.0)  # [Hz] of logs
@@ -44,7 +44,7 @@ def noise(pieces: Sequence[np.ndarray]) -> float:
     steps = np.concatenate([np.abs(np.diff(piece)) for piece in kept])
     steps = steps[steps > 0]
     span = max((float(np.ptp(piece)) for piece in kept if len(piece)), default=1.0)
-    found = float(np.median(third)) / NORMAL / THIRD if len(third) else 0.0
+    found = NORMAL * float(np.median(third)) / THIRD if len(third) else 0.0
     rounding = float(steps.min()) / np.sqrt(12.0) if len(steps) else 0.0
     return max(found, rounding, 1e-5 * span, 1e-9)
 

@@ -10,14 +10,12 @@ import numpy as np
 
 from bns.errors import FormatError, UnknownNameError
 from bns.gap.candidates import mjcf, mjcf_rows
-from bns.gap.core import segments
-from bns.gap.decomposition.model import DecomposableModel
 from bns.gap.decomposition.row import Row
-from bns.gap.models.base import Windows
+from bns.gap.models.base import GapModel, Windows
 from bns.gap.models.mjcf import effects as own_effects
 from bns.gap.models.mjcf import log, prepared, start, view
 from bns.gap.models.mjcf.config import OwnConfig
-from bns.gap.records import Candidate
+from bns.gap.recordings import segments
 from bns.models import mjcf as mjcf_file
 from bns.storage import files
 from bns.worlds.effects.base import ControlSignal, Effect
@@ -31,7 +29,7 @@ FINEST = 0.0025  # [s] steps beyond which a simulation lags visibly; assumed
 LEAST = 0.3  # of the noise that is told: the smallest that is believed
 
 
-class OwnModel(DecomposableModel):
+class OwnModel(GapModel):
     """A model of the user's own; see `gap/models/base.py` for the attributes.
 
     Several numbers of such a robot are off at once, so fits are also started from all
@@ -48,6 +46,7 @@ class OwnModel(DecomposableModel):
 
     memory = 2
     many = True
+    logs = True
 
     def __init__(self, config: OwnConfig, *, threads: int = 2):
         self.config, self.name = config, config.name
@@ -67,10 +66,9 @@ class OwnModel(DecomposableModel):
         if config.keyframe:
             _index(model, "key", config.keyframe)  # there, before anything runs
         self.view = view.View.of(config, model)
-        self._candidates = mjcf.candidates(config, model)
+        self.listed = mjcf.candidates(config, model)
         self._terms = {
-            item.name: item
-            for item in (*self._candidates, *mjcf_rows.grouped(self._candidates))
+            item.name: item for item in (*self.listed, *mjcf_rows.grouped(self.listed))
         }
 
     @classmethod
@@ -86,10 +84,6 @@ class OwnModel(DecomposableModel):
     def read_log(self, path: str) -> list[Trial]:
         """Trials of a CSV log."""
         return log.read(path, self.config)
-
-    def candidates(self) -> tuple[Candidate, ...]:
-        """All candidates, in a fixed order."""
-        return self._candidates
 
     def spec(self, effects: Sequence[Effect]) -> mujoco.MjSpec:
         """The model with the effects on its parts written into it.
@@ -152,7 +146,7 @@ class OwnModel(DecomposableModel):
         *,
         fine: bool = True,
     ) -> list[list[np.ndarray]]:
-        """See `DecomposableModel.paths`; the coarse step is that of the model."""
+        """See `GapModel.paths`; the coarse step is that of the model."""
         pairs, leads = [], []
         for row in sets:
             for trial, values in zip(trials, row, strict=True):

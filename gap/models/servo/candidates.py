@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bns.errors import BnsError
-from bns.gap.records import Candidate
+from bns.gap.decomposition.row import Row
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect, ServoEffect
 from bns.worlds.physics.servo_law import Law
@@ -51,30 +51,58 @@ _ALIASES = {"servo_gain": ("servo_voltage",), "servo_voltage": ("servo_gain",)}
 """the same effect while the duty does not saturate, whatever is commanded"""
 
 
-def candidates(names: Sequence[str] = tuple(_GRIDS)) -> tuple[Candidate, ...]:
-    """Candidates for servo effects.
+_SD = {
+    "servo_payload": 0.3,
+    "servo_lever": 0.15,
+    "servo_gain": 0.5,
+    "servo_voltage": 0.3,
+    "servo_torque_constant": 0.3,
+    "servo_coulomb": 0.1,
+    "servo_viscous": 0.1,
+    "servo_stribeck": 0.1,
+    "servo_load_friction": 0.1,
+    "servo_armature": 0.02,
+    "servo_delay": 0.03,
+    "servo_lag": 0.03,
+    "servo_backlash": 0.03,
+    "servo_dead_zone": 0.03,
+    "servo_offset": 0.05,
+}
+"""plausible departures (standard deviation; assumed); the others are limits"""
+
+
+def candidates(names: Sequence[str] = tuple(_GRIDS)) -> tuple[Row, ...]:
+    """Numbers of a servo that may be off, with the values that are tried.
 
     Args:
         names: of effects; quantisation of the encoder is left out by default, as it
             moves nothing.
     """
-    return tuple(_candidate(name) for name in names)
+    return tuple(_row(name) for name in names)
 
 
-def _candidate(name: str) -> Candidate:
+def ratio(row: Row) -> bool:
+    """Whether its values are ratios, which span decades."""
+    return row.nominal >= 1.0
+
+
+def _row(name: str) -> Row:
     parameter = registry.get(name).parameters[0]
-    return Candidate(
+    nominal = float(parameter.nominal)
+    return Row(
         name=name,
-        effect=name,
-        parameter=parameter.name,
-        unit=parameter.unit,
-        nominal=parameter.nominal,
+        nominal=nominal,
+        sd=_SD.get(name, 0.3),
         low=parameter.low,
         high=parameter.high,
-        grid=_GRIDS[name],
-        scale="log" if parameter.nominal >= 1.0 else "linear",
-        aliases=_ALIASES.get(name, ()),
+        unit=parameter.unit,
+        levels=_GRIDS[name],
+        smooth=name in _SD,
+        step=0.25 * _SD.get(name, 0.3),
         excite=_EXCITE.get(name, SLOW),
+        effect=name,
+        parameter=parameter.name,
+        aliases=_ALIASES.get(name, ()),
     )
 
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bns.gap.decomposition.row import Row
 from bns.gap.models.servo.candidates import columns
 from bns.gap.models.servo.nominal import Nominal
 from bns.gap.models.servo.runs import SAMPLE, Runs
-from bns.gap.records import Candidate
 from bns.worlds.physics.servo_rollout import simulate
 
 STEP = 0.1  # [s] between two features of a run
@@ -31,7 +31,7 @@ class Curve:
         departures: shape ``(R, G, F)`` [rad]; 0 at the nominal.
     """
 
-    candidate: Candidate
+    candidate: Row
     magnitudes: np.ndarray
     departures: np.ndarray
 
@@ -44,7 +44,7 @@ def residuals(runs: Runs, nominal: Nominal) -> np.ndarray:
 def curves(
     runs: Runs,
     nominal: Nominal,
-    candidates: Sequence[Candidate],
+    candidates: Sequence[Row],
     magnitudes: Mapping[str, Sequence[float]] | None = None,
 ) -> list[Curve]:
     """Simulate candidates at their magnitudes, all runs in one batch.
@@ -56,7 +56,7 @@ def curves(
         magnitudes: by name; None = each candidate's grid and its nominal.
     """
     grids = [
-        np.unique(magnitudes[c.name] if magnitudes else (*c.grid, c.nominal))
+        np.unique(magnitudes[c.name] if magnitudes else (*c.levels, c.nominal))
         for c in candidates
     ]
     law, made = nominal.told(runs), [None] * len(candidates)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bns.errors import BnsError
+from bns.gap.decomposition.row import Row
 from bns.gap.models.servo import curves as servo_curves
 from bns.gap.models.servo import discrepancy as servo_discrepancy
 from bns.gap.models.servo import score
@@ -21,7 +22,7 @@ from bns.gap.models.servo.repeats import sound
 from bns.gap.models.servo.runs import Runs, cells, merged
 from bns.gap.models.servo.score import Scores
 from bns.gap.models.servo.verdict import Null, verdict
-from bns.gap.records import Candidate, Verdict
+from bns.gap.records import Verdict
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +40,12 @@ class Reference:
     nominal: Nominal
     discrepancy: Discrepancy
     null: Null
-    candidates: Mapping[str, Candidate]
+    candidates: Mapping[str, Row]
     left_out: tuple[str, ...] = ()
 
 
 def learn(
-    runs: Runs, nominal: Nominal, *, candidates: Sequence[Candidate] | None = None
+    runs: Runs, nominal: Nominal, *, candidates: Sequence[Row] | None = None
 ) -> Reference:
     """What runs without a change teach: each setting is held against all others.
 

@@ -12,13 +12,13 @@ import numpy as np
 
 from bns import models
 from bns.errors import BnsError
-from bns.gap.models.base import Windows
+from bns.gap.decomposition.row import Row
+from bns.gap.models.base import LibraryModel, Windows
 from bns.gap.models.servo import candidates as servo_candidates
 from bns.gap.models.servo.nominal import Nominal
 from bns.gap.models.servo.runs import SAMPLE, Runs, runs
 from bns.gap.planning import servo_excitation
 from bns.gap.planning.excitation import Excitation
-from bns.gap.records import Candidate
 from bns.models import servo_pendulum
 from bns.worlds.effects.base import Effect
 from bns.worlds.physics.servo_rollout import simulate
@@ -28,7 +28,7 @@ WINDOW = 0.1  # [s] between two angles that are compared
 AT_ONCE = 400  # sets of effects in one batch, which bounds the memory
 
 
-class ServoModel:
+class ServoModel(LibraryModel):
     """The servo law with what each trial's conditions tell of it.
 
     Conditions named like numbers of the law (mass, lever, gain, voltage, ...) hold for
@@ -43,6 +43,7 @@ class ServoModel:
     name = "servo_pendulum"
     channels = (Channel("angle", "rad"),)
     features = (Channel("angle", "rad"),)
+    memory = 2
 
     def __init__(
         self,
@@ -58,9 +59,15 @@ class ServoModel:
         self.process = np.array(process, dtype=float)
         self.resolution = np.array(resolution, dtype=float)
 
-    def candidates(self) -> tuple[Candidate, ...]:
+    @property
+    def least(self) -> np.ndarray:
+        """Smallest believed standard deviation of an angle [rad]."""
+        return self.resolution
+
+    def rows(self, trials: Sequence[Trial]) -> tuple[Row, ...]:
         """All servo effects."""
-        return servo_candidates.candidates()
+        del trials
+        return self.remembered(servo_candidates.candidates())
 
     def excitations(
         self, *, seed: int = 0, told: Mapping[str, float] | None = None

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bns.errors import BnsError
+from bns.gap.decomposition.row import Row
 from bns.gap.models.servo import diagnosis
 from bns.gap.models.servo import nominal as servo_nominal
 from bns.gap.models.servo.model import ServoModel, seen
@@ -12,7 +13,7 @@ from bns.gap.models.servo.nominal import Nominal
 from bns.gap.models.servo.repeats import sound
 from bns.gap.models.servo.runs import Runs, cells, runs
 from bns.gap.models.servo.score import Scores
-from bns.gap.records import Candidate, Diagnosis, Fit
+from bns.gap.records import Diagnosis, Fit
 from bns.worlds.trial import Trial
 
 FITTED = 20  # unchanged runs that the nominal law is fitted to, spread over settings
@@ -114,9 +115,7 @@ def _spread(others: Runs) -> np.ndarray:
     return np.array([distinct[place] for place in places])
 
 
-def _fits(
-    scores: Scores, candidates: dict[str, Candidate], slack: float
-) -> tuple[Fit, ...]:
+def _fits(scores: Scores, candidates: dict[str, Row], slack: float) -> tuple[Fit, ...]:
     size = scores.size
     nothing = scores.nothing
     made = [Fit((), (), (), (), (), nothing, nothing / size, 0.0, nothing)]

@@ -5,12 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bns.gap.decomposition.row import Row
 from bns.gap.models.servo import curves as servo_curves
+from bns.gap.models.servo.candidates import ratio
 from bns.gap.models.servo.curves import Curve
 from bns.gap.models.servo.discrepancy import Discrepancy
 from bns.gap.models.servo.nominal import Nominal
 from bns.gap.models.servo.runs import Runs
-from bns.gap.records import Candidate
 
 FINE = np.linspace(-1, 1, 9)  # magnitudes tried again around the best, in grid steps
 
@@ -68,7 +69,7 @@ def score(
     for curve in curves:
         name = curve.candidate.name
         points = _whitened(curve.departures, whiteners)
-        log = curve.candidate.scale == "log"
+        log = ratio(curve.candidate)
         cost, best = servo_curves.nearest(points, target, curve.magnitudes, log)
         costs[name], magnitudes[name] = cost, best
         signatures[name] = _between(points, curve.magnitudes, best)
@@ -95,7 +96,7 @@ def refined(
     runs: Runs,
     nominal: Nominal,
     scores: Scores,
-    candidates: Mapping[str, Candidate],
+    candidates: Mapping[str, Row],
     whiteners: Sequence[np.ndarray],
     *,
     best: int = 4,
@@ -127,14 +128,11 @@ def refined(
     )
 
 
-def _near(candidate: Candidate, at: float) -> np.ndarray:
-    grid = np.unique([*candidate.grid, candidate.nominal])
+def _near(candidate: Row, at: float) -> np.ndarray:
+    grid = np.unique([*candidate.levels, candidate.nominal])
     after = int(np.clip(np.searchsorted(grid, at), 1, len(grid) - 1))
     low, high = grid[after - 1], grid[after]
-    if candidate.scale == "log":
-        made = at * (high / low) ** FINE
-    else:
-        made = at + (high - low) * FINE
+    made = at * (high / low) ** FINE if ratio(candidate) else at + (high - low) * FINE
     return np.clip(made, candidate.low, candidate.high)
 
 

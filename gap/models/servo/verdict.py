@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
+from bns.gap.decomposition.row import Row
 from bns.gap.models.servo.score import Scores
-from bns.gap.records import Candidate, Verdict
+from bns.gap.records import Verdict
 
 LEVEL = 0.05  # chance of a false alarm that is accepted
 MANY = round(1 / LEVEL) - 1  # settings whose own statistics reach to that chance
@@ -108,7 +109,7 @@ class Null:
 
 
 def verdict(
-    scores: Scores, null: Null, candidates: Mapping[str, Candidate], gain: float
+    scores: Scores, null: Null, candidates: Mapping[str, Row], gain: float
 ) -> Verdict:
     """Say what explains the runs.
 
@@ -183,17 +184,17 @@ def _named(scores: Scores, inside, candidates, common) -> Verdict:
     )
 
 
-def _class(name: str, candidates: Mapping[str, Candidate]) -> set[str]:
+def _class(name: str, candidates: Mapping[str, Row]) -> set[str]:
     return {name, *candidates[name].aliases}
 
 
-def _text(scores: Scores, name: str, candidates: Mapping[str, Candidate]) -> str:
+def _text(scores: Scores, name: str, candidates: Mapping[str, Row]) -> str:
     item, value = candidates[name], scores.magnitudes[name]
     unit = f" {item.unit}" if item.unit != "1" else ""
     return f"{name} ({item.parameter} = {value:.3g}{unit})"
 
 
-def _excite(names: Sequence[str], candidates: Mapping[str, Candidate]) -> str:
+def _excite(names: Sequence[str], candidates: Mapping[str, Row]) -> str:
     wanted = dict.fromkeys(candidates[name].excite for name in names[:3])
     return f"Record {'; '.join(wanted)}, at a low gain." if wanted else ""
 

@@ -9,11 +9,9 @@ import pytest
 
 from bns.cli.gap import after
 from bns.errors import BnsError
-from bns.gap import diagnose
 from bns.gap.bench import light_cases
 from bns.gap.candidates import light
-from bns.gap.core.cross_trial_check import confirmed
-from bns.gap.core.problem import Problem
+from bns.gap.diagnose import diagnose, single
 from bns.gap.models.light import diagnosis
 from bns.gap.models.light.model import SightModel, sees, unlikely
 from bns.gap.models.light.reader import _clipped
@@ -42,8 +40,7 @@ def find():
     def run(*effects, singles=True):
         trials = recorded(*effects, singles=singles)
         sight = SightModel(trials, pose_sd=(1e-3, 1e-3, 8e-3))
-        few = [item for item in sight.candidates() if item.name in KEPT]
-        return diagnose.analyse(trials, sight, candidates=few).verdict
+        return diagnosis.look(trials, sight, single, rows=KEPT, full=False).verdict
 
     return run
 
@@ -60,32 +57,8 @@ def test_a_reading_stuck_at_zero_in_part_is_a_gain():
     )
     assert one == pytest.approx(other, abs=0.51)
     assert not np.allclose(one, readings)
-    found = {item.name: item.aliases for item in light.candidates(singles=True)}
+    found = {row.name: row.aliases for row in light.rows(singles=True)}
     assert found["sensor_gain[left_45]"] == ("sensor_stuck_min[left_45]",)
-
-
-def test_a_sensor_may_look_a_little_askew_either_way():
-    """Three standard deviations show hardly more than three times the noise does."""
-    trials = recorded()
-    sight = SightModel(trials, pose_sd=(1e-3, 1e-3, 8e-3))
-    few = [item for item in sight.candidates() if item.effect == "sensor_misaligned"]
-    problem = Problem.of(sight.check(trials)[0], sight, candidates=few)
-    one = next(item for item in few if item.name.endswith("[right_90]"))
-    shown = problem.signatures([[one.make(angle)] for angle in (-0.03, 0.03)])
-    assert np.linalg.norm(shown, axis=1) == pytest.approx([3.8, 3.8], abs=0.4)
-
-
-def test_a_gap_that_other_recordings_do_not_confirm_is_none():
-    trials = recorded(singles=False)
-    sight = SightModel(trials, pose_sd=(1e-3, 1e-3, 8e-3))
-    few = [item for item in sight.candidates() if item.name in KEPT]
-    made = diagnose.analyse(trials, sight, candidates=few)
-    claimed = replace(made.verdict, kind="none of the library", p_gap=1e-4)
-    bare = replace(made.choice, rung=made.choice.rungs[0])
-    made = replace(made, verdict=claimed, choice=bare)
-    assert confirmed(made).verdict.kind == "no gap"
-    torn = replace(made, choice=replace(bare, rung=replace(bare.rung, p_misfit=1e-6)))
-    assert confirmed(torn) is torn
 
 
 @pytest.mark.parametrize(
@@ -116,7 +89,7 @@ def test_the_two_virtual_sensors_are_enough(find):
 def test_whitened_readings_are_standard_normal():
     trials = recorded()
     sight = SightModel(trials, pose_sd=(1e-3, 1e-3, 8e-3))
-    ready, notes = sight.check(trials)
+    ready, notes = sight.ready(trials)
     seen = np.concatenate([trial.observed[:, 3:] for trial in ready])
     assert notes == ()
     count = len(sight.names)
@@ -138,15 +111,16 @@ def test_scatter_does_not_grow_without_end():
     assert unlikely(np.array([0.0, 1e3])) == pytest.approx([0.0, 1.0])
 
 
-def test_a_lamp_is_displaced_as_far_as_the_candidate_says():
-    (item,) = [c for c in light.candidates(singles=True) if c.name == "light_displaced"]
-    effect = item.make(0.2, extras={"heading": np.pi / 6})
-    assert effect["x"] == pytest.approx(0.2 * np.cos(np.pi / 6))
-    assert effect["y"] == pytest.approx(0.1)
+def test_a_lamp_is_displaced_by_two_numbers():
+    sight = SightModel(recorded())
+    sight.rows(())
+    values = {"light_displaced.x": 0.2, "light_displaced.y": -0.1}
+    effect = sight.effect("light_displaced", values)
+    assert (effect["x"], effect["y"]) == (0.2, -0.1)
 
 
-def test_the_virtual_sensors_have_no_candidates_behind():
-    names = [c.name for c in light.candidates(singles=False)]
+def test_the_virtual_sensors_have_no_rows_behind():
+    names = [row.name for row in light.rows(singles=False)]
     assert "sensor_gain[left_45]" in names
     assert not [name for name in names if "back" in name]
 
@@ -200,13 +174,9 @@ def test_a_recording_with_light_is_diagnosed_whole():
     trials = recorded(slow, gain, singles=False)
     model = WheeledModel(threads=1)
     wanted = ("wheel_gain[left]", "tracker_scale")
-    few = [item for item in model.candidates() if item.name in wanted]
-    sight = [c for c in SightModel(trials).candidates() if c.name in KEPT]
-    gained = [
-        c for c in SightModel(trials).candidates() if c.name == "sensor_gain[right]"
-    ]
     assert sees(trials)
-    found = diagnose.diagnose(trials, model, candidates=[*few, *sight, *gained])
+    names = (*wanted, *KEPT, "sensor_gain[right]")
+    found = diagnose(trials, model, rows=names)
     assert found.verdict.kind == "together"
     assert found.verdict.named == (("wheel_gain[left]", "sensor_gain[right]"),)
     assert found.best.magnitudes == pytest.approx((0.9, 0.9), abs=0.01)
@@ -214,8 +184,17 @@ def test_a_recording_with_light_is_diagnosed_whole():
 
 
 def test_ties_on_light_have_no_plan():
+    names = ("sensor_gain[left]", "sensor_stuck_min[left]")
+    texts = (
+        "sensor_gain:sensor=left,factor=0.8",
+        "sensor_stuck_min:sensor=left,blend=0.2",
+    )
+    fits = [
+        SimpleNamespace(names=(name,), effects=(text,))
+        for name, text in zip(names, texts, strict=True)
+    ]
     tied = SimpleNamespace(
-        verdict=verdict("either", "sensor_gain[left]", "sensor_stuck_min[left]")
+        verdict=verdict("either", *names), fits=fits, floor={"light": {}}
     )
     with pytest.raises(BnsError, match=r"part sensor_gain\[left\], sensor_stuck_min"):
         after._plannable(tied, WheeledModel(threads=1))

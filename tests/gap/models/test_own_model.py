@@ -37,11 +37,9 @@ def told(arm):
 
 @pytest.fixture(scope="module")
 def find(arm, told):
-    few = [item for item in arm.candidates() if item.name in KEPT]
-
     def run(*texts):
         trials = mjcf_cases.record(arm, told, [arm.parse(t) for t in texts], seed=1)
-        return diagnose(trials, arm, candidates=few, full=False)
+        return diagnose(trials, arm, rows=KEPT, full=False)
 
     return run
 
@@ -167,7 +165,7 @@ def test_what_is_wrong_with_a_log_is_said(arm, tmp_path):
 
 def test_effects_are_considered_where_none_are_listed(arm):
     config = replace(OwnConfig.read(ARM), effects=None)
-    names = {item.name for item in OwnModel(config, threads=1).candidates()}
+    names = {item.name for item in OwnModel(config, threads=1).listed}
     assert {
         "joint_damping[elbow]",
         "reading_gain[shoulder]",
@@ -188,7 +186,7 @@ def test_every_effect_can_be_a_candidate(arm, name):
     assert [item.parameter for item in made] == strengths
     for item in made:
         assert item.low <= item.nominal <= item.high and item.excite
-        for magnitude in (item.low, *item.grid, item.high):
+        for magnitude in (item.low, *item.levels, item.high):
             assert item.make(magnitude)["part"] == part
 
 
@@ -212,7 +210,7 @@ def test_the_description_in_the_documentation_is_one(tmp_path):
     elbow = '[commands.elbow_goal]\nactuator = "elbow_servo"\nunit = "rad"\n'
     (tmp_path / "arm.toml").write_text(text + elbow + "low = 0\nhigh = 2\n")
     made = OwnModel.read(tmp_path / "arm.toml", threads=1)
-    bounds = {item.name: item for item in made.candidates()}
+    bounds = {item.name: item for item in made.listed}
     assert bounds["joint_damping[elbow]"].high == 0.5
     assert bounds["body_mass[forearm]"].slack == 0.01
     assert made.config.log["shoulder"] == ("q1", "deg")

@@ -6,7 +6,6 @@ import pytest
 from bns.errors import BnsError
 from bns.gap import diagnose
 from bns.gap.models import base
-from bns.gap.models.servo.candidates import candidates
 from bns.gap.models.servo.model import ServoModel, angles_only
 from bns.worlds.effects import registry
 from bns.worlds.trial import Channel, Commands, Trial
@@ -46,9 +45,9 @@ def recorded(effect: str, count: int = 4) -> list[Trial]:
 
 def test_it_is_such_a_model():
     made: base.GapModel = ServoModel()
-    names = [item.name for item in made.candidates()]
+    names = [row.name for row in made.rows(())]
     assert len(names) == len(set(names)) >= 13
-    assert all(item.excite and item.unit for item in made.candidates())
+    assert all(row.excite and row.unit for row in made.rows(()))
     assert len(made.process) == len(made.features) == 1
     assert len(made.resolution) == len(made.channels)
 
@@ -89,9 +88,9 @@ def test_windows_tile_what_was_seen_and_compare_angles():
     "effect, name", [("servo_payload:mass=0.3", "servo_payload"), ("servo_delay", "")]
 )
 def test_the_general_diagnosis_runs_on_it(effect, name):
-    some = candidates(("servo_payload", "servo_delay", "servo_coulomb"))
+    some = ("servo_payload", "servo_delay", "servo_coulomb")
     servo = ServoModel(process=(0.002,))
-    found = diagnose.diagnose(recorded(effect), servo, candidates=some, full=False)
+    found = diagnose.diagnose(recorded(effect), servo, rows=some, full=False)
     if not name:
         assert found.verdict.kind == "no gap"
         return

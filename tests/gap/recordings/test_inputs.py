@@ -172,14 +172,15 @@ def test_trials_keep_their_numbers_in_what_is_said(model, tmp_path):
     place = str(
         dataset.write(tmp_path / "runs", recorded, replicates=[0] * 8 + [1] * 8)
     )
-    few = [c for c in model.candidates() if c.name.startswith("wheel_gain")]
-    found = diagnose(load_recordings.trials([place], model), model, candidates=few)
+    names = [f"wheel_gain[{side}]" for side in ("left", "right", "both")]
+    trials = load_recordings.trials([place], model)
+    found = diagnose(trials, model, rows=names)
     assert (found.change["trial"], found.change["direction"]) == (4, "sets in")
-    notes = warnings.warnings(found, model)
+    notes = warnings.warnings(found, model.rows(trials))
     assert any("sets in at trial 4, but" in note for note in notes)
     same = "trial 2 of run 0: the same samples as trial 1 of run 0, left out"
     assert same in found.faults
     after = load_recordings.trials([place], model, numbers="4-")
-    later = diagnose(after, model, candidates=few)
+    later = diagnose(after, model, rows=names)
     assert later.change == {}
     assert later.verdict.named == (("wheel_gain[left]",),)

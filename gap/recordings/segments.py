@@ -1,57 +1,15 @@
-"""Trials in pieces: windows between samples, and short runs from observed headings."""
+"""Trials in pieces: windows between samples, and what was told in them."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from bns.gap.models.base import Windows
-from bns.gap.models.planar_rollout import EVERY
 from bns.worlds.trial import Trial
 
-LENGTH = 2.5  # [s] of a piece; a heading drifts little in it
 # Place and heading in a regime are told this coarsely [m, m, rad]: finer, they would
 # hold the tracker's noise, which is in the residuals of the same samples as well.
 COARSE = 0.03, 0.03, 0.1
-LEAD = 1.0  # [s] simulated before each, eight time constants of the drive
-
-
-class Piece(NamedTuple):
-    """A stretch of a trial that is simulated by itself.
-
-    Attributes:
-        first, last: physics steps of its controls; None = to the end.
-        lead: of them, how many only bring the robot up to speed.
-        yaw: heading at the first [rad].
-    """
-
-    first: int
-    last: int | None
-    lead: int
-    yaw: float
-
-
-WHOLE = Piece(0, None, 0, 0.0)
-
-
-def pieces_of(trial: Trial, steps: int, dt: float) -> list[Piece]:
-    """Pieces that tile a trial, each started at the heading that was observed.
-
-    Args:
-        trial: recorded trial.
-        steps: physics steps of it.
-        dt: of a step [s].
-    """
-    yaw = trial.channel("yaw")
-    seen = np.isfinite(yaw)
-    times = trial.times - trial.times[trial.boundaries[0]]
-    made = []
-    for begin in range(0, steps, round(LENGTH / dt)):
-        first = max(begin - round(LEAD / dt), 0)
-        at = float(np.interp(first * dt, times[seen], yaw[seen]))
-        last = min(begin + round(LENGTH / dt), steps)
-        made.append(Piece(first, last, begin - first, at))
-    return made
 
 
 class Told(NamedTuple):
@@ -75,21 +33,6 @@ def told(trial: Trial, windows: Windows) -> Told:
     at = windows.times - trial.times[trial.boundaries[0]]
     index = np.minimum(np.searchsorted(ends, at), len(ends) - 1)
     return Told(index, at - (ends - lasting)[index], at)
-
-
-def stitched(poses: Sequence[np.ndarray]) -> np.ndarray:
-    """Pieces of a path put end to end; motion in the robot's frame is kept.
-
-    Args:
-        poses: per piece ``(S_i + 1, 3)``; each begins where the one before ended.
-
-    Returns:
-        ``(S + 1, 3)``.
-    """
-    path = [poses[0]]
-    for piece in poses[1:]:
-        path.append(moved(piece, path[-1][-1])[1:])
-    return np.concatenate(path)
 
 
 def moved(
@@ -141,17 +84,6 @@ def overlapping(trial: Trial, length: float) -> Windows:
     first, last = seen[first[inside]], seen[last[inside]]
     begin, end = trial.times[first], trial.times[last]
     return Windows(first, last, (begin + end) / 2, end - begin)
-
-
-def thinned(poses: np.ndarray) -> np.ndarray:
-    """Every `EVERY`-th pose, ``(T, 3)``; beyond the end it goes on straight."""
-    missing = -(len(poses) - 1) % EVERY
-    if missing:
-        beyond = poses[-1] + np.arange(1, missing + 1)[:, None] * (
-            poses[-1] - poses[-2]
-        )
-        poses = np.concatenate([poses, beyond])
-    return poses[::EVERY].copy()
 
 
 def coarse(poses: np.ndarray) -> np.ndarray:

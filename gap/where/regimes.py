@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from bns.gap.core.problem import Problem
-from bns.gap.core.whitening import terms
+from bns.gap.where.compared import Compared, terms
 
 DEPTH, CUTS = 2, 12  # splits in a row; thresholds tried per quantity
 LEAST = 0.08  # share of windows in a leaf
@@ -27,25 +26,25 @@ class Node:
     above: "Node | None" = None
 
 
-def regime(problem: Problem, *, seed: int = 0) -> dict[str, Any]:
+def regime(compared: Compared, *, seed: int = 0) -> dict[str, Any]:
     """The regime in words, empty if the gap is alike everywhere.
 
     Returns:
         words: where most of it sits; energy: mean whitened energy there and
         elsewhere; explained: held-out share of the variance.
     """
-    channels = len(problem.model.features)
     columns: dict[str, list] = {}
     energy, owner = [], []
-    for number, (trial, windows, rows) in enumerate(
-        zip(problem.trials, problem.windows, problem.whiten.rows, strict=True)
+    for number, (trial, windows, gap) in enumerate(
+        zip(compared.trials, compared.windows, compared.gap, strict=True)
     ):
-        for name, value in problem.model.regime(trial, windows).items():
+        for name, value in compared.model.regime(trial, windows).items():
             columns.setdefault(name, []).append(value)
-        piece = terms(problem.rest[rows]).reshape(-1, channels).mean(axis=1)
-        energy.append(np.minimum(piece, CAP))
+        energy.append(np.minimum(terms(gap).mean(axis=1), CAP))
         owner.append(np.full(len(windows), number))
     table = {name: np.concatenate(value) for name, value in columns.items()}
+    if not table:
+        return {}
     target, trial = np.concatenate(energy), np.concatenate(owner)
     held_out = trial % 3 == seed % 3
     if held_out.all() or not held_out.any():

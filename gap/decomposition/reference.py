@@ -1,0 +1,143 @@
+"""A nominal model put right by recordings in which nothing was changed.
+
+What departs there departs anyway: it is fitted as any gap is, its values become the
+nominal ones, and how far they remain unsure takes the slack's place (a discrepancy
+learnt from no-change data, after Kennedy and O'Hagan 2001).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bns.gap.decomposition import descent, fit, shares
+from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.row import Row
+from bns.gap.models.base import GapModel, Windows
+from bns.worlds.effects.base import Effect
+from bns.worlds.trial import Trial
+
+
+class Corrected(GapModel):
+    """A model some of whose rows are not where they were believed to be.
+
+    Args:
+        model: the nominal model.
+        moved: departures of rows from their nominal values, by name.
+        slack: how far each row remains unsure (standard deviation), by name.
+    """
+
+    def __init__(
+        self, model: GapModel, moved: Mapping[str, float], slack: Mapping[str, float]
+    ):
+        self.model, self.moved, self.slack = model, dict(moved), dict(slack)
+        self._nominal: dict[str, float] = {}
+        self.name, self.channels = model.name, model.channels
+        self.features, self.process = model.features, model.process
+        self.resolution, self.limits = model.resolution, model.limits
+        self.dt, self.timed, self.logs = model.dt, model.timed, model.logs
+        self.memory, self.many = model.memory, model.many
+        self.starts, self.singly, self.odds = model.starts, model.singly, model.odds
+
+    @classmethod
+    def of(cls, trials: Sequence[Trial], model: GapModel) -> "Corrected":
+        """From checked recordings in which nothing was changed."""
+        problem = Problem.of(trials, model)
+        point = descent.decompose(problem)
+        support = shares.guarded(problem, point)
+        values = fit.placed(problem, point.linear, support, point.values)
+        linear = point.linear
+        found = linear.solve(support)
+        spread = np.sqrt(np.diagonal(linear.covariance(support)))
+        moved, slack = {}, {}
+        for at, number in enumerate(linear.columns):
+            row = problem.rows[number]
+            inside = row.term in support
+            off = values[number] - row.nominal if inside else found[at] * row.sd
+            if row.nuisance or not off:
+                continue
+            moved[row.name] = float(off)
+            slack[row.name] = float(max(spread[at] * row.sd, 1e-3 * row.sd))
+        return cls(model, moved, slack)
+
+    @property
+    def least(self) -> np.ndarray:
+        """See `GapModel.least`."""
+        return self.model.least
+
+    def rows(self, trials: Sequence[Trial]) -> tuple[Row, ...]:
+        """The model's rows, as sure as the recordings without a change make them."""
+        found = self.model.rows(trials)
+        self._nominal = {row.name: row.nominal for row in found}
+        return tuple(
+            replace(row, slack=self.slack[row.name]) if row.name in self.slack else row
+            for row in found
+        )
+
+    def simulate(
+        self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
+    ) -> list[list[np.ndarray]]:
+        """See `GapModel.simulate`: by the model as it was."""
+        return self.model.simulate(trials, effects)
+
+    def paths(
+        self,
+        trials: Sequence[Trial],
+        sets: Sequence[Sequence[Mapping[str, float]]],
+        *,
+        fine: bool = True,
+    ) -> list[list[np.ndarray]]:
+        """See `GapModel.paths`: departures on top of those that are there anyway."""
+        known = {n: off for n, off in self.moved.items() if n in self._nominal}
+        changed = [
+            [
+                {
+                    **values,
+                    **{
+                        name: values.get(name, self._nominal[name]) + off
+                        for name, off in known.items()
+                    },
+                }
+                for values in row
+            ]
+            for row in sets
+        ]
+        return self.model.paths(trials, changed, fine=fine)
+
+    def compare(
+        self, trial: Trial, observed: np.ndarray, windows: Windows
+    ) -> np.ndarray:
+        """See `GapModel.compare`."""
+        return self.model.compare(trial, observed, windows)
+
+    def windows(self, trial: Trial) -> Windows:
+        """See `GapModel.windows`."""
+        return self.model.windows(trial)
+
+    def joint_windows(self, trial: Trial) -> Windows:
+        """See `GapModel.joint_windows`."""
+        return self.model.joint_windows(trial)
+
+    def effect(self, term: str, values: Mapping[str, float]) -> Effect | None:
+        """See `GapModel.effect`."""
+        return self.model.effect(term, values)
+
+    def motion(self, features: np.ndarray) -> np.ndarray:
+        """See `GapModel.motion`."""
+        return self.model.motion(features)
+
+    def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
+        """See `GapModel.regime`."""
+        return self.model.regime(trial, windows)
+
+    def blocks(self, trials: Sequence[Trial], windows: Sequence[Windows]) -> np.ndarray:
+        """See `GapModel.blocks`."""
+        return self.model.blocks(trials, windows)
+
+    def parse(self, text: str) -> Effect:
+        """See `GapModel.parse`."""
+        return self.model.parse(text)
+
+    def at_rest(self, trial: Trial, predicted: np.ndarray) -> frozenset[str]:
+        """See `GapModel.at_rest`."""
+        return self.model.at_rest(trial, predicted)
