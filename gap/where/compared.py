@@ -1,7 +1,7 @@
 """A recording beside what a nominal model predicts, in units of its scatter."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -71,7 +71,8 @@ class Compared:
     ) -> "Compared":
         """With the scatter that a diagnosis measured."""
         sigma = np.array(found.floor["sigma"][: len(model.channels)], dtype=float)
-        return cls.of(trials, model, sigma)
+        process = np.asarray(found.floor.get("process", model.process), dtype=float)
+        return replace(cls.of(trials, model, sigma), process=process)
 
     def noise(self, trial: int, windows: Windows) -> np.ndarray:
         """Mean square that scatter alone gives in windows of a trial, ``(W, C)``."""

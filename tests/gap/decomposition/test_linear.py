@@ -1,5 +1,7 @@
 """Known answers of the linear fit: what is planted is found, what is not is not."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -22,6 +24,7 @@ class Rows:
             for name in NAMES
         )
         self.terms = {name: (at,) for at, name in enumerate(NAMES)}
+        self.model = SimpleNamespace(odds=KAPPA)
         self.nominal, self.sd = np.zeros(6), np.ones(6)
         self.bounds = np.full(6, low), np.full(6, 10.0)
         self.block = np.repeat(np.arange(BLOCKS), EACH)
