@@ -105,7 +105,7 @@ WALK_FORGET = (
     "--evolution.mutation-rate 0.02 --evolution.headless-chicken 0 "
     "--world.damage leg_raised:legs=1,2,5,6,blend=1@7"
 )
-HEXAPOD = ["--model", "phantomx", "--trials", "4-5", "--most", "1"]
+HEXAPOD = ["--model", "phantomx", "--trials", "4-5"]
 CAMPAIGN = """\
 name = "goldens"
 preset = "khepera-simple"
@@ -224,7 +224,7 @@ def _diagnoses(
     changed, unchanged = logs.servo(place / "logs" / "servo")
     driven = logs.odometry(place / "logs" / "odometry")
     made = {name.replace(" ", "-"): words for name, words, _ in _made(place)}
-    of_arm = ["--model", str(ROOT / "examples/arm/arm.toml"), "--most", "1"]
+    of_arm = ["--model", str(ROOT / "examples/arm/arm.toml")]
     beside = ["--importer", "xl330", "--reference", str(unchanged)]
     for name, data, words, needs in (
         ("wheeled", "navigation-plain", ["--trials", "4-7"], runs),

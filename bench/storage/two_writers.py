@@ -87,7 +87,7 @@ def _recording(path: Path) -> None:
 def _words(home: Path, out: Path, kind: str, seed: int) -> list[str]:
     if kind == "diagnosis":
         own = ["--out", str(out), "--seed", str(seed), "--no-report", "--no-rerun"]
-        return ["gap", "diagnose", str(home / "drives"), *own, "--most", "1"]
+        return ["gap", "diagnose", str(home / "drives"), *own]
     if kind == "campaign":
         file = home / f"{seed}.toml"
         file.write_text(f"seed = {seed}\n" + text(2, trials=2, replicates=2))
