@@ -66,7 +66,7 @@ def descend(
         near = at is not None and np.abs((values - at) / problem.sd).max() <= fit.FAR
         slopes, at = (slopes, at) if near else (None, values.copy())
         linear, known, slopes = linearised(problem, values, rest, known, slopes)
-        found = linear.search(start=support)[1]
+        found = linear.search(start=support, backward=not problem.model.singly)[1]
         if found == support:
             break
         support = found
@@ -129,11 +129,10 @@ def decompose(problem: Problem, start: Point | None = None) -> Point:
         start: the nominal model, None = made here.
     """
     start = start or nothing(problem)
-    found = start.linear.search()[1]
     best = start
-    if found and problem.model.singly:
-        best = _alone(problem, start)
-    elif found:
+    if problem.model.singly:
+        best = better(problem, [start, _alone(problem, start)])
+    elif found := start.linear.search()[1]:
         values = placed(problem, start.linear, found, start.values)
         best = descend(problem, values, found, start.noise)
         if len(best.support) > 1:
@@ -220,7 +219,17 @@ def _fitted_at(problem: Problem, point: Point, support: Support) -> Point:
 
 def _others(problem: Problem, start: Point, first: Point) -> list[Point]:
     """Points from the best single explanation and from all at once."""
-    tried = _singles(problem, start, first.noise)
+    linear, most = start.linear, problem.model.starts
+    order = sorted(linear.free, key=lambda name: linear.cost({name}))[:most]
+    starts = [(n, placed(problem, linear, {n}, start.values)) for n in order]
+    starts += levels.alone(problem, start, most)
+    few = problem.sample(fit.ROUGH)
+    few = None if len(few) == len(problem.trials) else few
+    tried = []
+    for name, values in starts:
+        fitted = _fitted(problem, {name})
+        values, rest = newton(problem, values, fitted, start.noise, turns=6, only=few)
+        tried.append((first.noise.loss(rest), name, values))
     _, name, values = min(tried, key=lambda item: item[0])
     made = [descend(problem, values, {name}, first.noise)]
     if len(made[0].support) > 1 and (both := _with_level(problem, name, values, first)):
@@ -230,45 +239,27 @@ def _others(problem: Problem, start: Point, first: Point) -> list[Point]:
     return made
 
 
-def _singles(problem: Problem, start: Point, known: Noise) -> list[tuple]:
-    """Loss, name and values of the single explanations that come first in a tangent or
-    by a level, each fitted to a part of the recording."""
+def _alone(problem: Problem, start: Point) -> Point:
+    """From the single explanation that leaves least, each fitted to the simulation."""
     linear, most = start.linear, problem.model.starts
     order = sorted(linear.free, key=lambda name: linear.cost({name}))[:most]
-    few = problem.sample(fit.ROUGH)
-    few = None if len(few) == len(problem.trials) else few
     starts = [(n, placed(problem, linear, {n}, start.values)) for n in order]
-    starts += levels.alone(problem, start, most)
-    tried = []
+    starts += levels.screened(problem, start, most)
+    tried: dict[str, tuple[float, np.ndarray]] = {}
     for name, values in starts:
         fitted = _fitted(problem, {name})
-        values, rest = newton(problem, values, fitted, start.noise, turns=6, only=few)
-        tried.append((known.loss(rest), name, values))
-    return tried
+        values, rest = newton(problem, values, fitted, start.noise, turns=6)
+        height = start.noise.loss(rest) / start.noise.lam + _prior(problem, values)
+        if name not in tried or height < tried[name][0]:
+            tried[name] = height, values
+    best = min(tried, key=lambda name: tried[name][0])
+    return descend(problem, tried[best][1], {best}, start.noise)
 
 
-def _alone(problem: Problem, start: Point) -> Point:
-    """From the single explanation that leaves least, those without a slope included."""
-    tried = _singles(problem, start, start.noise)
-    sets = [
-        (row.term, number, value)
-        for number, row in enumerate(problem.rows)
-        for value in row.levels
-        if not row.smooth and value != row.nominal
-    ]
-    moved = []
-    for _, number, value in sets:
-        values = start.values.copy()
-        values[number] = value
-        moved.append(values)
-    if moved:
-        made = problem.predict(moved, fine=False)
-        for (name, _, _), values, path in zip(sets, moved, made, strict=True):
-            if np.isfinite(path[problem.seen]).all():
-                left = start.noise.loss(problem.recorded - path)
-                tried.append((left, name, values))
-    _, name, values = min(tried, key=lambda item: item[0])
-    return descend(problem, values, {name}, start.noise)
+def _prior(problem: Problem, values: np.ndarray) -> float:
+    """What nuisances cost, in squared deviations."""
+    rows = [k for name in fit.nuisances(problem) for k in problem.terms[name]]
+    return float((((values - problem.nominal) / problem.sd)[rows] ** 2).sum())
 
 
 def _with_level(problem: Problem, name: str, values, first: Point) -> Point | None:

@@ -1,6 +1,7 @@
 """Starts over the whole range of what has no slope at the nominal: dead bands, limits,
 lags that are long, wheels that stop."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from bns.gap.decomposition.fit import Noise, Point
 from bns.gap.decomposition.linear import KAPPA, Linear, Support, stretches
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.row import Row
 
 FELT = 4.0  # weighted square of a change below which a level is not felt
 NEAR = 15.0  # nats beyond the present cost within which levels are tried in full
@@ -92,10 +94,53 @@ def alone(problem: Problem, point: Point, most: int) -> list[tuple[str, np.ndarr
     return made
 
 
+def screened(problem: Problem, point: Point, most: int) -> list[tuple[str, np.ndarray]]:
+    """Explanations that say most by themselves at one of their levels, or at one of the
+    model's departures: where a tangent at the nominal says little.
+
+    Args:
+        problem: the recording.
+        point: the nominal model.
+        most: how many.
+
+    Returns:
+        names and values of all rows, ``(R,)``, nuisances fitted; the best first.
+    """
+    todo = [
+        (number, value)
+        for number, row in enumerate(problem.rows)
+        if not row.nuisance
+        for value in _departures(row, problem.model.spread)
+    ]
+    made: dict[str, np.ndarray] = {}
+    for _, (number, value), linear in _scored(problem, point, todo, None):
+        term = problem.rows[number].term
+        if term not in made and len(made) < most:
+            made[term] = _values(problem, point, number, value, linear, frozenset())
+    return list(made.items())
+
+
+def _departures(row: Row, spread: Sequence[float]) -> list[float]:
+    """Levels of a row, and values as many plausible departures from the nominal."""
+    found = {value for value in row.levels if value != row.nominal}
+    for size in spread if row.smooth else ():
+        for value in (row.nominal - size * row.sd, row.nominal + size * row.sd):
+            if row.low <= value <= row.high:
+                found.add(value)
+    return sorted(found)
+
+
 def _level(problem, point: Point, number: int, value: float, linear: Linear) -> Level:
     known = min((point.support, frozenset()), key=lambda s: linear.cost(_in(linear, s)))
     cost, support = linear.search(start=known, quick=True)
     row = problem.rows[number]
+    values = _values(problem, point, number, value, linear, support)
+    paid = cost + KAPPA + np.log(len(row.levels)) + 0.5
+    return Level(float(paid), values, support | {row.term})
+
+
+def _values(problem, point: Point, number: int, value: float, linear: Linear, support):
+    """Values of all rows with a row at a level, the others by the linear model."""
     values = problem.nominal.copy()
     found = linear.solve(support)
     for at, column in enumerate(linear.columns):
@@ -106,8 +151,7 @@ def _level(problem, point: Point, number: int, value: float, linear: Linear) -> 
             values[column] += found[at] * other.sd
     values = np.clip(values, *problem.bounds)
     values[number] = value
-    paid = cost + KAPPA + np.log(len(row.levels)) + 0.5
-    return Level(float(paid), values, support | {row.term})
+    return values
 
 
 def _in(linear: Linear, support: Support) -> Support:

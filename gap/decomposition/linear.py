@@ -266,7 +266,11 @@ class Linear:
         return sum(most.values())
 
     def search(
-        self, start: Iterable[str] | None = None, *, quick: bool = False
+        self,
+        start: Iterable[str] | None = None,
+        *,
+        quick: bool = False,
+        backward: bool = True,
     ) -> tuple[float, Support]:
         """The set of highest evidence: from all backward, from none forward and from a
         given one, each improved by adding, dropping and swapping.
@@ -274,11 +278,14 @@ class Linear:
         Args:
             start: a further set to start from.
             quick: from there alone, and without trying two against one.
+            backward: from all as well; of hundreds that takes long and says little.
 
         Returns:
             its cost, and the set.
         """
-        starts = [] if quick else [self._backward(), frozenset()]
+        starts = [] if quick else [frozenset()]
+        if backward and not quick:
+            starts.insert(0, self._backward())
         if start is not None:
             starts.append(frozenset(start) & frozenset(self.free))
         found = [self._improved(item, merge=not quick) for item in starts]

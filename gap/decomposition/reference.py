@@ -38,6 +38,8 @@ class Corrected(GapModel):
         self.dt, self.timed, self.logs = model.dt, model.timed, model.logs
         self.memory, self.many = model.memory, model.many
         self.starts, self.singly, self.odds = model.starts, model.singly, model.odds
+        self.spread, self.longest = model.spread, model.longest
+        self.before = model.before
 
     @classmethod
     def of(cls, trials: Sequence[Trial], model: GapModel) -> "Corrected":

@@ -73,6 +73,7 @@ class GapModel(ABC):
         before: seconds after which a simulation begun at rest moves as the robot.
         singly: whether fits are started from single explanations alone: where there
             are more rows than a tangent at the nominal can tell apart.
+        spread: plausible departures at which each row is then tried, beside its levels.
     """
 
     name: str
@@ -90,6 +91,7 @@ class GapModel(ABC):
     before: float = 0.0
     starts: int = 4
     singly: bool = False
+    spread: tuple[float, ...] = ()
     odds: float = 3.0
 
     @property

@@ -30,6 +30,7 @@ TRACKER = (1e-3, 1e-3, 1e-2)  # [m, m, rad] noise of the tracker; assumed
 READING = 2e-3  # [rad] of a servo's reading, which comes in steps of 5.1 mrad
 SCATTER = (2e-3, 2e-3, 0.01)  # [m, m, rad per root second] of a walking body; assumed
 SLIPS = (1e-3, 1e-3, 5e-3)  # [m, m, rad] of a step although all is as told; assumed
+SPREAD = (0.4, 1.3)  # plausible departures: feet come down elsewhere soon
 WOBBLE = 3e-3  # [rad per root second] of a joint; assumed
 
 
@@ -47,6 +48,7 @@ class WalkModel(LibraryModel):
     timed = False
     starts = 8
     singly = True
+    spread = SPREAD
     odds = 12.0  # what walking scatters is alike in all servos, hardly independent
     """commands last until the robot rests, not as long as they are told"""
 
