@@ -16,17 +16,18 @@ BLOCKS, EACH = 8, 60
 class Rows:
     """Six rows with random columns; what a `Problem` gives a `Linear`."""
 
-    def __init__(self, rng, alike=(), low=-10.0):
+    def __init__(self, rng, alike=(), low=-10.0, high=10.0, smooth=True):
         from bns.gap.decomposition.row import Row
 
         self.rows = tuple(
-            Row(name, 0.0, 1.0, low, 10.0, slack=0.02 if name == "f" else 0.0)
+            Row(name, 0.0, 1.0, low, high, slack=0.02 if name == "f" else 0.0,
+                smooth=smooth)
             for name in NAMES
-        )
+        )  # fmt: skip
         self.terms = {name: (at,) for at, name in enumerate(NAMES)}
         self.model = SimpleNamespace(odds=KAPPA)
         self.nominal, self.sd = np.zeros(6), np.ones(6)
-        self.bounds = np.full(6, low), np.full(6, 10.0)
+        self.bounds = np.full(6, low), np.full(6, high)
         self.block = np.repeat(np.arange(BLOCKS), EACH)
         self.columns = rng.normal(size=(6, BLOCKS * EACH, 2))
         for first, second in alike:
@@ -184,3 +185,14 @@ def test_an_autoregression_is_taken_out():
     assert memory.factors[0, 0] == pytest.approx(0.9, abs=0.05)
     assert correlated(memory(values), trial) < 1.3 < 5 < correlated(values, trial)
     assert Memory.of(values, trial, 0)(values) is values
+
+
+@pytest.mark.parametrize(("value", "kept"), [(0.98, True), (1.02, True), (1.3, False)])
+def test_a_whole_loss_is_kept_though_noise_puts_it_beyond_its_bound(value, kept):
+    """A level at the bound of its row: an estimate a little beyond says the bound."""
+    rng = np.random.default_rng(7)
+    problem = Rows(rng, low=0.0, high=1.0, smooth=False)
+    linear = problem.linear(planted(rng, problem, a=value), lam=1.0)
+    found = linear.solve({"a"})[0]
+    assert abs(found - value) < 0.08
+    assert (linear.search()[1] == {"a"}) == kept

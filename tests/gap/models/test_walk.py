@@ -6,7 +6,7 @@ import pytest
 from bns.gap.bench import cases, walk_cases
 from bns.gap.bench.walk_cases import WalkStand
 from bns.gap.candidates import legged
-from bns.gap.decomposition import fit
+from bns.gap.decomposition import descent, diagnosis, fit, levels
 from bns.gap.decomposition.problem import Problem
 from bns.gap.diagnose import diagnose
 from bns.gap.models.legged import lost, scatter, where
@@ -135,6 +135,21 @@ def test_a_planted_effect_is_named_with_its_leg(model, told):
     made = diagnose(trials, model, rows=KEPT, full=False)
     assert made.verdict.named == (("servo_gain[right_front]",),)
     assert made.best.magnitudes[0] == pytest.approx(0.5, abs=0.03)
+
+
+def test_a_soft_floor_is_named_which_a_tangent_misses(model, told):
+    """Feet come down elsewhere: by the slope at the nominal it explains nothing."""
+    soft = registry.make("floor_compliance", factor=3.0)
+    trials = walk_cases.record(told, [soft], 1)
+    usable, _ = check.check(trials, model)
+    names = (*KEPT, "floor_compliance", "foot_slippery[all]", "centre_of_mass.dx")
+    problem = diagnosis.narrowed(Problem.of(usable, model), names)
+    start = descent.nothing(problem)
+    first, values = levels.screened(problem, start, 3)[0]
+    assert first == "floor_compliance"
+    assert fit.newton(problem, values, {first}, start.noise)[0][
+        problem.terms[first][0]
+    ] == pytest.approx(3.0, abs=0.3)
 
 
 @pytest.mark.parametrize("kind", ["single", "lost"])
