@@ -17,6 +17,7 @@ MOST = 14  # levels that are tried in full on account of their cost
 KINDS = 6  # further ones, the best level of other rows
 SEARCHED = 6  # levels whose sets are searched
 EACH = 2  # levels of one row among these
+AT_ONCE = 60  # levels in one batch, which bounds the memory
 PARTS = 6  # between two levels in a search for the best value
 GAIN = 0.5  # of the loss that a new value has to bring
 
@@ -112,12 +113,16 @@ def screened(problem: Problem, point: Point, most: int) -> list[tuple[str, np.nd
         if not row.nuisance
         for value in _departures(row, problem.model.spread)
     ]
-    made: dict[str, np.ndarray] = {}
-    for _, (number, value), linear in _scored(problem, point, todo, None):
-        term = problem.rows[number].term
-        if term not in made and len(made) < most:
-            made[term] = _values(problem, point, number, value, linear, frozenset())
-    return list(made.items())
+    best: dict[str, tuple[float, np.ndarray]] = {}
+    for at in range(0, len(todo), AT_ONCE):
+        part = todo[at : at + AT_ONCE]
+        for cost, (number, value), linear in _scored(problem, point, part, None):
+            term = problem.rows[number].term
+            if term not in best or cost < best[term][0]:
+                values = _values(problem, point, number, value, linear, frozenset())
+                best[term] = cost, values
+    order = sorted(best, key=lambda term: best[term][0])[:most]
+    return [(term, best[term][1]) for term in order]
 
 
 def _departures(row: Row, spread: Sequence[float]) -> list[float]:
