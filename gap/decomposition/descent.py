@@ -131,7 +131,7 @@ def decompose(problem: Problem, start: Point | None = None) -> Point:
     start = start or nothing(problem)
     best = start
     if problem.model.singly:
-        best = better(problem, [start, _alone(problem, start)])
+        best = _alone(problem, start)
     elif found := start.linear.search()[1]:
         values = placed(problem, start.linear, found, start.values)
         best = descend(problem, values, found, start.noise)
@@ -240,7 +240,8 @@ def _others(problem: Problem, start: Point, first: Point) -> list[Point]:
 
 
 def _alone(problem: Problem, start: Point) -> Point:
-    """From the single explanation that leaves least, each fitted to the simulation."""
+    """From the single explanation that leaves least, each fitted to the simulation;
+    nothing, if it is no better than the best of so many fits is by chance."""
     linear, most = start.linear, problem.model.starts
     order = sorted(linear.free, key=lambda name: linear.cost({name}))[:most]
     starts = [(n, placed(problem, linear, {n}, start.values)) for n in order]
@@ -253,7 +254,9 @@ def _alone(problem: Problem, start: Point) -> Point:
         if name not in tried or height < tried[name][0]:
             tried[name] = height, values
     best = min(tried, key=lambda name: tried[name][0])
-    return descend(problem, tried[best][1], {best}, start.noise)
+    found = descend(problem, tried[best][1], {best}, start.noise)
+    nominal, here = costs(problem, [start, found])
+    return found if here + np.log(len(tried)) < nominal else start
 
 
 def _prior(problem: Problem, values: np.ndarray) -> float:
