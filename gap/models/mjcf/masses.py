@@ -7,6 +7,7 @@ mass of the model: numbers in which motion is linear while they are small.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -51,16 +52,21 @@ def rows(item: OwnCandidate, body: Body, excite: str) -> list[Row]:
         excite: which commands make it felt.
     """
     sd, slack = PLAUSIBLE * body.mass, item.slack or SLACK * body.mass
+    part = item.fixed["part"]
+    shared: dict[str, Any] = {
+        "group": item.name,
+        "covers": tuple(f"body_centre.d{axis}[{part}]" for axis in AXES),
+        "excite": excite,
+    }
     made = [
         Row(item.name, 0.0, sd, item.low, item.high, unit=item.unit, slack=slack,
-            group=item.name, excite=excite)
+            **shared)
     ]  # fmt: skip
     if body.gyration:
         far = FAR * item.high * body.gyration
         made += [
             Row(f"{item.name}.m{axis}", 0.0, sd * body.gyration, -far, far,
-                unit="kg m", slack=slack * body.gyration, group=item.name,
-                excite=excite)
+                unit="kg m", slack=slack * body.gyration, **shared)
             for axis in AXES
         ]  # fmt: skip
     return made
