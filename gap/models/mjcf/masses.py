@@ -22,17 +22,22 @@ PLAUSIBLE = 0.1  # of a body's mass (assumed)
 SLACK = 0.004  # of a body's mass: how well a model knows it, and its centre (assumed)
 LIGHT = 0.01  # of a body's mass: below, moments do not tell where an added mass sits
 FAR = 4.0  # radii of gyration from the centre: the farthest
-INERTIA = 0.5  # of the least moment of inertia that a mass taken off may take along
+TAKEN = 0.5  # of its spread that a mass taken off may take along
 
 
 @dataclass(frozen=True)
 class Body:
-    """What a model says of a body: mass [kg], largest radius of gyration [m] and least
-    moment of inertia [kg m2]."""
+    """What a model says of a body.
+
+    Attributes:
+        mass: [kg].
+        gyration: largest radius of gyration [m].
+        spread: least second moment of the mass about its centre [kg m2].
+    """
 
     mass: float
     gyration: float
-    inertia: float
+    spread: float
 
     @classmethod
     def of(cls, model: mujoco.MjModel, name: str) -> "Body":
@@ -40,7 +45,8 @@ class Body:
         at = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
         mass = max(float(model.body_mass[at]), 1e-9)
         inertia = model.body_inertia[at]
-        return cls(mass, float(np.sqrt(inertia.max() / mass)), float(inertia.min()))
+        spread = max(float(inertia.sum() / 2 - inertia.max()), 0.0)
+        return cls(mass, float(np.sqrt(inertia.max() / mass)), spread)
 
 
 def rows(item: OwnCandidate, body: Body, excite: str) -> list[Row]:
@@ -108,9 +114,9 @@ def added(name: str, values: Mapping[str, float], part: str, body: Body) -> Effe
     size = max(abs(mass), LIGHT * body.mass) * (-1 if mass < 0 else 1)
     away = _moments(name, values) / size
     limit = FAR * body.gyration
-    if mass < 0:  # what is left keeps an inertia
+    if mass < 0:  # what is left has a spread
         reduced = body.mass * -mass / (body.mass + mass)
-        limit = min(limit, float(np.sqrt(INERTIA * body.inertia / reduced)))
+        limit = min(limit, float(np.sqrt(TAKEN * body.spread / reduced)))
     length = float(np.linalg.norm(away))
     away = away * min(1.0, limit / max(length, 1e-12))
     return effects.make("body_mass", {"part": part, "added": mass, **_place(away)})
