@@ -13,10 +13,15 @@ from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.shares import HeldOut
 
 TURNS = 4  # of fitting and searching
+SINGLES = 4  # explanations that are tried alone
+WIDE = 3  # numbers of an explanation from which its tangent tells little of it
+FEW = 2  # explanations that need no other start if they leave little
+ENOUGH = 1.2  # times what all explanations leave: little more
 ROUNDS = 2  # of levels
 MARGIN = 1.02  # of the held-out error that an autoregression may cost
 WEAK = 0.05  # of what a set explains: so little may be left to the others
 TRIED = 3  # of these, the weakest first
+SLIGHT = 0.25  # of a plausible departure: next to none
 WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
 
 
@@ -82,6 +87,8 @@ def _fitted(problem: Problem, support: Iterable[str]) -> set[str]:
 
 def better(problem: Problem, points: Sequence[Point]) -> Point:
     """The point of highest evidence."""
+    if len(points) == 1:
+        return points[0]
     return points[int(np.argmin(costs(problem, points)))]
 
 
@@ -129,14 +136,13 @@ def decompose(problem: Problem, start: Point | None = None) -> Point:
         start: the nominal model, None = made here.
     """
     start = start or nothing(problem)
-    best = start
-    if problem.model.singly:
-        best = _alone(problem, start)
-    elif found := start.linear.search()[1]:
-        values = placed(problem, start.linear, found, start.values)
-        best = descend(problem, values, found, start.noise)
-        if len(best.support) > 1:
-            best = better(problem, [best, *_others(problem, start, best)])
+    several = not problem.model.singly
+    found = start.linear.search()[1] if several else frozenset()
+    best = start if several else _alone(problem, start)
+    if len(found) == 1:
+        best = _followed(problem, start, found)
+    if several and len(found | best.support) > 1:
+        best = _several(problem, start, found, best)
     for _ in range(ROUNDS):
         tried = levels.best(problem, best)
         if tried is None or tried.cost > best.cost - WORTH:
@@ -146,7 +152,28 @@ def decompose(problem: Problem, start: Point | None = None) -> Point:
         if chosen is best:
             break
         best = chosen
+    best = narrowed(problem, best)
     return best if problem.model.many else pruned(problem, best)
+
+
+def narrowed(problem: Problem, point: Point) -> Point:
+    """A point with what an explanation covers in its place where that is as good: a
+    shifted centre of mass for a load of next to no mass.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+    """
+    for name in sorted(point.support & set(point.linear.covers)):
+        first = problem.terms[name][0]
+        covered = point.linear.covers[name] & set(problem.terms)
+        off = point.values[first] - problem.nominal[first]
+        if covered and abs(off) < SLIGHT * problem.sd[first]:
+            support = (point.support - {name}) | covered
+            other = refitted(problem, point, support)
+            least, here = costs(problem, [other, point])
+            point = other if least <= here else point
+    return point
 
 
 def pruned(problem: Problem, point: Point) -> Point:
@@ -217,25 +244,50 @@ def _fitted_at(problem: Problem, point: Point, support: Support) -> Point:
     return Point(values, support, rest, linear, slopes, known)
 
 
-def _others(problem: Problem, start: Point, first: Point) -> list[Point]:
-    """Points from the best single explanation and from all at once."""
-    linear, most = start.linear, problem.model.starts
-    order = sorted(linear.free, key=lambda name: linear.cost({name}))[:most]
-    starts = [(n, placed(problem, linear, {n}, start.values)) for n in order]
-    starts += levels.alone(problem, start, most)
+def _several(problem: Problem, start: Point, found: Support, best: Point) -> Point:
+    """The best point where a tangent finds several explanations: from a single one, and
+    if that is not enough from those several, and from all where many depart."""
+    points = _simple(problem, start) + [best] * bool(best.support)
+    if not any(enough(point) for point in points):
+        if not best.support:
+            points.append(_followed(problem, start, found))
+        if problem.model.many:
+            points.append(_from_all(problem, start))
+    return better(problem, points)
+
+
+def enough(point: Point) -> bool:
+    """Whether few explanations leave little more than all together do."""
+    linear, support = point.linear, point.support
+    whole = linear.squares(linear.free)
+    return len(support) <= FEW and linear.squares(support) < ENOUGH * whole
+
+
+def _followed(problem: Problem, start: Point, support: Support) -> Point:
+    """A point from a set found by the tangent at the nominal model."""
+    values = placed(problem, start.linear, support, start.values)
+    return descend(problem, values, support, start.noise)
+
+
+def _simple(problem: Problem, start: Point) -> list[Point]:
+    """Points from the best single explanation, and from it with a level on top."""
+    linear = start.linear
+    order = sorted(linear.free, key=lambda name: linear.cost({name}))
+    wide = [name for name in order if len(linear.terms[name]) >= WIDE][: SINGLES // 2]
+    order = [*dict.fromkeys((*order[:SINGLES], *wide))]
     few = problem.sample(fit.ROUGH)
     few = None if len(few) == len(problem.trials) else few
+    starts = [(n, placed(problem, linear, {n}, start.values)) for n in order]
+    starts += levels.alone(problem, start, SINGLES)
     tried = []
     for name, values in starts:
         fitted = _fitted(problem, {name})
         values, rest = newton(problem, values, fitted, start.noise, turns=6, only=few)
-        tried.append((first.noise.loss(rest), name, values))
+        tried.append((start.noise.loss(rest), name, values))
     _, name, values = min(tried, key=lambda item: item[0])
-    made = [descend(problem, values, {name}, first.noise)]
-    if len(made[0].support) > 1 and (both := _with_level(problem, name, values, first)):
+    made = [descend(problem, values, {name}, start.noise)]
+    if not enough(made[0]) and (both := _with_level(problem, name, values, start)):
         made.append(both)
-    if problem.model.many:
-        made.append(_from_all(problem, start))
     return made
 
 
@@ -265,10 +317,10 @@ def _prior(problem: Problem, values: np.ndarray) -> float:
     return float((((values - problem.nominal) / problem.sd)[rows] ** 2).sum())
 
 
-def _with_level(problem: Problem, name: str, values, first: Point) -> Point | None:
+def _with_level(problem: Problem, name: str, values, start: Point) -> Point | None:
     """A point from a single explanation and a level on top of it: through a tangent
     that lacks the level, the rest of it looks like several others."""
-    single = _fitted_at(problem, replace(first, values=values), frozenset({name}))
+    single = _fitted_at(problem, replace(start, values=values), frozenset({name}))
     level = levels.best(problem, single)
     if level is None or level.cost > single.cost - WORTH:
         return None

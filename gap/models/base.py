@@ -64,8 +64,7 @@ class GapModel(ABC):
         memory: order of the autoregression that residuals may have; 0 = none.
         many: whether fits are also started from all rows at once: where many depart
             at once a tangent at the nominal misleads.
-        starts: explanations from which alone fits are started as well; more where a
-            tangent at the nominal says little of which it is.
+        starts: explanations that are fitted singly, where `singly`.
         odds: log odds against each explanation, by how many there are: with 3 about one
             of twenty is expected.
         longest: seconds of a recording that are fitted; of a longer one each trial is
