@@ -305,6 +305,8 @@ def _alone(problem: Problem, start: Point) -> Point:
         height = start.noise.loss(rest) / start.noise.lam + _prior(problem, values)
         if name not in tried or height < tried[name][0]:
             tried[name] = height, values
+    if not tried:
+        return start
     best = min(tried, key=lambda name: tried[name][0])
     found = descend(problem, tried[best][1], {best}, start.noise)
     nominal, here = costs(problem, [start, found])

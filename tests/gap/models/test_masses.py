@@ -4,9 +4,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from bns.gap.decomposition.row import Row
 from bns.gap.models.mjcf import masses
 from bns.gap.models.mjcf.masses import Body
-from bns.gap.records import Candidate
 
 NAME = "body_mass[load]"
 BODY = Body(mass=0.9, gyration=0.11, spread=0.002)
@@ -59,9 +59,9 @@ def test_far_moments_leave_a_body_that_can_be(mass):
 
 
 def test_mass_and_moments_are_one_explanation_that_covers_a_shifted_centre():
-    item = Candidate(
+    item = Row(
         name=NAME, effect="body_mass", parameter="added", unit="kg", nominal=0.0,
-        low=-0.8, high=1.8, grid=(0.1,), fixed={"part": "load"},
+        sd=0.1, low=-0.8, high=1.8, levels=(0.1,), fixed={"part": "load"},
     )  # fmt: skip
     rows = masses.rows(item, BODY, "motion")
     assert [row.name for row in rows] == [NAME, *(f"{NAME}.m{a}" for a in "xyz")]
