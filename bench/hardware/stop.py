@@ -123,7 +123,7 @@ def _once(
     """Times of one drive, None if it ended before anything happened."""
     clock = port.with_name("clock")
     env = {"PYTHONPATH": str(port.parent), "BENCH_CLOCK": str(clock)}
-    driver = Driver(drive.script, port, {**os.environ, **env})
+    driver = Driver(drive.robot, port, {**os.environ, **env})
     scene, at = Scene(driver, port, log, clock), 0.0
     try:
         if not _wait(lambda: drive.steady(log, driver), 60.0, driver):
