@@ -89,11 +89,13 @@ class Drive(NamedTuple):
 
     Attributes:
         robot: its name.
+        cycle: time within which its motion repeats, or all phases of loops [s].
         steady: whether a drive has gone on for a moment.
         driven: whether the robot was driven at a time.
     """
 
     robot: str
+    cycle: float
     steady: Callable[[Log, Driver], bool]
     driven: Callable[[Log, float], bool]
 
@@ -119,6 +121,6 @@ def _walked(log: Log, at: float) -> bool:
 
 
 DRIVES = (
-    Drive("khepera3", _rolling, _rolled),
-    Drive("phantomx", _walking, _walked),
+    Drive("khepera3", 0.2, _rolling, _rolled),
+    Drive("phantomx", 1.2, _walking, _walked),
 )
