@@ -5,10 +5,9 @@ one, to share the work.
 """
 
 import sys
-import time
 from typing import Any
 
-from bench.gap.kept_cases import Cases
+from bench.gap.kept_cases import Cases, Stopwatch
 from bench.result import Result, bench
 
 COUNTS = {"large": 56, "none": 32, "lost": 16}
@@ -33,13 +32,12 @@ def one(kind: str, seed: int) -> dict[str, Any]:
 
     model = WalkModel()
     case = walk_cases.build(seed, kind, model)
-    begin, busy = time.perf_counter(), time.process_time()
+    watch = Stopwatch()
     made = analyse(case.trials, model, seed=seed, most=1)
     row = {
         "kind": kind,
         "seed": seed,
-        "seconds": time.perf_counter() - begin,
-        "cpu": time.process_time() - busy,
+        **watch.read(),
         "answer": walk_cases.answer(case, made),
         "said": {
             "verdict": made.verdict.kind,
@@ -86,7 +84,10 @@ def gap_hexapod(quick: bool) -> Result:
             "named as one of several": scoring.share(
                 large, lambda row: row["said"]["verdict"] == "either"
             ),
-            "false alarms": {"n": len(none), "share": scoring.share(none, _claims)},
+            "false alarms": {
+                "n": len(none),
+                "share": scoring.share(none, scoring.claims),
+            },
             "smaller effects": {
                 "n": len(singles) - len(large),
                 "named": scoring.share(
@@ -116,10 +117,6 @@ def leg(row: dict) -> bool:
 
 def _among(row: dict) -> bool:
     return any(names[0] in row["answer"]["aliases"] for names in row["said"]["named"])
-
-
-def _claims(row: dict) -> bool:
-    return row["said"]["verdict"] != "no gap"
 
 
 def _line(row: dict) -> str:

@@ -8,12 +8,11 @@ one, to share the work.
 """
 
 import sys
-import time
 from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any
 
-from bench.gap.kept_cases import Cases
+from bench.gap.kept_cases import Cases, Stopwatch
 from bench.result import Result, bench
 
 COUNTS = {"single": 160, "none": 60, "motion": 12, "off-library": 40}
@@ -36,7 +35,7 @@ def one(kind: str, seed: int) -> dict[str, Any]:
     case = light_cases.build(
         seed, kind, model, singles=_singles(seed), off_library=off_library()
     )
-    begin, busy = time.perf_counter(), time.process_time()
+    watch = Stopwatch()
     whole = kind == "motion" or seed % WHOLE == 0
     if whole:
         parts = diagnosis.analyse(case.trials, model, seed=seed)
@@ -49,12 +48,7 @@ def one(kind: str, seed: int) -> dict[str, Any]:
     said = asdict(answer) | {"verdict": answer.kind, "whole": whole}
     choice = parts[-1].choice
     said |= {"worth": choice.worth, "rungs": [rung.as_dict() for rung in choice.rungs]}
-    row = {
-        "kind": kind,
-        "seed": seed,
-        "seconds": time.perf_counter() - begin,
-        "cpu": time.process_time() - busy,
-    }
+    row = {"kind": kind, "seed": seed, **watch.read()}
     return plain({**row, "answer": case.answer.as_dict(), "said": said})
 
 
@@ -101,20 +95,24 @@ def gap_sensors(quick: bool) -> Result:
                 large, lambda row: row["said"]["verdict"] == "either"
             ),
             "named alone, and wrong": scoring.share(large, _alone_wrong),
-            "found at 3 x": scoring.share(large, _claims),
-            "false alarms": scoring.share(none, _claims),
+            "found at 3 x": scoring.share(large, scoring.claims),
+            "false alarms": scoring.share(none, scoring.claims),
             "no-effect cases": len(none),
             "effects on wheels": _wheels(scoring.of(found, "motion", scoring.LARGE)),
-            "outside the library, called so": scoring.share(off, _strange),
+            "outside the library, called so": scoring.share(off, scoring.strange),
             "outside the library": len(off),
             "by size": scoring.by_size(every),
             "seconds of processor time": _middle([row["cpu"] for row in found]),
             "confusion": scoring.confusion(large),
             "failures": scoring.failures(large, scoring.right),
-            "outside the library, called otherwise": scoring.failures(off, _strange),
-            "called outside the library, and wrongly": scoring.share(large, _strange),
+            "outside the library, called otherwise": scoring.failures(
+                off, scoring.strange
+            ),
+            "called outside the library, and wrongly": scoring.share(
+                large, scoring.strange
+            ),
             "alarms": [
-                f"{r['seed']}: {r['said']['named']}" for r in none if _claims(r)
+                f"{r['seed']}: {r['said']['named']}" for r in none if scoring.claims(r)
             ],
         },
     )
@@ -164,14 +162,6 @@ def _wheels(found: list[dict]) -> dict[str, float]:
     from bns.gap.bench import scoring
 
     return {"n": len(found), "named": scoring.share(found, scoring.right)}
-
-
-def _claims(row: dict) -> bool:
-    return row["said"]["verdict"] != "no gap"
-
-
-def _strange(row: dict) -> bool:
-    return row["said"]["verdict"] == "none of the library"
 
 
 def _alone_wrong(row: dict) -> bool:

@@ -8,7 +8,6 @@ are taken from what was kept, with the package's calibration, when it is read.
 """
 
 import sys
-import time
 
 from bench.gap import kept_cases
 
@@ -102,18 +101,13 @@ def one(kind: str, seed: int) -> dict:
         extra=other_solver(),
         wanted=ALIKE[seed % len(ALIKE)] if kind == "alias" else "",
     )
-    begin, busy = time.perf_counter(), time.process_time()
+    watch = kept_cases.Stopwatch()
     try:
         made = analyse(case.trials, model, seed=seed)
         said = scoring.said(made, case, model)
     except BnsError as error:
         said = {"error": str(error)}
-    row = {
-        "kind": kind,
-        "seed": seed,
-        "seconds": time.perf_counter() - begin,
-        "cpu": time.process_time() - busy,
-    }
+    row = {"kind": kind, "seed": seed, **watch.read()}
     return plain({**row, "answer": case.answer.as_dict(), "said": said})
 
 
