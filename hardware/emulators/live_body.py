@@ -86,13 +86,14 @@ class LiveBody(ABC):
 
     @property
     def state(self) -> np.ndarray:
-        """Full state of the physics; may be set."""
+        """Full state of the physics, ``(S,)`` (`mjSTATE_FULLPHYSICS`); may be set."""
         state = np.empty(mujoco.mj_stateSize(self.model, STATE))
         mujoco.mj_getState(self.model, self.data, state, STATE)
         return state
 
     @state.setter
     def state(self, state: np.ndarray) -> None:
+        """Put the body into a state, ``(S,)``."""
         mujoco.mj_setState(self.model, self.data, state, STATE)
         mujoco.mj_forward(self.model, self.data)
 
