@@ -1,12 +1,14 @@
 """Numbers of a model of the user's own that may be off, and how far they may be."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from bns.gap.candidates.mjcf import EXCITE, OwnCandidate
 from bns.gap.decomposition.row import Row
+from bns.gap.models.mjcf import masses
+from bns.gap.models.mjcf.masses import Body
 from bns.worlds.effects.parts import ALL
 from bns.worlds.trial import Trial
 
@@ -17,7 +19,6 @@ GROUPED = ("joint_damping", "joint_friction", "joint_armature")
 LATE = ("command_delay", "command_lag", "reading_delay")
 TOLD = (0.05, 0.12, 0.2, 0.3, 0.4, 0.55)  # quantiles of what was told, for dead zones
 EIGHTH = 0.125  # of the largest value: the plausible one
-MASS = 0.1  # of a body's mass
 OFFSET = 0.0625  # of the span of an offset
 
 # plausible departure and slack of what has no scale of its own (assumed): a gain of a
@@ -39,7 +40,10 @@ SHARE = 0.02  # slack of a number over its plausible departure
 
 
 def rows(
-    candidates: Sequence[OwnCandidate], trials: Sequence[Trial], dt: float
+    candidates: Sequence[OwnCandidate],
+    trials: Sequence[Trial],
+    dt: float,
+    bodies: Mapping[str, Body],
 ) -> tuple[Row, ...]:
     """All numbers that may be off, with those of all joints alike.
 
@@ -47,18 +51,28 @@ def rows(
         candidates: of the model.
         trials: a recording; levels of dead zones lie between what it was told.
         dt: physics step [s].
+        bodies: whose mass may be off, by name.
     """
     lead = max(0.002, 0.5 * dt)
-    made = [row for item in candidates for row in _of(item, trials, lead)]
+    made: list[Row] = []
+    for item in candidates:
+        if item.effect == "body_mass":
+            body = bodies[item.fixed["part"]]
+            made += masses.rows(item, body, EXCITE[item.effect])
+        else:
+            made += _of(item, trials, lead)
     made.append(Row(LEAD, 0.0, lead, -0.02, 0.02, unit="s", nuisance=True, step=0.001))
     return tuple(made)
 
 
 def grouped(candidates: Sequence[OwnCandidate]) -> list[OwnCandidate]:
-    """Further candidates: an effect alike on all joints that are considered singly."""
+    """Further candidates: an effect alike on all joints that are considered singly,
+    where it has the same unit on all (a slide's damping is no hinge's)."""
     made = []
     for name in GROUPED:
         parts = [item for item in candidates if item.effect == name]
+        if len({item.unit for item in parts}) > 1:
+            continue
         if len(parts) > 1 and all(item.fixed["part"] != ALL for item in parts):
             low = max(item.low for item in parts)
             high = max(item.high for item in parts)
@@ -75,6 +89,12 @@ def grouped(candidates: Sequence[OwnCandidate]) -> list[OwnCandidate]:
                 )
             )
     return made
+
+
+def term(name: str) -> str:
+    """The explanation that a row belongs to: its name up to the part's."""
+    stem, bracket, rest = name.partition("[")
+    return stem + bracket + rest.partition("]")[0] + ("]" if bracket else "")
 
 
 def _of(item: OwnCandidate, trials: Sequence[Trial], lead: float) -> Iterable[Row]:
@@ -108,8 +128,6 @@ def _plausible(item: OwnCandidate) -> tuple[float, float]:
     sd, slack = PLAUSIBLE.get(item.effect, (0.0, 0.0))
     if item.effect.startswith("joint_"):
         sd, slack = EIGHTH * item.high, SHARE * EIGHTH * item.high
-    elif item.effect == "body_mass":  # the largest value is twice the mass
-        sd, slack = MASS * item.high / 2, SHARE * MASS * item.high
     elif item.effect.endswith("_offset") and not sd:
         sd = OFFSET * (item.high - item.low)
     if item.fixed["part"] == ALL and item.effect in GROUPED:

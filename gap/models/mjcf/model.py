@@ -15,7 +15,7 @@ from bns.gap.decomposition.model import DecomposableModel
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import Windows
 from bns.gap.models.mjcf import effects as own_effects
-from bns.gap.models.mjcf import log, prepared, start, view
+from bns.gap.models.mjcf import log, masses, prepared, start, view
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.records import Candidate
 from bns.models import mjcf as mjcf_file
@@ -68,6 +68,11 @@ class OwnModel(DecomposableModel):
             _index(model, "key", config.keyframe)  # there, before anything runs
         self.view = view.View.of(config, model)
         self._candidates = mjcf.candidates(config, model)
+        self._bodies = {
+            item.fixed["part"]: masses.Body.of(model, item.fixed["part"])
+            for item in self._candidates
+            if item.effect == "body_mass"
+        }
         self._terms = {
             item.name: item
             for item in (*self._candidates, *mjcf_rows.grouped(self._candidates))
@@ -137,13 +142,33 @@ class OwnModel(DecomposableModel):
 
     def rows(self, trials: Sequence[Trial]) -> tuple[Row, ...]:
         """All numbers that may be off, those of all joints alike included."""
-        return mjcf_rows.rows(tuple(self._terms.values()), trials, self.dt)
+        items = tuple(self._terms.values())
+        return mjcf_rows.rows(items, trials, self.dt, self._bodies)
 
     def effect(self, term: str, values: Mapping[str, float]) -> Effect | None:
         """The effect of an explanation; None for the shift in time."""
         if term == mjcf_rows.LEAD:
             return None
-        return self._terms[term].make(values[term])
+        item = self._terms[term]
+        if item.effect == "body_mass":
+            part = item.fixed["part"]
+            return masses.added(term, values, part, self._bodies[part])
+        return item.make(values[term])
+
+    def _changes(self, values: Mapping[str, float]) -> tuple[Effect, ...]:
+        """The effects that rows which are not nominal are simulated by."""
+        made: list[Effect] = []
+        loads: dict[str, dict[str, float]] = {}
+        for name, value in values.items():
+            item = self._terms.get(mjcf_rows.term(name))
+            if item and item.effect == "body_mass":
+                loads.setdefault(item.name, {})[name] = value
+            elif item:
+                made.append(item.make(value))
+        for name, rows in loads.items():
+            part = self._terms[name].fixed["part"]
+            made += masses.changes(name, rows, part, self._bodies[part])
+        return tuple(made)
 
     def paths(
         self,
@@ -156,8 +181,7 @@ class OwnModel(DecomposableModel):
         pairs, leads = [], []
         for row in sets:
             for trial, values in zip(trials, row, strict=True):
-                made = [self.effect(name, values) for name in values]
-                pairs.append((trial, tuple(e for e in made if e is not None)))
+                pairs.append((trial, self._changes(values)))
                 leads.append(values.get(mjcf_rows.LEAD, 0.0))
         seen = self._predicted(pairs, self._parts() if fine else 1)
         moved = [

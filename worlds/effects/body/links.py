@@ -12,11 +12,25 @@ from bns.worlds.effects.bodies import Inertial
 from bns.worlds.effects.parts import ANY, WIDE
 
 
+def _shift(axis: str, *, scales: bool = True) -> Parameter:
+    return Parameter(
+        f"d{axis}",
+        unit="m",
+        nominal=0.0,
+        low=-10.0,
+        high=10.0,
+        doc=f"away from the model's centre of mass along the body's own {axis} axis; "
+        "bounds assumed",
+        example=0.02 if scales else 0.0,
+        scales=scales,
+    )
+
+
 class BodyMass(BodyEffect):
     """A body is heavier, or lighter, than the model says."""
 
     name = "body_mass"
-    source = "rigid-body mechanics; a point mass at the centre of mass is assumed"
+    source = "parallel-axis theorem; a point mass is assumed"
     robots = ANY
     choices = parts.part("body")
     parameters = (
@@ -27,6 +41,7 @@ class BodyMass(BodyEffect):
             "mass added; 1 % of the body's stays at least",
             example=0.2,
         ),
+        *(_shift(axis, scales=False) for axis in "xyz"),
     )
 
     def edit(self, spec: Any) -> None:
@@ -36,17 +51,8 @@ class BodyMass(BodyEffect):
         for body in parts.bodies(spec, self["part"]):
             inertial = Inertial.of(spec, body)
             added = max(self["added"], -0.99 * inertial.mass)
-            inertial.plus_point(added, inertial.centre).write(body)
-
-
-def _shift(axis: str) -> Parameter:
-    return strength(
-        f"d{axis}",
-        "m",
-        (-10.0, 10.0),
-        f"shift along the body's own {axis} axis; bounds assumed",
-        example=0.02,
-    )
+            away = np.array([self["dx"], self["dy"], self["dz"]])
+            inertial.plus_point(added, inertial.centre + away).write(body)
 
 
 class BodyCentre(BodyEffect):

@@ -1,0 +1,118 @@
+"""A body's mass as an explanation: what is added, and where it sits.
+
+A load seldom sits at a link's centre of mass, and a link that is heavier than its model
+is so somewhere. The explanation has the mass and its three moments about the centre of
+mass of the model: numbers in which motion is linear while they are small.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from bns.gap.candidates.mjcf import OwnCandidate
+from bns.gap.decomposition.row import Row
+from bns.gap.models.mjcf import effects
+from bns.worlds.effects.base import Effect
+
+AXES = "xyz"
+PLAUSIBLE = 0.1  # of a body's mass (assumed)
+SLACK = 0.004  # of a body's mass: how well a model knows it, and its centre (assumed)
+LIGHT = 0.01  # of a body's mass: below, moments do not tell where an added mass sits
+FAR = 4.0  # radii of gyration from the centre: the farthest
+INERTIA = 0.5  # of the least moment of inertia that a mass taken off may take along
+
+
+@dataclass(frozen=True)
+class Body:
+    """What a model says of a body: mass [kg], largest radius of gyration [m] and least
+    moment of inertia [kg m2]."""
+
+    mass: float
+    gyration: float
+    inertia: float
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel, name: str) -> "Body":
+        """As compiled."""
+        at = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+        mass = max(float(model.body_mass[at]), 1e-9)
+        inertia = model.body_inertia[at]
+        return cls(mass, float(np.sqrt(inertia.max() / mass)), float(inertia.min()))
+
+
+def rows(item: OwnCandidate, body: Body, excite: str) -> list[Row]:
+    """The mass and its moments, one explanation.
+
+    Args:
+        item: the candidate of the mass.
+        body: that it is of.
+        excite: which commands make it felt.
+    """
+    sd, slack = PLAUSIBLE * body.mass, item.slack or SLACK * body.mass
+    made = [
+        Row(item.name, 0.0, sd, item.low, item.high, unit=item.unit, slack=slack,
+            group=item.name, excite=excite)
+    ]  # fmt: skip
+    if body.gyration:
+        far = FAR * item.high * body.gyration
+        made += [
+            Row(f"{item.name}.m{axis}", 0.0, sd * body.gyration, -far, far,
+                unit="kg m", slack=slack * body.gyration, group=item.name,
+                excite=excite)
+            for axis in AXES
+        ]  # fmt: skip
+    return made
+
+
+def changes(name: str, values: Mapping[str, float], part: str, body: Body):
+    """The effects that an explanation is simulated by.
+
+    A light mass, which would sit far off for its moments, is one at the centre and a
+    shift of the centre: so its moments have a slope at no mass.
+
+    Args:
+        name: of the explanation.
+        values: of its rows that are not nominal.
+        part: name of the body.
+        body: that.
+    """
+    mass = max(values.get(name, 0.0), -0.9 * body.mass)
+    if abs(mass) > LIGHT * body.mass:
+        return [added(name, values, part, body)]
+    moments = _moments(name, values)
+    made = [effects.make("body_mass", {"part": part, "added": mass})] if mass else []
+    if moments.any():
+        away = _place(moments / (body.mass + mass))
+        made.append(effects.make("body_centre", {"part": part, **away}))
+    return made
+
+
+def added(name: str, values: Mapping[str, float], part: str, body: Body) -> Effect:
+    """The mass where its moments say.
+
+    Args:
+        name: of the explanation.
+        values: of its rows.
+        part: name of the body.
+        body: that.
+    """
+    mass = max(values.get(name, 0.0), -0.9 * body.mass)
+    size = max(abs(mass), LIGHT * body.mass) * (-1 if mass < 0 else 1)
+    away = _moments(name, values) / size
+    limit = FAR * body.gyration
+    if mass < 0:  # what is left keeps an inertia
+        reduced = body.mass * -mass / (body.mass + mass)
+        limit = min(limit, float(np.sqrt(INERTIA * body.inertia / reduced)))
+    length = float(np.linalg.norm(away))
+    away = away * min(1.0, limit / max(length, 1e-12))
+    return effects.make("body_mass", {"part": part, "added": mass, **_place(away)})
+
+
+def _moments(name: str, values: Mapping[str, float]) -> np.ndarray:
+    return np.array([values.get(f"{name}.m{axis}", 0.0) for axis in AXES])
+
+
+def _place(away: np.ndarray) -> dict[str, float]:
+    return {f"d{axis}": float(x) for axis, x in zip(AXES, away, strict=True)}
