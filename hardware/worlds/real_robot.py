@@ -8,7 +8,7 @@ from typing import ClassVar, Generic, Protocol, TypeVar
 from bns import models
 from bns.errors import BnsError
 from bns.hardware.clock import Clock
-from bns.hardware.errors import Void
+from bns.hardware.errors import SafetyStop, Void
 from bns.hardware.faults import FaultLog
 from bns.hardware.rig import EMULATED
 from bns.hardware.safety.limits import Operator
@@ -180,6 +180,10 @@ class RealRobot(ABC, Generic[RigT]):
         Args:
             once: carries it out, once.
             trial: its number.
+
+        Raises:
+            BnsError: it was void too often.
+            SafetyStop: void twice running by what a person has to mend.
         """
         rig, voids = self.connected(), []
         faults = len(rig.faults)
@@ -189,6 +193,8 @@ class RealRobot(ABC, Generic[RigT]):
                 try:
                     made = once(rig)
                 except Void as void:
+                    if void.advice and voids[-1:] == [void.reason]:
+                        raise SafetyStop(void.reason, void.advice) from void
                     self.voids += 1
                     voids.append(void.reason)
                     rig.faults.note("void trial", str(trial), void.reason)
