@@ -17,6 +17,7 @@ from bns.hardware.emulators.run import SLOW
 
 ROUND = 0.0045  # s between two looks, as in the emulator's log
 SINKS, LASTS = 0.3, 0.1  # s until a hexapod sinks, s that rest lasts
+BLUR = 0.02  # s by which a log may take a moment's rest for longer than it was
 STEADY, ENDS = 2.0, 2.0  # s of driving before; s after which it stands
 
 
@@ -45,7 +46,11 @@ def phantomx(state: Sequence[float]) -> float:
 
 
 def came_to_rest(
-    rows: Sequence[tuple[float, bool]], begin: float, *, sinks: bool
+    rows: Sequence[tuple[float, bool]],
+    begin: float,
+    *,
+    sinks: bool,
+    lasts: float = LASTS,
 ) -> float | None:
     """When a robot has come to rest after it was told to [s]; None: not yet.
 
@@ -53,6 +58,7 @@ def came_to_rest(
         rows: when it began to stand or to move [s], and whether it stands.
         begin: when it was told to stand [s].
         sinks: it stands on its legs when it is told, and sinks a moment later.
+        lasts: how long rest has to last to be rest [s].
     """
     state = next((stands for at, stands in reversed(rows) if at <= begin), True)
     later = [row for row in rows if row[0] > begin]
@@ -60,7 +66,7 @@ def came_to_rest(
     if state and not sinks:
         return begin
     for (at, stands), (end, _) in pairwise([*later, (np.inf, False)]):
-        if stands and end - at > LASTS:
+        if stands and end - at > lasts:
             return at
     return None
 
@@ -73,5 +79,5 @@ def _time(body: LiveBody, stands: Callable[[], bool], *, sinks: bool = False) ->
         body.advance(at)
         if stands() != rows[-1][1]:
             rows.append((float(at), stands()))
-    found = came_to_rest(rows, begin, sinks=sinks)
+    found = came_to_rest(rows, begin, sinks=sinks, lasts=LASTS + BLUR)
     return np.inf if found is None else found - begin
