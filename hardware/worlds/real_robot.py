@@ -185,7 +185,7 @@ class RealRobot(ABC, Generic[RigT]):
             BnsError: it was void too often.
             SafetyStop: void twice running by what a person has to mend.
         """
-        rig, voids = self.connected(), []
+        rig, voids = self.connected(), list[str]()
         faults = len(rig.faults)
         with rig.operator:
             for _ in range(TRIES):
