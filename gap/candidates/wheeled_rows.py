@@ -73,6 +73,7 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
     made = [row for entry in _SMOOTH for row in _smooth(*entry)]
     made += [
         Row(name, 0.0, sd, low, high, unit=unit, group="payload",
+            covers=("centre_of_mass.dx", "centre_of_mass.dy"),
             excite=EXCITE["payload"], **given)
         for name, sd, low, high, unit, given in _LOAD
     ]  # fmt: skip

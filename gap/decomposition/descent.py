@@ -14,6 +14,9 @@ from bns.gap.decomposition.shares import HeldOut
 
 TURNS = 4  # of fitting and searching
 SINGLES = 4  # explanations that are tried alone
+WIDE = 3  # numbers of an explanation from which its tangent tells little of it
+FEW = 2  # explanations that need no other start if they leave little
+ENOUGH = 1.2  # times what all explanations leave: little more
 ROUNDS = 2  # of levels
 MARGIN = 1.02  # of the held-out error that an autoregression may cost
 WEAK = 0.05  # of what a set explains: so little may be left to the others
@@ -83,6 +86,8 @@ def _fitted(problem: Problem, support: Iterable[str]) -> set[str]:
 
 def better(problem: Problem, points: Sequence[Point]) -> Point:
     """The point of highest evidence."""
+    if len(points) == 1:
+        return points[0]
     return points[int(np.argmin(costs(problem, points)))]
 
 
@@ -132,11 +137,10 @@ def decompose(problem: Problem, start: Point | None = None) -> Point:
     start = start or nothing(problem)
     found = start.linear.search()[1]
     best = start
-    if found:
-        values = placed(problem, start.linear, found, start.values)
-        best = descend(problem, values, found, start.noise)
-        if len(best.support) > 1:
-            best = better(problem, [best, *_others(problem, start, best)])
+    if len(found) == 1:
+        best = _followed(problem, start, found)
+    if len(found | best.support) > 1:
+        best = _several(problem, start, found, best)
     for _ in range(ROUNDS):
         tried = levels.best(problem, best)
         if tried is None or tried.cost > best.cost - WORTH:
@@ -217,10 +221,37 @@ def _fitted_at(problem: Problem, point: Point, support: Support) -> Point:
     return Point(values, support, rest, linear, slopes, known)
 
 
-def _others(problem: Problem, start: Point, first: Point) -> list[Point]:
-    """Points from the best single explanation and from all at once."""
+def _several(problem: Problem, start: Point, found: Support, best: Point) -> Point:
+    """The best point where a tangent finds several explanations: from a single one, and
+    if that is not enough from those several, and from all where many depart."""
+    points = _simple(problem, start) + [best] * bool(best.support)
+    if not any(enough(point) for point in points):
+        if not best.support:
+            points.append(_followed(problem, start, found))
+        if problem.model.many:
+            points.append(_from_all(problem, start))
+    return better(problem, points)
+
+
+def enough(point: Point) -> bool:
+    """Whether few explanations leave little more than all together do."""
+    linear, support = point.linear, point.support
+    whole = linear.squares(linear.free)
+    return len(support) <= FEW and linear.squares(support) < ENOUGH * whole
+
+
+def _followed(problem: Problem, start: Point, support: Support) -> Point:
+    """A point from a set found by the tangent at the nominal model."""
+    values = placed(problem, start.linear, support, start.values)
+    return descend(problem, values, support, start.noise)
+
+
+def _simple(problem: Problem, start: Point) -> list[Point]:
+    """Points from the best single explanation, and from it with a level on top."""
     linear = start.linear
-    order = sorted(linear.free, key=lambda name: linear.cost({name}))[:SINGLES]
+    order = sorted(linear.free, key=lambda name: linear.cost({name}))
+    wide = [name for name in order if len(linear.terms[name]) >= WIDE][: SINGLES // 2]
+    order = [*dict.fromkeys((*order[:SINGLES], *wide))]
     few = problem.sample(fit.ROUGH)
     few = None if len(few) == len(problem.trials) else few
     starts = [(n, placed(problem, linear, {n}, start.values)) for n in order]
@@ -229,20 +260,18 @@ def _others(problem: Problem, start: Point, first: Point) -> list[Point]:
     for name, values in starts:
         fitted = _fitted(problem, {name})
         values, rest = newton(problem, values, fitted, start.noise, turns=6, only=few)
-        tried.append((first.noise.loss(rest), name, values))
+        tried.append((start.noise.loss(rest), name, values))
     _, name, values = min(tried, key=lambda item: item[0])
-    made = [descend(problem, values, {name}, first.noise)]
-    if len(made[0].support) > 1 and (both := _with_level(problem, name, values, first)):
+    made = [descend(problem, values, {name}, start.noise)]
+    if not enough(made[0]) and (both := _with_level(problem, name, values, start)):
         made.append(both)
-    if problem.model.many:
-        made.append(_from_all(problem, start))
     return made
 
 
-def _with_level(problem: Problem, name: str, values, first: Point) -> Point | None:
+def _with_level(problem: Problem, name: str, values, start: Point) -> Point | None:
     """A point from a single explanation and a level on top of it: through a tangent
     that lacks the level, the rest of it looks like several others."""
-    single = _fitted_at(problem, replace(first, values=values), frozenset({name}))
+    single = _fitted_at(problem, replace(start, values=values), frozenset({name}))
     level = levels.best(problem, single)
     if level is None or level.cost > single.cost - WORTH:
         return None

@@ -42,6 +42,7 @@ class Linear:
         lam: residuals that count as one independent one.
         penalty: what each explanation costs.
         family: of explanations that share one cause, and pay once.
+        covers: explanations that add nothing beside one, by that.
         design: whitened-free columns, ``(N, C, K)``.
         target: residuals of the nominal model, ``(N, C)``.
         weight: of the squares, ``(N, C)``.
@@ -61,6 +62,7 @@ class Linear:
     lam: float
     penalty: Mapping[str, float]
     family: Mapping[str, str]
+    covers: Mapping[str, frozenset[str]]
     design: np.ndarray
     target: np.ndarray
     weight: np.ndarray
@@ -116,6 +118,7 @@ class Linear:
             lam=lam,
             penalty=dict.fromkeys(free, KAPPA),
             family={row.term: row.family or row.term for row in rows},
+            covers={row.term: frozenset(row.covers) for row in rows if row.covers},
             design=matrix,
             target=target,
             weight=weight,
@@ -237,6 +240,9 @@ class Linear:
         return self._costs[key]
 
     def _cost(self, key: Support) -> float:
+        for name, covered in self.covers.items():
+            if name in key and covered & key:
+                return self.cost(key - covered) + KAPPA * len(covered & key)
         normal, slope, square = self._total()
         prior = self.prior(key)
         used = np.flatnonzero(prior)

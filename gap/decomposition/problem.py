@@ -175,7 +175,9 @@ class Problem:
         """
         high = self.bounds[1]
         sets, steps = [values], []
-        for number in which:
+        joined = self._joined(which)
+        simulated = [number for number in which if number not in joined]
+        for number in simulated:
             step = self.rows[number].difference
             step = step if values[number] + step <= high[number] else -step
             moved = values.copy()
@@ -183,9 +185,29 @@ class Problem:
             sets.append(moved)
             steps.append(step)
         base, *made = self.predict(sets, fine=False, only=only)
-        return {
+        found = {
             number: np.nan_to_num((path - base) / step, posinf=0.0, neginf=0.0)
-            for number, path, step in zip(which, made, steps, strict=True)
+            for number, path, step in zip(simulated, made, steps, strict=True)
+        }
+        for number, parts in joined.items():
+            factor = self.rows[number].nominal == 1.0 and values[number] > 0
+            found[number] = np.sum(
+                [
+                    found[k] * (values[k] / values[number] if factor else 1.0)
+                    for k in parts
+                ],
+                axis=0,
+            )
+        return found
+
+    def _joined(self, which: Sequence[int]) -> dict[int, list[int]]:
+        """Rows whose derivative is the sum of those of the rows that they join, by the
+        chain rule: a gain of both wheels is one of each."""
+        names = {self.rows[k].name: k for k in which}
+        return {
+            number: [names[name] for name in self.rows[number].joins]
+            for number in which
+            if self.rows[number].joins and set(self.rows[number].joins) <= set(names)
         }
 
     def sample(self, seconds: float = SAMPLE) -> list[int]:

@@ -28,7 +28,9 @@ class Row:
             in and out together.
         family: name of the cause that explanations share; one of them or all cost as
             much. "" = its own.
-        joins: explanations that are this one where they hold alike.
+        joins: explanations that are this one where they hold alike: its change is the
+            sum of theirs, or for a factor (nominally 1) their product.
+        covers: explanations that this one can be, too: beside it they explain nothing.
         excite: which commands make it felt, in words.
     """
 
@@ -48,6 +50,7 @@ class Row:
     group: str = ""
     family: str = ""
     joins: tuple[str, ...] = ()
+    covers: tuple[str, ...] = ()
     excite: str = ""
 
     def __post_init__(self):

@@ -100,7 +100,7 @@ class Ripple(CommandEffect):
 
 
 def test_an_effect_outside_the_library_is_none_of_it(find):
-    found = find(Ripple({"size": 0.5}))
+    found = find(Ripple({"size": 0.3}))
     assert found.verdict.kind == "none of the library"
     assert found.verdict.named == ()
     assert found.decomposition["left"] > 0.9

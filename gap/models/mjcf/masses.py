@@ -7,6 +7,7 @@ mass of the model: numbers in which motion is linear while they are small.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -21,17 +22,22 @@ PLAUSIBLE = 0.1  # of a body's mass (assumed)
 SLACK = 0.004  # of a body's mass: how well a model knows it, and its centre (assumed)
 LIGHT = 0.01  # of a body's mass: below, moments do not tell where an added mass sits
 FAR = 4.0  # radii of gyration from the centre: the farthest
-INERTIA = 0.5  # of the least moment of inertia that a mass taken off may take along
+TAKEN = 0.5  # of its spread that a mass taken off may take along
 
 
 @dataclass(frozen=True)
 class Body:
-    """What a model says of a body: mass [kg], largest radius of gyration [m] and least
-    moment of inertia [kg m2]."""
+    """What a model says of a body.
+
+    Attributes:
+        mass: [kg].
+        gyration: largest radius of gyration [m].
+        spread: least second moment of the mass about its centre [kg m2].
+    """
 
     mass: float
     gyration: float
-    inertia: float
+    spread: float
 
     @classmethod
     def of(cls, model: mujoco.MjModel, name: str) -> "Body":
@@ -39,7 +45,8 @@ class Body:
         at = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
         mass = max(float(model.body_mass[at]), 1e-9)
         inertia = model.body_inertia[at]
-        return cls(mass, float(np.sqrt(inertia.max() / mass)), float(inertia.min()))
+        spread = max(float(inertia.sum() / 2 - inertia.max()), 0.0)
+        return cls(mass, float(np.sqrt(inertia.max() / mass)), spread)
 
 
 def rows(item: OwnCandidate, body: Body, excite: str) -> list[Row]:
@@ -51,16 +58,21 @@ def rows(item: OwnCandidate, body: Body, excite: str) -> list[Row]:
         excite: which commands make it felt.
     """
     sd, slack = PLAUSIBLE * body.mass, item.slack or SLACK * body.mass
+    part = item.fixed["part"]
+    shared: dict[str, Any] = {
+        "group": item.name,
+        "covers": tuple(f"body_centre.d{axis}[{part}]" for axis in AXES),
+        "excite": excite,
+    }
     made = [
         Row(item.name, 0.0, sd, item.low, item.high, unit=item.unit, slack=slack,
-            group=item.name, excite=excite)
+            **shared)
     ]  # fmt: skip
     if body.gyration:
         far = FAR * item.high * body.gyration
         made += [
             Row(f"{item.name}.m{axis}", 0.0, sd * body.gyration, -far, far,
-                unit="kg m", slack=slack * body.gyration, group=item.name,
-                excite=excite)
+                unit="kg m", slack=slack * body.gyration, **shared)
             for axis in AXES
         ]  # fmt: skip
     return made
@@ -102,9 +114,9 @@ def added(name: str, values: Mapping[str, float], part: str, body: Body) -> Effe
     size = max(abs(mass), LIGHT * body.mass) * (-1 if mass < 0 else 1)
     away = _moments(name, values) / size
     limit = FAR * body.gyration
-    if mass < 0:  # what is left keeps an inertia
+    if mass < 0:  # what is left has a spread
         reduced = body.mass * -mass / (body.mass + mass)
-        limit = min(limit, float(np.sqrt(INERTIA * body.inertia / reduced)))
+        limit = min(limit, float(np.sqrt(TAKEN * body.spread / reduced)))
     length = float(np.linalg.norm(away))
     away = away * min(1.0, limit / max(length, 1e-12))
     return effects.make("body_mass", {"part": part, "added": mass, **_place(away)})

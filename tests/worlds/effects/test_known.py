@@ -116,9 +116,15 @@ class TestCommands:
 class TestActuators:
     def test_lag_has_done_63_per_cent_at_its_time_constant(self):
         reached = apply("motor_lag:time_constant=0.1", control(np.ones(200)))[:, 0]
-        steps = np.arange(1, 201)
-        assert reached == pytest.approx(1 - np.exp(-steps * DT / 0.1))
-        assert reached[19] == pytest.approx(1 - 1 / np.e)
+        ends = np.exp(-np.arange(201) * DT / 0.1)  # what is left at each step's ends
+        assert reached == pytest.approx(1 - -np.diff(ends) * 0.1 / DT)
+        assert (reached[19] + reached[20]) / 2 == pytest.approx(1 - 1 / np.e, abs=1e-3)
+
+    @pytest.mark.parametrize("late", [0.1 * DT, DT, 20 * DT])
+    def test_lag_is_late_by_its_time_constant_at_any_step(self, late):
+        name = f"motor_lag:time_constant={late}"
+        reached = apply(name, control(np.ones(2000)))[:, 0]
+        assert (1 - reached).sum() * DT == pytest.approx(late)
 
     def test_lag_that_sets_in_while_driving_starts_from_the_speed_driven(self):
         active = np.arange(100) >= 50

@@ -4,13 +4,14 @@ import numpy as np
 
 from bns.worlds.effects.base import ActuatorEffect, ControlSignal, Parameter, strength
 from bns.worlds.effects.common import WHEEL, columns, spans
+from bns.worlds.effects.signals import lagged
 
 
 class MotorLag(ActuatorEffect):
     """The wheels follow their commands with a first-order lag.
 
-    Solved exactly for commands that are constant over a physics step: a step from rest
-    has reached 1 - 1/e = 63.2 % at the time constant.
+    A step from rest has reached 1 - 1/e = 63.2 % at the time constant; a physics step
+    is driven at the mean speed over it.
     """
 
     name = "motor_lag"
@@ -33,15 +34,12 @@ class MotorLag(ActuatorEffect):
         values = signal.values.copy()
         if self.is_nominal:
             return values
-        from scipy.signal import lfilter
-
-        keep = np.exp(-signal.dt / self["time_constant"])
         for column in columns(self, signal):
             told = signal.values[:, column]
             for span in spans(active):
                 before = told[span.start - 1] if span.start else 0.0  # starts at rest
-                values[span, column], _ = lfilter(
-                    [1 - keep], [1, -keep], told[span], zi=[keep * before]
+                values[span, column] = lagged(
+                    told[span], before, self["time_constant"], signal.dt
                 )
         return values
 

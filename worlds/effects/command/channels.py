@@ -7,6 +7,7 @@ import numpy as np
 from bns.worlds.effects import parts
 from bns.worlds.effects.base import CommandEffect, ControlSignal, Parameter
 from bns.worlds.effects.parts import ANY, WIDE
+from bns.worlds.effects.signals import lagged
 
 
 def _number(
@@ -71,10 +72,7 @@ class CommandLag(_Channel):
 
     def change(self, told: np.ndarray, dt: float) -> np.ndarray:
         """The signal through a first-order filter, ``(S,)``."""
-        from scipy.signal import lfilter
-
-        keep = np.exp(-dt / max(self["time_constant"], 1e-9))
-        return lfilter([1 - keep], [1, -keep], told, zi=[keep * told[0]])[0]
+        return lagged(told, told[0], max(self["time_constant"], 1e-9), dt)
 
 
 class CommandGain(_Channel):
