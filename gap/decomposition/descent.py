@@ -21,6 +21,7 @@ ROUNDS = 2  # of levels
 MARGIN = 1.02  # of the held-out error that an autoregression may cost
 WEAK = 0.05  # of what a set explains: so little may be left to the others
 TRIED = 3  # of these, the weakest first
+SLIGHT = 0.25  # of a plausible departure: next to none
 WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
 
 
@@ -150,7 +151,28 @@ def decompose(problem: Problem, start: Point | None = None) -> Point:
         if chosen is best:
             break
         best = chosen
+    best = narrowed(problem, best)
     return best if problem.model.many else pruned(problem, best)
+
+
+def narrowed(problem: Problem, point: Point) -> Point:
+    """A point with what an explanation covers in its place where that is as good: a
+    shifted centre of mass for a load of next to no mass.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+    """
+    for name in sorted(point.support & set(point.linear.covers)):
+        first = problem.terms[name][0]
+        covered = point.linear.covers[name] & set(problem.terms)
+        off = point.values[first] - problem.nominal[first]
+        if covered and abs(off) < SLIGHT * problem.sd[first]:
+            support = (point.support - {name}) | covered
+            other = refitted(problem, point, support)
+            least, here = costs(problem, [other, point])
+            point = other if least <= here else point
+    return point
 
 
 def pruned(problem: Problem, point: Point) -> Point:

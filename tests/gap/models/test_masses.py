@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
+
 from bns.gap.models.mjcf import masses
 from bns.gap.models.mjcf.masses import Body
 from bns.gap.records import Candidate
