@@ -35,7 +35,8 @@ class Decomposition:
         recurs: standard errors by which what `point` leaves recurs.
         scatter: excess over the floor of what differs between repeats.
         moved: mean square of the recorded motion in units of the floor.
-        inside: which residuals count, ``(N, C)``: no wild points.
+        inside: which residuals count, ``(N, C)``: no wild points, no strayed trial.
+        strayed: numbers of trials that went another way than their repeats.
     """
 
     problem: Problem
@@ -51,6 +52,7 @@ class Decomposition:
     scatter: float
     moved: float
     inside: np.ndarray
+    strayed: tuple[int, ...] = ()
 
     @cached_property
     def closed(self) -> float:
@@ -133,6 +135,8 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
     known = rest.floor(problem, seed=seed)
     full = point.linear.rest(point.linear.solve(point.linear.free))
     inside = rest.kept(problem, full, point.noise.sd)
+    strayed = rest.strayed(problem, point.rest, known)
+    inside &= ~strayed[:, None]
     left = point.linear.rest(point.linear.solve(point.support))
     plain = left if not point.noise.memory.factors.size else point.rest
     return Decomposition(
@@ -154,4 +158,5 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         scatter=rest.scattered(problem, plain, known, inside),
         moved=max(rest.excess(problem.recorded, known, inside), 1.0),
         inside=inside,
+        strayed=tuple(problem.numbers[n] for n in np.unique(problem.trial[strayed])),
     )
