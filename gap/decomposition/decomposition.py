@@ -16,6 +16,7 @@ MOST = 0.5  # share of the gap beyond which what is left is most of it
 FELT = 0.02  # of the floor's variance: a gap below shows in no picture
 LARGE = 2.0  # variances of the floor: more than heavy tails of any camera's noise
 SCATTER = 3.0  # times what differs between repeats
+EXACT = 0.005  # of its motion: other integrators and steps differ by as much (assumed)
 BROKEN = 0.05  # of its motion: no sound robot scatters by as much (assumed)
 
 
@@ -93,12 +94,12 @@ class Decomposition:
 
     @property
     def lasting(self) -> bool:
-        """Whether the rest is more than scatter: it recurs, or it is far beyond what
-        measuring scatters and what differs between repeats, or beyond what a sound
+        """Whether the rest is more than scatter and than how exact a simulation is: it
+        recurs, or it is far beyond what measuring scatters and what differs between repeats, or beyond what a sound
         robot may scatter (what happens at one place, or by chance)."""
         if self.broken:
             return True
-        if self.after <= self.scatter:
+        if self.after <= max(self.scatter, EXACT**2 * self.moved):
             return False
         if self.recurring:
             return self.after > FELT
