@@ -25,8 +25,10 @@ class Void(BnsError):
 
     Args:
         reason: what happened, in a few words.
+        advice: what to do where it happens again at once, so that going on would be
+            no use or no good; empty = it is repeated as often as others.
     """
 
-    def __init__(self, reason: str):
-        self.reason = reason
+    def __init__(self, reason: str, advice: str = ""):
+        self.reason, self.advice = reason, advice
         super().__init__(f"The trial is void: {reason}; it has to be repeated.")

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 from bns.errors import BnsError, MissingDependencyError
 from bns.hardware.errors import LinkError
 from bns.hardware.openers import Openers
-from bns.hardware.safety.watchdog import LARGEST, send
+from bns.hardware.safety.watchdog import receive, send
 
 INSTALL = 'pip install "bns-testbed[hardware]"'
 
@@ -46,6 +46,10 @@ class Line(Protocol):
 
     def intruder(self) -> bool:
         """Whether another program has opened the line; told once for each."""
+        ...
+
+    def others(self) -> list[str]:
+        """Programs that have the line open as well, as "name (number)"."""
         ...
 
     def close(self) -> None:
@@ -99,12 +103,8 @@ class SerialLine:
     def read(self, timeout: float) -> bytes:
         """What has arrived, see `Line.read`."""
         try:
-            self._serial.timeout = max(timeout, 0.0)
-            first = self._serial.read(1)
-            if not first:
-                return b""
-            return first + self._serial.read(min(self._serial.in_waiting, LARGEST))
-        except (OSError, TypeError) as error:  # TypeError: closed while reading
+            return receive(self._serial.fileno(), max(timeout, 0.0))
+        except _errors() as error:
             raise self._dead(error) from error
 
     def discard(self) -> None:
@@ -117,6 +117,10 @@ class SerialLine:
     def intruder(self) -> bool:
         """See `Line.intruder`."""
         return self._openers.intruder()
+
+    def others(self) -> list[str]:
+        """See `Line.others`."""
+        return self._openers.others()
 
     def close(self) -> None:
         """Give the port back."""

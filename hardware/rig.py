@@ -59,6 +59,10 @@ class Rig:
             following=self.following,
         )
 
+    def others(self) -> list[str]:
+        """Programs that have the port open as well, as "name (number)"."""
+        return self.line.others()
+
     def close(self) -> None:
         """Give port and camera back; the robot stands."""
         self.eyes.close()

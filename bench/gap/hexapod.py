@@ -5,10 +5,9 @@ one, to share the work.
 """
 
 import sys
-import time
 from typing import Any
 
-from bench.gap.kept_cases import Cases
+from bench.gap.kept_cases import Cases, Stopwatch
 from bench.result import Result, bench
 
 COUNTS = {"large": 56, "none": 32, "lost": 16}
@@ -35,11 +34,10 @@ def one(kind: str, seed: int) -> dict[str, Any]:
 
     sizes = LARGE if kind == "large" else None
     case = cases.build(seed, kind, WalkStand(WalkModel()), sizes=sizes)
-    begin, busy = time.perf_counter(), time.process_time()
+    watch = Stopwatch()
     found = diagnose(case.trials, WalkModel(), seed=seed, full=False)
     row = scoring.row(kind, seed, case, found)
-    row["seconds"] = time.perf_counter() - begin
-    row["cpu"] = time.process_time() - busy
+    row |= watch.read()
     return plain(row)
 
 
@@ -76,7 +74,10 @@ def gap_hexapod(quick: bool) -> Result:
             "named as one of several": scoring.share(
                 large, lambda row: row["said"]["verdict"] == "either"
             ),
-            "false alarms": {"n": len(none), "share": scoring.share(none, _claims)},
+            "false alarms": {
+                "n": len(none),
+                "share": scoring.share(none, scoring.claims),
+            },
             "smaller effects": {
                 "n": len(singles) - len(large),
                 "named": scoring.share(
@@ -115,10 +116,6 @@ def _leg(row: dict) -> str:
 def _among(row: dict) -> bool:
     aliases = row["answer"]["aliases"][0]
     return any(names[0] in aliases for names in row["said"]["named"])
-
-
-def _claims(row: dict) -> bool:
-    return row["said"]["verdict"] != "no gap"
 
 
 def _line(row: dict) -> str:

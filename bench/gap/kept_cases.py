@@ -1,6 +1,7 @@
 """Cases of a gap bench, by kind and seed: diagnosed once, kept as JSON lines."""
 
 import json
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +12,18 @@ DIRECTORY = ROOT / "runs" / "bench"
 
 Case = tuple[str, int]
 """kind and seed"""
+
+
+class Stopwatch:
+    """Time since it was made."""
+
+    def __init__(self) -> None:
+        self._begin, self._busy = time.perf_counter(), time.process_time()
+
+    def read(self) -> dict[str, float]:
+        """Wall time and this process's time, "seconds" and "cpu" [s]."""
+        wall, busy = time.perf_counter() - self._begin, time.process_time() - self._busy
+        return {"seconds": wall, "cpu": busy}
 
 
 def mixed(counts: Mapping[str, int], seed: Callable[[str, int], int]) -> list[Case]:

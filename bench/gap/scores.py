@@ -1,8 +1,8 @@
 """What the wheeled diagnosis says of its scored cases, beside the truth."""
 
-import time
 from statistics import median
 
+from bench.gap.kept_cases import Stopwatch
 from bench.gap.wheeled_cases import ensure
 from bench.result import Result, bench
 from bns.gap.bench import cases, scoring
@@ -66,7 +66,7 @@ def gap_alias(quick: bool) -> Result:
     rows = ensure(quick)
     rows = [*scoring.of(rows, "single", 1.0), *scoring.of(rows, "alias", 1.0)]
     rows = [row for row in rows if scoring.aliased(row)]
-    rows = [r for r in rows if r["said"]["verdict"] != "no gap"]
+    rows = list(filter(scoring.claims, rows))
     figure = scoring.share(
         rows, lambda r: r["said"]["verdict"] == "either" and scoring.listed(r)
     )
@@ -89,24 +89,21 @@ def gap_off_library(quick: bool) -> Result:
     rows = ensure(quick)
     strange = scoring.of(rows, "off-library")
     known = scoring.of(rows, "single", scoring.LARGE)
-    figure = scoring.share(strange, _none)
+    figure = scoring.share(strange, scoring.strange)
     return Result(
         figure=figure,
         unit="share",
         holds=figure >= 0.75,
         n=len(strange),
         details={
-            "said of effects in the library": scoring.share(known, _none),
+            "said of effects in the library": scoring.share(known, scoring.strange),
             "without cross-talk, which is a shorter axle": scoring.share(
-                [row for row in strange if not _like_an_axle(row)], _none
+                [row for row in strange if not _like_an_axle(row)],
+                scoring.strange,
             ),
-            "failures": scoring.failures(strange, _none),
+            "failures": scoring.failures(strange, scoring.strange),
         },
     )
-
-
-def _none(row: dict) -> bool:
-    return row["said"]["verdict"] == "none of the library"
 
 
 def _like_an_axle(row: dict) -> bool:
@@ -122,8 +119,8 @@ def gap_false_alarm(quick: bool) -> Result:
     rows = ensure(quick)
     nothing = scoring.of(rows, "none")
     large = scoring.of(rows, "single", scoring.LARGE)
-    figure = scoring.share(nothing, _claims)
-    found = scoring.share(large, _claims)
+    figure = scoring.share(nothing, scoring.claims)
+    found = scoring.share(large, scoring.claims)
     return Result(
         figure=figure,
         unit="share",
@@ -135,14 +132,10 @@ def gap_false_alarm(quick: bool) -> Result:
             "false alarms": [
                 f"{row['seed']}: {row['said']['verdict']} {row['said']['named']}"
                 for row in nothing
-                if _claims(row)
+                if scoring.claims(row)
             ],
         },
     )
-
-
-def _claims(row: dict) -> bool:
-    return row["said"]["verdict"] != "no gap"
 
 
 def _faults(rows: list[dict]) -> dict[str, float]:
@@ -152,7 +145,7 @@ def _faults(rows: list[dict]) -> dict[str, float]:
         "cases": len(rows),
         "refused": len(refused),
         "repaired or noticed": sum(bool(row["said"]["faults"]) for row in used),
-        "claimed a gap": sum(map(_claims, used)),
+        "claimed a gap": sum(map(scoring.claims, used)),
     }
 
 
@@ -231,6 +224,7 @@ def _cold() -> tuple[float, float]:
         WheeledStand(WheeledModel(), other_solver()),
         wanted="wheel_gain[left]",
     )
-    begin, busy = time.perf_counter(), time.process_time()
+    watch = Stopwatch()
     diagnose(case.trials, WheeledModel(threads=1))
-    return time.perf_counter() - begin, time.process_time() - busy
+    took = watch.read()
+    return took["seconds"], took["cpu"]

@@ -8,10 +8,9 @@ one, to share the work.
 """
 
 import sys
-import time
 from typing import Any
 
-from bench.gap.kept_cases import Cases
+from bench.gap.kept_cases import Cases, Stopwatch
 from bench.result import Result, bench
 
 COUNTS = {"single": 160, "none": 60, "motion": 12, "off-library": 40}
@@ -37,7 +36,7 @@ def one(kind: str, seed: int) -> dict[str, Any]:
     stand = LightStand(model, singles=_singles(seed), wheels=kind == "motion")
     hidden = "single" if kind == "motion" else kind
     case = cases.build(seed, hidden, stand, off_library=off_library())
-    begin, busy = time.perf_counter(), time.process_time()
+    watch = Stopwatch()
     whole = kind == "motion" or seed % WHOLE == 0
     if whole:
         found = diagnose(case.trials, model, seed=seed, full=False)
@@ -46,8 +45,7 @@ def one(kind: str, seed: int) -> dict[str, Any]:
         found = diagnosis.look(case.trials, sight, single, seed=seed, full=False)
     row = scoring.row(kind, seed, case, found)
     row["said"]["whole"] = whole
-    row["seconds"] = time.perf_counter() - begin
-    row["cpu"] = time.process_time() - busy
+    row |= watch.read()
     return plain(row)
 
 
@@ -91,20 +89,24 @@ def gap_sensors(quick: bool) -> Result:
                 large, lambda row: row["said"]["verdict"] == "either"
             ),
             "named alone, and wrong": scoring.share(large, _alone_wrong),
-            "found at 3 x": scoring.share(large, _claims),
-            "false alarms": scoring.share(none, _claims),
+            "found at 3 x": scoring.share(large, scoring.claims),
+            "false alarms": scoring.share(none, scoring.claims),
             "no-effect cases": len(none),
             "effects on wheels": _wheels(scoring.of(found, "motion", scoring.LARGE)),
-            "outside the library, called so": scoring.share(off, _strange),
+            "outside the library, called so": scoring.share(off, scoring.strange),
             "outside the library": len(off),
             "by size": scoring.by_size(every),
             "seconds of processor time": _middle([row["cpu"] for row in found]),
             "confusion": scoring.confusion(large),
             "failures": scoring.failures(large, scoring.right),
-            "outside the library, called otherwise": scoring.failures(off, _strange),
-            "called outside the library, and wrongly": scoring.share(large, _strange),
+            "outside the library, called otherwise": scoring.failures(
+                off, scoring.strange
+            ),
+            "called outside the library, and wrongly": scoring.share(
+                large, scoring.strange
+            ),
             "alarms": [
-                f"{r['seed']}: {r['said']['named']}" for r in none if _claims(r)
+                f"{r['seed']}: {r['said']['named']}" for r in none if scoring.claims(r)
             ],
         },
     )
@@ -121,14 +123,6 @@ def _wheels(found: list[dict]) -> dict[str, float]:
     from bns.gap.bench import scoring
 
     return {"n": len(found), "named": scoring.share(found, scoring.right)}
-
-
-def _claims(row: dict) -> bool:
-    return row["said"]["verdict"] != "no gap"
-
-
-def _strange(row: dict) -> bool:
-    return row["said"]["verdict"] == "none of the library"
 
 
 def _alone_wrong(row: dict) -> bool:

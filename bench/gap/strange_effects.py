@@ -159,17 +159,18 @@ def other_solver() -> list:
     return [OtherSolver({"strength": 1.0})]
 
 
-class Narrower(OpticsEffect):
+class _Always:
+    """Of an effect without a parameter that could be nominal."""
+
+    is_nominal = False
+
+
+class Narrower(_Always, OpticsEffect):
     """Sensors see a narrower cone: another exponent of their angular response."""
 
     name = "off_narrower"
     doc = "sensors see a narrower cone"
     source = "assumed"
-
-    @property
-    def is_nominal(self) -> bool:
-        """Never."""
-        return False
 
     def change(
         self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
@@ -178,17 +179,12 @@ class Narrower(OpticsEffect):
         return {**law, "exponent": law["exponent"] * 2.0}
 
 
-class Nonlinear(SensorEffect):
+class Nonlinear(_Always, SensorEffect):
     """Readings bend: the middle of the range is read too dark."""
 
     name = "off_nonlinear"
     doc = "readings bend in the middle of their range"
     source = "assumed"
-
-    @property
-    def is_nominal(self) -> bool:
-        """Never."""
-        return False
 
     def apply(self, times, readings, channels, active, rng):
         """The readings, up to 600 counts darker."""
@@ -196,17 +192,12 @@ class Nonlinear(SensorEffect):
         return np.clip(readings + 2400 * share * (1 - share), 0, 4095)
 
 
-class Coarse(SensorEffect):
+class Coarse(_Always, SensorEffect):
     """Readings come in six steps."""
 
     name = "off_coarse"
     doc = "readings come in six steps"
     source = "assumed"
-
-    @property
-    def is_nominal(self) -> bool:
-        """Never."""
-        return False
 
     def apply(self, times, readings, channels, active, rng):
         """The readings rounded to steps of 819 counts."""

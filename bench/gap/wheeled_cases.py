@@ -7,7 +7,6 @@ results in `runs/bench/`, one file per part.
 """
 
 import sys
-import time
 
 from bench.gap import kept_cases
 
@@ -86,7 +85,7 @@ def one(kind: str, seed: int) -> dict:
         off_library=off_library(),
         wanted=ALIKE[seed % len(ALIKE)] if kind == "alias" else "",
     )
-    begin, busy = time.perf_counter(), time.process_time()
+    watch = kept_cases.Stopwatch()
     try:
         found = diagnose(case.trials, model, seed=seed, full=False)
         row = scoring.row(kind, seed, case, found)
@@ -100,8 +99,7 @@ def one(kind: str, seed: int) -> dict:
             "answer": case.answer.as_dict(),
             "said": said,
         }
-    row["seconds"] = time.perf_counter() - begin
-    row["cpu"] = time.process_time() - busy
+    row |= watch.read()
     return plain(row)
 
 

@@ -9,50 +9,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-HEAD = """
-import sys, threading
-from bns.hardware.safety.priority import urgent
-urgent()
-from bns.worlds import alarm
-from bns.worlds.trial import Channel, Commands
-def fail():
-    sys.stdin.readline()
-    alarm.ring("the learner failed")
-threading.Thread(target=fail, daemon=True).start()
-def begin(world, look):
-    rig = world.connected()
-    x, y, yaw = look(rig).wait_for_sight().pose
-    world.start = (x, y, yaw) if max(abs(x), abs(y)) < 0.4 else (0.0, 0.0, yaw)
-    print("watchdog", rig.watchdog.pid, flush=True)
-    return rig
-"""
-KHEPERA = """
-from bns.hardware.worlds.wheeled import HardwareWorld
-world = HardwareWorld(port=sys.argv[1])
-begin(world, lambda rig: rig.mover())
-try:
-    world.run([Commands([[0.04, 0.10]], [25.0])])
-finally:
-    world.close()
-"""
-HEXAPOD = """
-import numpy as np
-from bns.hardware.worlds.hexapod import HardwareHexapod
-world = HardwareHexapod(port=sys.argv[1])
-walker = begin(world, lambda rig: rig.walker).walker
-perform = walker.perform
-def performed(*words):
-    print("moving", flush=True)
-    return perform(*words)
-walker.perform = performed
-names = tuple(Channel(*channel) for channel in world.model.channels)
-goals = np.zeros((40, 18))
-goals[::2, 1::3] = 0.3
-try:
-    world.run([Commands(goals, np.full(40, 2.0), names)])
-finally:
-    world.close()
-"""
 DRIVEN = [5760, 14401]  # speed units of 0.04 and 0.10 m/s, firmware 2
 
 
@@ -94,14 +50,14 @@ class Driver:
     """A process that drives an emulated robot.
 
     Args:
-        script: what it does.
+        robot: its name.
         port: of the robot.
         env: its environment.
     """
 
-    def __init__(self, script: str, port: Path, env: dict[str, str]) -> None:
+    def __init__(self, robot: str, port: Path, env: dict[str, str]) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, "-c", script, str(port)],
+            [sys.executable, "-m", "bench.hardware.driven", robot, str(port)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -133,13 +89,13 @@ class Drive(NamedTuple):
 
     Attributes:
         robot: its name.
-        script: drives it.
+        cycle: time within which its motion repeats, or all phases of loops [s].
         steady: whether a drive has gone on for a moment.
         driven: whether the robot was driven at a time.
     """
 
     robot: str
-    script: str
+    cycle: float
     steady: Callable[[Log, Driver], bool]
     driven: Callable[[Log, float], bool]
 
@@ -165,6 +121,6 @@ def _walked(log: Log, at: float) -> bool:
 
 
 DRIVES = (
-    Drive("khepera3", HEAD + KHEPERA, _rolling, _rolled),
-    Drive("phantomx", HEAD + HEXAPOD, _walking, _walked),
+    Drive("khepera3", 0.2, _rolling, _rolled),
+    Drive("phantomx", 1.2, _walking, _walked),
 )

@@ -41,7 +41,8 @@ def resumed(name: str) -> Callable[[str, Callable[[], dict]], dict]:
 
 def _code() -> str:
     """What the code of robots and of their benches is, in a few letters."""
-    files = [*Path("hardware").rglob("*.py"), *Path("bench").glob("*.py")]
+    places = Path("hardware"), Path("bench", "hardware")
+    files = [path for place in places for path in place.rglob("*.py")]
     texts = (path.read_bytes() for path in sorted(files))
     return hashlib.sha256(b"".join(texts)).hexdigest()[:12]
 

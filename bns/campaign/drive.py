@@ -1,6 +1,6 @@
 """The loop around a campaign: what is missing is run and stored as it comes."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -170,7 +170,7 @@ def _work(
 
 def ended(
     jobs: Sequence[Job], store: CampaignStore, engine: Engine, shown: Progress
-) -> Iterator[Outcome]:
+) -> Generator[Outcome, None, None]:
     """Run batches; each is kept, noted and shown before it is told of.
 
     Args:

@@ -29,6 +29,12 @@ class Background(Learner):
 
     Args:
         configs, replicates, onsets: see `Learner`; models are made in the process.
+
+    Raises:
+        BnsError: the learner fails to start.
+
+    Attributes:
+        deploys: as of the learner in the process.
     """
 
     def __init__(
@@ -45,6 +51,7 @@ class Background(Learner):
         self._process = spawn.Process(target=_serve, args=words, daemon=True)
         self._process.start()
         other.close()
+        self.deploys = self._hear()
         threading.Thread(target=self._watch, daemon=True).start()
 
     def check_alike(self, configs: Sequence[RunConfig]) -> None:
@@ -82,9 +89,19 @@ class Background(Learner):
     def _ask(self, name: str, *words: Any) -> Any:
         try:
             self._line.send((name, words))
+        except OSError as error:
+            raise _failed() from error
+        return self._hear()
+
+    def _hear(self) -> Any:
+        try:
             return self._line.recv()
         except (OSError, EOFError) as error:
-            raise BnsError("The learner failed; its message is above.") from error
+            raise _failed() from error
+
+
+def _failed() -> BnsError:
+    return BnsError("The learner failed; its message is above.")
 
 
 def _serve(
@@ -107,6 +124,7 @@ def _serve(
         models=make_models(configs[0]),
     )
     learner.run_in_background()
+    line.send(learner.deploys)
     busy = False
     while True:
         while busy and not line.poll():

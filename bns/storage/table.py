@@ -1,5 +1,6 @@
 """The per-trial figures of a run as Parquet: a row per replicate and trial."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -32,6 +33,11 @@ def read_table(path: Path) -> dict[str, np.ndarray]:
     kinds = dict.fromkeys(table.column_names, "double") | dict.fromkeys(KEYS, "int64")
     columns = parquet.numbers(table, kinds, path)
     shape = tuple(int(columns[key].max(initial=-1)) + 1 for key in KEYS)
+    if math.prod(shape) != table.num_rows:  # nothing is made for numbers so large
+        raise FormatError(
+            f"{path}: {' x '.join(map(str, shape))} replicates and trials in "
+            f"{table.num_rows} rows."
+        )
     for key, index in zip(KEYS, np.indices(shape), strict=True):
         if not np.array_equal(columns.pop(key), index.ravel()):
             raise FormatError(

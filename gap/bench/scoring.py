@@ -171,6 +171,16 @@ def aliased(row: dict[str, Any]) -> bool:
     return any(len(names) > 1 for names in row["answer"]["aliases"])
 
 
+def claims(row: dict[str, Any]) -> bool:
+    """Whether a gap is claimed."""
+    return bool(row["said"]["verdict"] != "no gap")
+
+
+def strange(row: dict[str, Any]) -> bool:
+    """Whether a gap is claimed that no effect of the library explains."""
+    return bool(row["said"]["verdict"] == "none of the library")
+
+
 def confusion(rows: Sequence[dict]) -> dict[str, int]:
     """Counts of "true effect -> named effect", effects without their sides."""
     counts: Counter[str] = Counter()

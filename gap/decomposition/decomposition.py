@@ -16,6 +16,7 @@ MOST = 0.5  # share of the gap beyond which what is left is most of it
 FELT = 0.02  # of the floor's variance: a gap below shows in no picture
 LARGE = 2.0  # variances of the floor: more than heavy tails of any camera's noise
 SCATTER = 3.0  # times what differs between repeats
+EXACT = 0.005  # of its motion: other integrators and steps differ by as much (assumed)
 BROKEN = 0.05  # of its motion: no sound robot scatters by as much (assumed)
 
 
@@ -35,7 +36,8 @@ class Decomposition:
         recurs: standard errors by which what `point` leaves recurs.
         scatter: excess over the floor of what differs between repeats.
         moved: mean square of the recorded motion in units of the floor.
-        inside: which residuals count, ``(N, C)``: no wild points.
+        inside: which residuals count, ``(N, C)``: no wild points, no strayed trial.
+        strayed: numbers of trials that went another way than their repeats.
     """
 
     problem: Problem
@@ -51,6 +53,7 @@ class Decomposition:
     scatter: float
     moved: float
     inside: np.ndarray
+    strayed: tuple[int, ...] = ()
 
     @cached_property
     def closed(self) -> float:
@@ -91,12 +94,12 @@ class Decomposition:
 
     @property
     def lasting(self) -> bool:
-        """Whether the rest is more than scatter: it recurs, or it is far beyond what
-        measuring scatters and what differs between repeats, or beyond what a sound
+        """Whether the rest is more than scatter and than how exact a simulation is: it
+        recurs, or it is far beyond what measuring scatters and what differs between repeats, or beyond what a sound
         robot may scatter (what happens at one place, or by chance)."""
         if self.broken:
             return True
-        if self.after <= self.scatter:
+        if self.after <= max(self.scatter, EXACT**2 * self.moved):
             return False
         if self.recurring:
             return self.after > FELT
@@ -133,6 +136,8 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
     known = rest.floor(problem, seed=seed)
     full = point.linear.rest(point.linear.solve(point.linear.free))
     inside = rest.kept(problem, full, point.noise.sd)
+    strayed = rest.strayed(problem, point.rest, known)
+    inside &= ~strayed[:, None]
     left = point.linear.rest(point.linear.solve(point.support))
     plain = left if not point.noise.memory.factors.size else point.rest
     return Decomposition(
@@ -154,4 +159,5 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         scatter=rest.scattered(problem, plain, known, inside),
         moved=max(rest.excess(problem.recorded, known, inside), 1.0),
         inside=inside,
+        strayed=tuple(problem.numbers[n] for n in np.unique(problem.trial[strayed])),
     )

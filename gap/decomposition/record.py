@@ -123,8 +123,12 @@ def _ordered(made: Decomposition, support: Support) -> tuple[str, ...]:
 def statements(made: Decomposition) -> list[str]:
     """The three statements: size, explanation, rest."""
     problem, features = made.problem, made.problem.model.features
+    apart = "".join(
+        f" Trial {number} went another way than its repeat and does not count."
+        for number in made.strayed
+    )
     if made.kind == "no gap":
-        return ["No gap beyond what the recording scatters by itself."]
+        return ["No gap beyond what the recording scatters by itself." + apart]
     window = float(np.median(np.concatenate([w.durations for w in problem.windows])))
     before, beyond = _sizes(made, made.start.rest)
     _, left = _sizes(made, made.point.rest)
@@ -138,7 +142,8 @@ def statements(made: Decomposition) -> list[str]:
         words.explained(listed, made.closed, date, swapped),
         words.left(
             made.left, made.lasting, made.recurring, words.sized(left, features)
-        ),
+        )
+        + apart,
     ]
 
 

@@ -15,6 +15,8 @@ APART = (0.6, 2.0)  # [s] between windows whose errors are compared: beyond a wi
 # length, so that they share no sample
 PIECE = 2.0  # [s] of a trial that count as independent
 SHORT = 0.5  # [s] that do once an autoregression is taken out
+APART_BY = 30.0  # times the square of its repeat's error: another way
+PAIRS = 3  # of repeats from which one may stray
 SEARCHED = 1.0  # standard errors that the best of some ten lags exceeds by chance
 SURE = 3.0  # standard errors from which an error is said to recur
 
@@ -69,6 +71,30 @@ def kept(problem: Problem, left: np.ndarray, sd: np.ndarray) -> np.ndarray:
     """
     with np.errstate(invalid="ignore"):
         return problem.seen & (np.abs(left) < WILD * sd)
+
+
+def strayed(problem: Problem, rest: np.ndarray, known: Floor) -> np.ndarray:
+    """Windows of a trial that went another way than its repeat, ``(N,)``.
+
+    A pendulum that just goes over the top tells how it was pushed, not what the model
+    lacks. One pair of several has to disagree: where more do, something has changed.
+
+    Args:
+        problem: the recording.
+        rest: residuals, ``(N, C)``.
+        known: the floor.
+    """
+    units = (np.nan_to_num(rest) / known.sd) ** 2
+    size = [float(units[problem.trial == n].mean()) for n in range(len(problem.trials))]
+    pairs = repeats(problem)
+    apart = [
+        (one, other)
+        for one, other in pairs
+        if max(size[one], size[other]) > APART_BY * max(1.0, min(size[one], size[other]))
+    ]
+    if len(apart) != 1 or len(pairs) < PAIRS:
+        return np.zeros(len(problem.trial), dtype=bool)
+    return problem.trial == max(apart[0], key=lambda n: size[n])
 
 
 def excess(rest: np.ndarray, known: Floor, inside: np.ndarray) -> float:

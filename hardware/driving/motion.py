@@ -127,7 +127,10 @@ class Mover(SafetyMonitor):
         """
         if self.robot.paused():
             self.faults.note("seen to stand", "tag", "wheels turn")
-            raise Void("it drives and the picture does not change")
+            raise Void(
+                "it drives and the picture does not change",
+                "see that the camera works, then go on with --resume",
+            )
         self.faults.note("stands", "told to move", str(self.points[-1].units))
         units, robot = self.points[-1].units, self.robot
         speeds = map(robot.speed, units)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 CHECK = 0.12  # s between two looks
 ROOM = 0.06  # s before the next set point in which nothing is asked
-LAGS = (0.04, 0.13, 0.28)  # s, time constant of the wheels: least, usual, most; assumed
+LAGS = (0.04, 0.13, 0.28)  # s, wheels' time constant: the model's, bounds assumed
 SLACK, SHARE = 900, 0.06  # speed units, share: what wheels may be off a set point
 FAST = 8000  # speed units; slower, a share that is missing may not show
 TRIES = 3  # sent again in vain, after which the wheel is to blame and not the line

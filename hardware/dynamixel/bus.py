@@ -8,8 +8,6 @@ the wall clock. It is not safe for several threads: neither is this.
 """
 
 import contextlib
-import os
-import select
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -24,7 +22,7 @@ from bns.hardware.khepera.driver import Guard
 from bns.hardware.line import INSTALL, check_port, claim
 from bns.hardware.openers import Openers
 from bns.hardware.safety.stop_order import insist, phantomx
-from bns.hardware.safety.watchdog import LARGEST, send
+from bns.hardware.safety.watchdog import receive, send
 from bns.worlds.physics.legged_flags import OVERLOAD_TIME, SATURATED, STALLED
 
 TRIES = 4
@@ -84,6 +82,10 @@ class Bus:
     def fileno(self) -> int:
         """The open file's number, for the watchdog."""
         return int(self._port.ser.fileno())
+
+    def others(self) -> list[str]:
+        """Programs that have the port open as well, as "name (number)"."""
+        return self._openers.others()
 
     def identify(self) -> None:
         """See that every servo is there, once, and is an AX-12A.
@@ -236,10 +238,6 @@ class Bus:
         for _ in range(3):
             self._call("write2ByteTxOnly", packets.BROADCAST, packets.SPEED, units)
 
-    def angles(self) -> dict[str, float]:
-        """Where all joints are [rad], by name; reads every servo."""
-        return {j.name: j.angle(self.read(j.id).position) for j in self.joints}
-
     def volts(self) -> float:
         """The lowest voltage that a servo reads [V]."""
         return min(self.read(joint.id).voltage for joint in self.joints)
@@ -266,7 +264,7 @@ class Bus:
             confirmed = insist(
                 order,
                 lambda data: send(self.fileno(), data),
-                self._heard,
+                lambda seconds: receive(self.fileno(), seconds),
                 self.clock.now,
                 patience=STOPPING,
                 meanwhile=self._calm,
@@ -280,18 +278,6 @@ class Bus:
             )
         self._on = False
         self._calm()
-
-    def _heard(self, seconds: float) -> bytes:
-        """What has arrived within some time."""
-        if not select.select([self.fileno()], [], [], seconds)[0]:
-            return b""
-        try:
-            data = os.read(self.fileno(), LARGEST)
-        except BlockingIOError:  # the watchdog has read it
-            return b""
-        if not data:
-            raise OSError("the line is dead")
-        return data
 
     def _calm(self) -> None:
         """Feed the guard; whatever it says, the robot is being stopped already."""
@@ -315,8 +301,11 @@ class Bus:
         function = getattr(self._protocol, name)
         self._port.came = 0
         made = self._guarded(lambda: function(self._port, *words))
-        if self._on and self._port.came > BABBLE:
-            raise Void(f"the bus goes on talking ({self._port.came} bytes to {name})")
+        if self._port.came > BABBLE:
+            said = f"bus goes on talking ({self._port.came} bytes to {name})"
+            if self._on:
+                raise Void(f"the {said}")
+            raise LinkError(f"The {said}: check cable and adapter.")
         return made
 
     def _guarded(self, function: Any) -> Any:
@@ -362,9 +351,9 @@ def _port(sdk: Any, name: str, latency: float) -> Any:
             # the SDK looks at the time in a silent moment only; late answers are good
             if self.came > BABBLE and self.isPacketTimeout():
                 return b""
-            # the SDK asks without a pause: one core busy, nobody else's turn
-            select.select([self.ser.fileno()], [], [], 0.0005)
-            data = super().readPort(length)
+            # the SDK asks without a pause: one core busy, nobody else's turn; and it
+            # takes a line whose bytes another program has read for a dead one
+            data = receive(self.ser.fileno(), 0.0005, length)
             self.came += len(data)
             return data
 

@@ -43,6 +43,10 @@ class HexapodRig:
     watchdog: WatchdogClient
     walker: Walker
 
+    def others(self) -> list[str]:
+        """Programs that have the port open as well, as "name (number)"."""
+        return self.bus.others()
+
     def close(self) -> None:
         """Torque off; give port and camera back; a dead line is the watchdog's."""
         try:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bns.errors import BnsError
 from bns.hardware.clock import Clock
 from bns.hardware.dynamixel.bus import Bus, Overload
 from bns.hardware.faults import FaultLog
@@ -30,6 +31,7 @@ STILL = 0.18  # s without a change: every servo was read once
 LEAN = 0.13  # share by which the tag is smaller than at the stance: it leans by 45 deg
 AFTER = 0.25  # s of looking on after the last command
 FALLEN = 0.5  # s of leaning so far, after which it is taken for fallen
+LIES = 5.0  # s for a robot without torque to come to rest
 
 
 @dataclass
@@ -146,7 +148,7 @@ class Walker(SafetyMonitor):
         if self.up:
             return
         self.wait_for_sight()
-        present = self.bus.angles()
+        present = self._lying()
         self.goals = np.array([present[name] for name in self.names])
         with self._or_halt():
             self.bus.pace(SLOW)
@@ -156,6 +158,32 @@ class Walker(SafetyMonitor):
             self.go(np.zeros(len(self.names)), 8.0, speed=SLOW)
             self.bus.pace(SPEED)
             self._side = self.wait_for_sight().side
+
+    def _lying(self) -> dict[str, float]:
+        """Angles [rad] of the joints, by name, once neither they nor the tag move.
+
+        A robot whose torque went off sinks for a while: torque in the midst of that
+        would catch it in a stance that nobody chose, and it would not have stopped.
+
+        Raises:
+            BnsError: it does not come to rest.
+        """
+        begin = self.clock.now()
+        self._rest.again(begin)
+        while self.clock.now() - begin < LIES:
+            found = {}
+            for joint in self.bus.joints:
+                units = self.bus.read(joint.id).position
+                self._rest.servo(joint.id, units, self.clock.now())
+                found[joint.name] = joint.angle(units)
+            self.look()
+            if self.clock.now() - self._rest.since >= STILL:
+                return found
+            self.clock.sleep(PERIOD)
+        raise BnsError(
+            "The robot moves though its servos have no torque: put it on the board and "
+            "let go of it."
+        )
 
     def halt(self) -> None:
         """Torque off, whatever happened."""

@@ -128,6 +128,10 @@ class VirtualLine:
         """Nobody else can open it."""
         return False
 
+    def others(self) -> list[str]:
+        """Nobody else can open it."""
+        return []
+
     def close(self) -> None:
         """Nothing to give back."""
 

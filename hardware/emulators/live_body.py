@@ -56,9 +56,8 @@ class LiveBody(ABC):
         scene = compile.compiled(robot, body)
         self.model = copy.copy(scene.model)  # its own: a servo can be switched off
         self.data = mujoco.MjData(self.model)
-        begin = self._begin(scene, (float(start[0]), float(start[1]), float(start[2])))
-        mujoco.mj_setState(self.model, self.data, begin, STATE)
-        mujoco.mj_forward(self.model, self.data)
+        place = (float(start[0]), float(start[1]), float(start[2]))
+        self.state = self._begin(scene, place)
         self.dt = float(self.model.opt.timestep)
         self._free = compile.free_joint(self.model)
         self._from, self._steps = at, 0
@@ -84,6 +83,19 @@ class LiveBody(ABC):
     def now(self) -> float:
         """Time that the physics has reached [s]."""
         return self._from + self._steps * self.dt
+
+    @property
+    def state(self) -> np.ndarray:
+        """Full state of the physics, ``(S,)`` (`mjSTATE_FULLPHYSICS`); may be set."""
+        state = np.empty(mujoco.mj_stateSize(self.model, STATE))
+        mujoco.mj_getState(self.model, self.data, state, STATE)
+        return state
+
+    @state.setter
+    def state(self, state: np.ndarray) -> None:
+        """Put the body into a state, ``(S,)``."""
+        mujoco.mj_setState(self.model, self.data, state, STATE)
+        mujoco.mj_forward(self.model, self.data)
 
     def advance(self, now: float) -> None:
         """Step until `now` [s]; after a long sleep of the host, time skips."""

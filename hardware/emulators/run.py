@@ -20,6 +20,8 @@ from bns.hardware.khepera import protocol
 from bns.hardware.safety.priority import urgent
 from bns.worlds.light.field import Lamp
 
+SLOW = 0.005  # m/s; slower, a wheel stands
+
 
 def khepera3(
     port: Path | str,
@@ -163,7 +165,7 @@ class _WheelsDiary(Diary):
             when, *told = self.device.log[-1]
             self._told = (told[0], told[1])
             self.write(at=when, told=told)
-        stands = max(map(abs, self.device.body.wheel_speeds())) < 0.005
+        stands = max(map(abs, self.device.body.wheel_speeds())) < SLOW
         if stands != self._stood:
             self._stood = stands
             self.write(at=at, stands=stands)
@@ -202,8 +204,9 @@ def phantomx(
         seed: of what is random.
         battery: voltage of the bus [V].
         rate: of the camera [1/s].
-        log: file for a line at each stop order, and whenever torque is switched or
-            the body begins to move or comes to rest.
+        log: file for a line at each stop order, whenever torque is switched (with
+            the state of the physics, where it is off), and whenever the body begins to
+            move or comes to rest.
         baud: rate that it talks at.
         stop: asked all the time; None = signals decide.
     """
@@ -239,7 +242,8 @@ class _LegsDiary(Diary):
         super().note(at, hears)
         on = int(self.body.on.sum())
         if on != self._on:
-            self.write(at=at, powered=on)
+            falls = {} if on else {"state": self.body.state.tolist()}
+            self.write(at=at, powered=on, **falls)
         self._on = on
         stands = self.body.rests()
         if stands != self._stood:

@@ -24,6 +24,8 @@ SILENT = 0.12  # s without a byte, after which a moving robot is stopped
 UNANSWERED = 0.3  # s without a proper answer, after which a moving robot is stopped
 BABBLE = 256  # bytes that are no answer, after which a moving robot is stopped
 TURNING = 1000  # speed units of a wheel that turned until a moment ago
+STANDS = 0.005  # m/s; slower in `LOOKS` readings running, a wheel stands
+LOOKS = 3
 STOPPING = 1.0  # s for the robot to acknowledge a stop
 
 
@@ -260,9 +262,12 @@ class Khepera3:
                 raise Void("another program has opened the port")
 
     def _standing(self) -> bool:
-        """Whether the wheels slow down to a stand within a moment."""
-        for _ in range(12):
-            if max(map(abs, self.speeds())) < 1500:  # below the smallest regulated
+        """Whether the wheels slow down to a stand within a moment, and stay."""
+        looks = 0
+        for _ in range(16):
+            left, right = map(self.speed, self.speeds())
+            looks = looks + 1 if max(abs(left), abs(right)) < STANDS else 0
+            if looks == LOOKS:
                 return True
             self.clock.sleep(SLICE)
         return False

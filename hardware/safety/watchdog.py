@@ -107,15 +107,7 @@ class Watchdog:
         send(self.fd, data)
 
     def _read(self, seconds: float) -> bytes:
-        if not select.select([self.fd], [], [], seconds)[0]:
-            return b""
-        try:
-            data = os.read(self.fd, LARGEST)
-        except BlockingIOError:  # somebody else has read it
-            return b""
-        if not data:
-            raise OSError("the line is dead")
-        return data
+        return receive(self.fd, seconds)
 
     def _reopen(self) -> None:
         """Take the port again, once it is there."""
@@ -153,6 +145,35 @@ def send(fd: int, data: bytes) -> None:
         termios.tcflush(fd, termios.TCOFLUSH)
     with contextlib.suppress(BlockingIOError):  # written again in a moment
         os.write(fd, data)
+
+
+def receive(fd: int, seconds: float, most: int = LARGEST) -> bytes:
+    """What has arrived at a port, within some time; nothing where another read it.
+
+    Args:
+        fd: open file of the port, not blocking.
+        seconds: to wait for the first byte [s].
+        most: bytes.
+
+    Raises:
+        OSError: the line is dead.
+    """
+    if not select.select([fd], [], [], seconds)[0]:
+        return b""
+    with contextlib.suppress(BlockingIOError):
+        data = os.read(fd, most)
+        if not data and _hung_up(fd):
+            raise OSError("the line is dead")
+        return data
+    return b""
+
+
+def _hung_up(fd: int) -> bool:
+    """Whether a port that gives no byte has gone, and not only its bytes."""
+    asked = select.poll()
+    asked.register(fd, select.POLLIN)
+    gone = select.POLLHUP | select.POLLERR | select.POLLNVAL
+    return any(events & gone for _, events in asked.poll(0))
 
 
 def _say(text: str) -> None:

@@ -7,7 +7,8 @@ from typing import ClassVar, Generic, Protocol, TypeVar
 
 from bns import models
 from bns.errors import BnsError
-from bns.hardware.errors import Void
+from bns.hardware.clock import Clock
+from bns.hardware.errors import SafetyStop, Void
 from bns.hardware.faults import FaultLog
 from bns.hardware.rig import EMULATED
 from bns.hardware.safety.limits import Operator
@@ -19,13 +20,19 @@ from bns.worlds.physics import control
 from bns.worlds.trial import Commands, Trial
 
 TRIES = 20  # of a trial that is void
+ALONE = 10.0  # s for another program to close the port, before the session ends
 
 
 class Connected(Protocol):
     """What a session with a robot has, whatever robot it is."""
 
+    clock: Clock
     faults: FaultLog
     operator: Operator
+
+    def others(self) -> list[str]:
+        """Programs that have the port open as well, as "name (number)"."""
+        ...
 
     def close(self) -> None:
         """Give port and camera back."""
@@ -173,14 +180,21 @@ class RealRobot(ABC, Generic[RigT]):
         Args:
             once: carries it out, once.
             trial: its number.
+
+        Raises:
+            BnsError: it was void too often.
+            SafetyStop: void twice running by what a person has to mend.
         """
-        rig, voids = self.connected(), []
+        rig, voids = self.connected(), list[str]()
         faults = len(rig.faults)
         with rig.operator:
             for _ in range(TRIES):
+                _alone(rig)
                 try:
                     made = once(rig)
                 except Void as void:
+                    if void.advice and voids[-1:] == [void.reason]:
+                        raise SafetyStop(void.reason, void.advice) from void
                     self.voids += 1
                     voids.append(void.reason)
                     rig.faults.note("void trial", str(trial), void.reason)
@@ -222,3 +236,21 @@ class RealRobot(ABC, Generic[RigT]):
         Raises:
             Void: the trial was disturbed.
         """
+
+
+def _alone(rig: Connected) -> None:
+    """Wait until nobody else has the port open, who would take the robot's answers.
+
+    Raises:
+        BnsError: somebody keeps it open.
+        SafetyStop: the operator says so.
+    """
+    begin = rig.clock.now()
+    while others := rig.others():
+        rig.operator.check()
+        if rig.clock.now() - begin > ALONE:
+            raise BnsError(
+                f"Another program has the robot's port open, {', '.join(others)}: end "
+                "it, then go on with --resume."
+            )
+        rig.clock.sleep(0.1)

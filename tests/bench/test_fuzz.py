@@ -1,11 +1,12 @@
 """Files of every kind made wrong: one line each, or content that makes sense."""
 
+import time
 import warnings
 
 import pytest
 
 from bench.storage import reading
-from bench.storage.readers import readers
+from bench.storage.readers import Reader, readers
 from bench.storage.sample_files import make
 
 INPUTS = 30
@@ -32,3 +33,23 @@ def test_wrong_files_are_refused_by_one_line(reader, home):
     assert found.counts["inputs"] == INPUTS
     skips = reader.name == "timing.jsonl"  # lines that are torn are left out
     assert skips or found.counts["refused"] > 0
+
+
+def busy(home):
+    while True:
+        pass
+
+
+@pytest.mark.parametrize(
+    ("read", "hangs"),
+    [(busy, 1), (lambda home: time.sleep(60), 1), (lambda home: time.sleep(0.1), 0)],
+    ids=["busy", "waits for ever", "waits its turn"],
+)
+def test_what_hangs_is_ended_and_a_busy_machine_is_no_hang(
+    read, hangs, monkeypatch, tmp_path
+):
+    monkeypatch.setattr(reading, "SLOW", 0.05)
+    monkeypatch.setattr(reading, "ASLEEP", 1.0)
+    found = reading.Found()
+    reading.judge(Reader("one", "file", read), tmp_path, 0, found)
+    assert found.counts["hangs"] == hangs and len(found.cases) == hangs

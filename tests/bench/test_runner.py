@@ -1,6 +1,7 @@
 """Every bench keeps the contract of `bench/result.py`; rows are stored and shown."""
 
 import ast
+import importlib.util
 import json
 
 import pytest
@@ -144,3 +145,24 @@ def test_the_exit_code_tells_whether_the_bar_holds(
     monkeypatch.setattr(runner, "commit", lambda: "abc")
     assert command.main(["small"]) == code
     assert json.loads(capsys.readouterr().out)["holds"] is holds
+
+
+def test_what_benches_import_is_there_within_functions_as_well():
+    missing = []
+    for path in (ROOT / "bench").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            module = node.module if isinstance(node, ast.ImportFrom) else ""
+            if module.startswith(("bench", "bns")):
+                names = [alias.name for alias in node.names]
+                lost = [name for name in names if not _there(module, name)]
+                missing += [f"{path.name}: {module}.{name}" for name in lost]
+    assert not missing
+
+
+def _there(module, name):
+    """Whether a module has a name, or a package a module of that name."""
+    home = importlib.import_module(module)
+    return hasattr(home, name) or (
+        hasattr(home, "__path__")
+        and importlib.util.find_spec(f"{module}.{name}") is not None
+    )

@@ -52,6 +52,16 @@ def test_damage_that_was_always_there_has_no_date(recorded, model):
     assert len(found.decomposition["statements"]) == 3
 
 
+def test_a_trial_that_strays_from_its_repeat_is_named_and_does_not_count(model, told):
+    twice = [*told[:4], *told[:4]]
+    trials = MujocoWorld(reality=[NOISE], threads=1).run(twice, seeds=range(8))
+    slow = "wheel_gain:wheel=left,factor=0.3"
+    pushed = MujocoWorld(reality=[slow, NOISE], threads=1).run(told[1:2], seeds=[9])
+    found = kept([trials[0], *pushed, *trials[2:]], model)
+    assert found.verdict.kind == "no gap"
+    assert "Trial 1 went another way than its repeat" in found.verdict.sentence
+
+
 def test_repeats_are_found_with_tolerance(model):
     told = [Commands([[0.1, 0.05]], [2.0]), Commands([[0.1, 0.05]], [2.004])]
     other = Commands([[0.1, 0.06]], [2.0])

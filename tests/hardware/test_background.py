@@ -8,6 +8,7 @@ import pytest
 from bns import presets
 from bns.errors import BnsError
 from bns.experiment.background import behind
+from bns.experiment.batch import Batch
 from bns.experiment.loading import with_learner
 from bns.learners import registry as learners
 from bns.learners.bns.learner import LEAST
@@ -76,6 +77,14 @@ def test_any_learner_can_be_in_a_process_of_its_own(name):
     assert np.isfinite(row["best_seen"]).all()
     assert ("evaluations" in row) == (name == "cma")
     assert learner.state().keys()
+
+
+def test_what_a_learner_deploys_is_measured_apart_beside_a_robot_as_well():
+    config = replace(small("khepera-simple"), deploy="seen")
+    learner = behind(config)
+    place = world("khepera-simple", learner.task)
+    step, _ = Batch([config], [place], learner=learner).advance(0)
+    assert learner.deploys and step.columns["solved_best"].shape == (1,)
 
 
 def test_a_task_that_closes_a_loop_is_refused():

@@ -11,7 +11,7 @@ from bns.worlds.trial import Commands
 pytest.importorskip("cv2")
 
 from bns.hardware.emulators import virtual
-from bns.hardware.errors import Void
+from bns.hardware.errors import SafetyStop, Void
 from bns.hardware.worlds.wheeled import HardwareWorld
 
 BOTH = np.ones(2)
@@ -86,11 +86,8 @@ def test_a_picture_that_comes_again_is_marked():
     assert [s.repeated for s in (first, again, other)] == [False, True, False]
 
 
-@pytest.mark.parametrize("way", ["frozen", "stuck", "stale", "ahead"])
-def test_a_camera_that_hangs_stops_the_robot_in_time(way, monkeypatch):
-    if way == "frozen":  # a repeated picture is no sighting, whatever it shows
-        monkeypatch.setattr(MotionCheck, "stands", lambda *words: False)
-    rig = virtual.rig(rate=30.0)
+def hanging(rig, way):
+    """Let its camera hang, once the robot has driven for half a second; when it did."""
     broken = {"at": 0.0}
     paint, poll = rig.eyes.source.paint_at, rig.eyes.poll
 
@@ -116,7 +113,15 @@ def test_a_camera_that_hangs_stops_the_robot_in_time(way, monkeypatch):
         return seen
 
     rig.eyes.source.paint_at, rig.eyes.poll = painted, polled
-    world = HardwareWorld(rig=rig)
+    return broken
+
+
+@pytest.mark.parametrize("way", ["frozen", "stuck", "stale", "ahead"])
+def test_a_camera_that_hangs_stops_the_robot_in_time(way, monkeypatch):
+    if way == "frozen":  # a repeated picture is no sighting, whatever it shows
+        monkeypatch.setattr(MotionCheck, "stands", lambda *words: False)
+    rig = virtual.rig(rate=30.0)
+    broken, world = hanging(rig, way), HardwareWorld(rig=rig)
     with pytest.raises(Void):
         world._once(rig, ROUND, world._stages(4.0, 0, ())[0], 0, 0)
     stops = [at for at in rig.device.stops if at > broken["at"] > 0]
@@ -127,6 +132,27 @@ def test_a_camera_that_hangs_stops_the_robot_in_time(way, monkeypatch):
         with pytest.raises(BnsError, match="not in view"):
             world.run([ROUND])
         assert all(row[1:] == (0, 0) for row in list(rig.device.log)[told:])
+
+
+def test_a_picture_that_stays_stuck_ends_the_session_and_each_try_begins_at_rest(
+    monkeypatch,
+):
+    """A standing robot looks the same: that it is stuck shows only once it drives."""
+    rig = virtual.rig(rate=30.0)
+    speeds, drive = [], rig.robot.drive
+
+    def driven(left, right, **words):
+        if (left or right) and rig.device.log and rig.device.log[-1][1:] == (0, 0):
+            speeds.append(max(map(abs, rig.body.wheel_speeds())))
+        return drive(left, right, **words)
+
+    monkeypatch.setattr(rig.robot, "drive", driven)
+    hanging(rig, "stuck")
+    world = HardwareWorld(rig=rig)
+    with pytest.raises(SafetyStop, match="see that the camera works"):
+        world.run([ROUND])
+    assert world.voids == 1
+    assert speeds and max(speeds) < 0.005
 
 
 def test_a_robot_that_is_held_is_no_hanging_camera():

@@ -133,9 +133,17 @@ def test_some_robots_of_a_batch_begin_anew():
         native.step(np.zeros((2, 2)))
     with pytest.raises(BnsError, match="3 seeds for 2 robots"):
         native.reset(seed=[1, 2, 3])
+    some = {"reset_mask": np.array([True, False])}
+    with pytest.raises(BnsError, match="reset all of them first"):
+        native.reset(options=some)
+    with pytest.raises(BnsError, match="reset first"):
+        native.step(np.ones((2, 2)))
     native.reset(seed=[1, 2], options={"start": (0.8, 0.1, 0.3)})
+    for wrong in ([True], [1, 0], "both"):
+        with pytest.raises(BnsError, match="reset_mask has shape"):
+            native.reset(options={"reset_mask": wrong})
     seen = native.step(np.ones((2, 2)))[0]
-    again, _ = native.reset(options={"reset_mask": np.array([True, False])})
+    again, _ = native.reset(options=some)
     assert np.array_equal(again[1], seen[1]) and not np.array_equal(again[0], seen[0])
     native.step(np.ones((2, 2)))
     with pytest.raises(BnsError, match="finite"):

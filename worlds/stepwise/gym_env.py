@@ -169,7 +169,8 @@ class RobotVectorEnv(VectorEnv):
             observations ``(N, O)``; further values by name, ``(N, ...)``.
 
         Raises:
-            BnsError: another number of seeds; as `RobotEnv.reset`.
+            BnsError: another number of seeds, a mask of another shape or that leaves a
+                robot without its first episode; as `RobotEnv.reset`.
         """
         seeds = [seed] * self.num_envs if seed is None else seed
         if isinstance(seeds, int | np.integer):
@@ -177,16 +178,14 @@ class RobotVectorEnv(VectorEnv):
         if len(seeds) != self.num_envs:
             raise BnsError(f"{len(seeds)} seeds for {self.num_envs} robots: one each.")
         options = dict(options or {})
-        chosen = options.pop("reset_mask", np.ones(self.num_envs, bool))
+        chosen = self._mask(options.pop("reset_mask", None))
         start = _options(options, self.episodes)
         robots = np.flatnonzero(chosen).tolist()
         for robot in robots:
             if seeds[robot] is not None:
                 self._rngs[robot] = seeding.np_random(seeds[robot])[0]
-        self._ended[robots] = False
-        unseen: list[Any] = [None] * self.num_envs
-        self._seen = self._seen or unseen
         self._begin(robots, start)
+        self._ended[robots] = False
         return self._observed(), self._told(robots)
 
     def step(
@@ -233,6 +232,29 @@ class RobotVectorEnv(VectorEnv):
             return None
         return tuple(episode.stepper.picture() for episode in self.episodes)
 
+    def _mask(self, given: Any) -> np.ndarray:
+        """Which robots begin an episode, ``(N,)`` bool.
+
+        Args:
+            given: the same; None = all.
+
+        Raises:
+            BnsError: another shape or type, or not all at the first reset.
+        """
+        everyone = np.ones(self.num_envs, bool)
+        mask = everyone if given is None else np.asarray(given)
+        if mask.shape != everyone.shape or mask.dtype != everyone.dtype:
+            raise BnsError(
+                f"reset_mask has shape {mask.shape} of {mask.dtype}: give shape "
+                f"({self.num_envs},) of bool."
+            )
+        if not self._seen and not mask.all():
+            raise BnsError(
+                "No robot has an episode yet: reset all of them first, without a "
+                "reset_mask."
+            )
+        return mask
+
     def _begin(self, robots: Sequence[int], start: Any) -> None:
         """Begin episodes of some robots."""
         if not robots:
@@ -240,8 +262,13 @@ class RobotVectorEnv(VectorEnv):
         seeds = [_drawn(self._rngs[robot]) for robot in robots]
         steppers = [self.episodes[robot].stepper for robot in robots]
         trials = reset_all(steppers, seeds, start)
-        for robot, trial in zip(robots, trials, strict=True):
-            self._seen[robot] = self.episodes[robot].begun(trial)
+        begun = [
+            self.episodes[robot].begun(trial)
+            for robot, trial in zip(robots, trials, strict=True)
+        ]
+        self._seen = self._seen or begun  # the first are of all robots
+        for robot, seen in zip(robots, begun, strict=True):
+            self._seen[robot] = seen
 
     def _observed(self) -> np.ndarray:
         return np.stack([_observation(seen) for seen in self._seen])

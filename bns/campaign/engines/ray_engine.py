@@ -23,6 +23,9 @@ RETRIES = 4
 LISTEN_SECONDS = 2.0
 """time between two looks at how far the batches are [s]"""
 
+LATE = "timed out during startup"
+"""what Ray says, in a plain `Exception`, of a node here that is not up in time"""
+
 ANSWER_SECONDS = 5.0
 """time in which a cluster has to answer [s]"""
 
@@ -71,8 +74,8 @@ class RayEngine:
             options |= {"num_cpus": self.workers, "include_dashboard": False}
             try:
                 ray.init(**options)
-            except Exception as error:
-                if type(error) is not Exception:  # Ray has no class for this one
+            except Exception as error:  # Ray has no class for a node that starts late
+                if type(error) is not Exception or LATE not in str(error):
                     raise
                 raise BnsError(
                     f"Ray does not start here: {work.describe(error)} Try again when "

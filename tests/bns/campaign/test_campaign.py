@@ -5,6 +5,7 @@ import os
 import signal
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -315,6 +316,28 @@ def test_ray_that_is_not_there_and_addresses_that_are_none(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(BnsError, match=r"pip install 'bns-testbed\[ray\]'"):
         list(ray_engine.RayEngine().run([], beat=lambda key, trials: None))
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (Exception("The current node timed out during startup."), BnsError),
+        (Exception("something else"), Exception),
+        (RuntimeError("it timed out during startup"), RuntimeError),
+    ],
+)
+def test_ray_that_starts_too_late_is_told_of_and_nothing_else(monkeypatch, error, said):
+    import sys
+
+    from bns.campaign.engines.ray_engine import RayEngine
+
+    def init(**words):
+        raise error
+
+    monkeypatch.setitem(sys.modules, "ray", SimpleNamespace(init=init))
+    with pytest.raises(Exception, match=r"timed out|something else") as caught:
+        list(RayEngine().run([], beat=lambda key, trials: None))
+    assert caught.type is said
 
 
 def test_a_batch_hangs_only_once_it_has_started_and_said_nothing_new():

@@ -9,8 +9,9 @@ import pytest
 from bns.errors import BnsError, FormatError
 from bns.experiment.config import RunConfig
 from bns.experiment.step import Step
-from bns.storage import arrays
+from bns.storage import arrays, parquet
 from bns.storage.store import load
+from bns.storage.table import read_table
 from bns.worlds.data import dataset
 from bns.worlds.trial import Commands, Outcome, Trial
 from tests.bns.contents import contents
@@ -61,6 +62,19 @@ def test_record_has_a_row_per_replicate_and_trial(run):
     record = load(run)
     assert (record.replicates, record.trials) == (3, 4)
     assert record["fitness"][1, 3] == table["fitness"][1 * 4 + 3].as_py()
+
+
+@pytest.mark.parametrize("trial", [2**39, -5, 1])
+def test_a_table_whose_rows_do_not_count_up_is_refused(tmp_path, trial):
+    """And no room is made for as many as it claims."""
+    path = tmp_path / "record.parquet"
+    rows = {"replicate": np.zeros(2, np.int64), "trial": np.array([0, trial])}
+    parquet.write(path, rows | {"fitness": np.zeros(2)})
+    if trial == 1:
+        assert read_table(path)["fitness"].shape == (1, 2)
+        return
+    with pytest.raises(FormatError, match="in 2 rows"):
+        read_table(path)
 
 
 def test_dataset_holds_the_recorded_replicates(run):
