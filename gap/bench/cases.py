@@ -148,7 +148,13 @@ class Stand(ABC):
     def pool(
         self, rng: np.random.Generator, problem: Problem, kind: str
     ) -> Sequence[Row]:
-        """Rows to draw from."""
+        """Rows to draw from.
+
+        Args:
+            rng: the only source of randomness.
+            problem: a recording without an effect.
+            kind: of case.
+        """
         del rng, kind
         return [row for row in problem.rows if not row.nuisance]
 
@@ -242,7 +248,15 @@ def _stem(name: str) -> str:
 
 
 def drawn(rng, problem: Problem, point: Point, pool, length: float) -> Hidden | None:
-    """A row, evenly over effects, with about a whitened length; None = not excited."""
+    """A row, evenly over effects, with about a whitened length; None = not excited.
+
+    Args:
+        rng: the only source of randomness.
+        problem: a recording without an effect.
+        point: the nominal model on it.
+        pool: rows to draw from.
+        length: of what the effect does, in deviations.
+    """
     effects = sorted({_stem(row.term) for row in pool})
     effect = effects[int(rng.integers(len(effects)))]
     rows = [row for row in pool if _stem(row.term) == effect]

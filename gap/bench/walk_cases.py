@@ -71,7 +71,13 @@ class WalkStand(Stand):
     def pool(
         self, rng: np.random.Generator, problem: Problem, kind: str
     ) -> Sequence[Row]:
-        """Rows on a joint and a leg that are drawn, and on all; or losses."""
+        """Rows on a joint and a leg that are drawn, and on all; or losses.
+
+        Args:
+            rng: the only source of randomness.
+            problem: a recording without an effect.
+            kind: of case.
+        """
         joints = self.walker.joints
         legs = names(joints)
         joint = joints[int(rng.integers(len(joints)))]

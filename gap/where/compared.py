@@ -69,7 +69,13 @@ class Compared:
     def diagnosed(
         cls, found: Diagnosis, trials: Sequence[Trial], model: GapModel
     ) -> "Compared":
-        """With the scatter that a diagnosis measured."""
+        """With the scatter that a diagnosis measured.
+
+        Args:
+            found: the diagnosis.
+            trials: checked recording.
+            model: nominal model.
+        """
         sigma = np.array(found.floor["sigma"][: len(model.channels)], dtype=float)
         process = np.asarray(found.floor.get("process", model.process), dtype=float)
         return replace(cls.of(trials, model, sigma), process=process)
@@ -104,7 +110,7 @@ class Compared:
         )
 
     def left(self, effects: Sequence[Effect]) -> tuple[np.ndarray, ...]:
-        """The same with effects added to the nominal model."""
+        """The same with effects added to the nominal model, by trial ``(W, C)``."""
         (predicted,) = self.model.simulate(self.trials, [tuple(effects)])
         made = map(self.model.compare, self.trials, predicted, self.windows)
         return tuple(
@@ -116,8 +122,8 @@ class Compared:
 
 
 def terms(units: np.ndarray) -> np.ndarray:
-    """What residuals in deviations add to a loss: their square, linear beyond `CLIP`;
-    those not seen nothing."""
+    """What residuals in deviations ``(W, C)`` add to a loss, ``(W, C)``: their square,
+    linear beyond `CLIP`; those not seen nothing."""
     size = np.abs(np.nan_to_num(units))
     return np.where(size <= CLIP, size**2, CLIP * (2 * size - CLIP))
 
