@@ -5,18 +5,18 @@ from functools import cached_property
 
 import numpy as np
 
-from bns.gap.decomposition import descent, onset, rest, shares, ties
+from bns.gap.decomposition import descent, fit, onset, rest, shares, ties
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.onset import Onset
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.shares import Part
+from bns.gap.recordings import command_moments
 
 MOST = 0.5  # share of the gap beyond which what is left is most of it
 FELT = 0.02  # of the floor's variance: a gap below shows in no picture
 LARGE = 2.0  # variances of the floor: more than heavy tails of any camera's noise
 SCATTER = 3.0  # times what differs between repeats
-EXACT = 0.005  # of its motion: other integrators and steps differ by as much (assumed)
 BROKEN = 0.05  # of its motion: no sound robot scatters by as much (assumed)
 
 
@@ -99,10 +99,12 @@ class Decomposition:
         robot may scatter (what happens at one place, or by chance)."""
         if self.broken:
             return True
-        if self.after <= max(self.scatter, EXACT**2 * self.moved):
+        if self.after <= max(self.scatter, fit.INEXACT**2 * self.moved):
             return False
         if self.recurring:
             return self.after > FELT
+        if command_moments.unknown(self.problem.trials):
+            return False  # so do commands that began a little sooner or later
         return self.after > max(LARGE, SCATTER * self.scatter)
 
     @property
@@ -134,6 +136,8 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
     if support != point.support:
         point = descent.refitted(problem, point, support)
     known = rest.floor(problem, seed=seed)
+    if _worse(problem, start, point, known):
+        point = descent.refitted(problem, point, frozenset())
     full = point.linear.rest(point.linear.solve(point.linear.free))
     inside = rest.kept(problem, full, point.noise.sd)
     strayed = rest.strayed(problem, point.rest, known)
@@ -160,4 +164,13 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         moved=max(rest.excess(problem.recorded, known, inside), 1.0),
         inside=inside,
         strayed=tuple(problem.numbers[n] for n in np.unique(problem.trial[strayed])),
+    )
+
+
+def _worse(problem: Problem, start: Point, point: Point, known: rest.Floor) -> bool:
+    """Whether explanations make the plain error larger: an autoregression may like
+    what predictions do not."""
+    every = problem.seen
+    return bool(point.support) and rest.excess(point.rest, known, every) > rest.excess(
+        start.rest, known, every
     )

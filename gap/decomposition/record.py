@@ -138,9 +138,7 @@ def statements(made: Decomposition) -> list[str]:
     return [
         words.size(before, beyond, features, window),
         words.explained(listed, made.closed, date, swapped),
-        words.left(
-            made.left, made.lasting, made.recurring, words.sized(left, features)
-        )
+        words.left(made.left, made.lasting, made.recurring, words.sized(left, features))
         + apart,
     ]
 

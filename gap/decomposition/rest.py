@@ -90,7 +90,8 @@ def strayed(problem: Problem, rest: np.ndarray, known: Floor) -> np.ndarray:
     apart = [
         (one, other)
         for one, other in pairs
-        if max(size[one], size[other]) > APART_BY * max(1.0, min(size[one], size[other]))
+        if max(size[one], size[other])
+        > APART_BY * max(1.0, min(size[one], size[other]))
     ]
     if len(apart) != 1 or len(pairs) < PAIRS:
         return np.zeros(len(problem.trial), dtype=bool)
