@@ -94,9 +94,12 @@ class Decomposition:
 
     @property
     def lasting(self) -> bool:
-        """Whether the rest is more than scatter and than how exact a simulation is: it
-        recurs, or it is far beyond what measuring scatters and what differs between repeats, or beyond what a sound
-        robot may scatter (what happens at one place, or by chance)."""
+        """Whether the rest is more than scatter and than how exact a simulation is.
+
+        It recurs, or it is far beyond what measuring scatters and what differs between
+        repeats, or beyond what a sound robot may scatter (what happens at one place, or
+        by chance).
+        """
         if self.broken:
             return True
         if self.after <= max(self.scatter, fit.INEXACT**2 * self.moved):
