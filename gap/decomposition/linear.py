@@ -20,6 +20,8 @@ from bns.gap.decomposition.problem import Problem
 KAPPA = 3.0
 """what an explanation costs: the log odds against it; e^3 = 20, the number of
 explanations of a usual model, so that about one in all is expected"""
+EDGE = 0.1  # of a level's departure, by which a fit may leave its bounds: whole losses
+# are at theirs
 MERGED = 5  # explanations up to which two are tried against one
 
 Support = frozenset[str]
@@ -102,8 +104,9 @@ class Linear:
         rows = [problem.rows[k] for k in columns]
         always = np.array([row.nuisance for row in rows])
         free = tuple(n for n, found in terms.items() if not always[found[0]])
-        low, high = (edge[columns] for edge in problem.bounds)
+        low, high = (bound[columns] for bound in problem.bounds)
         middle = problem.nominal[columns]
+        edge = np.array([0.0 if row.smooth else EDGE for row in rows])
         made = cls(
             columns=columns,
             terms=terms,
@@ -113,8 +116,8 @@ class Linear:
             square=np.empty(0),
             slack=np.array([row.slack for row in rows]) / unit,
             always=always,
-            low=(low - middle) / unit,
-            high=(high - middle) / unit,
+            low=(low - middle) / unit - edge,
+            high=(high - middle) / unit + edge,
             lam=lam,
             penalty=dict.fromkeys(free, KAPPA),
             family={row.term: row.family or row.term for row in rows},
