@@ -37,6 +37,7 @@ class Decomposition:
         scatter: excess over the floor of what differs between repeats.
         moved: mean square of the recorded motion in units of the floor.
         inside: which residuals count, ``(N, C)``: no wild points, no strayed trial.
+        unstable: numbers of trials that may go anywhere, and are not fitted.
         strayed: numbers of trials that went another way than their repeats.
     """
 
@@ -53,6 +54,7 @@ class Decomposition:
     scatter: float
     moved: float
     inside: np.ndarray
+    unstable: tuple[int, ...] = ()
     strayed: tuple[int, ...] = ()
 
     @cached_property
@@ -130,6 +132,11 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         seed: of the noise that measures the floor.
     """
     start = descent.nothing(problem)
+    known = rest.floor(problem, seed=seed)
+    unstable = rest.unstable(problem, start.slopes, known)
+    if unstable.any() and not unstable.all():
+        problem = problem.without(unstable)
+        start = descent.nothing(problem)
     point = descent.decompose(problem, start)
     found = onset.dated(problem, start, point)
     late = None
@@ -138,7 +145,6 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
     support = shares.guarded(problem, point)
     if support != point.support:
         point = descent.refitted(problem, point, support)
-    known = rest.floor(problem, seed=seed)
     if _worse(problem, start, point, known):
         point = descent.refitted(problem, point, frozenset())
     full = point.linear.rest(point.linear.solve(point.linear.free))
@@ -166,8 +172,14 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         scatter=rest.scattered(problem, plain, known, inside),
         moved=max(rest.excess(problem.recorded, known, inside), 1.0),
         inside=inside,
-        strayed=tuple(problem.numbers[n] for n in np.unique(problem.trial[strayed])),
+        unstable=_numbers(problem, unstable),
+        strayed=_numbers(problem, strayed),
     )
+
+
+def _numbers(problem: Problem, windows: np.ndarray) -> tuple[int, ...]:
+    """Numbers of the trials that windows ``(N,)`` are of."""
+    return tuple(problem.numbers[n] for n in np.unique(problem.trial[windows]))
 
 
 def _worse(problem: Problem, start: Point, point: Point, known: rest.Floor) -> bool:
