@@ -94,8 +94,7 @@ def unstable(
         for k, slope in slopes.items()
     ]
     spread = np.sum(loose, axis=0).mean(axis=1)
-    count = np.maximum(np.bincount(problem.trial), 1)
-    size = np.bincount(problem.trial, spread) / count
+    size = _by_trial(problem, spread)
     far = (size > ANYWHERE**2) & (size > ANYWHERE * np.median(size))
     return far[problem.trial]
 
@@ -111,7 +110,7 @@ def strayed(problem: Problem, rest: np.ndarray, known: Floor) -> np.ndarray:
         known: the floor.
     """
     units = (np.nan_to_num(rest) / known.sd) ** 2
-    size = [float(units[problem.trial == n].mean()) for n in range(len(problem.trials))]
+    size = _by_trial(problem, units.mean(axis=1))
     pairs = repeats(problem)
     apart = [
         (one, other)
@@ -122,6 +121,12 @@ def strayed(problem: Problem, rest: np.ndarray, known: Floor) -> np.ndarray:
     if len(apart) != 1 or len(pairs) < PAIRS:
         return np.zeros(len(problem.trial), dtype=bool)
     return problem.trial == max(apart[0], key=lambda n: size[n])
+
+
+def _by_trial(problem: Problem, values: np.ndarray) -> np.ndarray:
+    """Mean of values ``(N,)`` over the windows of each trial."""
+    count = np.maximum(np.bincount(problem.trial), 1)
+    return np.bincount(problem.trial, values) / count
 
 
 def excess(rest: np.ndarray, known: Floor, inside: np.ndarray) -> float:
