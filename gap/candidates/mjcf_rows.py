@@ -9,6 +9,7 @@ from bns.gap.candidates.mjcf import EXCITE
 from bns.gap.decomposition.row import Row
 from bns.gap.models.mjcf import masses
 from bns.gap.models.mjcf.masses import Body
+from bns.gap.recordings import command_moments
 from bns.worlds.effects.parts import ALL
 from bns.worlds.trial import Trial
 
@@ -54,6 +55,7 @@ def rows(
         bodies: whose mass may be off, by name.
     """
     lead = max(0.002, 0.5 * dt)
+    late = max(lead, command_moments.unknown(trials) / 2)
     made: list[Row] = []
     for item in candidates:
         if item.effect == "body_mass":
@@ -61,7 +63,8 @@ def rows(
             made += masses.rows(item, body, EXCITE[item.effect])
         else:
             made += _of(item, trials, lead)
-    made.append(Row(LEAD, 0.0, lead, -0.02, 0.02, unit="s", nuisance=True, step=0.001))
+    edge = max(0.02, late)
+    made.append(Row(LEAD, 0.0, late, -edge, edge, unit="s", nuisance=True, step=0.001))
     return tuple(made)
 
 
@@ -130,6 +133,7 @@ def _plausible(item: Row) -> tuple[float, float]:
         sd, slack = EIGHTH * item.high, SHARE * EIGHTH * item.high
     elif item.effect.endswith("_offset") and not sd:
         sd = OFFSET * (item.high - item.low)
+        slack = SHARE * sd
     if item.fixed["part"] == ALL and item.effect in GROUPED:
         slack = 0.0
     return sd or EIGHTH * (item.high - item.low), slack

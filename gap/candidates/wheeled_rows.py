@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from bns.gap.decomposition.row import Row
+from bns.gap.recordings import command_moments
 from bns.worlds.effects import registry
 from bns.worlds.effects.common import TOP_SPEED
 from bns.worlds.trial import Trial
@@ -92,7 +93,8 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
             excite=EXCITE["payload"], **given)
         for name, sd, low, high, unit, given in _LOAD
     ]  # fmt: skip
-    made.append(Row(LEAD, 0.0, 0.003, -0.02, 0.02, unit="s", nuisance=True, step=0.001))
+    lead = max(0.003, command_moments.unknown(trials) / 2)
+    made.append(Row(LEAD, 0.0, lead, -0.06, 0.06, unit="s", nuisance=True, step=0.001))
     for name, sd, high, sided, levels in _PLANES:
         for side in SIDES[:2] if sided else ("",):
             term = f"{name}[{side}]" if side else name

@@ -5,18 +5,18 @@ from functools import cached_property
 
 import numpy as np
 
-from bns.gap.decomposition import descent, onset, rest, shares, ties
+from bns.gap.decomposition import descent, fit, onset, rest, shares, ties
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.onset import Onset
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.shares import Part
+from bns.gap.recordings import command_moments
 
 MOST = 0.5  # share of the gap beyond which what is left is most of it
 FELT = 0.02  # of the floor's variance: a gap below shows in no picture
 LARGE = 2.0  # variances of the floor: more than heavy tails of any camera's noise
 SCATTER = 3.0  # times what differs between repeats
-EXACT = 0.005  # of its motion: other integrators and steps differ by as much (assumed)
 BROKEN = 0.05  # of its motion: no sound robot scatters by as much (assumed)
 
 
@@ -37,6 +37,7 @@ class Decomposition:
         scatter: excess over the floor of what differs between repeats.
         moved: mean square of the recorded motion in units of the floor.
         inside: which residuals count, ``(N, C)``: no wild points, no strayed trial.
+        unstable: numbers of trials that may go anywhere, and are not fitted.
         strayed: numbers of trials that went another way than their repeats.
     """
 
@@ -53,6 +54,7 @@ class Decomposition:
     scatter: float
     moved: float
     inside: np.ndarray
+    unstable: tuple[int, ...] = ()
     strayed: tuple[int, ...] = ()
 
     @cached_property
@@ -94,15 +96,20 @@ class Decomposition:
 
     @property
     def lasting(self) -> bool:
-        """Whether the rest is more than scatter and than how exact a simulation is: it
-        recurs, or it is far beyond what measuring scatters and what differs between repeats, or beyond what a sound
-        robot may scatter (what happens at one place, or by chance)."""
+        """Whether the rest is more than scatter and than how exact a simulation is.
+
+        It recurs, or it is far beyond what measuring scatters and what differs between
+        repeats, or beyond what a sound robot may scatter (what happens at one place, or
+        by chance).
+        """
         if self.broken:
             return True
-        if self.after <= max(self.scatter, EXACT**2 * self.moved):
+        if self.after <= max(self.scatter, fit.INEXACT**2 * self.moved):
             return False
         if self.recurring:
             return self.after > FELT
+        if command_moments.unknown(self.problem.trials):
+            return False  # so do commands that began a little sooner or later
         return self.after > max(LARGE, SCATTER * self.scatter)
 
     @property
@@ -125,6 +132,11 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         seed: of the noise that measures the floor.
     """
     start = descent.nothing(problem)
+    known = rest.floor(problem, seed=seed)
+    unstable = rest.unstable(problem, start.slopes, known)
+    if unstable.any() and not unstable.all():
+        problem = problem.without(unstable)
+        start = descent.nothing(problem)
     point = descent.decompose(problem, start)
     found = onset.dated(problem, start, point)
     late = None
@@ -133,7 +145,8 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
     support = shares.guarded(problem, point)
     if support != point.support:
         point = descent.refitted(problem, point, support)
-    known = rest.floor(problem, seed=seed)
+    if _worse(problem, start, point, known):
+        point = descent.refitted(problem, point, frozenset())
     full = point.linear.rest(point.linear.solve(point.linear.free))
     inside = rest.kept(problem, full, point.noise.sd)
     strayed = rest.strayed(problem, point.rest, known)
@@ -159,5 +172,20 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         scatter=rest.scattered(problem, plain, known, inside),
         moved=max(rest.excess(problem.recorded, known, inside), 1.0),
         inside=inside,
-        strayed=tuple(problem.numbers[n] for n in np.unique(problem.trial[strayed])),
+        unstable=_numbers(problem, unstable),
+        strayed=_numbers(problem, strayed),
+    )
+
+
+def _numbers(problem: Problem, windows: np.ndarray) -> tuple[int, ...]:
+    """Numbers of the trials that windows ``(N,)`` are of."""
+    return tuple(problem.numbers[n] for n in np.unique(problem.trial[windows]))
+
+
+def _worse(problem: Problem, start: Point, point: Point, known: rest.Floor) -> bool:
+    """Whether explanations make the plain error larger: an autoregression may like
+    what predictions do not."""
+    every = problem.seen
+    return bool(point.support) and rest.excess(point.rest, known, every) > rest.excess(
+        start.rest, known, every
     )

@@ -26,10 +26,11 @@ WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
 
 
 def nothing(problem: Problem) -> Point:
-    """The nominal model."""
+    """The nominal model, its nuisances fitted."""
     values = problem.nominal.copy()
     rest, made = problem.residual(values)
     first = fit.first_noise(problem, rest, made)
+    values, rest = newton(problem, values, fit.nuisances(problem), first)
     linear, known, slopes = linearised(problem, values, rest, first)
     plain = Point(values, frozenset(), rest, linear, slopes, known)
     if not problem.model.memory:

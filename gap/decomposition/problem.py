@@ -1,7 +1,7 @@
 """A recording and a model made ready for the fit: `Problem`."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -150,6 +150,11 @@ class Problem:
         made = np.where(lost, 0.0, made)
         rest = np.where(self.seen & lost, FAR, self.recorded - made)
         return rest, made
+
+    def without(self, left_out: np.ndarray) -> "Problem":
+        """The same, some windows ``(N,)`` taken as not seen."""
+        recorded = np.where(left_out[:, None], np.nan, self.recorded)
+        return replace(self, recorded=recorded)
 
     @cached_property
     def gap(self) -> np.ndarray:

@@ -124,6 +124,10 @@ def statements(made: Decomposition) -> list[str]:
     """The three statements: size, explanation, rest."""
     problem, features = made.problem, made.problem.model.features
     apart = "".join(
+        f" Trial {number} is left out: it may go anywhere within what the model is "
+        "uncertain by."
+        for number in made.unstable
+    ) + "".join(
         f" Trial {number} went another way than its repeat and does not count."
         for number in made.strayed
     )

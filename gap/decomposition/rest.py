@@ -1,5 +1,6 @@
 """How large a gap is beyond what measuring it scatters, and whether it recurs."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ APART = (0.6, 2.0)  # [s] between windows whose errors are compared: beyond a wi
 PIECE = 2.0  # [s] of a trial that count as independent
 SHORT = 0.5  # [s] that do once an autoregression is taken out
 APART_BY = 30.0  # times the square of its repeat's error: another way
+ANYWHERE = 30.0  # deviations of the floor, and times the variance of other trials
 PAIRS = 3  # of repeats from which one may stray
 SEARCHED = 1.0  # standard errors that the best of some ten lags exceeds by chance
 SURE = 3.0  # standard errors from which an error is said to recur
@@ -73,11 +75,34 @@ def kept(problem: Problem, left: np.ndarray, sd: np.ndarray) -> np.ndarray:
         return problem.seen & (np.abs(left) < WILD * sd)
 
 
+def unstable(
+    problem: Problem, slopes: Mapping[int, np.ndarray], known: Floor
+) -> np.ndarray:
+    """Windows of trials that may go anywhere, ``(N,)``.
+
+    A pendulum that just reaches the top goes on or falls back with what lies within the
+    slack of the model, and tells nothing of what lies beyond.
+
+    Args:
+        problem: the recording.
+        slopes: derivatives by number of the row, each ``(N, C)``.
+        known: the floor.
+    """
+    rows = problem.rows
+    loose = [
+        (slope * (rows[k].sd if rows[k].nuisance else rows[k].slack) / known.sd) ** 2
+        for k, slope in slopes.items()
+    ]
+    spread = np.sum(loose, axis=0).mean(axis=1)
+    size = _by_trial(problem, spread)
+    far = (size > ANYWHERE**2) & (size > ANYWHERE * np.median(size))
+    return far[problem.trial]
+
+
 def strayed(problem: Problem, rest: np.ndarray, known: Floor) -> np.ndarray:
     """Windows of a trial that went another way than its repeat, ``(N,)``.
 
-    A pendulum that just goes over the top tells how it was pushed, not what the model
-    lacks. One pair of several has to disagree: where more do, something has changed.
+    One pair of several has to disagree: where more do, something has changed.
 
     Args:
         problem: the recording.
@@ -85,7 +110,7 @@ def strayed(problem: Problem, rest: np.ndarray, known: Floor) -> np.ndarray:
         known: the floor.
     """
     units = (np.nan_to_num(rest) / known.sd) ** 2
-    size = [float(units[problem.trial == n].mean()) for n in range(len(problem.trials))]
+    size = _by_trial(problem, units.mean(axis=1))
     pairs = repeats(problem)
     apart = [
         (one, other)
@@ -96,6 +121,12 @@ def strayed(problem: Problem, rest: np.ndarray, known: Floor) -> np.ndarray:
     if len(apart) != 1 or len(pairs) < PAIRS:
         return np.zeros(len(problem.trial), dtype=bool)
     return problem.trial == max(apart[0], key=lambda n: size[n])
+
+
+def _by_trial(problem: Problem, values: np.ndarray) -> np.ndarray:
+    """Mean of values ``(N,)`` over the windows of each trial."""
+    count = np.maximum(np.bincount(problem.trial), 1)
+    return np.bincount(problem.trial, values) / count
 
 
 def excess(rest: np.ndarray, known: Floor, inside: np.ndarray) -> float:

@@ -6,8 +6,7 @@ import numpy as np
 
 from bns.errors import BnsError, FormatError
 from bns.gap.models.base import GapModel
-from bns.gap.recordings import stuck_channels, trial_labels
-from bns.worlds.data.importing import MOMENTS
+from bns.gap.recordings import command_moments, stuck_channels, trial_labels
 from bns.worlds.trial import Trial
 
 TURNS = 1.5  # steps beside it that a spike is larger than; a turn is one; assumed
@@ -75,12 +74,11 @@ def check(
 
 def _moments(trials: Sequence[Trial]) -> list[str]:
     """Whether it is known when commands began."""
-    sampled = [t for t in trials if t.conditions.get(MOMENTS) == "sampled"]
-    if not sampled:
+    count, step = len(command_moments.sampled(trials)), command_moments.unknown(trials)
+    if not count:
         return []
-    step = np.median(np.concatenate([np.diff(trial.times) for trial in sampled]))
     return [
-        f"{len(sampled)} trials: when a command began is known to a sample only "
+        f"{count} trials: when a command began is known to a sample only "
         f"({step:.3g} s), which can pass for a gap; give command_time"
     ]
 

@@ -17,6 +17,7 @@ from bns.hardware.tracking.tracker import Sighting
 
 TICK = 0.02  # s between two looks at everything
 ASTRAY = 0.018  # m that a wrong or mistimed set point may lead a wheel astray
+UNSEEN = 0.002  # m that a wheel may have moved before its trial began; assumed
 LATE = 0.25  # s by which a command may be late before the trial is void
 AFTER = 0.25  # s of looking on after the last command
 
@@ -173,7 +174,7 @@ class Mover(SafetyMonitor):
                     break
                 drive = self.switch(point.left, point.right)
                 if begin is None:  # it still stands where it stood
-                    begin = drive.at
+                    begin = self.begun(drive)
                     done.sightings.append(stand._replace(time=begin))
                 done.late = max(done.late, abs(drive.at - begin - point.at))
                 if point.command >= 0:
@@ -197,6 +198,26 @@ class Mover(SafetyMonitor):
         stand = self.wait_for_sight()
         self._wheels = Wheels(self)
         return stand
+
+    def doubt(self, drive: Drive) -> float:
+        """By how much it is not known when a set point held [s]: one that had to be
+        sent again may have got through before."""
+        usual = 3 * min(self.robot.round_trips[-20:])
+        return drive.took / 2 if drive.took > usual else 0.0
+
+    def begun(self, drive: Drive) -> float:
+        """When the first set point of a trial held [s].
+
+        Raises:
+            Void: it had to be sent again, and a wheel may have moved before.
+        """
+        fastest = max(abs(self.robot.speed(units)) for units in drive.units)
+        if (way := self.doubt(drive) * fastest) > UNSEEN:
+            raise Void(
+                "the first command had to be sent again: a wheel may have moved "
+                f"{1e3 * way:.0f} mm before"
+            )
+        return drive.at
 
     def switch(self, left: float, right: float) -> Drive:
         """As `drive`, within what is carried out: the wheels are then watched."""

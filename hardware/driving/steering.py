@@ -148,7 +148,7 @@ class Steering:
                 return
             drive = self.mover.switch(point.left, point.right)
             if self._origin is None:  # it still stands where it stood
-                self._origin = drive.at - point.at
+                self._origin = self.mover.begun(drive) - point.at
             done.late = max(done.late, abs(drive.at - self._origin - point.at))
             if point.command >= 0:
                 done.switched.append(drive.at - self._origin)

@@ -77,9 +77,7 @@ class Wheels:
         self.follow.tries[:] = 0
         now, told = drive.at, np.array(drive.units, float)
         jump = float(np.abs(told - self._told).max())
-        usual = 3 * min(self.mover.robot.round_trips[-20:])
-        if drive.took > usual:  # repeated: either of them may have got through
-            self._way += drive.took / 2 * self._metres(jump)
+        self._way += self.mover.doubt(drive) * self._metres(jump)
         self._low, self._high, self._from = self._expected(now)
         self._told, self._since, self._good = told, now, now
         self._next = now + CHECK

@@ -53,6 +53,32 @@ def test_a_set_point_that_was_spoilt_is_sent_again_and_the_trial_is_void():
     assert (17281, 15841) in told[wrong:]
 
 
+class Unanswered(Spoilt):
+    """A device whose answers to a number are lost, so many times."""
+
+    def receive(self, data, now):
+        answer = self.device.receive(data, now)
+        if self.heard in data and self.times:
+            self.times -= 1
+            return type(answer)()
+        return answer
+
+
+def test_a_first_set_point_that_may_have_held_before_makes_the_trial_void():
+    rig = virtual.rig()
+    world = HardwareWorld(rig=rig)
+    world.run([LONG])  # from then on it is known how soon answers come
+    units = round(rig.robot.units.units(0.12))
+    rig.line.device = Unanswered(rig.line.device, f"l{units},".encode(), b"", 1)
+    (trial,) = world.run([LONG], trial=1)
+    (why,) = trial.conditions["voids"]
+    assert "the first command had to be sent again" in why
+    began = [row[0] for row in rig.device.log if row[1] == units]
+    assert trial.conditions["first"] == pytest.approx(
+        min(moment for moment in began if moment > trial.conditions["began"]), abs=0.05
+    )
+
+
 @pytest.mark.parametrize("suspected", [False, True])
 def test_a_damaged_wheel_is_learned_and_not_taken_for_the_line(suspected):
     rig = virtual.rig(["wheel_gain:wheel=left,factor=0.6"])
