@@ -15,9 +15,11 @@ An effect is a class in a file of one of the folders here; `registry` finds it b
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
+from numpy.random import Generator
 
 from bns.errors import BnsError, UnknownNameError
 from bns.worlds.effects.leg_sets import SERVO, chosen
@@ -170,7 +172,6 @@ class CommandEffect(Effect):
     stage = "command"
     memoryless: ClassVar[bool] = False
 
-    @abstractmethod
     def apply(
         self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
@@ -184,6 +185,17 @@ class CommandEffect(Effect):
         Returns:
             New values, shape ``(S, C)``; equal to `signal.values` where not active.
         """
+        values = signal.values.copy()
+        if not self.is_nominal:
+            self._change(replace(signal, values=values), active)
+        return values
+
+    def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
+        """Change `signal.values`, a copy, in place: what most effects write.
+
+        Others, which draw from the generator say, have an `apply` of their own.
+        """
+        raise NotImplementedError
 
 
 class ActuatorEffect(CommandEffect):
@@ -198,13 +210,18 @@ class BodyEffect(Effect):
     stage = "body"
     resizes: ClassVar[bool] = False  # whether it changes the sizes of the model
 
-    @abstractmethod
     def edit(self, spec: Any) -> None:
         """Write the effect into `spec` (a `mujoco.MjSpec`), elements found by name.
 
         Keeps the sizes of the model, unless the class says that it `resizes`; one that
         changes the number of joints can not set in within a trial.
         """
+        if not self.is_nominal:
+            self._write(spec)
+
+    def _write(self, spec: Any) -> None:
+        """`edit` of an effect that is not nominal; subclasses have one of the two."""
+        raise NotImplementedError
 
 
 class ServoEffect(Effect):
@@ -308,7 +325,6 @@ class TrackingEffect(Effect):
 
     stage = "tracking"
 
-    @abstractmethod
     def apply(
         self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -319,3 +335,14 @@ class TrackingEffect(Effect):
             active: where in time the effect is on, shape ``(T,)``.
             rng: the only source of randomness.
         """
+        times, poses = signal.times.copy(), signal.poses.copy()
+        if not self.is_nominal:
+            self._change(replace(signal, times=times, poses=poses), active, rng)
+        return times, poses
+
+    def _change(self, signal: PoseSignal, active: np.ndarray, rng: Generator) -> None:
+        """`apply` in place, on copies of times and poses; subclasses have one of them.
+
+        It is asked only of effects that are not nominal.
+        """
+        raise NotImplementedError

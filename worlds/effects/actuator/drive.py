@@ -27,21 +27,14 @@ class MotorLag(ActuatorEffect):
         ),
     )
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """See `CommandEffect.apply`."""
-        values = signal.values.copy()
-        if self.is_nominal:
-            return values
+    def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
         for column in columns(self, signal):
             told = signal.values[:, column]
             for span in spans(active):
                 before = told[span.start - 1] if span.start else 0.0  # starts at rest
-                values[span, column] = lagged(
+                told[span] = lagged(
                     told[span], before, self["time_constant"], signal.dt
                 )
-        return values
 
 
 class WheelBacklash(ActuatorEffect):
@@ -64,20 +57,13 @@ class WheelBacklash(ActuatorEffect):
         ),
     )
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """See `CommandEffect.apply`."""
-        values = signal.values.copy()
-        if self.is_nominal:
-            return values
+    def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
         half = self["play"] / 2
         for column in columns(self, signal):
             for span in spans(active):
                 motor = np.cumsum(signal.values[span, column]) * signal.dt  # [m]
                 wheel = _played(motor, half)
-                values[span, column] = np.diff(wheel, prepend=0.0) / signal.dt
-        return values
+                signal.values[span, column] = np.diff(wheel, prepend=0.0) / signal.dt
 
 
 def _played(motor: np.ndarray, half: float) -> np.ndarray:
@@ -115,19 +101,12 @@ class BatterySag(ActuatorEffect):
         ),
     )
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """See `CommandEffect.apply`."""
-        values = signal.values.copy()
-        if self.is_nominal:
-            return values
+    def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
         speed = np.abs(signal.values).mean(axis=1)  # [m/s] of the two wheels
         rate = self["per_second"] + self["per_metre"] * speed  # [1/s]
         loss = np.where(active, rate * signal.dt, 0.0)
         left = np.exp(-(np.cumsum(loss) - loss))  # at the start of each step
-        values[active] *= left[active, None]
-        return values
+        signal.values[active] *= left[active, None]
 
 
 class BatteryFade(ActuatorEffect):
@@ -169,11 +148,5 @@ class BatteryFade(ActuatorEffect):
         """The effect after so many trials more."""
         return type(self)({**self.values, "trials": self["trials"] + since})
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """See `CommandEffect.apply`."""
-        values = signal.values.copy()
-        if not self.is_nominal:
-            values[active] *= np.exp(-self["per_trial"] * self["trials"])
-        return values
+    def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
+        signal.values[active] *= np.exp(-self["per_trial"] * self["trials"])

@@ -26,10 +26,7 @@ class ActuatorGain(BodyEffect):
     choices = parts.part("actuator")
     parameters = _factor("force over the model's", 0.7)
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         for item in parts.actuators(spec, self["part"]):
             item.gainprm = np.asarray(item.gainprm) * self["factor"]
             item.biasprm = np.asarray(item.biasprm) * self["factor"]
@@ -61,14 +58,12 @@ class ActuatorKp(BodyEffect):
     choices = parts.part("actuator")
     parameters = _factor("kp over the model's", 0.7)
 
-    def edit(self, spec: Any) -> None:
+    def _write(self, spec: Any) -> None:
         """See `BodyEffect.edit`.
 
         Raises:
             BnsError: an actuator has no such gain to scale.
         """
-        if self.is_nominal:
-            return
         for item in _servos(spec, self["part"], 1, "position gain"):
             item.gainprm[0] *= self["factor"]
             item.biasprm[1] *= self["factor"]
@@ -85,14 +80,12 @@ class ActuatorKd(BodyEffect):
     choices = parts.part("actuator")
     parameters = _factor("kd over the model's", 0.5)
 
-    def edit(self, spec: Any) -> None:
+    def _write(self, spec: Any) -> None:
         """See `BodyEffect.edit`.
 
         Raises:
             BnsError: an actuator has no such gain to scale.
         """
-        if self.is_nominal:
-            return
         for item in _servos(spec, self["part"], 2, "damping gain"):
             item.biasprm[2] *= self["factor"]
 
@@ -110,14 +103,12 @@ class ActuatorTorqueLimit(BodyEffect):
     choices = parts.part("actuator")
     parameters = _factor("largest force over the model's", 0.5)
 
-    def edit(self, spec: Any) -> None:
+    def _write(self, spec: Any) -> None:
         """See `BodyEffect.edit`.
 
         Raises:
             BnsError: an actuator has no force range to scale.
         """
-        if self.is_nominal:
-            return
         for item in parts.actuators(spec, self["part"]):
             force = np.array(item.forcerange)
             if not force.any() and item.biastype == NO_BIAS:

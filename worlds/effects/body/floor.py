@@ -27,10 +27,7 @@ class FloorFriction(BodyEffect):
         ),
     )
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         for body in (*bodies.grounded(spec), spec.worldbody):
             for geom in bodies.contact_geoms(body):
                 geom.friction[0] *= self["factor"]
@@ -56,10 +53,7 @@ class FloorSlope(BodyEffect):
         ),
     )
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         pull = float(np.linalg.norm(spec.option.gravity))  # [m/s2]
         angle, uphill = self["angle"], self["direction"]
         spec.option.gravity = [
@@ -81,10 +75,7 @@ class FloorCompliance(BodyEffect):
     robots = ("legged",)
     parameters = (factor((1.0, 5.0), "time constant over the model's", example=2.5),)
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         for body in spec.bodies:
             for geom in bodies.contact_geoms(body):
                 geom.solref[0] *= self["factor"]

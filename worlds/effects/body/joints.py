@@ -30,10 +30,7 @@ class _JointNumber(BodyEffect):
     source = "MuJoCo's joint model"
     field: ClassVar[str]
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         for joint in parts.joints(spec, self["part"]):
             value = np.array(getattr(joint, self.field), dtype=float)
             flat = value.reshape(-1)
@@ -101,10 +98,7 @@ class JointStribeck(BodyEffect):
     rest: ClassVar[float] = 1e-3  # share of the friction that stays; it must not vanish
     quickness: ClassVar[float] = 0.4  # of the bristles, per physics step
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         import mujoco
 
         model, rate = spec.copy().compile(), self.quickness / spec.option.timestep
@@ -144,10 +138,7 @@ class JointBacklash(BodyEffect):
     resizes = True
     parameters = (strength("play", "rad or m", (0.0, 1.0), "full play", example=0.1),)
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         for joint in parts.joints(spec, self["part"]):
             parts.loosen(spec, joint, self["play"])
 
@@ -170,10 +161,7 @@ class EncoderOffset(BodyEffect):
         ),
     )
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         for joint in parts.joints(spec, self["part"]):
             shift = parts.in_file(spec, joint, self["added"])
             joint.ref += shift

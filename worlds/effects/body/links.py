@@ -44,10 +44,7 @@ class BodyMass(BodyEffect):
         *(_shift(axis, scales=False) for axis in "xyz"),
     )
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         for body in parts.bodies(spec, self["part"]):
             inertial = Inertial.of(spec, body)
             added = max(self["added"], -0.99 * inertial.mass)
@@ -64,10 +61,7 @@ class BodyCentre(BodyEffect):
     choices = parts.part("body")
     parameters = (_shift("x"), _shift("y"), _shift("z"))
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         for body in parts.bodies(spec, self["part"]):
             inertial = Inertial.of(spec, body)
             centre = inertial.centre + np.array([self["dx"], self["dy"], self["dz"]])
@@ -88,10 +82,7 @@ class BodyLength(BodyEffect):
     choices = parts.part("body")
     parameters = (factor((0.1, 10.0), "length over the model's", example=1.1),)
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         for body in parts.bodies(spec, self["part"]):
             inertial = Inertial.of(spec, body)
             along = _along(body, inertial)
@@ -147,10 +138,7 @@ class GeomFriction(BodyEffect):
         factor((0.0, WIDE), "sliding friction over the model's", example=0.5),
     )
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         for geom in parts.geoms(spec, self["part"]):
             friction = np.array(geom.friction, dtype=float)
             friction[0] *= self["factor"]

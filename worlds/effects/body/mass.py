@@ -41,10 +41,7 @@ class Payload(BodyEffect):
         _place("z", 0.07, 0.0, 0.3, "above the floor; nominal: the top plate (69 mm)"),
     )
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         body = bodies.base(spec)
         position = np.array([self["x"], self["y"], self["z"]])
         inertial = bodies.Inertial.of(spec, body).plus_point(self["mass"], position)
@@ -66,10 +63,7 @@ class CentreOfMass(BodyEffect):
         _shift("dy", "shift to the left", 0.01),
     )
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         body = bodies.base(spec)
         inertial = bodies.Inertial.of(spec, body)
         centre = inertial.centre + np.array([self["dx"], self["dy"], 0.0])

@@ -23,10 +23,7 @@ class AxleLength(BodyEffect):
         ),
     )
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         left, right = (bodies.wheel(spec, side) for side in ("left", "right"))
         growth = (self["factor"] - 1) * (left.pos - right.pos) / 2
         left.pos += growth
@@ -51,10 +48,7 @@ class WheelDiameter(BodyEffect):
         ),
     )
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         for side in self.wheels():
             body = bodies.wheel(spec, side)
             radius = max(geom.size[0] for geom in bodies.contact_geoms(body))
@@ -86,10 +80,7 @@ class RollingDrag(BodyEffect):
         ),
     )
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         for side in self.wheels():
             joint = bodies.joint(spec, side)
             joint.frictionloss += self["torque"]
@@ -107,14 +98,12 @@ class TorqueLimit(BodyEffect):
     choices = (WHEEL,)
     parameters = (factor((0.0, 1.0), "largest torque over the model's", example=0.02),)
 
-    def edit(self, spec: Any) -> None:
+    def _write(self, spec: Any) -> None:
         """See `BodyEffect.edit`.
 
         Raises:
             BnsError: an actuator has no force range to scale.
         """
-        if self.is_nominal:
-            return
         for side in self.wheels():
             motor = bodies.actuator(spec, side)
             if not motor.forcerange.any():
@@ -155,10 +144,7 @@ class WheelEccentricity(BodyEffect):
         ),
     )
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         for side in self.wheels():
             axis = np.array(bodies.joint(spec, side).axis)
             ahead = np.array([1.0, 0.0, 0.0])
@@ -183,14 +169,12 @@ class CasterDrag(BodyEffect):
         ),
     )
 
-    def edit(self, spec: Any) -> None:
+    def _write(self, spec: Any) -> None:
         """See `BodyEffect.edit`.
 
         Raises:
             BnsError: the robot rests on its wheels alone.
         """
-        if self.is_nominal:
-            return
         base = bodies.base(spec)
         casters = list(bodies.contact_geoms(base))
         if not casters:

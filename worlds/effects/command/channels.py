@@ -33,17 +33,11 @@ class _Channel(CommandEffect):
     choices = parts.part("channel")
     source = "a transform of the command signal"
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """The signal with the columns of the part changed."""
-        values = signal.values.copy()
-        if self.is_nominal:
-            return values
+    def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
+        """The columns of the part changed."""
         for column in parts.among(signal.channels, self["part"], "command channel"):
-            made = self.change(values[:, column], signal.dt)
-            values[active, column] = made[active]
-        return values
+            told = signal.values[:, column]
+            told[active] = self.change(told, signal.dt)[active]
 
     @abstractmethod
     def change(self, told: np.ndarray, dt: float) -> np.ndarray:

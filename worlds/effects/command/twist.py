@@ -29,21 +29,15 @@ class TurningLoss(CommandEffect):
         ),
     )
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
+    def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
         """See `CommandEffect.apply`; forward speed never changes its sign.
 
         Raises:
             UnknownNameError: the robot is not told a forward speed and a turning rate.
         """
-        values = signal.values.copy()
-        if self.is_nominal:
-            return values
         if missing := [name for name in TWIST if name not in signal.channels]:
             raise UnknownNameError("command channel", missing[0], signal.channels)
         speed, rate = (signal.channels.index(name) for name in TWIST)
-        told = values[:, speed]
-        left = np.maximum(np.abs(told) - self["loss"] * np.abs(values[:, rate]), 0.0)
-        values[active, speed] = (np.sign(told) * left)[active]
-        return values
+        told, turning = signal.values[:, speed], np.abs(signal.values[:, rate])
+        left = np.maximum(np.abs(told) - self["loss"] * turning, 0.0)
+        told[active] = (np.sign(told) * left)[active]

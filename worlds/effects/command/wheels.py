@@ -28,15 +28,10 @@ class _EachCommand(CommandEffect):
     memoryless = True
     choices = (WHEEL,)
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """See `CommandEffect.apply`."""
-        values = signal.values.copy()
-        if not self.is_nominal:
-            for column in columns(self, signal):
-                values[active, column] = self._turned(values[active, column])
-        return values
+    def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
+        values = signal.values
+        for column in columns(self, signal):
+            values[active, column] = self._turned(values[active, column])
 
     @abstractmethod
     def _turned(self, told: np.ndarray) -> np.ndarray:
@@ -150,18 +145,11 @@ class WheelIntermittent(CommandEffect):
         every = rarer(self, severity)
         return type(self)({**super().scaled(severity).values, "every": every})
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """See `CommandEffect.apply`."""
-        values = signal.values.copy()
-        if self.is_nominal:
-            return values
+    def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
         number = signal.command + 1  # counted from 1; 0 after the last command
         hit = active & (number > 0) & (number % int(self["every"]) == 0)
         for column in columns(self, signal):
-            values[hit, column] = self["speed"]
-        return values
+            signal.values[hit, column] = self["speed"]
 
 
 DIRECTION = Choice(
@@ -200,20 +188,14 @@ class StuckWheel(CommandEffect):
     choices = (WHEEL, DIRECTION)
     memoryless = True
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """See `CommandEffect.apply`."""
-        values = signal.values.copy()
-        if self.is_nominal:
-            return values
+    def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
+        values = signal.values
         on = active & (signal.command >= 0)
         signs = {"forward": 1.0, "backward": -1.0}
         for column in columns(self, signal):
             told = values[on, column]
             sign = signs.get(self["direction"], np.sign(told))
             values[on, column] += self["blend"] * (sign * self["speed"] - told)
-        return values
 
 
 class WheelStuckMax(StuckWheel):
@@ -258,21 +240,14 @@ class CommandLatency(CommandEffect):
         strength("delay", "s", (0.0, 2.0), "time from command to motor", example=0.2),
     )
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """See `CommandEffect.apply`."""
-        values = signal.values.copy()
-        if self.is_nominal:
-            return values
+    def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
         steps = self["delay"] / signal.dt
         whole = int(np.floor(steps + 1e-9))  # rounding must not cost a step
         share = max(steps - whole, 0.0)
         late = _shifted(signal.values, whole)
         if share > 1e-9:
             late = (1 - share) * late + share * _shifted(signal.values, whole + 1)
-        values[active] = late[active]
-        return values
+        signal.values[active] = late[active]
 
 
 def _shifted(values: np.ndarray, steps: int) -> np.ndarray:

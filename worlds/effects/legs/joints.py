@@ -19,10 +19,7 @@ class JointWeak(BodyEffect):
     choices = (JOINT,)
     parameters = (factor((0.02, 1.0), "torque left over torque before", example=0.4),)
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         for actuator in chosen(spec, self["joint"]):
             law, powered = servo_joint.read(actuator)
             weak = {name: law[name] * self["factor"] for name in ("gain", "duty_limit")}
@@ -60,10 +57,7 @@ class JointLocked(BodyEffect):
         ),
     )
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         joint = spec.joint(self["joint"])
         low, high = joint.range
         angle, loss = min(max(self["angle"], low), high), self["loss"]
@@ -90,10 +84,7 @@ class LooseHorn(BodyEffect):
     resizes = True
     parameters = (strength("angle", "rad", (0.0, 0.6), "full play", example=0.15),)
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         joint = spec.joint(self["joint"])
         loosen(spec, joint, self["angle"], (ARMATURE, DAMPING))
 
@@ -110,10 +101,7 @@ class LinkLength(BodyEffect):
     choices = (PART, LEGS_OR_ALL)
     parameters = (factor((0.8, 1.25), "length over the model's", example=1.08),)
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         factor = self["factor"]
         for body in leg_bodies(spec, self["legs"], self["part"]):
             body.ipos[0] *= factor
@@ -135,10 +123,7 @@ class FootSlippery(BodyEffect):
         factor((0.02, 2.0), "friction coefficient over the model's", example=0.2),
     )
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         for body in shins(spec, self["legs"]):
             for geom in bodies.contact_geoms(body):
                 geom.friction[0] *= self["factor"]

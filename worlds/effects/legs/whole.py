@@ -33,10 +33,7 @@ class LegMissing(BodyEffect):
         ),
     )
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         gone = set()
         for part in PARTS:
             for body in leg_bodies(spec, self["legs"], part):
@@ -67,10 +64,7 @@ class LegLimp(BodyEffect):
         ),
     )
 
-    def edit(self, spec: Any) -> None:
-        """See `BodyEffect.edit`."""
-        if self.is_nominal:
-            return
+    def _write(self, spec: Any) -> None:
         for leg in read(self["legs"]):
             for actuator in chosen(spec, LEGS[leg - 1]):
                 law, powered = servo_joint.read(actuator)
@@ -102,19 +96,13 @@ class LegRaised(CommandEffect):
         ),
     )
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """See `CommandEffect.apply`."""
-        values = signal.values.copy()
-        if self.is_nominal:
-            return values
+    def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
+        values = signal.values
         for leg in read(self["legs"]):
             for part in parts(signal.channels):
                 column = signal.column(f"{LEGS[leg - 1]}_{part}")
                 told = values[active, column]
                 values[active, column] += self["blend"] * (RAISED[part] - told)
-        return values
 
     def lost(self) -> frozenset[int]:
         """See `Effect.lost`."""

@@ -1,6 +1,7 @@
 """Where the tracker sees the robot: its frame, its unit of length."""
 
 import numpy as np
+from numpy.random import Generator
 
 from bns.worlds.effects.base import (
     Parameter,
@@ -27,19 +28,12 @@ class TrackerRotation(TrackingEffect):
         ),
     )
 
-    def apply(
-        self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """See `TrackingEffect.apply`."""
-        poses = signal.poses.copy()
-        if self.is_nominal:
-            return signal.times.copy(), poses
+    def _change(self, signal: PoseSignal, active: np.ndarray, rng: Generator) -> None:
         cos, sin = np.cos(self["angle"]), np.sin(self["angle"])
         x, y, yaw = signal.poses[active].T
-        poses[active] = np.stack(
+        signal.poses[active] = np.stack(
             [cos * x - sin * y, sin * x + cos * y, yaw + self["angle"]], axis=1
         )
-        return signal.times.copy(), poses
 
 
 class TrackerScale(TrackingEffect):
@@ -56,13 +50,8 @@ class TrackerScale(TrackingEffect):
         ),
     )
 
-    def apply(
-        self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """See `TrackingEffect.apply`."""
-        poses = signal.poses.copy()
-        poses[active, :2] *= self["factor"]
-        return signal.times.copy(), poses
+    def _change(self, signal: PoseSignal, active: np.ndarray, rng: Generator) -> None:
+        signal.poses[active, :2] *= self["factor"]
 
 
 def _off(name: str, unit: str, high: float, doc: str, example: float) -> Parameter:
@@ -88,14 +77,8 @@ class TrackerShift(TrackingEffect):
         _off("dy", "m", 1.0, "added to y", -0.03),
     )
 
-    def apply(
-        self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """See `TrackingEffect.apply`."""
-        poses = signal.poses.copy()
-        if not self.is_nominal:
-            poses[active, :2] += np.array([self["dx"], self["dy"]])
-        return signal.times.copy(), poses
+    def _change(self, signal: PoseSignal, active: np.ndarray, rng: Generator) -> None:
+        signal.poses[active, :2] += np.array([self["dx"], self["dy"]])
 
 
 class MarkerMount(TrackingEffect):
@@ -110,18 +93,11 @@ class MarkerMount(TrackingEffect):
         _off("yaw", "rad", np.pi, "turned counter-clockwise", 0.05),
     )
 
-    def apply(
-        self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """See `TrackingEffect.apply`."""
-        poses = signal.poses.copy()
-        if self.is_nominal:
-            return signal.times.copy(), poses
+    def _change(self, signal: PoseSignal, active: np.ndarray, rng: Generator) -> None:
         x, y, yaw = signal.poses[active].T
         cos, sin = np.cos(yaw), np.sin(yaw)
         dx, dy = self["dx"], self["dy"]
-        poses[active] = np.stack(
+        signal.poses[active] = np.stack(
             [x + cos * dx - sin * dy, y + sin * dx + cos * dy, yaw + self["yaw"]],
             axis=1,
         )
-        return signal.times.copy(), poses

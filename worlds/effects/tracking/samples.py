@@ -1,6 +1,7 @@
 """What becomes of the tracker's samples: noise, loss, age, clock."""
 
 import numpy as np
+from numpy.random import Generator
 
 from bns.worlds.effects.base import Parameter, PoseSignal, TrackingEffect, strength
 
@@ -29,17 +30,10 @@ class TrackerNoise(TrackingEffect):
         ),
     )
 
-    def apply(
-        self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """See `TrackingEffect.apply`."""
-        poses = signal.poses.copy()
-        if self.is_nominal:
-            return signal.times.copy(), poses
+    def _change(self, signal: PoseSignal, active: np.ndarray, rng: Generator) -> None:
         sd = np.array([self["position_sd"], self["position_sd"], self["heading_sd"]])
-        noise = sd * rng.standard_normal(poses.shape)
-        poses[active] += noise[active]
-        return signal.times.copy(), poses
+        noise = sd * rng.standard_normal(signal.poses.shape)
+        signal.poses[active] += noise[active]
 
 
 class TrackerDropouts(TrackingEffect):
@@ -70,20 +64,13 @@ class TrackerDropouts(TrackingEffect):
         ),
     )
 
-    def apply(
-        self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """See `TrackingEffect.apply`."""
-        poses = signal.poses.copy()
-        if self.is_nominal:
-            return signal.times.copy(), poses
+    def _change(self, signal: PoseSignal, active: np.ndarray, rng: Generator) -> None:
         length = int(self["length"])
         # A sample survives if no burst began at it or up to length - 1 before it.
         begin = 1 - (1 - self["probability"]) ** (1 / length)
-        begins = rng.random(len(poses) + length - 1) < begin
+        begins = rng.random(len(signal.poses) + length - 1) < begin
         lost = np.convolve(begins, np.ones(length, dtype=int), mode="valid") > 0
-        poses[active & lost] = np.nan
-        return signal.times.copy(), poses
+        signal.poses[active & lost] = np.nan
 
 
 class TrackerLatency(TrackingEffect):
@@ -106,19 +93,12 @@ class TrackerLatency(TrackingEffect):
         ),
     )
 
-    def apply(
-        self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """See `TrackingEffect.apply`."""
-        poses = signal.poses.copy()
-        if self.is_nominal:
-            return signal.times.copy(), poses
+    def _change(self, signal: PoseSignal, active: np.ndarray, rng: Generator) -> None:
         now, then = signal.times[active], signal.times[active] - self["delay"]
         for axis in range(3):
             track = signal.fine_poses[:, axis]
-            poses[active, axis] += np.interp(then, signal.fine_times, track)
-            poses[active, axis] -= np.interp(now, signal.fine_times, track)
-        return signal.times.copy(), poses
+            signal.poses[active, axis] += np.interp(then, signal.fine_times, track)
+            signal.poses[active, axis] -= np.interp(now, signal.fine_times, track)
 
 
 class ClockDrift(TrackingEffect):
@@ -141,13 +121,7 @@ class ClockDrift(TrackingEffect):
         ),
     )
 
-    def apply(
-        self, signal: PoseSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """See `TrackingEffect.apply`."""
-        times = signal.times.copy()
-        if self.is_nominal:
-            return times, signal.poses.copy()
+    def _change(self, signal: PoseSignal, active: np.ndarray, rng: Generator) -> None:
+        times = signal.times
         on = np.diff(times, prepend=times[:1]) * active  # [s] on before each sample
-        times += self["rate"] * np.cumsum(on)
-        return times, signal.poses.copy()
+        times[:] += self["rate"] * np.cumsum(on)
