@@ -8,7 +8,7 @@ from bns.gap.candidates.mjcf import EXCITE
 from bns.gap.decomposition.row import Row
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import Effect, Parameter
-from bns.worlds.effects.command.twist import TWIST
+from bns.worlds.effects.command import TWIST
 
 LATE = (0.1, 0.2, 0.4)  # [s] delays and lags that fits are started from
 ZONES = (0.05, 0.15, 0.4)  # dead zones, likewise, of the largest

@@ -14,7 +14,7 @@ from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, Windows
 from bns.gap.recordings import segments
 from bns.worlds.effects.base import ControlSignal, Effect, PoseSignal
-from bns.worlds.effects.command.twist import TWIST
+from bns.worlds.effects.command import TWIST
 from bns.worlds.physics import control
 from bns.worlds.trial import POSE_CHANNELS, Channel, Trial, body_displacement
 

@@ -9,7 +9,7 @@ nominal value; at the nominal values the effect changes nothing, bit for bit. Th
 library serves as damage, as imperfect reality, as candidate explanation of a
 sim-to-real gap, and as correction of a simulator.
 
-An effect is a class in a file of one of the folders here; `registry` finds it by its
+An effect is a class in a file here or in a folder here; `registry` finds it by its
 `name`.
 """
 

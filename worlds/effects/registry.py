@@ -1,4 +1,4 @@
-"""All effects by name: classes in the folders here, by stage; no list to edit.
+"""All effects by name: classes in the files here, by stage; no list to edit.
 
 Other packages add theirs by the entry point `bns.effects`, in their `pyproject.toml`:
 
@@ -81,12 +81,9 @@ def _installed(
 
 
 def _modules() -> Iterator[ModuleType]:
-    """All files in the folders here."""
-    for folder in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
-        if folder.ispkg:
-            inside = import_module(folder.name)
-            for info in pkgutil.iter_modules(inside.__path__, f"{folder.name}."):
-                yield import_module(info.name)
+    """All files here, and in the folders here."""
+    for info in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+        yield import_module(info.name)
 
 
 def names() -> tuple[str, ...]:

@@ -1,12 +1,19 @@
-"""What effects on light sensors share: which sensors, and the range of a reading."""
+"""Readings of light sensors: changed one by one, or by those before."""
 
 from abc import abstractmethod
 
 import numpy as np
 
-from bns.models.light_sites import NAMES, SIDES
-from bns.worlds.effects.base import Choice, Effect, SensorEffect
-from bns.worlds.effects.common import spans
+from bns.models.light_sites import NAMES, SIDES, twin
+from bns.worlds.effects.base import (
+    Choice,
+    Effect,
+    Parameter,
+    SensorEffect,
+    factor,
+    strength,
+)
+from bns.worlds.effects.common import rarer, spans
 
 # [count] 12 bits; the dissertation writes 4200, the maker's test program scales by 4096
 FULL_SCALE = 4095.0
@@ -70,3 +77,275 @@ class ReadingEffect(SensorEffect):
             span: a stretch of time in which the effect is on.
             which: columns of the chosen sensors.
         """
+
+
+class SensorGain(ReadingEffect):
+    """A sensor's readings are scaled."""
+
+    name = "sensor_gain"
+    source = "assumed: a supply or amplifier that has changed"
+    parameters = (
+        factor(
+            (0.0, 4.0), "reading after over reading before; bounds assumed", example=0.8
+        ),
+    )
+
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
+    ) -> np.ndarray:
+        return limited(readings[span, which] * self["factor"])
+
+
+class SensorOffset(ReadingEffect):
+    """A sensor's readings are shifted."""
+
+    name = "sensor_offset"
+    source = "assumed: a dirty or heated sensor"
+    parameters = (
+        strength(
+            "counts",
+            "count",
+            (-4095.0, 4095.0),
+            "added to each reading; the whole range",
+            example=-500.0,
+        ),
+    )
+
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
+    ) -> np.ndarray:
+        return limited(readings[span, which] + self["counts"])
+
+
+class SensorSaturation(ReadingEffect):
+    """A sensor saturates before full light."""
+
+    name = "sensor_saturation"
+    source = "assumed: a load resistor or supply that has changed"
+    parameters = (
+        strength(
+            "level",
+            "count",
+            (0.0, FULL_SCALE),
+            "smallest reading; 0 = down to full light",
+            example=1500.0,
+        ),
+    )
+
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
+    ) -> np.ndarray:
+        return np.maximum(readings[span, which], self["level"])
+
+
+def _stuck(extreme: str, reading: float) -> tuple[Parameter, ...]:
+    """The parameters of a sensor that is stuck at an extreme reading."""
+    return (
+        strength(
+            "blend",
+            "1",
+            (0.0, 1.0),
+            f"from the reading (0) to the {extreme} (1)",
+            example=1.0,
+        ),
+        Parameter(
+            "reading",
+            unit="count",
+            nominal=reading,
+            low=0.0,
+            high=FULL_SCALE,
+            doc=f"the {extreme}",
+            example=reading,
+            scales=False,
+        ),
+    )
+
+
+class _StuckSensor(ReadingEffect):
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
+    ) -> np.ndarray:
+        before = readings[span, which]
+        return before + self["blend"] * (self["reading"] - before)
+
+
+class SensorStuckMax(_StuckSensor):
+    """A sensor always reads the maximum: it reads dark."""
+
+    name = "sensor_stuck_max"
+    source = "thesis 6.2.1: always returns the maximum sensor value"
+    parameters = _stuck("maximum", FULL_SCALE)
+
+
+class SensorStuckMin(_StuckSensor):
+    """A sensor always reads the minimum: it reads bright."""
+
+    name = "sensor_stuck_min"
+    source = "thesis 6.2.1: always returns the minimum sensor value"
+    parameters = _stuck("minimum", 0.0)
+
+
+class SensorCrosstalk(ReadingEffect):
+    """Neighbouring sensors leak into a reading."""
+
+    name = "sensor_crosstalk"
+    source = "assumed: one multiplexer serves all sensors"
+    parameters = (
+        strength(
+            "share",
+            "1",
+            (0.0, 0.5),
+            "of the reading that is the neighbours' mean; bounds assumed",
+            example=0.2,
+        ),
+    )
+
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
+    ) -> np.ndarray:
+        beside = (np.roll(readings, 1, axis=1) + np.roll(readings, -1, axis=1)) / 2
+        before = readings[span, which]
+        return before + self["share"] * (beside[span, which] - before)
+
+
+class SensorIntermittent(ReadingEffect):
+    """Every m-th reading of a sensor is the minimum."""
+
+    name = "sensor_intermittent"
+    source = "thesis 6.2.1 and 6.3.1: once every m readings; m is silent"
+    parameters = (
+        Parameter(
+            "every",
+            unit="1",
+            nominal=0,
+            low=0,
+            high=1000,
+            doc="m: readings m, 2m, ... of a trial are hit; 0 = never; assumed",
+            example=3,
+            integer=True,
+        ),
+        strength(
+            "reading",
+            "count",
+            (0.0, FULL_SCALE),
+            "what is read then",
+            example=0.0,
+            scales=False,
+        ),
+    )
+
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
+    ) -> np.ndarray:
+        number = np.arange(span.start + 1, span.stop + 1)
+        hit = number % int(self["every"]) == 0
+        return np.where(hit[:, None], self["reading"], readings[span, which])
+
+    def scaled(self, severity: float) -> "SensorIntermittent":
+        """Milder means rarer: half the severity hits half as many readings."""
+        every = rarer(self, severity)
+        return type(self)({**super().scaled(severity).values, "every": every})
+
+
+class SensorSwapped(SensorEffect):
+    """Left and right sensors are exchanged."""
+
+    name = "sensor_swapped"
+    source = "assumed: a plug in the wrong socket"
+    parameters = (
+        strength(
+            "blend",
+            "1",
+            (0.0, 1.0),
+            "from their own reading (0) to that of their twin (1)",
+            example=1.0,
+        ),
+    )
+
+    def apply(
+        self,
+        times: np.ndarray,
+        readings: np.ndarray,
+        channels: tuple[str, ...],
+        active: np.ndarray,
+        rng: np.random.Generator,
+    ) -> np.ndarray:
+        """See `SensorEffect.apply`."""
+        changed = readings.copy()
+        if self.is_nominal:
+            return changed
+        from_there = [channels.index(twin(name)) for name in channels]
+        changed[active] += self["blend"] * (
+            readings[active][:, from_there] - readings[active]
+        )
+        return changed
+
+
+class SensorDrift(ReadingEffect):
+    """A sensor's readings drift with time."""
+
+    name = "sensor_drift"
+    source = "assumed: a sensor that warms up"
+    parameters = (
+        strength(
+            "rate",
+            "count/s",
+            (-1000.0, 1000.0),
+            "added for each second that it lasts; bounds assumed",
+            example=-40.0,
+        ),
+    )
+
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
+    ) -> np.ndarray:
+        since = (times[span] - times[max(span.start - 1, 0)])[:, None]
+        return limited(readings[span, which] + self["rate"] * since)
+
+
+class SensorFrozen(ReadingEffect):
+    """A sensor repeats one reading."""
+
+    name = "sensor_frozen"
+    source = "assumed: a converter that no longer updates"
+    parameters = (
+        strength(
+            "blend",
+            "1",
+            (0.0, 1.0),
+            "from the reading (0) to the frozen one (1)",
+            example=1.0,
+        ),
+    )
+
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
+    ) -> np.ndarray:
+        kept, before = readings[max(span.start - 1, 0), which], readings[span, which]
+        return before + self["blend"] * (kept - before)
+
+
+class SensorResponseTime(ReadingEffect):
+    """A sensor's readings lag behind."""
+
+    name = "sensor_response_time"
+    source = "thesis 5.2.2 gives 50 ms for an answer; a lag beyond that is assumed"
+    parameters = (
+        strength(
+            "time_constant",
+            "s",
+            (0.0, 10.0),
+            "of the filter; 0 = none; bounds assumed",
+            example=0.5,
+        ),
+    )
+
+    def _read(
+        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
+    ) -> np.ndarray:
+        keep = np.exp(-np.diff(times, prepend=times[0]) / self["time_constant"])
+        read = readings[span, which]
+        last = readings[max(span.start - 1, 0), which]
+        for at, share in enumerate(keep[span]):
+            read[at] = last = read[at] + share * (last - read[at])
+        return read

@@ -7,7 +7,7 @@ from bns.gap import diagnose, store
 from bns.gap.candidates import unicycle_rows
 from bns.gap.models.unicycle import UnicycleModel
 from bns.worlds.effects import registry
-from bns.worlds.effects.command.twist import TWIST
+from bns.worlds.effects.command import TWIST
 from bns.worlds.trial import Channel, Commands, Trial
 
 UNITS = ("m/s", "rad/s")

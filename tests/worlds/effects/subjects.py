@@ -8,7 +8,7 @@ import numpy as np
 
 from bns import models
 from bns.worlds.effects.base import ControlSignal
-from bns.worlds.effects.command.twist import TWIST
+from bns.worlds.effects.command import TWIST
 from bns.worlds.effects.parts import Part
 from bns.worlds.light import sensors
 from bns.worlds.light.field import Lamp, LightField
@@ -18,6 +18,11 @@ ARM = (Path(__file__).parent / "arm.xml").read_text()
 STEPS, DT = 600, 0.005
 LEGGED = ("legged",)  # robots of effects that need legs
 OF_TWIST = {"turning_loss"}  # effects on a forward speed and a turning rate
+
+
+def at_example(effect):
+    """An effect with the example value of every parameter of its class."""
+    return effect({item.name: item.example for item in effect.parameters})
 
 
 def frozen(array) -> np.ndarray:

@@ -1,6 +1,5 @@
 """What every effect must keep to; a new effect is tested by being there."""
 
-import json
 import re
 
 import mujoco
@@ -9,7 +8,7 @@ import pytest
 
 from bns.errors import BnsError, OutOfBoundsError, UnknownNameError
 from bns.models.legs import JOINTS
-from bns.worlds.effects import listing, registry
+from bns.worlds.effects import registry
 from bns.worlds.effects.base import (
     STAGES,
     ControlSignal,
@@ -24,6 +23,7 @@ from tests.worlds.effects.subjects import (
     DT,
     STEPS,
     as_bytes,
+    at_example,
     bare,
     compiled,
     frozen,
@@ -47,11 +47,12 @@ OF_WHEELS = [
 ]
 LASTING = {"clock_drift"}  # what a clock has gained stays when the drift ends
 SAMPLES = 31
-FOLDERS = {  # beside the one of the same name
-    "command": ("command", "legs", "servo"),
+FILES = {  # in which the effects of a stage stand
+    "command": ("command", "channels", "legs", "servo"),
     "actuator": ("actuator", "servo"),
     "body": ("body", "legs", "servo"),
-    "sensor": ("sensor", "light", "servo"),
+    "sensor": ("sensors", "channels", "light", "servo"),
+    "tracking": ("tracking",),
 }
 
 
@@ -140,8 +141,7 @@ def unchanged(effect, signals) -> bool:
 class TestEveryEffect:
     def test_says_what_it_is(self, name):
         effect = registry.get(name)
-        folder = effect.__module__.split(".")[-2]
-        assert folder in FOLDERS.get(effect.stage, (effect.stage,))
+        assert effect.__module__.split(".")[3] in FILES[effect.stage]
         assert effect.stage in STAGES
         assert effect.doc and "\n" not in effect.doc
         assert effect.source and effect.robots and effect.parameters
@@ -156,7 +156,7 @@ class TestEveryEffect:
         assert unchanged(registry.make(name), signals)
 
     def test_severity_zero_is_nominal_and_one_is_the_effect(self, name, signals):
-        effect = listing.example(registry.get(name))
+        effect = at_example(registry.get(name))
         assert effect.scaled(1) == effect
         assert effect.scaled(0).is_nominal
         assert unchanged(effect.scaled(0), signals)
@@ -164,7 +164,7 @@ class TestEveryEffect:
             effect.scaled(1.5)
 
     def test_example_changes_something(self, name, signals):
-        effect = listing.example(registry.get(name))
+        effect = at_example(registry.get(name))
         assert not effect.is_nominal
         assert not unchanged(effect, signals)
 
@@ -194,7 +194,7 @@ class TestEveryEffect:
     ):
         if not on_part(registry.get(name)):
             return
-        values = listing.example(registry.get(name)).values | {"part": part}
+        values = at_example(registry.get(name)).values | {"part": part}
         with pytest.raises(UnknownNameError, match=re.escape(part)):
             unchanged(registry.make(name, **values), signals)
 
@@ -212,7 +212,7 @@ class TestEveryEffect:
             assert registry.from_table({"effect": name, **effect.values}) == effect
 
     def test_same_seed_same_bytes(self, name, signals):
-        effect = listing.example(registry.get(name))
+        effect = at_example(registry.get(name))
         if laws := lawful(effect):
             assert same(laws[1].values(), lawful(effect)[1].values())
             assert not effect.random
@@ -228,7 +228,7 @@ class TestEveryEffect:
 @pytest.mark.parametrize("name", IN_TIME)
 class TestEffectsOnSignals:
     def test_nothing_changes_while_off(self, name, signals):
-        effect = listing.example(registry.get(name))
+        effect = at_example(registry.get(name))
         count = length(signals, effect)
         active = np.zeros(count, bool)
         active[count // 3 : 2 * count // 3] = True
@@ -242,7 +242,7 @@ class TestEffectsOnSignals:
         assert not same(after(effect, signals, active=active), before(effect, signals))
 
     def test_result_is_its_own_memory_and_shape(self, name, signals):
-        for effect in (registry.make(name), listing.example(registry.get(name))):
+        for effect in (registry.make(name), at_example(registry.get(name))):
             for new, old in zip(
                 after(effect, signals), before(effect, signals), strict=True
             ):
@@ -250,7 +250,7 @@ class TestEffectsOnSignals:
                 assert new.shape == old.shape and new.dtype == np.float64
 
     def test_time_does_not_go_backwards(self, name, signals):
-        effect = listing.example(registry.get(name))
+        effect = at_example(registry.get(name))
         if effect.stage == "tracking":
             times, _ = after(effect, signals)
             assert (np.diff(times) >= 0).all()
@@ -259,7 +259,7 @@ class TestEffectsOnSignals:
 @pytest.mark.parametrize("name", OF_WHEELS)
 @pytest.mark.parametrize("wheel, other", [("left", "right"), ("right", "left")])
 def test_only_the_named_wheel_is_touched(name, wheel, other, signals):
-    example = listing.example(registry.get(name))
+    example = at_example(registry.get(name))
     effect = registry.make(name, **{**example.values, "wheel": wheel})
     if effect.stage == "body":
         old, new = wheel_fields(bare(effect)), wheel_fields(compiled(effect))
@@ -277,7 +277,7 @@ def test_only_the_named_wheel_is_touched(name, wheel, other, signals):
     "name", [name for name in ON_SIGNALS if registry.get(name).stage == "body"]
 )
 def test_body_effects_keep_the_sizes_and_the_physics_sound(name):
-    model = compiled(listing.example(registry.get(name)))
+    model = compiled(at_example(registry.get(name)))
     kind = registry.get(name)
     if not kind.resizes:
         assert len(as_bytes(model)) == len(as_bytes(bare(kind)))
@@ -293,7 +293,7 @@ def test_body_effects_keep_the_sizes_and_the_physics_sound(name):
 @pytest.mark.parametrize("name", SERVO)
 def test_servo_effects_change_one_number_and_keep_it_in_bounds(name):
     law, kind = servo_numbers(), registry.get(name)
-    changed = listing.example(kind).change(law)
+    changed = at_example(kind).change(law)
     assert list(changed) == list(law)
     assert sum(not np.array_equal(changed[key], law[key]) for key in law) == 1
     for item in kind.parameters:
@@ -324,7 +324,7 @@ def stepped(effect) -> np.ndarray:
 @pytest.mark.parametrize("name", ON_BODY)
 def test_body_effects_do_not_jump_at_their_bounds(name):
     kind = registry.get(name)
-    others = listing.example(kind).values
+    others = at_example(kind).values
     for item in (item for item in kind.parameters if not item.integer):
         inwards = 1e-6 * (item.high - item.low)
         for bound, beside in ((item.low, inwards), (item.high, -inwards)):
@@ -333,16 +333,6 @@ def test_body_effects_do_not_jump_at_their_bounds(name):
                 for value in (bound, bound + beside)
             ]
             assert ends[0] == pytest.approx(ends[1], abs=5e-3), (item.name, bound)
-
-
-def test_listing_is_plain_data_for_every_effect():
-    rows = listing.rows()
-    assert json.loads(json.dumps(rows)) == rows
-    assert sorted(row["name"] for row in rows) == list(NAMES)
-    stages = [STAGES.index(row["stage"]) for row in rows]
-    assert stages == sorted(stages)
-    for row in rows:
-        assert str(registry.parse(row["example"])) == row["example"]
 
 
 def test_unknown_effect_gets_a_suggestion():

@@ -5,13 +5,13 @@ import pytest
 
 from bns.errors import BnsError
 from bns.worlds import registry as worlds
-from bns.worlds.effects import listing, registry
+from bns.worlds.effects import registry
 from bns.worlds.effects.base import CommandEffect, OpticsEffect, SensorEffect
 from bns.worlds.light import law as light_law
 from bns.worlds.light import sensors as light_sensors
 from bns.worlds.light.field import LightField
 from tests.worlds.effects import subjects
-from tests.worlds.effects.subjects import DT, light, read
+from tests.worlds.effects.subjects import DT, at_example, light, read
 
 EVERY = [registry.get(name) for name in registry.names()]
 EVERY = [kind for kind in EVERY if "wheeled" in kind.robots]
@@ -31,9 +31,7 @@ LEFT = [NAMES.index(f"ir_{name}") for name in ("left_90", "left_45", "front_left
 
 def example(name, **values):
     """The effect at its example values, some replaced."""
-    return registry.make(
-        name, **{**listing.example(registry.get(name)).values, **values}
-    )
+    return registry.make(name, **{**at_example(registry.get(name)).values, **values})
 
 
 def after(effect, readings=None, active=None):

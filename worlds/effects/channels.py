@@ -1,11 +1,22 @@
-"""Commands of any robot, channel by channel: delay, lag, gain, offset and limits."""
+"""Commands and readings of any robot, channel by channel.
+
+Light sensors have effects of their own, within the range of their converter:
+`sensor_gain`, `sensor_offset`, `sensor_response_time`.
+"""
 
 from abc import abstractmethod
 
 import numpy as np
 
 from bns.worlds.effects import parts
-from bns.worlds.effects.base import CommandEffect, ControlSignal, Parameter
+from bns.worlds.effects.base import (
+    CommandEffect,
+    ControlSignal,
+    Parameter,
+    SensorEffect,
+    factor,
+    strength,
+)
 from bns.worlds.effects.parts import ANY, WIDE
 from bns.worlds.effects.signals import lagged
 
@@ -26,7 +37,7 @@ def _number(
     )
 
 
-class _Channel(CommandEffect):
+class _Command(CommandEffect):
     """What one channel is told becomes something else."""
 
     robots = ANY
@@ -44,7 +55,7 @@ class _Channel(CommandEffect):
         """One channel of the signal, ``(S,)``, after the effect."""
 
 
-class CommandDelay(_Channel):
+class CommandDelay(_Command):
     """Commands reach the actuators late."""
 
     name = "command_delay"
@@ -58,7 +69,7 @@ class CommandDelay(_Channel):
         return np.interp(at, np.arange(len(told)), told)
 
 
-class CommandLag(_Channel):
+class CommandLag(_Command):
     """Commands are followed gradually."""
 
     name = "command_lag"
@@ -69,7 +80,7 @@ class CommandLag(_Channel):
         return lagged(told, told[0], max(self["time_constant"], 1e-9), dt)
 
 
-class CommandGain(_Channel):
+class CommandGain(_Command):
     """A command is scaled on its way."""
 
     name = "command_gain"
@@ -81,7 +92,7 @@ class CommandGain(_Channel):
         return told * self["factor"]
 
 
-class CommandOffset(_Channel):
+class CommandOffset(_Command):
     """A command is shifted by a constant on its way."""
 
     name = "command_offset"
@@ -95,7 +106,7 @@ class CommandOffset(_Channel):
         return told + self["added"]
 
 
-class CommandDeadZone(_Channel):
+class CommandDeadZone(_Command):
     """Small commands do nothing."""
 
     name = "command_dead_zone"
@@ -109,7 +120,7 @@ class CommandDeadZone(_Channel):
         return np.where(np.abs(told) < self["size"], 0.0, told)
 
 
-class CommandLimit(_Channel):
+class CommandLimit(_Command):
     """A command is cut to a limit: a speed or torque limit of its drive."""
 
     name = "command_limit"
@@ -129,7 +140,7 @@ class CommandLimit(_Channel):
         return np.clip(told, -self["limit"], self["limit"])
 
 
-class CommandRate(_Channel):
+class CommandRate(_Command):
     """A command changes no faster than a limit: a servo's speed limit."""
 
     name = "command_rate"
@@ -149,3 +160,75 @@ class CommandRate(_Channel):
             now = min(max(goal, now - most), now + most)
             made[at] = now
         return made
+
+
+class _Reading(SensorEffect):
+    """What is read of one channel becomes something else."""
+
+    robots = ("own",)
+    choices = parts.part("channel")
+    source = "a transform of what is observed"
+
+    def apply(
+        self,
+        times: np.ndarray,
+        readings: np.ndarray,
+        channels: tuple[str, ...],
+        active: np.ndarray,
+        rng: np.random.Generator,
+    ) -> np.ndarray:
+        """The readings with the columns of the part changed."""
+        made = readings.copy()
+        if self.is_nominal:
+            return made
+        for column in parts.among(channels, self["part"], "observed channel"):
+            changed = self.change(times, readings[:, column])
+            made[active, column] = changed[active]
+        return made
+
+    @abstractmethod
+    def change(self, times: np.ndarray, readings: np.ndarray) -> np.ndarray:
+        """One channel, ``(T,)``, after the effect."""
+
+
+class ReadingGain(_Reading):
+    """The readings of any sensor are scaled."""
+
+    name = "reading_gain"
+    parameters = (factor((0.0, WIDE), "reading over the true value", example=0.8),)
+
+    def change(self, times: np.ndarray, readings: np.ndarray) -> np.ndarray:
+        """The readings scaled, ``(T,)``."""
+        return readings * self["factor"]
+
+
+class ReadingOffset(_Reading):
+    """The readings of any sensor are shifted by a constant."""
+
+    name = "reading_offset"
+    parameters = (
+        strength(
+            "added",
+            "unit of the reading",
+            (-WIDE, WIDE),
+            "added to the reading",
+            example=0.1,
+        ),
+    )
+
+    def change(self, times: np.ndarray, readings: np.ndarray) -> np.ndarray:
+        """The readings shifted in value, ``(T,)``."""
+        return readings + self["added"]
+
+
+class ReadingDelay(_Reading):
+    """The readings of any sensor are older than their time stamps."""
+
+    name = "reading_delay"
+    parameters = (
+        strength("delay", "s", (-WIDE, WIDE), "age of a reading", example=0.5),
+    )
+
+    def change(self, times: np.ndarray, readings: np.ndarray) -> np.ndarray:
+        """The readings shifted in time, ``(T,)``."""
+        return np.interp(times - self["delay"], times, readings)
