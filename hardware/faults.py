@@ -1,4 +1,4 @@
-"""What goes wrong on a line or in a trial, noted one by one."""
+"""What can go wrong with a robot on a line, and what did: noted one by one."""
 
 import contextlib
 import json
@@ -6,7 +6,40 @@ from collections import Counter
 from pathlib import Path
 from typing import NamedTuple
 
+from bns.errors import BnsError
 from bns.hardware.clock import Clock
+
+
+class LinkError(BnsError):
+    """The line to the robot is dead, or nothing that can be understood comes back."""
+
+
+class SafetyStop(BnsError):
+    """The robot was stopped before its commands were done.
+
+    Args:
+        reason: what happened, in a few words.
+        advice: what to do now.
+    """
+
+    def __init__(self, reason: str, advice: str = "look at the robot, then go on"):
+        self.reason = reason
+        super().__init__(f"The robot was stopped: {reason}; {advice}.")
+
+
+class Void(BnsError):
+    """A trial that was not executed as told; it is repeated, never learned from.
+
+    Args:
+        reason: what happened, in a few words.
+        advice: what to do where it happens again at once, so that going on would be
+            no use or no good; empty = it is repeated as often as others.
+    """
+
+    def __init__(self, reason: str, advice: str = ""):
+        self.reason, self.advice = reason, advice
+        super().__init__(f"The trial is void: {reason}; it has to be repeated.")
+
 
 KEPT = 100_000  # faults kept in memory
 

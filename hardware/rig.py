@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from bns.errors import BnsError
-from bns.hardware.clock import Clock, RealClock
+from bns.hardware.clock import Clock, RealClock, urgent
 from bns.hardware.driving.motion import Mover
 from bns.hardware.driving.odometry import Wheels
 from bns.hardware.driving.wheels import Following
@@ -13,7 +13,6 @@ from bns.hardware.khepera import protocol
 from bns.hardware.khepera.driver import Khepera3
 from bns.hardware.line import Line, SerialLine, check_port
 from bns.hardware.safety.limits import Limits, Operator
-from bns.hardware.safety.priority import urgent
 from bns.hardware.safety.watchdog_client import WatchdogClient
 from bns.hardware.tracking.eyes import Eyes
 

@@ -10,8 +10,15 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from bns.models.places import find, known, names
-from bns.models.robot_model import CommandChannel, RobotModel, Wheel, read
+from bns.models.robot_model import (
+    CommandChannel,
+    RobotModel,
+    Wheel,
+    find,
+    known,
+    names,
+    read,
+)
 
 __all__ = [
     "CommandChannel",
@@ -59,9 +66,9 @@ def spec(name: str, *, scene: bool = True, visuals: bool = True, **options: str)
     Raises:
         UnknownNameError: no such robot, option or alternative.
     """
-    from bns.models import edits
+    from bns.models import mjcf
 
-    return edits.load(robot(name), scene=scene, visuals=visuals, options=options)
+    return mjcf.robot_spec(robot(name), scene=scene, visuals=visuals, options=options)
 
 
 def scene_spec(
@@ -84,8 +91,8 @@ def scene_spec(
     Raises:
         UnknownNameError: no such robot, option or alternative.
     """
-    from bns.models import arena, edits
+    from bns.models import arena, mjcf
 
-    made = edits.load(robot(name), scene=False, visuals=visuals, options=options)
+    made = mjcf.robot_spec(robot(name), scene=False, visuals=visuals, options=options)
     arena.furnish(made, objectives=objectives or {}, radius=radius, visuals=visuals)
     return made

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bns.errors import BnsError
-from bns.models import edits, legs, light_sites, numbers, servo_numbers
+from bns.models import legs, light_sites, mjcf, numbers, servo_numbers
 from bns.models.robot_model import RobotModel
 
 KINDS = ("wheeled", "legged", "servo")
@@ -35,7 +35,7 @@ def check(robot: RobotModel) -> list[Checked]:
     """Every point that a robot has to keep, in the order in which to mend them."""
     done = [Checked("robot.toml names all there is to know", tuple(_facts(robot)))]
     try:
-        model = edits.load(robot, scene=True, visuals=True, options={}).compile()
+        model = mjcf.robot_spec(robot, scene=True, visuals=True, options={}).compile()
     except (BnsError, ValueError) as error:
         return [*done, Checked("scene.xml compiles", (str(error),))]
     done.append(Checked("scene.xml compiles", ()))
@@ -200,7 +200,7 @@ def _drives(robot: RobotModel, model: Any) -> list[str]:
 
 def _repeats(robot: RobotModel, model: Any) -> list[str]:
     controls = smooth(model, 0.5, seed=2)
-    again = edits.load(robot, scene=True, visuals=True, options={}).compile()
+    again = mjcf.robot_spec(robot, scene=True, visuals=True, options={}).compile()
     first, _ = controlled(model, controls)
     second, _ = controlled(again, controls)
     same = first.tobytes() == second.tobytes()
@@ -210,7 +210,7 @@ def _repeats(robot: RobotModel, model: Any) -> list[str]:
 def _bare(robot: RobotModel, model: Any) -> list[str]:
     controls = smooth(model, 0.5, seed=3)
     try:
-        bare = edits.load(robot, scene=True, visuals=False, options={}).compile()
+        bare = mjcf.robot_spec(robot, scene=True, visuals=False, options={}).compile()
     except ValueError as error:
         return [f"without what only shows it does not compile: {error}"]
     shown, _ = controlled(model, controls)

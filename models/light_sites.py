@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bns.errors import BnsError
-from bns.models import edits
+from bns.models import mjcf
 from bns.models.robot_model import RobotModel
 
 SIDES = {
@@ -65,7 +65,7 @@ def placed(robot: RobotModel) -> dict[str, Site]:
     """
     import mujoco
 
-    model = edits.load(robot, scene=False, visuals=False, options={}).compile()
+    model = mjcf.robot_spec(robot, scene=False, visuals=False, options={}).compile()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     found = {}

@@ -5,10 +5,14 @@ replicated body. What a file asks for is added up first.
 """
 
 import xml.etree.ElementTree as xml
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bns.errors import FormatError
+import numpy as np
+
+from bns.errors import FormatError, UnknownNameError
+from bns.models.robot_model import RobotModel
 from bns.storage import reading
 
 MOST = 20_000_000
@@ -170,3 +174,50 @@ def _check_file(
         if there:
             with reading.regular(found, most=reading.TEXT << 4):
                 return
+
+
+def robot_spec(
+    robot: RobotModel, *, scene: bool, visuals: bool, options: Mapping[str, str]
+) -> Any:
+    """The robot's `mujoco.MjSpec`, its options applied.
+
+    Args:
+        robot: the robot's files and options.
+        scene: with a floor, a light and a camera; False = the robot alone.
+        visuals: with what only shows; False = see `strip`.
+        options: chosen alternative by option; the others stay as in the file.
+
+    Raises:
+        UnknownNameError: an option or alternative that the robot does not offer.
+        FormatError: a file that is missing or that MuJoCo cannot read.
+    """
+    for name, value in options.items():
+        if name not in robot.options:
+            raise UnknownNameError(f"option of {robot.name}", name, robot.options)
+        if value not in robot.options[name].headings:
+            raise UnknownNameError(name, value, robot.options[name].headings)
+    file = robot.scene if scene else robot.xml
+    spec = load(file)
+    for name, value in options.items():
+        for site, heading in robot.options[name].headings[value].items():
+            _look(spec.site(site), np.radians(heading))
+    if not visuals:
+        strip(spec)
+    return spec
+
+
+def _look(site: Any, heading: float) -> None:
+    """Turn a site so that its z axis is horizontal at `heading` [rad]."""
+    half = np.sqrt(0.5)  # cos and sin of 90 / 2 deg, from straight up to the horizon
+    cos, sin = np.cos(heading / 2), np.sin(heading / 2)
+    site.alt.type = 0  # the quaternion holds, not the euler angles of the file
+    site.quat = [half * cos, -half * sin, half * cos, half * sin]
+
+
+def strip(spec: Any) -> None:
+    """Delete what only shows: geoms that touch nothing, lights, cameras."""
+    for geom in list(spec.geoms):
+        if not (geom.contype or geom.conaffinity):
+            spec.delete(geom)
+    for item in [*spec.lights, *spec.cameras]:
+        spec.delete(item)

@@ -1,8 +1,9 @@
-"""The `World` protocol: all that a learner may know of reality."""
+"""The `World` protocol: all that a learner may know of reality; worlds that count."""
 
 from collections.abc import Sequence
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
+from bns.errors import BnsError
 from bns.worlds.trial import Commands, Trial
 
 
@@ -60,3 +61,64 @@ def reason() -> str:
 def clear() -> None:
     """End the alarm."""
     _reasons.clear()
+
+
+class BudgetSpentError(BnsError):
+    """A learner asked for more evaluations of its model than it may have."""
+
+
+class CountedWorld:
+    """A model world of one run; a `World` that counts every execution.
+
+    Args:
+        world: what executes; it may be shared by several runs.
+        limit: executions that the run may spend.
+
+    Attributes:
+        spent: executions so far; to be kept in the learner's state.
+    """
+
+    def __init__(self, world: World, limit: int):
+        self._world, self.limit, self.spent = world, limit, 0
+        self.name, self.robot = world.name, world.robot
+
+    @property
+    def left(self) -> int:
+        """Executions that may still be spent."""
+        return max(self.limit - self.spent, 0)
+
+    def run(
+        self, commands: Sequence[Commands], *, trial: int = 0, seeds: Sequence[int] = ()
+    ) -> list[Trial]:
+        """See `World.run`.
+
+        Raises:
+            BudgetSpentError: more than what is left; nothing is executed or charged.
+        """
+        self._charge(len(commands))
+        return self._world.run(commands, trial=trial, seeds=seeds)
+
+    def drive(self, policy: Any, **settings: Any) -> list[Trial]:
+        """Let N controllers steer a robot each, see `LightWorld.drive`.
+
+        Raises:
+            BudgetSpentError: more than what is left; nothing is executed or charged.
+            BnsError: a world without closed loops.
+        """
+        drive = getattr(self._world, "drive", None)
+        if drive is None:
+            raise BnsError(
+                f"The model world {self.name!r} has no closed loops: give "
+                "--prior.world light."
+            )
+        self._charge(len(policy))
+        driven: list[Trial] = drive(policy, **settings)
+        return driven
+
+    def _charge(self, count: int) -> None:
+        if count > self.left:
+            raise BudgetSpentError(
+                f"{count} evaluations of the model asked for, {self.left} of "
+                f"{self.limit} left: raise prior.evaluations, or ask for fewer."
+            )
+        self.spent += count

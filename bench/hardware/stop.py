@@ -43,7 +43,7 @@ def hardware_stop(quick: bool) -> Result:
     kept, so that an interrupted run goes on.
     Quick: the Khepera alone, five ways, once each.
     """
-    from bns.hardware.safety.priority import urgent
+    from bns.hardware.clock import urgent
 
     urgent()  # else the moment of the event is noted late
     details: dict[str, object] = {}
@@ -193,7 +193,7 @@ def _stood(drive: Drive, log: Log, order: float) -> float | None:
 @contextlib.contextmanager
 def _canary() -> Iterator[list[float]]:
     """By how much the machine wakes a thread too late at most [s]."""
-    from bns.hardware.safety.priority import urgent
+    from bns.hardware.clock import urgent
 
     worst, over = [0.0], threading.Event()
 

@@ -84,7 +84,7 @@ def worlds() -> Schema:
 
 def hardware() -> Schema:
     """Schema of a hardware set-up, which `bns hardware setup` writes."""
-    from bns.hardware.setup_file import Setup
+    from bns.hardware.setup import Setup
 
     made = _typed(Setup, "A robot's set-up for the BNS testbed")
     _described(made["$defs"]["Setup"], Setup)

@@ -14,10 +14,9 @@ from bns.learners import registry as learners
 from bns.learners.base import Learner
 from bns.tasks import registry as tasks
 from bns.tasks.base import Task
-from bns.worlds.counted import CountedWorld
 from bns.worlds.damage import Damage
 from bns.worlds.trial import Trial
-from bns.worlds.world import World
+from bns.worlds.world import CountedWorld, World
 
 
 class Batch:

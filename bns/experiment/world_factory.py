@@ -11,8 +11,7 @@ from bns.learners.bns.config import AdaptationConfig
 from bns.storage import files
 from bns.tasks import registry as tasks
 from bns.worlds import registry as worlds
-from bns.worlds.counted import CountedWorld
-from bns.worlds.world import World
+from bns.worlds.world import CountedWorld, World
 
 
 def make_world(

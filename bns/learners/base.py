@@ -16,8 +16,8 @@ from bns.errors import BnsError
 from bns.experiment.config import LearnerSettings, RunConfig
 from bns.tasks import registry as tasks
 from bns.tasks.base import Task
-from bns.worlds.counted import CountedWorld
 from bns.worlds.trial import Trial
+from bns.worlds.world import CountedWorld
 
 Controller = TypeVar("Controller")  # what the task's `Space` decodes
 

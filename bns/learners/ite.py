@@ -23,8 +23,8 @@ from bns.learners.base import Curves, Learner, Panel, Proposal
 from bns.prior import gaussian, repertoire
 from bns.prior.archive import Archive
 from bns.tasks.base import Space
-from bns.worlds.counted import CountedWorld
 from bns.worlds.trial import Trial
+from bns.worlds.world import CountedWorld
 
 BATCH, FIRST = 20, 5
 """evaluations of a generation of a map made here, and random ones at first"""

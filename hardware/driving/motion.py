@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 from bns.hardware.clock import Clock
 from bns.hardware.driving.wheels import Following, Wheels
-from bns.hardware.errors import LinkError, Void
-from bns.hardware.faults import FaultLog
+from bns.hardware.faults import FaultLog, LinkError, Void
 from bns.hardware.khepera.driver import Drive, Khepera3
 from bns.hardware.safety.limits import Limits, Operator
 from bns.hardware.safety.monitor import SafetyMonitor

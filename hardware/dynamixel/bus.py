@@ -16,8 +16,7 @@ from bns.errors import BnsError, MissingDependencyError
 from bns.hardware.clock import Clock
 from bns.hardware.dynamixel import packets
 from bns.hardware.dynamixel.joints import Joint
-from bns.hardware.errors import LinkError, SafetyStop, Void
-from bns.hardware.faults import FaultLog
+from bns.hardware.faults import FaultLog, LinkError, SafetyStop, Void
 from bns.hardware.khepera.driver import Guard
 from bns.hardware.line import INSTALL, check_port, claim
 from bns.hardware.openers import Openers

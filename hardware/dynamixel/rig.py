@@ -5,16 +5,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bns.errors import BnsError
-from bns.hardware.clock import Clock, RealClock
+from bns.hardware.clock import Clock, RealClock, urgent
 from bns.hardware.dynamixel import joints, packets
 from bns.hardware.dynamixel.bus import EMPTY, Bus
 from bns.hardware.dynamixel.walker import Walker
-from bns.hardware.errors import LinkError
-from bns.hardware.faults import FaultLog
+from bns.hardware.faults import FaultLog, LinkError
 from bns.hardware.line import check_port
 from bns.hardware.rig import EMULATED, look
 from bns.hardware.safety.limits import Limits, Operator
-from bns.hardware.safety.priority import urgent
 from bns.hardware.safety.watchdog_client import WatchdogClient
 from bns.hardware.tracking.eyes import Eyes
 

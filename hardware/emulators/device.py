@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from bns.hardware.clock import VirtualClock
-from bns.hardware.errors import LinkError
+from bns.hardware.faults import LinkError
 
 
 class Reply(NamedTuple):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bns.hardware.clock import urgent
 from bns.hardware.dynamixel import joints, packets
 from bns.hardware.emulators.camera import PoseServer
 from bns.hardware.emulators.device import Noise
@@ -17,7 +18,6 @@ from bns.hardware.emulators.mishaps import Mishaps, Restarts
 from bns.hardware.emulators.pty_host import PtyHost
 from bns.hardware.emulators.servo_bank import ServoBank
 from bns.hardware.khepera import protocol
-from bns.hardware.safety.priority import urgent
 from bns.worlds.light.field import Lamp
 
 SLOW = 0.005  # m/s; slower, a wheel stands

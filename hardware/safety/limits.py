@@ -8,7 +8,7 @@ import sys
 from dataclasses import dataclass
 from types import FrameType
 
-from bns.hardware.errors import SafetyStop
+from bns.hardware.faults import SafetyStop
 from bns.hardware.tracking.tracker import Sighting
 from bns.worlds import world
 

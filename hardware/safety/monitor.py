@@ -4,8 +4,7 @@ from abc import ABC, abstractmethod
 
 from bns.errors import BnsError
 from bns.hardware.clock import Clock
-from bns.hardware.errors import SafetyStop, Void
-from bns.hardware.faults import FaultLog
+from bns.hardware.faults import FaultLog, SafetyStop, Void
 from bns.hardware.safety.limits import Limits, Operator
 from bns.hardware.tracking.eyes import Eyes
 from bns.hardware.tracking.tracker import Sighting

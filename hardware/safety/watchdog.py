@@ -26,7 +26,7 @@ import termios
 import time
 import tty
 
-from bns.hardware.safety.priority import urgent
+from bns.hardware.clock import urgent
 from bns.hardware.safety.stop_order import KINDS, StopOrder, insist, order_for
 
 BEAT = "."

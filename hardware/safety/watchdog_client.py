@@ -8,7 +8,7 @@ import sys
 import time
 
 from bns.errors import BnsError
-from bns.hardware.errors import SafetyStop, Void
+from bns.hardware.faults import SafetyStop, Void
 from bns.hardware.safety.watchdog import BEAT
 
 SILENCE = 0.14  # s without food while the robot moves, after which it is stopped

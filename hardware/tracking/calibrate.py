@@ -9,8 +9,7 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.hardware.tracking.camera import Camera
-from bns.hardware.tracking.finder import Finder
-from bns.hardware.tracking.marker import Floor, Marker, dictionary
+from bns.hardware.tracking.marker import Finder, Floor, Marker, dictionary
 from bns.hardware.tracking.opencv import cv2
 from bns.hardware.tracking.tracker import Sighting
 

@@ -7,8 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from bns.errors import BnsError
-from bns.hardware.clock import VirtualClock
-from bns.hardware.safety.priority import urgent
+from bns.hardware.clock import VirtualClock, urgent
 from bns.hardware.tracking.sources import Source
 from bns.hardware.tracking.tracker import Frame, Sighting, Tracker
 

@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bns.hardware.tracking.camera import Camera, plane_points
-from bns.hardware.tracking.finder import Finder
-from bns.hardware.tracking.marker import Marker
+from bns.hardware.tracking.marker import Finder, Marker
 
 CROOKED = 0.12  # share of its side by which a seen side may differ: else no tag
 LEANING = 0.40  # the same of a robot that may lean, by 50 deg at most

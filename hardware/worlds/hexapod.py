@@ -11,7 +11,7 @@ from bns.hardware.dynamixel import rig as rigs
 from bns.hardware.dynamixel.bus import Overload
 from bns.hardware.dynamixel.rig import HexapodRig
 from bns.hardware.dynamixel.walker import SPEED
-from bns.hardware.errors import Void
+from bns.hardware.faults import Void
 from bns.hardware.safety.limits import Limits
 from bns.hardware.worlds import walked
 from bns.hardware.worlds.real_robot import RealRobot

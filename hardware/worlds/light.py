@@ -10,8 +10,7 @@ from bns import seeding
 from bns.errors import BnsError
 from bns.hardware.driving import homing
 from bns.hardware.driving.motion import Mover
-from bns.hardware.driving.schedule import GRID
-from bns.hardware.driving.steering import Rules, Steered, Steering
+from bns.hardware.driving.steering import GRID, Rules, Steered, Steering
 from bns.hardware.rig import Rig, battery
 from bns.hardware.safety.limits import Limits
 from bns.hardware.worlds import records

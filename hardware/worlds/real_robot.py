@@ -8,8 +8,7 @@ from typing import ClassVar, Generic, Protocol, TypeVar
 from bns import models
 from bns.errors import BnsError
 from bns.hardware.clock import Clock
-from bns.hardware.errors import SafetyStop, Void
-from bns.hardware.faults import FaultLog
+from bns.hardware.faults import FaultLog, SafetyStop, Void
 from bns.hardware.rig import EMULATED
 from bns.hardware.safety.limits import Operator
 from bns.worlds import active

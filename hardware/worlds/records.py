@@ -5,7 +5,7 @@ from scipy.interpolate import Akima1DInterpolator
 
 from bns.errors import BnsError
 from bns.hardware.driving.motion import Performed
-from bns.hardware.errors import Void
+from bns.hardware.faults import Void
 from bns.hardware.tracking.calibrate import askew
 from bns.hardware.tracking.camera import Camera
 from bns.hardware.tracking.tracker import Sighting

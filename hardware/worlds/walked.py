@@ -4,7 +4,7 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.hardware.dynamixel.walker import Walked
-from bns.hardware.errors import Void
+from bns.hardware.faults import Void
 from bns.hardware.worlds.records import GAP, interpolated
 from bns.worlds.trial import Channel, Commands, Outcome, Trial
 

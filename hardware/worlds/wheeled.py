@@ -4,7 +4,7 @@ from dataclasses import KW_ONLY, dataclass
 from typing import ClassVar
 
 from bns.errors import BnsError
-from bns.hardware.driving import homing, schedule
+from bns.hardware.driving import homing, steering
 from bns.hardware.driving.motion import Performed
 from bns.hardware.rig import Rig, battery, connect
 from bns.hardware.safety.limits import Limits
@@ -71,7 +71,7 @@ class HardwareWorld(RealRobot[Rig]):
         mover = rig.mover()
         volts = battery(rig.robot, rig.limits)
         stand = homing.go(mover, self.start)
-        points = schedule.points(given, stages, seed, trial)
+        points = steering.points(given, stages, seed, trial)
         begin = rig.clock.now()
         done = mover.perform(points, given.duration)
         conditions = stages.conditions(trial, seed) | self._about(

@@ -12,7 +12,7 @@ from bns.hardware.clock import RealClock
 from bns.hardware.dynamixel import joints, packets
 from bns.hardware.emulators.pty_host import PtyHost
 from bns.hardware.emulators.servo_bank import ServoBank
-from bns.hardware.errors import LinkError, SafetyStop, Void
+from bns.hardware.faults import LinkError, SafetyStop, Void
 
 pytest.importorskip("dynamixel_sdk")
 pytest.importorskip("serial")

@@ -12,7 +12,7 @@ pytest.importorskip("cv2")
 
 from bns.hardware.driving import homing
 from bns.hardware.emulators import virtual
-from bns.hardware.errors import SafetyStop
+from bns.hardware.faults import SafetyStop
 from bns.hardware.worlds.light import HardwareLight
 from bns.worlds.light import sensors as light_sensors
 from bns.worlds.light.field import Lamp

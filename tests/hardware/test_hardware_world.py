@@ -10,7 +10,7 @@ from bns.worlds.world import clear, ring
 pytest.importorskip("cv2")
 
 from bns.hardware.emulators import virtual
-from bns.hardware.errors import SafetyStop
+from bns.hardware.faults import SafetyStop
 from bns.hardware.worlds.wheeled import HardwareWorld
 
 AHEAD = Commands([[0.1, 0.1], [0.06, -0.06]], [1.0, 0.8])

@@ -14,7 +14,7 @@ from bns.hardware.emulators.hexapod_body import HexapodBody
 from bns.hardware.emulators.pty_host import PtyHost
 from bns.hardware.emulators.run import phantomx
 from bns.hardware.emulators.servo_bank import ServoBank
-from bns.hardware.errors import Void
+from bns.hardware.faults import Void
 from bns.hardware.tracking.tracker import Sighting
 from bns.hardware.worlds import hexapod, walked
 from bns.hardware.worlds.hexapod import HardwareHexapod

@@ -11,7 +11,7 @@ from bns.worlds.trial import Commands
 pytest.importorskip("cv2")
 
 from bns.hardware.emulators import virtual
-from bns.hardware.errors import SafetyStop, Void
+from bns.hardware.faults import SafetyStop, Void
 from bns.hardware.worlds.wheeled import HardwareWorld
 
 BOTH = np.ones(2)

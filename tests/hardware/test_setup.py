@@ -9,12 +9,12 @@ import pytest
 
 from bns.__main__ import WRONG_INPUT, main
 from bns.errors import BnsError, FormatError
-from bns.hardware import setup_file
+from bns.hardware import setup
 from bns.worlds.data import dataset
 
 pytest.importorskip("serial")
 
-from bns.hardware import ports
+from bns.hardware import line
 from bns.hardware.emulators.khepera_body import KheperaBody
 from bns.hardware.emulators.khepera_device import KheperaDevice
 from bns.hardware.emulators.pty_host import PtyHost
@@ -24,7 +24,7 @@ from bns.hardware.emulators.pty_host import PtyHost
 def asked(tmp_path, monkeypatch):
     """Answers the questions of a command in an empty directory, a line each."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(ports, "ports", lambda: {"/dev/rfcomm0": "Bluetooth"})
+    monkeypatch.setattr(line, "ports", lambda: {"/dev/rfcomm0": "Bluetooth"})
 
     def ask(words, *answers):
         monkeypatch.setattr(
@@ -39,7 +39,7 @@ def test_the_wizard_writes_what_was_answered_and_what_it_means(asked, capsys, tm
     (tmp_path / "camera.json").write_text("{}")
     assert asked(["setup"], "", "/dev/ttyUSB0", "1", "", "") == 0
     text = (tmp_path / "hardware.toml").read_text()
-    found = setup_file.read(tmp_path / "hardware.toml")
+    found = setup.read(tmp_path / "hardware.toml")
     assert (found.robot, found.port, found.camera) == ("khepera3", "/dev/ttyUSB0", "1")
     assert found.calibration == str(tmp_path / "camera.json") and not found.wheels
     shown = capsys.readouterr().out
@@ -57,7 +57,7 @@ def test_it_takes_what_it_found_and_asks_again_where_an_answer_cannot_be(
     assert "'spot' is none: khepera3 or phantomx" in shown
     assert "give a number, a video file that is there, or emulated" in shown
     assert "There is no file x" in shown
-    found = setup_file.read(tmp_path / "hardware.toml")
+    found = setup.read(tmp_path / "hardware.toml")
     assert (found.robot, found.port, found.camera) == (
         "phantomx",
         "/dev/rfcomm0",
@@ -67,7 +67,7 @@ def test_it_takes_what_it_found_and_asks_again_where_an_answer_cannot_be(
     assert "--force" in capsys.readouterr().err
     assert asked(["setup", "--force"], "khepera3") == WRONG_INPUT
     assert "The answers ended at 'Its port?'" in capsys.readouterr().err
-    assert setup_file.read(tmp_path / "hardware.toml") == found
+    assert setup.read(tmp_path / "hardware.toml") == found
 
 
 def test_verbs_take_a_set_up_and_what_they_are_told_goes_before(
@@ -99,7 +99,7 @@ def test_verbs_take_a_set_up_and_what_they_are_told_goes_before(
 def test_a_set_up_that_is_wrong_is_told(tmp_path, text, said):
     (tmp_path / "a.toml").write_text(text)
     with pytest.raises((BnsError, FormatError), match=said):
-        setup_file.read(tmp_path / "a.toml")
+        setup.read(tmp_path / "a.toml")
 
 
 def test_the_port_of_the_robot_is_the_one_that_went(asked, capsys, monkeypatch):
@@ -107,7 +107,7 @@ def test_the_port_of_the_robot_is_the_one_that_went(asked, capsys, monkeypatch):
     assert "/dev/rfcomm0  Bluetooth" in capsys.readouterr().out
     both = {"/dev/ttyUSB0": "adapter", "/dev/ttyS0": "n/a"}
     left = iter([both, {"/dev/ttyS0": "n/a"}, both, both, {}])
-    monkeypatch.setattr(ports, "ports", lambda: next(left))
+    monkeypatch.setattr(line, "ports", lambda: next(left))
     assert asked(["find-port"], "") == 0
     assert "/dev/ttyUSB0 is the robot's" in capsys.readouterr().out
     assert asked(["find-port"], "") == WRONG_INPUT
@@ -124,12 +124,12 @@ def test_a_port_is_asked_who_it_is(tmp_path):
     thread = threading.Thread(target=host.serve, args=(over.is_set, lambda at: None))
     thread.start()
     try:
-        assert ports.answers(str(port)) == "khepera3, firmware 2.5"
+        assert line.answers(str(port)) == "khepera3, firmware 2.5"
     finally:
         over.set()
         thread.join()
         host.unplug()
-    assert ports.answers(str(tmp_path / "none")).startswith("There is no port")
+    assert line.answers(str(tmp_path / "none")).startswith("There is no port")
 
 
 def test_a_rehearsal_ends_with_a_diagnosis(tmp_path, monkeypatch, capsys):

@@ -11,7 +11,7 @@ from bns.hardware.emulators.khepera_body import KheperaBody
 from bns.hardware.emulators.khepera_device import KheperaDevice
 from bns.hardware.emulators.pty_host import PtyHost
 from bns.hardware.emulators.servo_bank import ServoBank
-from bns.hardware.errors import SafetyStop, Void
+from bns.hardware.faults import SafetyStop, Void
 from bns.hardware.safety.watchdog_client import WatchdogClient
 
 SLOW = 20.0  # s; a busy machine

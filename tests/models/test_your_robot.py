@@ -7,7 +7,7 @@ import pytest
 
 from bns import models
 from bns.errors import BnsError, FormatError, UnknownNameError
-from bns.models import check, places
+from bns.models import check, robot_model
 from bns.worlds import registry
 from bns.worlds.trial import Commands
 from tests.sources import ROOT
@@ -153,10 +153,10 @@ def test_packages_register_theirs(monkeypatch):
         def load(self):
             return type("package", (), {"__path__": [str(BURGER)]})
 
-    places.installed.cache_clear()
-    monkeypatch.setattr(places, "entry_points", lambda group: [Entry()])
+    robot_model.installed.cache_clear()
+    monkeypatch.setattr(robot_model, "entry_points", lambda group: [Entry()])
     try:
         assert "burger" in models.names()
-        assert places.find("burger") == BURGER
+        assert robot_model.find("burger") == BURGER
     finally:
-        places.installed.cache_clear()
+        robot_model.installed.cache_clear()

@@ -39,7 +39,6 @@ MAY_IMPORT = {
 PROTOCOL = {
     "bns.worlds",
     "bns.worlds.world",
-    "bns.worlds.counted",
     "bns.worlds.trial",
     "bns.worlds.damage",
     "bns.worlds.data.dataset",

@@ -5,9 +5,8 @@ import pytest
 
 from bns.errors import BnsError
 from bns.worlds import registry
-from bns.worlds.counted import BudgetSpentError, CountedWorld
 from bns.worlds.trial import Commands
-from bns.worlds.world import World
+from bns.worlds.world import BudgetSpentError, CountedWorld, World
 
 COMMANDS = [Commands([[0.1, 0.05]], [0.5]), Commands([[0.05, 0.1]], [0.5])]
 

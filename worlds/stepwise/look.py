@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bns import models
-from bns.models.arena import lamps
+from bns.models import arena
 from bns.worlds import objects
 from bns.worlds.light.world import LightWorld
 
@@ -77,6 +77,6 @@ def spec(world: LightWorld) -> Any:
     """
     made = models.scene_spec(world.robot)
     places = [tuple(place) for place in world.field.positions.tolist()]
-    lamps.add(made, places, safety=world.supervisor.safety)
+    arena.add(made, places, safety=world.supervisor.safety)
     objects.stand(made, world.posts)
     return made

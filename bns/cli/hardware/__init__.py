@@ -186,7 +186,7 @@ def main(verb: str, argv: list[str]) -> int:
     from bns.cli.hardware import setup as hardware_setup
 
     def connected(act: Callable[[Any], int]) -> Callable[[Any], int]:
-        from bns.hardware.setup_file import filled
+        from bns.hardware.setup import filled
 
         return lambda given: act(filled(given))
 
@@ -208,7 +208,7 @@ def _emulate(given: Emulate) -> int:
             raise BnsError(f"--{name} = {getattr(given, name)}: give 0 to 0.5.")
     lights = _lamps(given)
     print(f"{given.robot} on {given.port}; Ctrl-C ends it.", flush=True)
-    from bns.hardware.safety.priority import urgent
+    from bns.hardware.clock import urgent
 
     urgent()
     x, y, yaw = given.start

@@ -17,9 +17,9 @@ def execute(given: Any) -> int:
     Args:
         given: what `bns run` was told; one replicate is run, whatever the preset says.
     """
+    from bns.hardware.clock import urgent
     from bns.hardware.line import check_port
-    from bns.hardware.safety.priority import urgent
-    from bns.hardware.setup_file import filled
+    from bns.hardware.setup import filled
     from bns.storage.lock import Lock
 
     given = filled(given, given.config.world.robot)
@@ -33,7 +33,7 @@ def _locked(given: Any, lock: Any) -> int:
     """Train into a directory in which nobody else writes."""
     from bns.cli import outputs
     from bns.experiment.run import train
-    from bns.hardware.errors import LinkError, SafetyStop
+    from bns.hardware.faults import LinkError, SafetyStop
     from bns.tasks import registry as tasks
 
     config = replace(given.config, replicates=1, record_replicates=1, threads=1)

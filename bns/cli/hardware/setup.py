@@ -49,7 +49,7 @@ def setup(given: Any) -> int:
     Raises:
         BnsError: the file exists, or the answers ended early.
     """
-    from bns.hardware import setup_file
+    from bns.hardware import setup
 
     out = Path(given.out)
     if out.exists() and not given.force:
@@ -61,8 +61,8 @@ def setup(given: Any) -> int:
         if question.needed(found):
             found[question.key] = _answer(question, question.usual(found))
             said[question.key] = question.why
-    made = setup_file.Setup(**found)  # type: ignore[arg-type]
-    setup_file.write(out, made, said)
+    made = setup.Setup(**found)  # type: ignore[arg-type]
+    setup.write(out, made, said)
     print(f"\n{out} is written. Next:")
     if found.get("calibration") == "" and found["camera"] != "emulated":
         print(
@@ -157,9 +157,9 @@ def _measured(robot: str, key: str, what: str) -> Question:
 
 
 def _ports() -> dict[str, str]:
-    from bns.hardware import ports
+    from bns.hardware import line
 
-    return ports.ports()
+    return line.ports()
 
 
 def _no_camera(answer: str) -> str:
@@ -182,11 +182,11 @@ def find_port(given: Any) -> int:
     Raises:
         BnsError: there is no port, or the robot's did not go.
     """
-    from bns.hardware import ports
+    from bns.hardware import line
 
-    before = ports.ports()
+    before = line.ports()
     for device, about in before.items():
-        answer = f"; answers: {ports.answers(device)}" if given.ask else ""
+        answer = f"; answers: {line.answers(device)}" if given.ask else ""
         print(f"{device}  {about}{answer}")
     if not before:
         raise BnsError(
@@ -200,7 +200,7 @@ def find_port(given: Any) -> int:
     except EOFError:
         print("\n--ask asks each of them who it is.")
         return 0
-    left = ports.ports()
+    left = line.ports()
     gone = [device for device in before if device not in left]
     if len(gone) != 1:
         raise BnsError(

@@ -26,8 +26,8 @@ from bns.learners.bns.problem import Problem, should_compile
 from bns.learners.bns.trial_selection import choose
 from bns.tasks import registry as tasks
 from bns.tasks.base import Task
-from bns.worlds.counted import CountedWorld
 from bns.worlds.trial import Trial
+from bns.worlds.world import CountedWorld
 
 CHUNK = 5
 """generations between two looks whether a trial is over, in the background"""

@@ -13,7 +13,7 @@ from bns.experiment.world_factory import make_world
 from bns.learners import registry
 from bns.learners.safe_ite import improvement
 from bns.prior import maker
-from bns.worlds.counted import CountedWorld
+from bns.worlds.world import CountedWorld
 from tests.bns.walkers import Slider
 
 WALK = replace(presets.load("hexapod-walk"), threads=1, replicates=2, trials=30)

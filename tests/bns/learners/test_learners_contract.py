@@ -17,8 +17,7 @@ from bns.learners.bns.config import AdaptationConfig
 from bns.storage import store
 from bns.tasks import registry as tasks
 from bns.worlds import registry as worlds
-from bns.worlds.counted import CountedWorld
-from bns.worlds.world import World
+from bns.worlds.world import CountedWorld, World
 from tests.bns.light_fakes import FakeLightWorld
 from tests.bns.walkers import Slider
 
