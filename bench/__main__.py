@@ -4,8 +4,17 @@ import argparse
 import json
 import sys
 
-from bench.runner import RESULTS, discover, find, measure, store, stored, write
-from bench.table import page, table
+from bench.runner import (
+    RESULTS,
+    discover,
+    find,
+    measure,
+    page,
+    store,
+    stored,
+    table,
+    write,
+)
 from bns.errors import BnsError
 
 

@@ -1,4 +1,13 @@
-"""A robot's set-up: in a file, and a camera calibrated with what lies on the board."""
+"""A robot's set-up in a file, and calibrating a camera with what lies on the board.
+
+    robot = "khepera3"
+    port = "/dev/rfcomm0"
+    camera = "0"
+    calibration = "camera.json"
+
+`bns hardware setup` writes it; the verbs of `bns hardware`, and `bns run --world
+hardware`, take it as `--setup FILE`. What they are told beside it goes before.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What a robot model is to the rest of the project (`RobotModel`), and where robots lie."""
+"""A robot model to the rest of the project (`RobotModel`), and where robots lie."""
 
 import os
 import tomllib

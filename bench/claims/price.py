@@ -1,4 +1,6 @@
-"""Processor time of a trial of a run in the claims, by learner: the rates of the plan.
+"""What claims cost: all of them planned, and the rates of the plan measured.
+
+The rates are processor times of a trial of a run in the claims, by learner.
 
 A batch of ten on one thread, as `bns claims run` makes them. Trials before evolution
 starts give what world and training take, those after it what evolution takes, and a
@@ -7,13 +9,44 @@ where the claims use it; the time to compile is left out.
 """
 
 import time
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 
 from bench.result import Result, bench
-from bns.claims import price, sides
+from bns.claims import price, runner, sides
+from bns.claims.claim import INVESTIGATIONS, claims
 from bns.experiment.config import RunConfig
+
+MOST = 80
+
+
+@bench(
+    "processor hours planned for all claims in MuJoCo, trials shared, "
+    "looks as expected",
+    bar="<= 80 h",
+)
+def claims_plan(quick: bool) -> Result:
+    """The plan of `bns claims plan`, in both worlds; the rates are `claims-price`'s."""
+    del quick
+    every = list(claims().values())
+    details: dict[str, object] = {}
+    for world in ("mujoco", "static-snn"):
+        for letter in INVESTIGATIONS:
+            part = [claim for claim in every if claim.investigation == letter]
+            details[f"{letter} in {world}"] = asdict(price.planned(part, world=world))
+        details[f"without such a world: {world}"] = list(
+            runner.impossible(every, world=world)
+        )
+    whole = price.planned(every, world="mujoco")
+    return Result(
+        figure=whole.hours,
+        unit="h",
+        holds=whole.hours <= MOST,
+        n=whole.runs,
+        details=details,
+    )
+
 
 RUNS = 10
 CASES = {

@@ -1,13 +1,31 @@
-"""Robots on the move, for the bench that stops them: what drives, what the log says."""
+"""Robots on the move, for the bench that stops them: what drives, what the log says.
+
+What drives a robot until something stops it is a process of its own:
+
+    python -m bench.hardware.drives ROBOT PORT
+
+It says `watchdog NUMBER` once it has one; a line on its standard input makes its
+learner fail.
+"""
 
 import json
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
+
+from bns.hardware.clock import urgent
+from bns.hardware.dynamixel.walker import Walked
+from bns.hardware.safety.monitor import SafetyMonitor
+from bns.hardware.worlds.hexapod import HardwareHexapod
+from bns.hardware.worlds.wheeled import HardwareWorld
+from bns.worlds.trial import Channel, Commands
+from bns.worlds.world import ring
 
 DRIVEN = [5760, 14401]  # speed units of 0.04 and 0.10 m/s, firmware 2
 
@@ -57,7 +75,7 @@ class Driver:
 
     def __init__(self, robot: str, port: Path, env: dict[str, str]) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "bench.hardware.driven", robot, str(port)],
+            [sys.executable, "-m", "bench.hardware.drives", robot, str(port)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -124,3 +142,68 @@ DRIVES = (
     Drive("khepera3", 0.2, _rolling, _rolled),
     Drive("phantomx", 1.2, _walking, _walked),
 )
+
+
+SPEEDS, LASTS = (0.04, 0.10), 25.0  # m/s of the left and right wheel; s
+NEAR = 0.4  # m from the middle at which a drive may begin where the robot is
+
+
+def khepera3(port: str) -> None:
+    """Drive a curve."""
+    world = HardwareWorld(port=port)
+    try:
+        rig = world.connected()
+        _ready(world, rig.watchdog.pid, rig.mover())
+        world.run([Commands([list(SPEEDS)], [LASTS])])
+    finally:
+        world.close()
+
+
+def phantomx(port: str) -> None:
+    """Tread on the spot; says `moving` when that begins."""
+    world = HardwareHexapod(port=port)
+    try:
+        rig = world.connected()
+        _ready(world, rig.watchdog.pid, rig.walker)
+        rig.walker.perform = _told(rig.walker.perform)
+        names = tuple(Channel(*channel) for channel in world.model.channels)
+        world.run([Commands(treading(), np.full(40, 2.0), names)])
+    finally:
+        world.close()
+
+
+def treading() -> np.ndarray:
+    """Goals that raise all thighs and lower them, ``(40, 18)`` [rad]."""
+    goals = np.zeros((40, 18))
+    goals[::2, 1::3] = 0.3
+    return goals
+
+
+def _told(perform: Callable[..., Walked]) -> Callable[..., Walked]:
+    def performed(goals: np.ndarray, limits: Sequence[float]) -> Walked:
+        print("moving", flush=True)
+        return perform(goals, limits)
+
+    return performed
+
+
+def _ready(
+    world: HardwareWorld | HardwareHexapod, watchdog: int, looks: SafetyMonitor
+) -> None:
+    """Begin where the robot is, if it is near the middle."""
+    x, y, yaw = looks.wait_for_sight().pose
+    world.start = (x, y, yaw) if max(abs(x), abs(y)) < NEAR else (0.0, 0.0, yaw)
+    print("watchdog", watchdog, flush=True)
+
+
+def _fail() -> None:
+    sys.stdin.readline()
+    ring("the learner failed")
+
+
+DRIVERS = {"khepera3": khepera3, "phantomx": phantomx}
+
+if __name__ == "__main__":
+    urgent()
+    threading.Thread(target=_fail, daemon=True).start()
+    DRIVERS[sys.argv[1]](sys.argv[2])

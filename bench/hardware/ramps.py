@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from bench.hardware.driven import SPEEDS
+from bench.hardware.drives import SPEEDS
 from bns.hardware.emulators.hexapod_body import HexapodBody
 from bns.hardware.emulators.khepera_body import KheperaBody
 from bns.hardware.emulators.live_body import LiveBody

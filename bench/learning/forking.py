@@ -64,7 +64,7 @@ def records(
     """Records by configuration name, training what is missing; all with a damage.
 
     Args:
-        configs: made by `bench.learning.light_runs.damaged`.
+        configs: made by `bench.learning.light.damaged`.
         quick: few replicates and trials, for a look that takes seconds.
     """
     wanted = [experiments.shortened(c) if quick else c for c in configs]

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.learning import experiments, light_runs
+from bench.learning import experiments, light
 from bench.result import Result, bench
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
@@ -36,10 +36,10 @@ def deployed_light(quick: bool) -> Result:
     """`khepera-light-recover`, `RUNS` of each damage from trial 20 of 70."""
     wanted = {
         damage: _named(
-            replace(light_runs.recovering(damage), trials=light_runs.ONSET + 50),
+            replace(light.recovering(damage), trials=light.ONSET + 50),
             f"light-{damage}",
         )
-        for damage in light_runs.DAMAGES
+        for damage in light.DAMAGES
     }
     return _result(wanted, quick=quick)
 

@@ -97,7 +97,7 @@ Act = Callable[[Path], object]
 def _acts(home: Path) -> dict[str, Act]:
     """What is done in a directory, by kind; the same again goes on."""
     from bns.campaign import drive
-    from bns.campaign.engines.inline import InlineEngine
+    from bns.campaign.engines.registry import InlineEngine
     from bns.experiment.run import train
 
     campaign = tiny(2, trials=2)

@@ -1,17 +1,23 @@
-"""Files made wrong, all kinds, read: one line each, or content that makes sense."""
+"""Damaged files: fuzzed and with flipped bits."""
 
 import json
+import logging
 import multiprocessing
 import resource
 import tempfile
 import time
+from collections import Counter
 from pathlib import Path
+
+import numpy as np
 
 from bench.result import Result, bench
 from bench.runner import RESULTS
-from bench.storage.readers import readers
+from bench.storage.readers import fingerprint, readers
 from bench.storage.reading import Found, attempt, quiet
 from bench.storage.sample_files import make
+from bns import seeding
+from bns.errors import BnsError
 
 INPUTS, QUICK = 1_000_000, 4000
 BLOCK = 50  # seeds of every reader in a process of its own, which may die
@@ -130,3 +136,51 @@ def _result(rows: list[dict], quick: bool) -> Result:
             "cases": [case for row in rows for case in row["cases"]][:20],
         },
     )
+
+
+FLIPS = 400
+
+
+@bench(
+    "single bits flipped in every kind of stored file: accepted with other content",
+    bar="0 of 400 a kind",
+)
+def bit_flips(quick: bool) -> Result:
+    """Flip, read, compare every number and word with what was read before."""
+    count = 20 if quick else FLIPS
+    logging.getLogger("bns").setLevel(logging.ERROR)
+    with tempfile.TemporaryDirectory() as name:
+        home = Path(name)
+        make(home)
+        stored = [reader for reader in readers() if reader.stored]
+        kinds = {reader.name: _flipped(reader, home, count) for reader in stored}
+    wrong = sum(kind["other content"] + kind["tracebacks"] for kind in kinds.values())
+    return Result(
+        figure=wrong,
+        unit="flips",
+        holds=wrong == 0,
+        n=count * len(kinds),
+        details={"flips a kind": count, "kinds": kinds},
+    )
+
+
+def _flipped(reader, home: Path, count: int) -> dict[str, int]:
+    """What comes of flips of one file."""
+    path, found = home / reader.file, Counter()
+    data, before = path.read_bytes(), fingerprint(reader.read(home))
+    rng = seeding.generator(0, "bench", "bit-flips", reader.name)
+    bits = rng.choice(8 * len(data), count, replace=8 * len(data) < count)
+    for bit in np.asarray(bits):
+        made = bytearray(data)
+        made[bit // 8] ^= 1 << (bit % 8)
+        path.write_bytes(made)
+        try:
+            same = fingerprint(reader.read(home)) == before
+            found["same content" if same else "other content"] += 1
+        except BnsError as error:
+            found["refused" if "\n" not in str(error) else "tracebacks"] += 1
+        except Exception:  # any other is a fault
+            found["tracebacks"] += 1
+    path.write_bytes(data)
+    names = ("refused", "same content", "other content", "tracebacks")
+    return {name: found[name] for name in names}

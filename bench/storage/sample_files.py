@@ -16,7 +16,7 @@ from bench.versions import ROOT
 def make(home: Path) -> None:
     """Write all the files."""
     from bns.campaign import drive
-    from bns.campaign.engines.inline import InlineEngine
+    from bns.campaign.engines.registry import InlineEngine
     from bns.campaign.file import Campaign
     from bns.experiment.run import train
 

@@ -1,13 +1,63 @@
-"""How soon a hexapod learns an adequate gait, undamaged."""
+"""Gaits: what the robot stands on, and tripods."""
+
+from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 
 from bench.learning import solving
 from bench.result import Result, bench
 from bench.walking import ceiling, runs
-from bench.walking import loads as hexapod_loads
 from bench.walking.runs import spread
 from bns.experiment.record import RunRecord
+
+PARTS = ("foot", "tibia", "femur", "belly")
+EVERY = 4  # steps of the physics
+
+
+def shares(lists: Sequence[np.ndarray]) -> np.ndarray:
+    """Share of the floor's push on each of `PARTS` over whole trials, ``(N, 4)``.
+
+    Args:
+        lists: goals, each ``(K, 18)`` [rad], walked undamaged.
+    """
+    from bench.walking import runs
+
+    world, commands = runs.standing_by(lists)
+    return np.array([_shares(world, plan) for plan in world.plan(commands)])
+
+
+def _shares(world, plan) -> np.ndarray:
+    import mujoco
+
+    (done,) = world.motions([plan])
+    model = plan.job.pieces[0].compiled.model
+    data, total = mujoco.MjData(model), np.zeros(len(PARTS))
+    whole = mujoco.mjtState.mjSTATE_FULLPHYSICS
+    for state, control in zip(
+        done.states[::EVERY], done.control[::EVERY], strict=False
+    ):
+        mujoco.mj_setState(model, data, state, whole)
+        data.ctrl[:] = control
+        mujoco.mj_forward(model, data)
+        total += _pushes(model, data)
+    return total / total.sum()
+
+
+def _pushes(model, data) -> np.ndarray:
+    """Normal force of the floor on each of `PARTS` [N]."""
+    import mujoco
+
+    found, force = np.zeros(len(PARTS)), np.zeros(6)
+    for number, contact in enumerate(data.contact):
+        bodies = model.geom_bodyid[contact.geom]
+        if bodies.min() > 0:
+            continue
+        mujoco.mj_contactForce(model, data, number, force)
+        name = model.geom(int(contact.geom[bodies.argmax()])).name
+        found[[part in name for part in PARTS].index(True)] += force[0]
+    return found
+
 
 LIMIT, STRETCH = 100, 40
 LATE = 10  # trials at the end of a run that say how far it has come
@@ -51,7 +101,7 @@ def at_the_end(record: RunRecord) -> dict[str, object]:
     far = np.median(ways[:, late], axis=1)
     share = ceiling.share(far, "none")
     speed = (ways / record["seconds"])[:, late].mean(1)
-    loads = hexapod_loads.shares([run[-1] for run in record.sent]).mean(0)
+    loads = shares([run[-1] for run in record.sent]).mean(0)
     return {
         "trials": record.trials,
         "farthest of a run [m]": spread(ways.max(1)),
@@ -66,3 +116,67 @@ def at_the_end(record: RunRecord) -> dict[str, object]:
             round(float(load), 3) for load in loads
         ],
     }
+
+
+COMMANDS = 11
+LONGEST = 1.5  # [s] of a command
+STRIDES, LIFTS = (0.14, 0.16, 0.18), (0.045, 0.06)
+REACHES, HEIGHTS = (0.12, 0.13, 0.14, 0.15), (0.12, 0.13, 0.14)
+
+
+@bench(
+    "distance of the tripod gait made by hand, eleven commands of the hexapod",
+    bar="the farthest of a grid of such gaits",
+)
+def hexapod_tripod(quick: bool) -> Result:
+    """`gait.BEST` against every gait of the grid that legs can reach.
+
+    The figure is the distance of `gait.BEST` [m]; the bar holds where none of the grid
+    goes more than 2 % farther without a fall or a collision of its own parts.
+    """
+    from bns.models.phantomx import gait
+
+    grid = [gait.Tripod(*item) for item in product(STRIDES, LIFTS, REACHES, HEIGHTS)]
+    gaits = [gait.BEST, *(grid[::30] if quick else grid)]
+    trials = _walked(gaits)
+    far = {
+        item: float(np.hypot(*trial.poses_world[-1, :2]))
+        for item, trial in trials.items()
+        if not (trial.outcome.fell or trial.outcome.collided)
+    }
+    best, own = max(far, key=far.__getitem__), trials[gait.BEST]
+    details = {
+        "gait": dict(gait.BEST._asdict()),
+        "end x, y [m], yaw [rad]": [round(float(v), 4) for v in own.poses_world[-1]],
+        "seconds": round(float(own.times[-1]), 3),
+        "metres per second": round(far[gait.BEST] / float(own.times[-1]), 4),
+        "farthest": {**best._asdict(), "distance": round(far[best], 4)},
+        "median of the grid": round(float(np.median(list(far.values()))), 4),
+    }
+    return Result(
+        figure=round(far[gait.BEST], 4),
+        unit="m",
+        holds=far[best] <= 1.02 * far[gait.BEST],
+        n=len(trials),
+        details=details,
+    )
+
+
+def _walked(gaits: list) -> dict:
+    """A trial of each gait that the legs can do."""
+    from bns.errors import BnsError
+    from bns.models.phantomx.gait import tripod
+    from bns.worlds import registry
+    from bns.worlds.trial import Channel, Commands
+
+    world = registry.make("hexapod")
+    channels = tuple(Channel(*item) for item in world.model.channels)
+    done, lists = [], []
+    for item in dict.fromkeys(gaits):
+        try:
+            goals = tripod(item, commands=COMMANDS)
+        except BnsError:
+            continue
+        done.append(item)
+        lists.append(Commands(goals, np.full(COMMANDS, LONGEST), channels))
+    return dict(zip(done, world.run(lists), strict=True))

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bns.campaign import drive
-from bns.campaign.adopt import adopt
+from bns.campaign.drive import Progress
 from bns.campaign.engines.base import Engine
 from bns.campaign.file import Campaign, Member
+from bns.campaign.merge import adopt
 from bns.campaign.plan import Job
-from bns.campaign.progress import Progress
 from bns.campaign.store import CampaignStore
 from bns.claims import held, price, report, schedule, sides
 from bns.claims.claim import Claim

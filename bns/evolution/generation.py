@@ -2,6 +2,11 @@
 
 A generation is a pure function of the population, its costs and uniform numbers drawn
 beforehand (`Coins`), so that it can be compiled as a whole and tested number by number.
+
+Diversity (thesis eqs 4.1, 5.1, 7.3): genes are taken as shares of their range, so that
+speeds and durations count alike. The dissertation leaves variable lengths undefined;
+here the average individual has at each place the mean over those individuals that have
+that place, and only genes that exist are summed.
 """
 
 from dataclasses import dataclass
@@ -11,7 +16,7 @@ import torch
 from torch import Tensor
 
 from bns.draws import Draws
-from bns.evolution import crossover, mutation, selection
+from bns.evolution import selection, variation
 from bns.evolution.chromosome import Population
 from bns.learners.bns.config import EvolutionConfig
 
@@ -105,7 +110,7 @@ class Breeder:
         pool = 0
         if config.headless_chicken > 0:
             pool = max(1, int(2 * config.headless_chicken * count))
-        needed = crossover.coins_needed(
+        needed = variation.coins_needed(
             config.crossover, config.crossover_points, genes
         )
         return Coins(
@@ -135,7 +140,7 @@ class Breeder:
         parents = self.parents(cost, coins.parents)
         mothers, fathers = parents.chunk(2, dim=1)
         first, second = take(population, mothers), take(population, fathers)
-        children = crossover.cross(
+        children = variation.cross(
             config.crossover,
             first,
             self._headless_chicken(second, coins, rates.chicken),
@@ -167,7 +172,7 @@ class Breeder:
         )
 
     def _mutate(self, children: Population, rates: Rates, coins: Coins) -> Population:
-        genes = mutation.mutate(
+        genes = variation.mutate(
             self.config.mutation,
             children.genes,
             coins.mutation,
@@ -202,3 +207,23 @@ def take(population: Population, index: Tensor) -> Population:
 def whole_index(index: Tensor, shape: torch.Size) -> Tensor:
     """An index ``(R, N)`` expanded to gather genes of `shape` (R, P, K, 3)."""
     return index[:, :, None, None].expand(-1, -1, shape[2], shape[3])
+
+
+def deviations(population: Population, encoding: Genes) -> Tensor:
+    """|c_ij - mean_j| for genes that exist, 0 elsewhere, ``(R, P, K, 3)``."""
+    valid = population.valid.unsqueeze(-1)
+    scaled = (population.genes - encoding.low) / (encoding.high - encoding.low)
+    scaled = torch.where(valid, scaled, 0.0)
+    mean = scaled.sum(1, keepdim=True) / valid.sum(1, keepdim=True).clamp(min=1)
+    return torch.where(valid, (scaled - mean).abs(), 0.0)
+
+
+def measures(population: Population, encoding: Genes) -> dict[str, Tensor]:
+    """All three measures, each ``(R,)``: sum, sum of squares, log of the sum."""
+    apart = deviations(population, encoding)
+    total = apart.sum((1, 2, 3))
+    return {
+        "diversity_41": total,
+        "diversity_51": apart.square().sum((1, 2, 3)),
+        "diversity_73": total.clamp(min=1e-12).log(),
+    }

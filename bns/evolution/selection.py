@@ -1,7 +1,12 @@
-"""Selection of individuals by cost (thesis 2.3.6), batched over runs.
+"""Selection of individuals by cost (thesis 2.3.6), and survivors of a grid, batched.
 
 Each operator takes ``cost`` of shape ``(R, P)`` and uniform numbers `coins`, one row of
 them per individual to select, and returns indices ``(R, N)``.
+
+Survivors of a grid are the best of each cell of behaviours (Mouret and Clune 2015),
+MAP-Elites with as many places as the population has: of parents and children together
+the best of each cell lives on, the cheapest cells first where there are too many, and
+places that are left go to the best of the rest.
 """
 
 import torch
@@ -81,3 +86,39 @@ def select(kind: str, cost: Tensor, coins: Tensor) -> Tensor:
         "tournament": tournament,
     }
     return operators[kind](cost, coins)
+
+
+def cells(behaviours: Tensor, bins: int) -> Tensor:
+    """Number of the cell of each behaviour.
+
+    Args:
+        behaviours: each from 0 to 1, ``(R, P, B)``.
+        bins: along each of them.
+
+    Returns:
+        ``(R, P)``.
+    """
+    steps = (behaviours * bins).long().clamp(0, bins - 1)
+    weights = bins ** torch.arange(steps.shape[2], device=steps.device)
+    return (steps * weights).sum(2)
+
+
+def survivors(cells: Tensor, cost: Tensor, count: int) -> Tensor:
+    """Who lives on, the elites of cells first, each group by cost.
+
+    Args:
+        cells: ``(R, N)``.
+        cost: ``(R, N)``, lower is better.
+        count: how many do.
+
+    Returns:
+        Indices ``(R, count)``.
+    """
+    by_cost = cost.argsort(dim=1, stable=True)
+    held, by_cell = cells.gather(1, by_cost).sort(dim=1, stable=True)
+    first = torch.ones_like(held, dtype=torch.bool)
+    first[:, 1:] = held[:, 1:] != held[:, :-1]
+    elite = torch.zeros_like(first).scatter(1, by_cell, first)
+    later = torch.where(elite, 0, cells.shape[1])
+    place = torch.arange(cells.shape[1], device=cells.device) + later
+    return by_cost.gather(1, place.argsort(dim=1))[:, :count]

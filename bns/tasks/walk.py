@@ -1,4 +1,10 @@
-"""Walking: lists of servo goals that carry a legged robot as far as they can."""
+"""Walking: lists of servo goals that carry a legged robot as far as they can.
+
+Of gaits that repeat themselves (36 numbers, Cully et al. 2015) each leg's coxa and
+femur follow a square wave of their own amplitude, phase and duty cycle, smoothed over a
+tenth of its period; the tibia does the opposite of the femur, so that the foot stays
+below the knee. A controller samples it at its commands, `PERIOD` of them a period.
+"""
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
@@ -9,7 +15,6 @@ import torch
 
 from bns.evolution.chromosome import Population
 from bns.evolution.goals import Goals
-from bns.tasks import gaits
 from bns.tasks.base import Arrays, Curve, Picture, Space, Task
 from bns.worlds.trial import Commands, Trial
 
@@ -115,15 +120,15 @@ class WalkTask(Task):
     @property
     def genotypes(self) -> dict[str, Space]:
         """See `Task.genotypes`; six legs of three servos have "gait" (`gaits`), too."""
-        found, count = super().genotypes, gaits.SIZE
+        found, count = super().genotypes, SIZE
         if len(self.goals.channels) == 18:
             none, all_of_it = np.zeros(count), np.ones(count)
             found["gait"] = Space(none, all_of_it, none, all_of_it, self._gaits)
         return found
 
     def _gaits(self, genes: np.ndarray) -> list[Commands]:
-        reach = min(self.config.walk.reach, gaits.REACH)
-        found = gaits.goals(genes, self.goals.max_commands, reach)
+        reach = min(self.config.walk.reach, REACH)
+        found = goals(genes, self.goals.max_commands, reach)
         return self.space.controllers(found.reshape(len(genes), -1))
 
     def behaviour(self, trials: Sequence[Trial]) -> np.ndarray:
@@ -131,7 +136,7 @@ class WalkTask(Task):
         names = [channel.name for channel in self.goals.channels]
         femurs = [at for at, name in enumerate(names) if name.endswith("_femur")]
         told = np.stack([trial.commands.values for trial in trials])
-        return gaits.down(told, np.array(femurs))
+        return down(told, np.array(femurs))
 
     def measured(self, tried: Sequence[Trial]) -> Arrays:
         """See `Task.measured`; sent are goals ``(R, K, C)`` [rad]."""
@@ -218,3 +223,51 @@ CAPTIONS = {
 """How to read figures where walking reads otherwise than navigation."""
 
 TASK = WalkTask
+
+
+SIZE = 36
+PERIOD = 4
+"""commands of a period; assumed"""
+REACH = 0.6
+"""[rad] largest amplitude; assumed, as far as BNS lets its goals go"""
+SMOOTHED = 0.1
+"""share of a period over which the wave changes sides (Cully et al. 2015)"""
+_POINTS = 20
+
+
+def goals(genes: np.ndarray, commands: int, reach: float = REACH) -> np.ndarray:
+    """Servo goals of gaits.
+
+    Args:
+        genes: each from 0 to 1, ``(N, 36)``: leg by leg amplitude, phase and duty cycle
+            of the coxa, then of the femur.
+        commands: K.
+        reach: amplitude of 1 [rad].
+
+    Returns:
+        ``(N, K, 18)`` [rad] from half-way, leg by leg coxa, femur, tibia.
+    """
+    amplitude, phase, duty = np.moveaxis(genes.reshape(-1, 1, 6, 2, 3), -1, 0)
+    times = np.arange(commands)[None, :, None, None] / PERIOD + phase
+    around = (np.arange(_POINTS) + 0.5) / _POINTS - 0.5
+    wave = np.zeros(np.broadcast_shapes(times.shape, duty.shape))
+    for offset in SMOOTHED * around:
+        wave += np.where((times + offset) % 1.0 < duty, 1.0, -1.0) / _POINTS
+    angles = reach * amplitude * wave
+    coxa, femur = angles[..., 0], angles[..., 1]
+    found: np.ndarray = np.stack([coxa, femur, -femur], axis=-1)
+    return found.reshape(len(genes), commands, 18)
+
+
+def down(goals: np.ndarray, lifting: np.ndarray) -> np.ndarray:
+    """Share of commands in which each leg is not told to be up.
+
+    Args:
+        goals: ``(N, K, C)`` [rad] from half-way.
+        lifting: the channel of each leg that lifts it, ``(L,)``.
+
+    Returns:
+        ``(N, L)``, from 0 to 1: what duty factors a gait asks for.
+    """
+    found: np.ndarray = (goals[:, :, lifting] <= 0.0).mean(1)
+    return found

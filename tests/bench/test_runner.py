@@ -9,8 +9,7 @@ import pytest
 from bench import __main__ as command
 from bench import runner
 from bench.result import Result
-from bench.runner import Bench, discover, measure, plain, store, stored
-from bench.table import page, table
+from bench.runner import Bench, discover, measure, page, plain, store, stored, table
 from bns.errors import BnsError
 from tests.sources import ROOT
 

@@ -56,7 +56,7 @@ EXPERIMENT = {
         "static_walk",
         "world_factory",
     )
-} | {"bns.doctor", "bns.prior.contact", "bns.prior.maker"}
+} | {"bns.doctor", "bns.prior.maker"}
 """modules around the learner that set experiments up: they make worlds by name"""
 
 

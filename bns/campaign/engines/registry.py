@@ -1,9 +1,28 @@
-"""Engines by name."""
+"""Engines by name, and the one that needs nothing: this process, batch after batch."""
 
 import os
+import time
+from collections.abc import Generator, Sequence
+from functools import partial
 
-from bns.campaign.engines.base import Engine
+from bns.campaign import work
+from bns.campaign.engines.base import Beat, Engine, Outcome, outcome
+from bns.campaign.plan import Job
 from bns.errors import BnsError, UnknownNameError
+
+
+class InlineEngine:
+    """Batches run in this process."""
+
+    name = "inline"
+
+    def run(self, jobs: Sequence[Job], *, beat: Beat) -> Generator[Outcome, None, None]:
+        """See `Engine.run`."""
+        for job in jobs:
+            started = time.monotonic()
+            given = work.timed(job.to_mapping(), partial(beat, job.key))
+            yield outcome(job.key, given, time.monotonic() - started)
+
 
 NAMES = ("inline", "local", "ray")
 
@@ -28,7 +47,7 @@ def make(name: str, *, workers: int = 0, ray_address: str = "") -> Engine:
         raise BnsError(f"--workers {workers} is not allowed: give 1 to 1024.")
     count = workers or len(os.sched_getaffinity(0))
     if name == "inline":
-        from bns.campaign.engines.inline import InlineEngine
+        from bns.campaign.engines.registry import InlineEngine
 
         return InlineEngine()
     if name == "local":

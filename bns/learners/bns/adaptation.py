@@ -5,14 +5,19 @@ once, before the first trial that follows the first damaged one (until then noth
 has been seen of it). All are settings of single runs in a batch.
 """
 
-from collections.abc import Sequence
+import pkgutil
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bns.errors import BnsError, UnknownNameError
 from bns.experiment.config import RunConfig
-from bns.learners.bns.adaptations import registry
+from bns.learners.bns import adaptations
 from bns.units import metres_per_second
 
 
@@ -45,8 +50,7 @@ class Adaptations:
         self.configs = list(configs)
         self.onsets = np.asarray(onsets, dtype=np.int64)
         self.extras = [
-            [registry.parse(text) for text in config.adaptation.extra]
-            for config in self.configs
+            [parse(text) for text in config.adaptation.extra] for config in self.configs
         ]
 
     def _setting(self, name: str) -> np.ndarray:
@@ -88,10 +92,7 @@ class Adaptations:
             {part for extra in extras for part in extra.resets(trial, int(onset))}
             for extras, onset in zip(self.extras, self.onsets, strict=True)
         ]
-        return {
-            part: np.array([part in parts for parts in wanted])
-            for part in registry.PARTS
-        }
+        return {part: np.array([part in parts for parts in wanted]) for part in PARTS}
 
     def since_damage(
         self, trial: int, usual: ArrayLike, after: ArrayLike
@@ -130,3 +131,75 @@ class Adaptations:
             speed = metres_per_second(usual) * grown
             found.append([speed, speed, evolution.duration_magnitude * grown])
         return rates.astype(np.float32), np.array(found, np.float32)
+
+
+PARTS = ("population", "simulator", "data")
+
+
+@dataclass(frozen=True)
+class Extra:
+    """An adaptation with its parameters' values."""
+
+    name: str
+    parameters: tuple[tuple[str, float], ...]
+    function: Callable[..., set[str]]
+
+    def resets(self, trial: int, onset: int) -> set[str]:
+        """What a run resets before a trial; see `bns.learners.bns.adaptations`.
+
+        Raises:
+            BnsError: the adaptation names something that cannot be reset.
+        """
+        parts = self.function(trial, onset, **dict(self.parameters))
+        for part in parts:
+            if part not in PARTS:
+                raise UnknownNameError(f"part reset by {self.name}", part, PARTS)
+        return parts
+
+
+@cache
+def names() -> tuple[str, ...]:
+    """The adaptations that exist, sorted."""
+    return tuple(sorted(i.name for i in pkgutil.iter_modules(adaptations.__path__)))
+
+
+def describe(name: str) -> str:
+    """An adaptation in one line."""
+    return str(_module(name).DOC)
+
+
+def parse(text: str) -> Extra:
+    """An adaptation from `NAME` or `NAME:PARAMETER=VALUE,...`.
+
+    Raises:
+        UnknownNameError: no such adaptation or parameter.
+        BnsError: a value that is no positive number.
+    """
+    name, _, rest = text.partition(":")
+    module = _module(name)
+    values = dict(module.PARAMETERS)
+    for piece in filter(None, rest.split(",")):
+        key, _, value = piece.partition("=")
+        if key not in values:
+            raise UnknownNameError(f"parameter of {name}", key, values)
+        values[key] = _number(text, value)
+    return Extra(name, tuple(values.items()), module.resets)
+
+
+def _module(name: str) -> ModuleType:
+    if name not in names():
+        raise UnknownNameError("adaptation", name, names())
+    return import_module(f"bns.learners.bns.adaptations.{name}")
+
+
+def _number(text: str, value: str) -> float:
+    try:
+        number = float(value)
+    except ValueError:
+        number = float("nan")
+    if not 0 < number < float("inf"):
+        raise BnsError(
+            f"{value!r} in adaptation {text!r} is not allowed: give a positive number, "
+            "as in population_reset_every:trials=10."
+        )
+    return number

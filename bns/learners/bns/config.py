@@ -57,7 +57,7 @@ class EvolutionConfig:
     """probability that the second parent is a fresh random one"""
     cells: int = 0
     """bins along each behaviour of a grid whose elites survive (own; MAP-Elites inside
-    the SNN, bns/evolution/elites.py); 0 = children replace their parents"""
+    the SNN, bns/evolution/selection.py); 0 = children replace their parents"""
 
 
 @dataclass(frozen=True, kw_only=True)

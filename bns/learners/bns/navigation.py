@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from bns.draws import Draws
-from bns.evolution import diversity
+from bns.evolution import generation
 from bns.evolution.chromosome import Encoding, Population
 from bns.evolution.generation import Breeder, Coins, Genes, Rates
 from bns.experiment.config import RunConfig
@@ -168,7 +168,7 @@ class OpenLoopProblem(Problem):
 
     def diversity(self, population: Population) -> dict[str, np.ndarray]:
         """See `Problem.diversity`."""
-        found = diversity.measures(population, self.encoding)
+        found = generation.measures(population, self.encoding)
         return {name: value.double().cpu().numpy() for name, value in found.items()}
 
 

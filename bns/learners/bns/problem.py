@@ -17,7 +17,7 @@ from torch import Tensor
 
 from bns.draws import Draws
 from bns.errors import BnsError, MissingDependencyError
-from bns.evolution import elites
+from bns.evolution import selection
 from bns.evolution.chromosome import Population
 from bns.evolution.generation import Breeder, Coins, Genes, Rates, take
 from bns.experiment.config import RunConfig
@@ -197,8 +197,8 @@ class Problem(ABC):
         )
         cost = torch.cat([old[1], new[1]], dim=1)
         bins = self.config.evolution.cells
-        cells = elites.cells(self.behaviours(memories, both), bins)
-        index = elites.survivors(cells, cost, old[1].shape[1])
+        cells = selection.cells(self.behaviours(memories, both), bins)
+        index = selection.survivors(cells, cost, old[1].shape[1])
         return take(both, index), cost.gather(1, index)
 
     def behaviours(self, memories: Sequence[Memory], population: Population) -> Tensor:

@@ -27,7 +27,7 @@ from bns.evolution.generation import Rates
 from bns.evolution.goals import TICK, GoalBreeder, Goals
 from bns.experiment.config import RunConfig
 from bns.experiment.task_settings import WalkConfig
-from bns.learners.bns import change_evidence
+from bns.learners.bns import change_detection
 from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.memory import Memory
 from bns.learners.bns.navigation import OpenLoopProblem
@@ -291,10 +291,10 @@ class WalkProblem(OpenLoopProblem):
         return of_trial(trial)
 
     def forget(self, run: int, memories: Sequence[Memory]) -> int:
-        """See `Problem.forget`; by `change_evidence`."""
+        """See `Problem.forget`; by `change_detection`."""
         memory, size = memories[0], self.config.walk.commands
         inputs, targets = memory.patterns(run)
-        newest = change_evidence.changed(inputs, targets, size)
+        newest = change_detection.changed(inputs, targets, size)
         if not newest:
             return 0
         memory.keep(run, newest)

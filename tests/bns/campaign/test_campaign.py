@@ -13,8 +13,8 @@ import pytest
 from bns.campaign import drive, results
 from bns.campaign.engines import frames, registry
 from bns.campaign.engines.base import Outcome
-from bns.campaign.engines.inline import InlineEngine
 from bns.campaign.engines.pool import PoolEngine
+from bns.campaign.engines.registry import InlineEngine
 from bns.campaign.merge import merge
 from bns.campaign.plan import plan
 from bns.campaign.store import CampaignStore
@@ -272,7 +272,7 @@ def test_the_table_compares_members_that_differ_in_one_setting(clean):
 
 
 def test_progress_counts_what_runs_and_estimates_the_rest():
-    from bns.campaign.progress import Progress
+    from bns.campaign.drive import Progress
     from bns.progress import duration
 
     jobs = plan(campaign(), {})

@@ -9,7 +9,7 @@ import pytest
 
 from bench.learning import experiments
 from bns import presets, stats
-from bns.campaign.engines.inline import InlineEngine
+from bns.campaign.engines.registry import InlineEngine
 from bns.campaign.identity import identity
 from bns.campaign.part import Block
 from bns.claims import measures, price, report, runner, sides, verdict

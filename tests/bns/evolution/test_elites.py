@@ -7,7 +7,7 @@ import torch
 
 from bns import presets
 from bns.errors import BnsError
-from bns.evolution import elites
+from bns.evolution import selection
 from bns.experiment.run import train
 from bns.learners import registry
 from bns.tasks.base import BOARD
@@ -17,13 +17,13 @@ from tests.bns import light_fakes, walkers
 def test_the_best_of_each_cell_lives_and_then_the_best_of_the_rest():
     cells = torch.tensor([[7, 7, 3, 3, 5, 7]])
     cost = torch.tensor([[4.0, 1.0, 9.0, 8.0, 6.0, 2.0]])
-    index = elites.survivors(cells, cost, 4)
+    index = selection.survivors(cells, cost, 4)
     assert index.tolist() == [[1, 4, 3, 5]]  # cells 7, 5, 3 by cost, then the next best
-    assert elites.survivors(cells, cost, 2).tolist() == [[1, 4]]
+    assert selection.survivors(cells, cost, 2).tolist() == [[1, 4]]
 
 
 def test_cells_have_their_edges_where_they_belong():
-    found = elites.cells(torch.tensor([[[0.0, 0.0], [0.34, 0.0], [1.0, 1.0]]]), 3)
+    found = selection.cells(torch.tensor([[[0.0, 0.0], [0.34, 0.0], [1.0, 1.0]]]), 3)
     assert found.tolist() == [[0, 1, 8]]
 
 
@@ -41,7 +41,7 @@ def made(config):
 def filled(learner) -> int:
     """Cells that the populations of all runs fill."""
     found = learner.problem.behaviours(learner.memories, learner.population)
-    cells = elites.cells(found, 3)
+    cells = selection.cells(found, 3)
     return sum(len(set(row.tolist())) for row in cells)
 
 
@@ -75,7 +75,7 @@ def test_on_wheels_behaviours_are_where_lists_are_predicted_to_end():
     poses = learner.problem.evaluator.poses(learner.theta, learner.population)
     ends = poses[:, :, -1, :2] / torch.tensor(BOARD)
     torch.testing.assert_close(inside, (ends + 1) / 2)
-    assert all(len(set(row.tolist())) >= 2 for row in elites.cells(inside, 4))
+    assert all(len(set(row.tolist())) >= 2 for row in selection.cells(inside, 4))
 
 
 def test_killed_and_resumed_it_gives_the_same_bytes(tmp_path):

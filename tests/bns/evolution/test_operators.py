@@ -10,7 +10,7 @@ import torch
 from bns import models
 from bns.draws import Draws
 from bns.errors import UnknownNameError
-from bns.evolution import crossover, diversity, mutation, selection
+from bns.evolution import generation, selection, variation
 from bns.evolution.chromosome import Encoding, Population
 from bns.evolution.generation import Breeder, Rates
 from bns.evolution.goals import COINS, TICK, GoalBreeder, Goals, repeated
@@ -80,12 +80,12 @@ def test_unknown_operators_are_refused_with_a_suggestion():
     with pytest.raises(UnknownNameError, match="Did you mean 'tournament'"):
         selection.select("turnament", COSTS, torch.zeros(1, 1, 1))
     with pytest.raises(UnknownNameError, match="Available: n-point"):
-        crossover.coins_needed("two", 1, (1, 1, 6, 3))
+        variation.coins_needed("two", 1, (1, 1, 6, 3))
 
 
 def test_single_point_cuts_both_lists_independently():
     first, second = population([1, 2, 3, 4]), population([7, 8])
-    child = crossover.n_point(
+    child = variation.n_point(
         first, second, torch.tensor([[[3]]]), torch.tensor([[[1]]])
     )
     assert marks(child) == [1, 2, 3, 8]
@@ -93,7 +93,7 @@ def test_single_point_cuts_both_lists_independently():
 
 def test_two_points_come_back_to_the_first_parent():
     first, second = population([1, 2, 3, 4]), population([7, 8, 9])
-    child = crossover.n_point(
+    child = variation.n_point(
         first, second, torch.tensor([[[1, 3]]]), torch.tensor([[[0, 2]]])
     )
     assert marks(child) == [1, 7, 8, 4]
@@ -101,11 +101,11 @@ def test_two_points_come_back_to_the_first_parent():
 
 def test_crossover_keeps_the_longest_list_and_never_makes_an_empty_one():
     first, second = population([1, 2, 3, 4, 5]), population([6, 7, 8, 9])
-    long = crossover.n_point(
+    long = variation.n_point(
         first, second, torch.tensor([[[5]]]), torch.tensor([[[0]]])
     )
     assert marks(long) == [1, 2, 3, 4, 5, 6]
-    none = crossover.n_point(
+    none = variation.n_point(
         first, second, torch.tensor([[[0]]]), torch.tensor([[[4]]])
     )
     assert marks(none) == [1, 2, 3, 4, 5]
@@ -114,7 +114,7 @@ def test_crossover_keeps_the_longest_list_and_never_makes_an_empty_one():
 def test_fixed_length_stays():
     first, second = population([1, 2, 3, 4, 5, 6]), population([11, 12, 13, 14, 15, 16])
     coins = torch.tensor([[[0.5, 0.0]]])
-    child = crossover.cross("single-point", first, second, coins, fixed_length=True)
+    child = variation.cross("single-point", first, second, coins, fixed_length=True)
     assert marks(child) == [1, 2, 3, 14, 15, 16]
 
 
@@ -122,13 +122,13 @@ def test_uniform_crossover_swaps_where_both_have_genes():
     first, second = population([1, 2, 3]), population([7, 8])
     coins = torch.full((1, 1, 6, 3), 0.9)
     coins[0, 0, 1:] = 0.1
-    assert marks(crossover.uniform(first, second, coins)) == [1, 8, 3]
+    assert marks(variation.uniform(first, second, coins)) == [1, 8, 3]
 
 
 @pytest.mark.parametrize(("v", "spread"), [(0.125, 0.5), (0.5, 1.0), (0.875, 2.0)])
 def test_simulated_binary_follows_equation_2_17(v, spread):
     first, second = population([1.0]), population([3.0])
-    child = crossover.simulated_binary(
+    child = variation.simulated_binary(
         first, second, torch.full((1, 1, 6, 3), v), eta=1.0
     )
     expected = 0.5 * ((1 + spread) * 1.0 + (1 - spread) * 3.0)
@@ -142,7 +142,7 @@ def mutated(kind: str, rate: float, size: float, start: float = 0.5) -> torch.Te
     genes = torch.full((1, 2000, 10, 3), start)
     coins = Draws(4).uniform(*genes.shape)
     rates = torch.tensor([rate]), torch.tensor([[size] * 3])
-    return mutation.mutate(kind, genes, coins, *rates, LOW, HIGH)
+    return variation.mutate(kind, genes, coins, *rates, LOW, HIGH)
 
 
 @pytest.mark.parametrize("kind", ["bounded-uniform", "uniform-range", "gaussian"])
@@ -175,7 +175,7 @@ def test_uniform_range_goes_uniformly_to_either_bound():
 def test_diversity_of_a_known_population():
     low, high = torch.zeros(3), torch.ones(3)
     encoding = Encoding(low, high, 0.0, 6, (1, 6))
-    found = diversity.measures(population([0.2, 0.4], [0.6]), encoding)
+    found = generation.measures(population([0.2, 0.4], [0.6]), encoding)
     assert found["diversity_41"].item() == pytest.approx(3 * 0.4)
     assert found["diversity_51"].item() == pytest.approx(3 * 2 * 0.2**2)
     assert found["diversity_73"].exp().item() == pytest.approx(3 * 0.4)

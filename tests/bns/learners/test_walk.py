@@ -13,7 +13,7 @@ from bns.errors import BnsError
 from bns.evolution.chromosome import Population
 from bns.evolution.goals import TICK, Goals
 from bns.experiment.run import train
-from bns.learners.bns import change_evidence as forgetting
+from bns.learners.bns import change_detection as forgetting
 from bns.learners.bns import walking
 from bns.learners.bns.config import WatchConfig
 from bns.learners.bns.learner import Bns

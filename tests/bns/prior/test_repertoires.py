@@ -9,11 +9,11 @@ import pytest
 from bns import presets
 from bns.errors import BnsError, FormatError, UnknownNameError
 from bns.models.phantomx import gait
-from bns.prior import contact, gaussian, maker, repertoire
+from bns.prior import gaussian, maker, repertoire
 from bns.prior.archive import Archive
 from bns.storage import arrays
-from bns.tasks import gaits
 from bns.tasks import registry as tasks
+from bns.tasks import walk
 from bns.worlds import registry as worlds
 from bns.worlds.trial import Commands
 from tests.bns.walkers import Slider
@@ -110,7 +110,7 @@ class TestGaits:
         genes = np.zeros((1, 6, 2, 3))
         genes[0, 0, 0] = (1.0, 0.0, 1.0)  # coxa of leg 1 always forward
         genes[0, 1, 1] = (0.5, 0.1, 0.5)  # femur of leg 2, between the edges
-        found = gaits.goals(genes.reshape(1, 36), 8).reshape(8, 6, 3)
+        found = walk.goals(genes.reshape(1, 36), 8).reshape(8, 6, 3)
         np.testing.assert_allclose(found[:, 0, 0], 0.6)
         np.testing.assert_allclose(found[:4, 1, 1], [0.3, 0.3, -0.3, -0.3])
         np.testing.assert_allclose(found[:4], found[4:])  # four commands a period
@@ -137,7 +137,7 @@ class TestContact:
             "hexapod", threads=1, truth=True, damage="leg_raised:legs=5,blend=1"
         )
         trials = [*hexapod.run([still]), *raised.run([still])]
-        found = contact.duty(trials)
+        found = maker.duty(trials)
         assert found[0].tolist() == [1.0] * 6
         assert found[1][4] < 0.35  # until it has been raised
         assert found[1][[0, 1, 2, 3, 5]].min() > 0.9
@@ -145,7 +145,7 @@ class TestContact:
     def test_without_the_hidden_states_it_says_so(self):
         (trial,) = Slider().run([made().space.controllers(np.zeros((1, 36)))[0]])
         with pytest.raises(BnsError, match="--behaviour told"):
-            contact.duty([trial])
+            maker.duty([trial])
 
 
 def test_steps_twice_as_long_walk_as_far(hexapod):

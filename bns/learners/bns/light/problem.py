@@ -15,7 +15,7 @@ from bns.draws import Draws, whole_below
 from bns.errors import BnsError
 from bns.evolution.chromosome import Population
 from bns.evolution.generation import Breeder, Coins, Rates
-from bns.evolution.mutation import normal
+from bns.evolution.variation import normal
 from bns.experiment.config import RunConfig
 from bns.learners.base import Curves, Panel
 from bns.learners.bns.adaptation import Adaptations

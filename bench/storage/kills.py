@@ -1,4 +1,4 @@
-"""A campaign whose workers, and then whose driver, are killed."""
+"""Campaigns whose processes are killed, and engines that agree."""
 
 import os
 import signal
@@ -7,15 +7,25 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from bench.result import Result, bench
-from bench.storage.campaigns import held, text
+from bench.storage.campaigns import held, text, tiny
 from bns import seeding
+from bns.campaign import drive
+from bns.campaign.engines import registry
+from bns.campaign.engines.base import Beat, Outcome
+from bns.campaign.engines.ray_engine import RayEngine
+from bns.campaign.engines.registry import InlineEngine
+from bns.campaign.plan import Job
 from bns.campaign.store import CampaignStore
+from bns.errors import MissingDependencyError
 
 WORKERS = 2
 
@@ -145,3 +155,107 @@ def _children(pid: int) -> list[int]:
         if int(fields[1]) == pid and fields[0] not in "ZX":
             found.append(int(stat.parent.name))
     return sorted(found)
+
+
+class Killing:
+    """Ray's engine; after some outcomes a node dies.
+
+    Args:
+        cluster: of `ray.cluster_utils`.
+        node: of it, to be killed.
+        after: outcomes.
+    """
+
+    name = "ray"
+
+    def __init__(self, cluster: Any, node: Any, after: int):
+        self.cluster, self.node, self.after = cluster, node, after
+        self.seen = 0
+
+    def run(self, jobs: Sequence[Job], *, beat: Beat) -> Iterator[Outcome]:
+        """See `Engine.run`."""
+        for outcome in RayEngine(self.cluster.address).run(jobs, beat=beat):
+            self.seen += 1
+            if self.seen == self.after:
+                self.cluster.remove_node(self.node, allow_graceful=False)
+            yield outcome
+
+
+@bench(
+    "batches done on two local Ray nodes of which one is killed mid-run",
+    bar="all, with the bytes of one process",
+)
+def ray_node_kill(quick: bool) -> Result:
+    """A node of one CPU each; the second is killed after a third of the batches."""
+    from ray.cluster_utils import Cluster
+
+    batches = 6 if quick else 16
+    campaign = tiny(batches, trials=12)
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    try:
+        node = cluster.add_node(num_cpus=1)
+        cluster.wait_for_nodes()
+        engine = Killing(cluster, node, batches // 3)
+        with tempfile.TemporaryDirectory() as name:
+            home = Path(name)
+            session = drive.run(campaign, home / "ray", engine)
+            drive.run(campaign, home / "inline", InlineEngine())
+            same = held(home / "ray") == held(home / "inline")
+    finally:
+        cluster.shutdown()
+    return Result(
+        figure=session.done,
+        unit=f"of {batches}",
+        holds=session.done == batches and same,
+        n=batches,
+        details={
+            "failed": dict(session.failed),
+            "same bytes as in process": same,
+            "batches done when the node was killed": engine.after,
+        },
+    )
+
+
+ENGINES = ("inline", "local", "ray")
+
+
+@bench(
+    "engines whose stores hold the same bytes: in process, local pool of 2, Ray",
+    bar="3 of 3",
+)
+def engines_agree(quick: bool) -> Result:
+    """One campaign on each; members alone in a batch, and sharing one."""
+    members = 3 if quick else 6
+    digests: dict[str, str] = {}
+    with tempfile.TemporaryDirectory() as name:
+        for engine in ENGINES:
+            try:
+                digests[engine] = _digest(engine, members, Path(name))
+            except MissingDependencyError as error:
+                digests[engine] = f"not run: {error}"
+    same = sum(digest == digests["inline"] for digest in digests.values())
+    return Result(
+        figure=same,
+        unit=f"of {len(ENGINES)}",
+        holds=same == len(ENGINES),
+        n=members,
+        details=digests,
+    )
+
+
+def _digest(engine: str, members: int, home: Path) -> str:
+    """A digest of the two stores that an engine makes."""
+    total = sha256()
+    for shared, replicates in ((False, 3), (True, 1)):
+        out = home / f"{engine}-{shared}"
+        campaign = tiny(members, replicates=replicates)
+        if shared:
+            from dataclasses import replace
+
+            campaign = replace(campaign, batch_runs=4)
+        session = drive.run(campaign, out, registry.make(engine, workers=2))
+        if session.failed or session.missing:
+            raise RuntimeError(f"{engine}: {session}")
+        for path, data in held(out).items():
+            total.update(path.encode() + data)
+    return total.hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""Does our IT&E do what the original's tests did (Mailer, Nitschke and Raw 2021)?
+"""IT&E as the original's tests had it (Mailer, Nitschke and Raw 2021), and its prior.
 
 Compared are numbers of tests, not speeds: walking that rests after each command is no
 gait of 1 Hz, and how far a map's gaits get is a matter of the evaluations spent on it.
@@ -93,3 +93,41 @@ def _group(damages: dict[str, str]) -> dict[str, list[float]]:
 
 def _texts(legs: str) -> tuple[str, ...]:
     return (f"leg_raised:legs={legs},blend=1@1",) if legs else ()
+
+
+LEAST_LOST, MOST_LOST, BEST = 0.20, 0.30, 20
+
+
+@bench(
+    "loss of the best walks of the repertoire in the world of the prior P2",
+    bar="0.20 to 0.30 (median of the best twenty)",
+)
+def prior_off(quick: bool) -> Result:
+    """The best of the map in both worlds; quick: five of them."""
+    from bns.prior import mismatch, repertoire
+    from bns.tasks import registry as tasks
+    from bns.worlds import registry as worlds
+
+    found = repertoire.read("phantomx-1")
+    task = tasks.of(replace(presets.load("hexapod-walk"), threads=1))
+    rows = np.argsort(-found.worth)[: 5 if quick else BEST]
+    tried = found.space(task).controllers(found.vectors(task)[rows])
+    told = {"robot": "phantomx", "threads": 1}
+    gap = mismatch.reality("phantomx")
+    exact, off = (
+        task.worth(worlds.make("hexapod", **told, reality=reality).run(tried))
+        for reality in ((), gap)
+    )
+    loss = float(1 - np.median(off / exact))
+    return Result(
+        figure=round(loss, 4),
+        unit="1",
+        holds=None if quick else LEAST_LOST <= loss <= MOST_LOST,
+        n=len(rows),
+        details={
+            "in the nominal world [m]": exact.round(3).tolist(),
+            "with the gap [m]": off.round(3).tolist(),
+            "gap": list(gap),
+            "evaluations of the map": found.head.evaluations,
+        },
+    )
