@@ -132,7 +132,7 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         seed: of the noise that measures the floor.
     """
     start = descent.nothing(problem)
-    known = rest.floor(problem, seed=seed)
+    known = rest.floor(problem, start.noise.starts, seed=seed)
     unstable = rest.unstable(problem, start.slopes, known)
     if unstable.any() and not unstable.all():
         problem = problem.without(unstable)

@@ -117,9 +117,9 @@ def relinearised(problem: Problem, point: Point, known: Noise) -> Linear:
     whole = fit.target(problem, point.values, point.rest, point.slopes)
     linear = Linear.of(
         problem,
-        {k: known.memory(slope) for k, slope in point.slopes.items()},
+        {k: known.innovations(slope) for k, slope in point.slopes.items()},
         fit.units(problem, point.values),
-        known.memory(whole),
+        known.innovations(whole),
         known.weights(point.rest, problem.seen),
     )
     return linear.correlated(known.lam)

@@ -195,7 +195,7 @@ def _scored(problem: Problem, point: Point, todo, only: list[int] | None):
         if problem.rows[number].smooth:  # what it did before is in the target
             off = point.values[number] - problem.nominal[number]
             change = change + point.slopes[number] * off
-        change = point.noise.memory(change)
+        change = point.noise.innovations(change)
         if (point.linear.weight * change**2).sum() < FELT:
             continue
         term = problem.rows[number].term

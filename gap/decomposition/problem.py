@@ -151,6 +151,26 @@ class Problem:
         rest = np.where(self.seen & lost, FAR, self.recorded - made)
         return rest, made
 
+    @cached_property
+    def begun(self) -> np.ndarray:
+        """What a standard deviation of each number of the state in which a trial began
+        changes of the nominal features of that trial, ``(K, N, C)``."""
+        unsure = [self.model.begun(trial) for trial in self.trials]
+        names = list(dict.fromkeys(name for row in unsure for name in row))
+        shape = (0, *self.recorded.shape)
+        if not names:
+            return np.zeros(shape)
+        sets: list[list[dict[str, float]]] = [[{} for _ in self.trials]]
+        sets += [[{name: row.get(name, 0.0)} for row in unsure] for name in names]
+        made = self.model.paths(self.trials, sets, fine=False)
+        base, *moved = (self._features(paths) for paths in made)
+        return np.nan_to_num(np.stack(moved) - base)
+
+    def _features(self, paths: Sequence[np.ndarray]) -> np.ndarray:
+        """Features of a path of each trial, ``(N, C)``."""
+        parts = zip(self.trials, paths, self.windows, strict=True)
+        return np.concatenate([self.model.compare(*part) for part in parts])
+
     def without(self, left_out: np.ndarray) -> "Problem":
         """The same, some windows ``(N,)`` taken as not seen."""
         recorded = np.where(left_out[:, None], np.nan, self.recorded)

@@ -128,7 +128,7 @@ class HeldOut:
             if not row.smooth:
                 change = slope * (point.values[number] - row.nominal)
                 one, other = fixed.get(row.term, (0.0, 0.0))
-                change = (one + point.noise.memory(change), other + change)
+                change = (one + point.noise.innovations(change), other + change)
                 fixed[row.term] = change
         return cls(linear, plain, weight, fixed)
 

@@ -183,6 +183,12 @@ class GapModel(ABC):
         del trial, windows
         return {}
 
+    def begun(self, trial: Trial) -> Mapping[str, float]:
+        """Numbers of the state in which a trial began that are not known, each with its
+        standard deviation; `paths` takes them by these names. Empty = it is known."""
+        del trial
+        return {}
+
     def motion(self, features: np.ndarray) -> np.ndarray:
         """How fast each feature moved, ``(N, C)``: noise may grow with it."""
         return np.abs(features)

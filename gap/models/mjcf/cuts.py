@@ -5,7 +5,6 @@ each observed joint's position and speed. What was told in the second before goe
 so that what comes late has something before it.
 """
 
-from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -43,7 +42,10 @@ def pieces(trial: Trial, config: OwnConfig) -> list[Trial]:
 
 
 def _begun(part: Trial, whole: Trial, first: int, config: OwnConfig) -> Trial:
-    conditions = {**part.conditions, start.STATE: state(whole, first, config)}
+    found = state(whole, first, config)
+    known = {joint: numbers[:2] for joint, numbers in found.items()}
+    unsure = {joint: numbers[2:] for joint, numbers in found.items()}
+    conditions = {**part.conditions, start.STATE: known, start.UNSURE: unsure}
     past = commands_before(whole, first)
     if past:
         conditions |= {start.BEFORE: past, start.STEP: GRID}
@@ -61,7 +63,7 @@ def commands_before(trial: Trial, row: int) -> list[list[float]]:
 
 
 def state(trial: Trial, row: int, config: OwnConfig) -> dict[str, list[float]]:
-    """Position and speed of each observed joint at a sample.
+    """Position and speed of each observed joint at a sample, and how sure these are.
 
     A speed that is observed itself is taken as the mean around the sample.
 
@@ -71,20 +73,20 @@ def state(trial: Trial, row: int, config: OwnConfig) -> dict[str, list[float]]:
         config: which joint each column observes.
 
     Returns:
-        position [rad or m] and speed, per second, by joint.
+        position [rad or m], speed, per second, and the standard deviations of both, by
+        joint.
     """
     found: dict[str, list[float]] = {}
     near = around(trial.times, np.isfinite(trial.observed).all(axis=1), row)
     at = trial.times[near] - trial.times[row]
     for column, item in enumerate(config.seen):
         if item.quantity == "joint":
-            position, speed = parabola(at, trial.observed[near, column])
-            found[item.part] = [position, found.get(item.part, [0.0, speed])[1]]
+            found[item.part] = parabola(at, trial.observed[near, column], item.noise)
     for column, item in enumerate(config.seen):
         if item.quantity == "speed":
-            mean = float(parabola(at, trial.observed[near, column])[0])
+            mean, _, sd, _ = parabola(at, trial.observed[near, column], item.noise)
             if item.part in found:
-                found[item.part][1] = mean
+                found[item.part][1::2] = mean, sd
     return found
 
 
@@ -106,11 +108,24 @@ def around(times: np.ndarray, seen: np.ndarray, row: int) -> np.ndarray:
     return rows[inside]
 
 
-def parabola(at: np.ndarray, values: Sequence[float]) -> tuple[float, float]:
-    """Value and slope at 0 of the parabola nearest to samples (a line through few)."""
+def parabola(at: np.ndarray, values: np.ndarray, noise: float) -> list[float]:
+    """Value and slope at 0 of the parabola nearest to samples (a line through few).
+
+    Args:
+        at: times of the samples [s], ``(n,)``.
+        values: of them, ``(n,)``.
+        noise: standard deviation of a sample. Where the samples lie farther from the
+            parabola than that, it is as unsure as they say.
+
+    Returns:
+        value; slope, per second; standard deviations of both.
+    """
     degree = min(2, len(at) - 1)
     if degree < 1:
-        return float(values[0]), 0.0
+        return [float(values[0]), 0.0, noise, 0.0]
     basis = np.vander(at, degree + 1, increasing=True)
     found = np.linalg.lstsq(basis, np.asarray(values, float), rcond=None)[0]
-    return float(found[0]), float(found[1])
+    free = len(at) - degree - 1
+    left = np.sum((values - basis @ found) ** 2) / free if free else 0.0
+    sd = np.sqrt(np.diag(np.linalg.inv(basis.T @ basis)) * max(noise**2, left))
+    return [float(number) for number in (found[0], found[1], sd[0], sd[1])]

@@ -98,8 +98,8 @@ def roles(
 ) -> tuple[list[Column], list[Column]]:
     """Columns that are told, and those that are seen.
 
-    By the format; by words in the name; an actuator's own name, where a joint has
-    another one or is seen in another column.
+    By the format; by a joint's own name; by words in the name; an actuator's own name,
+    where a joint has another one or is seen in another column.
 
     Args:
         columns: of the log.
@@ -107,13 +107,15 @@ def roles(
         joints: names in the model.
     """
     told, seen = [], []
-    own = set(actuators) - set(joints)
+    own, joint = set(actuators) - set(joints), set(joints) - set(actuators)
     for column in columns:
         said = set(words(column.name))
         measured = bool(said & (SEEN | SPEED | EFFORT))
         if column.role:
             (told if column.role == tables.TOLD else seen).append(column)
-        elif not measured and (said & TOLD or column.name in own):
+        elif column.name in joint or measured:
+            seen.append(column)
+        elif said & TOLD or column.name in own:
             told.append(column)
         else:
             seen.append(column)
