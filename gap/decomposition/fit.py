@@ -160,7 +160,7 @@ def first_noise(problem: Problem, rest: np.ndarray, motion: np.ndarray) -> Noise
         motion: predicted features, with whose motion noise may grow, ``(N, C)``.
     """
     memory = Memory.none(problem.trial, rest.shape[1])
-    starts = Starts.of(problem)
+    starts = Starts.of(problem, problem.nominal)
     left = np.where(problem.seen, starts(np.nan_to_num(rest)), np.nan)
     sd = noise.scale(left, problem.model.motion(motion), problem.model.least)
     return Noise(sd, starts, memory, 2.0)
@@ -191,6 +191,7 @@ def linearised(
     wanted = smooth(problem, values)
     if slopes is None or any(k not in slopes for k in wanted):
         slopes = columns(problem, values)
+        known = replace(known, starts=Starts.of(problem, values))
     whole = target(problem, values, rest, slopes)
     predicted = np.where(problem.seen, problem.recorded, 0.0) - np.nan_to_num(rest)
     motion = problem.model.motion(predicted)

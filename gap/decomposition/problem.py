@@ -151,17 +151,22 @@ class Problem:
         rest = np.where(self.seen & lost, FAR, self.recorded - made)
         return rest, made
 
-    @cached_property
-    def begun(self) -> np.ndarray:
+    def begun(self, values: np.ndarray) -> np.ndarray:
         """What a standard deviation of each number of the state in which a trial began
-        changes of the nominal features of that trial, ``(K, N, C)``."""
+        changes of the features of that trial, ``(K, N, C)``.
+
+        Args:
+            values: of all rows, ``(R,)``.
+        """
         unsure = [self.model.begun(trial) for trial in self.trials]
         names = list(dict.fromkeys(name for row in unsure for name in row))
         shape = (0, *self.recorded.shape)
         if not names:
             return np.zeros(shape)
-        sets: list[list[dict[str, float]]] = [[{} for _ in self.trials]]
-        sets += [[{name: row.get(name, 0.0)} for row in unsure] for name in names]
+        known = [self.changed(values, number) for number in range(len(unsure))]
+        off = [[{}] * len(unsure)]
+        off += [[{name: row.get(name, 0.0)} for row in unsure] for name in names]
+        sets = [[a | b for a, b in zip(known, row, strict=True)] for row in off]
         made = self.model.paths(self.trials, sets, fine=False)
         base, *moved = (self._features(paths) for paths in made)
         return np.nan_to_num(np.stack(moved) - base)

@@ -133,7 +133,6 @@ def statements(made: Decomposition) -> list[str]:
     )
     if made.kind == "no gap":
         return ["No gap beyond what the recording scatters by itself." + apart]
-    window = float(np.median(np.concatenate([w.durations for w in problem.windows])))
     before, beyond = _sizes(made, made.start.rest)
     _, left = _sizes(made, made.point.rest)
     listed = [words.part(part, *_main(made, part)) for part in made.parts]
@@ -142,11 +141,20 @@ def statements(made: Decomposition) -> list[str]:
         date = f"{made.onset.name} sets in at trial {made.onset.trial}."
     swapped = [" with ".join(_ordered(made, s)) for s in made.tied[1:]]
     return [
-        words.size(before, beyond, features, window),
+        words.size(before, beyond, features, _over(problem)),
         words.explained(listed, made.closed, date, swapped),
         words.left(made.left, made.lasting, made.recurring, words.sized(left, features))
         + apart,
     ]
+
+
+def _over(problem: Problem) -> str:
+    """In what time a gap has grown, in words."""
+    if problem.model.whole:
+        spans = [float(trial.times[-1] - trial.times[0]) for trial in problem.trials]
+        return f"in trials of {np.median(spans):.2g} s"
+    window = np.median(np.concatenate([w.durations for w in problem.windows]))
+    return f"over {window:.2g} s"
 
 
 def _sizes(made: Decomposition, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

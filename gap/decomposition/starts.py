@@ -32,10 +32,15 @@ class Starts:
     spread: np.ndarray
 
     @classmethod
-    def of(cls, problem: Problem) -> "Starts":
-        """Directions by differences at the nominal model."""
+    def of(cls, problem: Problem, values: np.ndarray) -> "Starts":
+        """Directions by differences.
+
+        Args:
+            problem: the recording.
+            values: of all rows, ``(R,)``.
+        """
         sd, seen = problem.model.least, problem.seen
-        moved = problem.begun
+        moved = problem.begun(values)
         spread = np.sqrt((moved**2).sum(axis=0))
         parts = []
         for number in range(len(problem.trials) if len(moved) else 0):
@@ -48,6 +53,11 @@ class Starts:
             if len(size):
                 parts.append((rows, way, 1 / np.sqrt(1 + size**2)))
         return cls(sd, tuple(parts), spread)
+
+    @property
+    def size(self) -> float:
+        """By how much starts widen what may have been recorded, in log volume."""
+        return float(-sum(np.log(left).sum() for _, _, left in self.parts))
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
         """Features or residuals ``(N, C)`` without what starts may explain of them."""

@@ -49,6 +49,7 @@ class OwnModel(GapModel):
 
     memory = 2
     many = True
+    whole = True
     logs = True
 
     def __init__(self, config: OwnConfig, *, threads: int = 2):
