@@ -220,7 +220,8 @@ class Problem:
         count = len(self.trials)
         order = sorted(range(count), key=lambda n: ((7 * n) % count, n))
         told: set[bytes] = set()
-        fresh, again = [], []
+        fresh: list[int] = []
+        again: list[int] = []
         for number in order:
             key = self.trials[number].commands.values.round(3).tobytes()
             (again if key in told else fresh).append(number)

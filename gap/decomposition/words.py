@@ -1,14 +1,15 @@
 """A decomposition in words: how large the gap is, what explains it, what is left."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from bns.gap.decomposition.shares import Part
+from bns.worlds.trial import Channel
 
 WORDS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3)}
 LISTED = 4  # alternatives in a sentence
 
 
-def sized(sizes: Sequence[float], channels: Sequence) -> str:
+def sized(sizes: Iterable[float], channels: Sequence[Channel]) -> str:
     """Sizes of features in units that are read, "1.2 mm forward"."""
     found = []
     for value, channel in zip(sizes, channels, strict=True):
@@ -17,7 +18,12 @@ def sized(sizes: Sequence[float], channels: Sequence) -> str:
     return ", ".join(found)
 
 
-def size(before: Sequence[float], beyond: Sequence[float], channels, window) -> str:
+def size(
+    before: Iterable[float],
+    beyond: Iterable[float],
+    channels: Sequence[Channel],
+    window: float,
+) -> str:
     """First statement: how large the gap is beyond what measuring scatters.
 
     Args:
