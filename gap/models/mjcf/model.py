@@ -18,7 +18,13 @@ from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.recordings import segments
 from bns.models import mjcf as mjcf_file
 from bns.storage import files
-from bns.worlds.effects.base import ControlSignal, Effect
+from bns.worlds.effects.base import (
+    CommandEffect,
+    ControlSignal,
+    Effect,
+    ModelEdit,
+    SensorEffect,
+)
 from bns.worlds.physics.rollout import STATE, Compiled, Job, Pool, Segment
 from bns.worlds.trial import Trial
 
@@ -62,6 +68,7 @@ class OwnModel(GapModel):
         self._compiled: OrderedDict[tuple, Compiled] = OrderedDict()
         self._cache: OrderedDict[tuple, np.ndarray] = OrderedDict()
         model = self.compiled(()).model
+        self.dt = float(model.opt.timestep)
         self.actuators = [_index(model, "actuator", t.actuator) for t in config.told]
         if config.keyframe:
             _index(model, "key", config.keyframe)  # there, before anything runs
@@ -101,7 +108,9 @@ class OwnModel(GapModel):
         made = prepared.spec(self.config)
         mjcf_file.compiled(made.copy(), self.config.model)
         for effect in effects:
-            if effect.stage == "body" and not effect.is_nominal:
+            if effect.is_nominal or effect.stage != "body":
+                continue
+            if isinstance(effect, ModelEdit):
                 effect.edit(made)
         return made
 
@@ -224,11 +233,6 @@ class OwnModel(GapModel):
             self._cache.popitem(last=False)
         return made
 
-    @property
-    def dt(self) -> float:
-        """Physics step [s]."""
-        return float(self.compiled(()).model.opt.timestep)
-
     def _lead(self, dt: float) -> int:
         return round(self.config.settle / dt)
 
@@ -264,7 +268,7 @@ class OwnModel(GapModel):
         )
         on, rng = np.ones(len(values), bool), np.random.default_rng(0)
         for effect in effects:
-            if effect.stage == "command":
+            if isinstance(effect, CommandEffect) and effect.stage == "command":
                 made = effect.apply(signal, on, rng)
                 signal = ControlSignal(
                     signal.times, made, signal.command, signal.channels, dt
@@ -298,7 +302,7 @@ class OwnModel(GapModel):
         names = tuple(channel.name for channel in self.channels)
         on, rng = np.ones(len(times), bool), np.random.default_rng(0)
         for effect in effects:
-            if effect.stage == "sensor":
+            if isinstance(effect, SensorEffect):
                 read = effect.apply(times, read, names, on, rng)
         at = trial.times - trial.times[trial.boundaries[0]]
         return np.stack([np.interp(at, times, column) for column in read.T], axis=1)
