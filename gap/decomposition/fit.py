@@ -1,6 +1,6 @@
 """The nonlinear fit: damped Gauss-Newton, linear models around it, and its starts."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -216,7 +216,14 @@ def linearised(
     return made.correlated(lam), replace(known, lam=lam), slopes
 
 
-def _linear(problem, values, slopes, whole, known: Noise, left) -> Linear:
+def _linear(
+    problem: Problem,
+    values: np.ndarray,
+    slopes: Mapping[int, np.ndarray],
+    whole: np.ndarray,
+    known: Noise,
+    left: np.ndarray,
+) -> Linear:
     design = {number: known.innovations(slope) for number, slope in slopes.items()}
     weight = known.weights(left, problem.seen)
     return Linear.of(
@@ -224,7 +231,13 @@ def _linear(problem, values, slopes, whole, known: Noise, left) -> Linear:
     )
 
 
-def _summed(problem, values, slopes, made: Linear, found: np.ndarray) -> np.ndarray:
+def _summed(
+    problem: Problem,
+    values: np.ndarray,
+    slopes: Mapping[int, np.ndarray],
+    made: Linear,
+    found: np.ndarray,
+) -> np.ndarray:
     sizes = units(problem, values)
     total = np.zeros_like(problem.recorded)
     for number, value in zip(made.columns, found, strict=True):
@@ -284,17 +297,24 @@ def _kept(problem: Problem, only: list[int]) -> np.ndarray:
     return np.where(inside[:, None], problem.recorded, np.nan)
 
 
-def _rest(problem: Problem, values: np.ndarray, only) -> np.ndarray:
+def _rest(problem: Problem, values: np.ndarray, only: list[int] | None) -> np.ndarray:
     if only is None:
         return problem.residual(values)[0]
     (made,) = problem.predict([values], only=only)
     return np.where(problem.seen, problem.recorded - np.nan_to_num(made, nan=1e3), 0.0)
 
 
-def _step(problem, values, rest, which, known: Noise, only):
+def _step(
+    problem: Problem,
+    values: np.ndarray,
+    rest: np.ndarray,
+    chosen: Sequence[int],
+    known: Noise,
+    only: list[int] | None,
+) -> tuple[np.ndarray, np.ndarray] | None:
     """One damped step that lowers the loss; None if there is none."""
-    which = np.array(which)
-    slopes = problem.slopes(values, which, only=only)
+    which = np.array(chosen)
+    slopes = problem.slopes(values, chosen, only=only)
     weight = known.weights(rest, problem.seen).ravel()
     design = np.stack([known.innovations(slopes[k]).ravel() for k in which], axis=-1)
     design = design * problem.sd[which]

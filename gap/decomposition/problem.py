@@ -164,7 +164,7 @@ class Problem:
         if not names:
             return np.zeros(shape)
         known = [self.changed(values, number) for number in range(len(unsure))]
-        off = [[{}] * len(unsure)]
+        off: list[list[dict[str, float]]] = [[{}] * len(unsure)]
         off += [[{name: row.get(name, 0.0)} for row in unsure] for name in names]
         sets = [[a | b for a, b in zip(known, row, strict=True)] for row in off]
         made = self.model.paths(self.trials, sets, fine=False)
@@ -245,7 +245,8 @@ class Problem:
         count = len(self.trials)
         order = sorted(range(count), key=lambda n: ((7 * n) % count, n))
         told: set[bytes] = set()
-        fresh, again = [], []
+        fresh: list[int] = []
+        again: list[int] = []
         for number in order:
             key = self.trials[number].commands.values.round(3).tobytes()
             (again if key in told else fresh).append(number)

@@ -1,6 +1,7 @@
 """A decomposition written down as a diagnosis: verdict, statements, fits."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,7 +19,12 @@ SINGLES = 8  # explanations whose share alone is reported
 
 
 def recorded(
-    made: Decomposition, *, faults, seed: int, seconds: dict[str, float], full: bool
+    made: Decomposition,
+    *,
+    faults: Sequence[str],
+    seed: int,
+    seconds: dict[str, float],
+    full: bool,
 ) -> Diagnosis:
     """A decomposition written down.
 
@@ -218,7 +224,9 @@ def _at_bound(problem: Problem, part: Part) -> bool:
     return any(value in (rows[n].low, rows[n].high) for n, value in part.values.items())
 
 
-def shown_effect(problem: Problem, name: str, part: Part):
+def shown_effect(
+    problem: Problem, name: str, part: Part
+) -> tuple[str, float, tuple[float, float], str]:
     """Text, magnitude, interval and unit of an explanation.
 
     Args:

@@ -190,7 +190,9 @@ def recurrence(
     return max(_errors(np.sum(every, axis=0)), _errors(same), alone)
 
 
-def scattered(problem: Problem, rest: np.ndarray, known: Floor, inside) -> float:
+def scattered(
+    problem: Problem, rest: np.ndarray, known: Floor, inside: np.ndarray
+) -> float:
     """Excess over the floor, per residual, of what differs between repeats: the
     robot's own scatter; 0 where there are no repeats.
 

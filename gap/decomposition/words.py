@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from bns.gap.decomposition.shares import Part
 from bns.worlds.trial import Channel
 
@@ -9,7 +11,7 @@ WORDS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3)}
 LISTED = 4  # alternatives, or channels, in a sentence
 
 
-def sized(sizes: Sequence[float], channels: Sequence[Channel]) -> str:
+def sized(sizes: Sequence[float] | np.ndarray, channels: Sequence[Channel]) -> str:
     """Sizes of features in units that are read, "1.2 mm forward"; of many the
     largest."""
     order = sorted(range(len(channels)), key=lambda n: -sizes[n])
@@ -29,8 +31,8 @@ def _one(value: float, channel: Channel) -> str:
 
 
 def size(
-    before: Sequence[float],
-    beyond: Sequence[float],
+    before: np.ndarray,
+    beyond: np.ndarray,
     channels: Sequence[Channel],
     over: str,
 ) -> str:

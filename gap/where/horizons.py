@@ -28,7 +28,9 @@ def residuals(
     squares = [by_trial(compared, effects, horizon) for horizon in HORIZONS]
     rng = seeding.generator(seed, "gap", "residuals")
     chosen = rng.integers(0, len(compared.trials), (DRAWS, len(compared.trials)))
-    rms, low, high = [], [], []
+    rms: list[np.ndarray] = []
+    low: list[np.ndarray] = []
+    high: list[np.ndarray] = []
     for square in squares:
         rms.append(np.sqrt(mean(square, 0)))
         drawn = np.sqrt(mean(square[chosen], 1))

@@ -124,7 +124,8 @@ def phase(compared: Compared) -> dict[str, Any]:
     names = [channel.name for channel in compared.model.features]
     made: dict[str, Any] = {}
     for column, name in enumerate(names):
-        cross, power = {}, {}
+        cross: dict[float, np.ndarray] = {}
+        power: dict[float, np.ndarray] = {}
         for seen, told, windows in zip(
             compared.recorded, compared.nominal, compared.windows, strict=True
         ):

@@ -6,7 +6,7 @@ along, it would say nothing but that; compared over pieces that begin in the sta
 the data, it is a robot like others.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import mujoco
@@ -58,7 +58,9 @@ def _observed(config: OwnConfig, model: mujoco.MjModel) -> bool:
     )
 
 
-def _lengths(trials: Sequence[Trial], config: OwnConfig, simulate: Simulate):
+def _lengths(
+    trials: Sequence[Trial], config: OwnConfig, simulate: Simulate
+) -> Iterator[float]:
     """Seconds of each trial that are foreseen; infinity = all of it."""
     joints = [k for k, item in enumerate(config.seen) if item.quantity == "joint"]
     noise = np.array([config.seen[k].noise for k in joints])

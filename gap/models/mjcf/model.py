@@ -19,7 +19,13 @@ from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.recordings import segments
 from bns.models import mjcf as mjcf_file
 from bns.storage import files
-from bns.worlds.effects.base import ControlSignal, Effect
+from bns.worlds.effects.base import (
+    CommandEffect,
+    ControlSignal,
+    Effect,
+    ModelEdit,
+    SensorEffect,
+)
 from bns.worlds.physics.rollout import STATE, Compiled, Job, Pool, Segment
 from bns.worlds.trial import Trial
 
@@ -67,6 +73,7 @@ class OwnModel(GapModel):
         self._cache: OrderedDict[tuple, np.ndarray] = OrderedDict()
         self._starts: dict[tuple, np.ndarray] = {}
         model = self.compiled(()).model
+        self.dt = float(model.opt.timestep)
         self._parts = self._finest
         self.actuators = [_index(model, "actuator", t.actuator) for t in config.told]
         if config.keyframe:
@@ -262,11 +269,6 @@ class OwnModel(GapModel):
             self._cache.popitem(last=False)
         return made
 
-    @property
-    def dt(self) -> float:
-        """Physics step [s]."""
-        return float(self.compiled(()).model.opt.timestep)
-
     def _lead(self, dt: float) -> int:
         return round(self.config.settle / dt)
 
@@ -302,7 +304,7 @@ class OwnModel(GapModel):
         )
         on, rng = np.ones(len(values), bool), np.random.default_rng(0)
         for effect in effects:
-            if effect.stage == "command":
+            if isinstance(effect, CommandEffect) and effect.stage == "command":
                 made = effect.apply(signal, on, rng)
                 signal = ControlSignal(
                     signal.times, made, signal.command, signal.channels, dt
@@ -344,7 +346,7 @@ class OwnModel(GapModel):
         names = tuple(channel.name for channel in self.channels)
         on, rng = np.ones(len(times), bool), np.random.default_rng(0)
         for effect in effects:
-            if effect.stage == "sensor":
+            if isinstance(effect, SensorEffect):
                 read = effect.apply(times, read, names, on, rng)
         at = trial.times - trial.times[trial.boundaries[0]]
         return np.stack([np.interp(at, times, column) for column in read.T], axis=1)
@@ -399,7 +401,8 @@ class OwnModel(GapModel):
 def _edit(made: mujoco.MjSpec, effects: Sequence[Effect]) -> None:
     """Write effects on parts into a spec."""
     for effect in effects:
-        if effect.stage == "body" and not effect.is_nominal:
+        wanted = effect.stage == "body" and not effect.is_nominal
+        if wanted and isinstance(effect, ModelEdit):
             effect.edit(made)
 
 
