@@ -5,6 +5,7 @@ of that time, and of the memory that compiled models take; what a body weighs is
 out from its geoms each time anew.
 """
 
+import warnings
 from collections.abc import Iterable
 
 import mujoco
@@ -44,15 +45,17 @@ def lean(made: mujoco.MjSpec) -> mujoco.MjSpec:
     Args:
         made: a spec that compiles.
     """
-    whole = made.compile()
-    copy = made.copy()
-    copy.compile()  # numbers its bodies
-    try:
-        weighed(copy, whole)
-        _undrawn(copy)
-        model = copy.compile()
-    except (ValueError, mujoco.FatalError):
-        return made
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # they were told when the file was read
+        whole = made.compile()
+        copy = made.copy()
+        copy.compile()  # numbers its bodies
+        try:
+            weighed(copy, whole)
+            _undrawn(copy)
+            model = copy.compile()
+        except (ValueError, mujoco.FatalError):
+            return made
     return copy if _alike(model, whole) else made
 
 
