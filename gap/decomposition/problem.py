@@ -165,7 +165,7 @@ class Problem:
             return np.zeros(shape)
         known = [self.changed(values, number) for number in range(len(unsure))]
         off: list[list[dict[str, float]]] = [[{}] * len(unsure)]
-        off += [[{name: row.get(name, 0.0)} for row in unsure] for name in names]
+        off += [[{n: row[n]} if n in row else {} for row in unsure] for n in names]
         sets = [[a | b for a, b in zip(known, row, strict=True)] for row in off]
         made = self.model.paths(self.trials, sets, fine=False)
         base, *moved = (self._features(paths) for paths in made)

@@ -6,7 +6,7 @@ along, it would say nothing but that; compared over pieces that begin in the sta
 the data, it is a robot like others.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import mujoco
@@ -19,15 +19,12 @@ from bns.worlds.trial import Trial
 GROWN = 30.0  # times an error of the start, from which what follows is of no use
 SHORTEST = 0.4  # [s] of a piece
 
-Simulate = Callable[[Sequence[Trial]], list[np.ndarray]]
-"""nominal samples of trials, each ``(T, C)``"""
-
 
 def foreseen(
     trials: Sequence[Trial],
     config: OwnConfig,
     model: mujoco.MjModel,
-    simulate: Simulate,
+    simulate: cuts.Simulate,
 ) -> list[Trial]:
     """Trials, cut into pieces that begin in the states of the data if any of them is
     not foreseen to its end and all that moves is observed.
@@ -43,8 +40,9 @@ def foreseen(
     length = min(_lengths(trials, config, simulate), default=np.inf)
     if np.isinf(length):
         return list(trials)
-    cut = replace(config, recorded=True, cut=max(length, SHORTEST))
-    return [piece for trial in trials for piece in cuts.pieces(trial, cut)]
+    cut = replace(config, cut=max(length, SHORTEST))
+    pieces = [piece for trial in trials for piece in cuts.pieces(trial, cut)]
+    return cuts.refined(pieces, config, simulate)
 
 
 def _observed(config: OwnConfig, model: mujoco.MjModel) -> bool:
@@ -59,7 +57,7 @@ def _observed(config: OwnConfig, model: mujoco.MjModel) -> bool:
 
 
 def _lengths(
-    trials: Sequence[Trial], config: OwnConfig, simulate: Simulate
+    trials: Sequence[Trial], config: OwnConfig, simulate: cuts.Simulate
 ) -> Iterator[float]:
     """Seconds of each trial that are foreseen; infinity = all of it."""
     joints = [k for k, item in enumerate(config.seen) if item.quantity == "joint"]

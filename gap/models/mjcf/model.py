@@ -13,8 +13,8 @@ from bns.errors import FormatError, UnknownNameError
 from bns.gap.candidates import mjcf, mjcf_rows
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, Windows
+from bns.gap.models.mjcf import cuts, horizon, lean, log, masses, prepared, start, view
 from bns.gap.models.mjcf import effects as own_effects
-from bns.gap.models.mjcf import horizon, lean, log, masses, prepared, start, view
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.recordings import segments
 from bns.models import mjcf as mjcf_file
@@ -103,11 +103,13 @@ class OwnModel(GapModel):
         """Trials of a log, none longer than the model foresees."""
         trials = log.read(path, self.config)
         if self.config.cut:
-            return trials
+            return cuts.refined(trials, self.config, self._nominal)
         model = self.compiled(()).model
-        return horizon.foreseen(
-            trials, self.config, model, lambda some: self.simulate(some, [()])[0]
-        )
+        return horizon.foreseen(trials, self.config, model, self._nominal)
+
+    def _nominal(self, trials: Sequence[Trial]) -> list[np.ndarray]:
+        """Nominal samples of trials."""
+        return self.simulate(trials, [()])[0]
 
     def spec(self, effects: Sequence[Effect]) -> mujoco.MjSpec:
         """The model with the effects on its parts written into it.
