@@ -12,7 +12,7 @@ import numpy as np
 from bns.errors import BnsError, FormatError
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column
-from bns.gap.models.mjcf import guesses, matching
+from bns.gap.models.mjcf import guesses, matching, rehearsal
 from bns.gap.models.mjcf.channels import Work, commands, compiled, factor, observed
 from bns.gap.models.mjcf.log import split
 from bns.gap.models.mjcf.toml_text import toml
@@ -173,6 +173,27 @@ def _held(values: np.ndarray) -> bool:
     return bool(np.isfinite(values).all() and (np.diff(values) == 0).mean() > 0.8)
 
 
+def _settled(work: Work, rows: np.ndarray, pose: str) -> bool:
+    """Whether a trial begins as a robot does that has come to rest, not as one that was
+    let go: by which of the two predicts its first samples better."""
+    rows = rows[work.times[rows] <= work.times[rows[0]] + guesses.SETTLE]
+    told = np.stack([c.values[rows] * factor(unit) for c, _, unit in work.told], axis=1)
+    actuators = [work.model.actuator(name).id for _, name, _ in work.told]
+    times = work.times[rows] - work.times[rows[0]]
+    errors = []
+    for lasting in (guesses.SETTLE, 0.0):
+        data = guesses.posed(work.model, pose, lasting)
+        made = rehearsal.motions(work.model, data, actuators, times, told)
+        rest = [
+            np.nanmean((column.values[rows] * factor(unit) - made[part]) ** 2)
+            / np.nanvar(column.values * factor(unit))
+            for column, part, unit in work.seen
+            if part in made
+        ]
+        errors.append(float(np.sum(rest)))
+    return errors[0] <= errors[1]
+
+
 def _begin(work: Work) -> None:
     """How trials begin: at rest in a pose, or where they were; cut or not."""
     told = np.stack([c.values for c, _, _ in work.told], axis=1)
@@ -191,6 +212,8 @@ def _begin(work: Work) -> None:
                 guesses.SIGMAS * guesses.noise(pieces), wide * factor(unit)
             )
     pose, settle = guesses.rests(work.model, first, tolerance)
+    if settle and not _settled(work, longest, pose or ""):
+        settle = 0.0
     if span > guesses.LONG and guesses.curved(told[longest]):
         work.start = {"recorded": True, "cut": guesses.CUT}
         work.start |= {"keyframe": pose} if pose else {}

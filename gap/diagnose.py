@@ -39,10 +39,11 @@ def diagnose(
         BnsError: too few trials, faults that cannot be repaired, channels that do not
             fit the model.
     """
-    given = {"seed": seed, "rows": rows, "full": full, "reference": reference}
     if light_model.told_by(model, (*trials, *reference)):
-        return light.diagnose(trials, model, single, **given)
-    return single(trials, model, **given)
+        return light.diagnose(
+            trials, model, single, seed=seed, rows=rows, full=full, reference=reference
+        )
+    return single(trials, model, seed=seed, rows=rows, full=full, reference=reference)
 
 
 def single(

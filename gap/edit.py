@@ -118,7 +118,9 @@ def _rms(compared: Compared, effects: Sequence[Effect]) -> tuple[float, ...]:
     return tuple(np.sqrt(np.nanmean(squares, axis=0)).tolist())
 
 
-def _sentence(gone, left, losses: Mapping[str, float]) -> str:
+def _sentence(
+    gone: Sequence[str], left: Sequence[Effect], losses: Mapping[str, float]
+) -> str:
     what = " and ".join(gone)
     rest = "leaves the nominal model" if not left else "leaves the other effects"
     error = losses["edited"]

@@ -101,7 +101,7 @@ class Verdict:
     sentence: str
     change: str = ""
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise BnsError(f"Verdict.kind {self.kind!r} is none of {', '.join(KINDS)}.")
 

@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 
 from bench.learning import branching, experiments, solving
-from bench.walking import recover
+from bench.walking import evidence
 from bns import presets
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig
@@ -128,7 +128,7 @@ def recovering(*, quick: bool = False) -> Mapping[Kind, Mapping[str, RunRecord]]
     }
     if not quick:
         trunks = records(map(undamaged, GROUPS))
-        if any(recover.forgets(trunk).any() for trunk in trunks.values()):
+        if any(evidence.forgets(trunk).any() for trunk in trunks.values()):
             raise BnsError("Run the undamaged runs with watch.forget, too.")
         for (_, _, group), config in configs.items():
             branching.begin(undamaged(group), config, idle=("watch", "walk"))

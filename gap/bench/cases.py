@@ -219,7 +219,16 @@ def build(
     raise BnsError(f"No effect could be hidden in case {seed}.")
 
 
-def _hidden(rng, stand, problem, point, kind, count, span, wanted) -> list[Hidden]:
+def _hidden(
+    rng: np.random.Generator,
+    stand: Stand,
+    problem: Problem,
+    point: Point,
+    kind: str,
+    count: int,
+    span: tuple[float, float],
+    wanted: str,
+) -> list[Hidden]:
     """Effects of different kinds, each about as strong as drawn."""
     found: list[Hidden] = []
     for _ in range(TRIES):
@@ -247,7 +256,13 @@ def _stem(name: str) -> str:
     return name.partition("[")[0].partition(".")[0].partition("@")[0]
 
 
-def drawn(rng, problem: Problem, point: Point, pool, length: float) -> Hidden | None:
+def drawn(
+    rng: np.random.Generator,
+    problem: Problem,
+    point: Point,
+    pool: Sequence[Row],
+    length: float,
+) -> Hidden | None:
     """A row, evenly over effects, with about a whitened length; None = not excited.
 
     Args:
@@ -283,9 +298,8 @@ def drawn(rng, problem: Problem, point: Point, pool, length: float) -> Hidden | 
     if not tried:
         return None
     sizes = np.sign(edge) * np.array(tried)
-    made = [problem.model.effect(row.term, values(float(s))) for s in sizes]
-    lengths = _lengths(problem, point, made)
-    lengths = np.where(np.isfinite(lengths), lengths, 0.0)
+    made = [_effect(problem, row.term, values(float(s))) for s in sizes]
+    lengths = np.nan_to_num(_lengths(problem, point, made), posinf=0.0, neginf=0.0)
     if lengths.max() < 0.7 * length:
         return None
     if row.stepped:
@@ -295,12 +309,19 @@ def drawn(rng, problem: Problem, point: Point, pool, length: float) -> Hidden | 
         size = float(np.interp(length, grown, np.append(0.0, np.abs(sizes))))
         size *= np.sign(edge)
     chosen = values(size)
-    hidden = problem.model.effect(row.term, chosen)
+    hidden = _effect(problem, row.term, chosen)
     (reached,) = _lengths(problem, point, [hidden])
     if not LEAST * SEEN < reached < 3 * max(length, SEEN):
         return None
     magnitude = abs(size) if plane else row.nominal + size
     return Hidden(row.term, chosen, hidden, float(magnitude))
+
+
+def _effect(problem: Problem, term: str, values: Mapping[str, float]) -> Effect:
+    found = problem.model.effect(term, values)
+    if found is None:
+        raise BnsError(f"{term!r} is a nuisance: no effect that a case can hide.")
+    return found
 
 
 def _features(problem: Problem, effects: Sequence[Effect]) -> np.ndarray:
@@ -378,9 +399,10 @@ def alike(problem: Problem, point: Point, item: Hidden) -> tuple[str, ...]:
         columns = [point.linear.columns[at] for at in point.linear.terms[name]]
         slopes = np.stack([point.slopes[k].ravel() for k in columns], axis=1)
         heavy = slopes * weight.ravel()[:, None]
-        values = np.linalg.lstsq(heavy.T @ slopes, heavy.T @ change.ravel(), rcond=None)
-        left = change.ravel() - slopes @ values[0]
-        near.append((float(weight.ravel() @ left**2), name, columns, values[0]))
+        pull = heavy.T @ change.ravel()
+        moved = np.linalg.lstsq(heavy.T @ slopes, pull, rcond=None)[0]
+        left = change.ravel() - slopes @ moved
+        near.append((float(weight.ravel() @ left**2), name, columns, moved))
     near = [entry for entry in near if entry[1] != item.term]
     for _, name, columns, departures in sorted(near, key=lambda e: e[:2])[:NEAREST]:
         values = problem.nominal.copy()
@@ -392,7 +414,7 @@ def alike(problem: Problem, point: Point, item: Hidden) -> tuple[str, ...]:
     return tuple(sorted(found | _by_level(problem, clean, point, item)))
 
 
-def _by_level(problem, clean, point: Point, item: Hidden) -> set[str]:
+def _by_level(problem: Problem, clean: Problem, point: Point, item: Hidden) -> set[str]:
     """Explanations without a slope one of whose values does the same."""
     sets, rows = [], []
     for number, row in enumerate(problem.rows):

@@ -1,7 +1,7 @@
 """Scores of the withheld-effect bench, from the rows that its runner writes."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from itertools import pairwise, permutations
 from typing import Any
@@ -127,7 +127,9 @@ def of(rows: Sequence[dict], kind: str, smallest: float = 0.0) -> list[dict]:
     ]
 
 
-def share(rows: Sequence[dict], holds) -> float:
+def share(
+    rows: Sequence[dict[str, Any]], holds: Callable[[dict[str, Any]], bool]
+) -> float:
     """Share of rows for which something holds; NaN if there are none."""
     return float(np.mean([bool(holds(row)) for row in rows])) if rows else float("nan")
 
@@ -191,7 +193,9 @@ def confusion(rows: Sequence[dict]) -> dict[str, int]:
     return dict(counts.most_common())
 
 
-def failures(rows: Sequence[dict], holds) -> list[str]:
+def failures(
+    rows: Sequence[dict[str, Any]], holds: Callable[[dict[str, Any]], bool]
+) -> list[str]:
     """One line per row for which something does not hold."""
     return [
         f"{row['kind']} {row['seed']}: {', '.join(row['answer']['effects'])} "

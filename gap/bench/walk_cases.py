@@ -126,7 +126,7 @@ def imperfection(rng: np.random.Generator, shin: str = PARTS[-1]) -> list[Effect
         rng: the only source of randomness.
         shin: the outermost part of its legs.
     """
-    rows = (
+    rows: tuple[tuple[str, dict[str, float | str]], ...] = (
         ("servo_gain", {"factor": rng.normal(1, 0.03)}),
         ("link_length", {"part": shin, "factor": rng.normal(1, 0.004)}),
         ("foot_slippery", {"factor": float(np.clip(rng.normal(1, 0.1), 0.7, 1.3))}),

@@ -76,7 +76,7 @@ def commands(
 
 def imperfection(rng: np.random.Generator) -> list[Effect]:
     """How a real robot departs from its model although nothing is wrong with it."""
-    values = {
+    values: dict[str, list[dict[str, float | str]]] = {
         "wheel_diameter": [
             {"wheel": side, "factor": float(np.clip(rng.normal(1, 0.002), 0.99, 1.01))}
             for side in ("left", "right")

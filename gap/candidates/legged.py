@@ -155,7 +155,13 @@ def _legwise(
         yield _whole(effect, parameter, levels, leg, fixed)
 
 
-def _whole(effect: str, parameter: str, levels: tuple[float, ...], part: str, fixed):
+def _whole(
+    effect: str,
+    parameter: str,
+    levels: tuple[float, ...],
+    part: str,
+    fixed: Mapping[str, Any],
+) -> Row:
     """A loss, which has no slope: a leg stands or it does not."""
     return _row(
         effect, parameter, 0.5, 0, 1, part=part, fixed=fixed, smooth=False,

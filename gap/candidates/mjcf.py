@@ -7,7 +7,6 @@ matters within a second.
 
 from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -179,8 +178,9 @@ def _range(
     return _of_channel(name, part, config)
 
 
-def _channel(part: str, config: OwnConfig) -> Any:
-    known = [item.channel.name for item in (*config.told, *config.seen)]
+def _channel(part: str, config: OwnConfig) -> None:
+    known = [item.channel.name for item in config.told]
+    known += [item.channel.name for item in config.seen]
     if part != ALL and part not in known:
         raise UnknownNameError("channel in [effects]", part, known)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -102,27 +103,25 @@ def term(name: str) -> str:
 
 def _of(item: Row, trials: Sequence[Trial], lead: float) -> Iterable[Row]:
     excite = EXCITE.get(item.effect, "any command")
-    edges = {"low": item.low, "high": item.high, "unit": item.unit, "excite": excite}
+    row = partial(Row, low=item.low, high=item.high, unit=item.unit, excite=excite)
     third = (item.high - item.low) / 3
     if item.effect == "command_dead_zone":
         if levels := _levels(item, trials):
-            yield Row(item.name, 0.0, third, smooth=False, stepped=True,
-                      levels=levels, **edges)  # fmt: skip
+            yield row(item.name, 0.0, third, smooth=False, stepped=True, levels=levels)
         return
     if item.effect == "command_limit":
         levels = tuple(v for v in item.levels if item.low < v < item.high)
-        yield Row(item.name, item.nominal, third, smooth=False, levels=levels, **edges)
+        yield row(item.name, item.nominal, third, smooth=False, levels=levels)
         return
     sd, slack = _plausible(item)
     late = item.effect in LATE
-    yield Row(
+    yield row(
         item.name,
         item.nominal,
         sd,
         slack=item.slack or (lead if late else slack),  # its steps lead by as much
         levels=(0.15, 0.3) if late else (),
         step=0.01 if late else 0.0,
-        **edges,
     )
 
 

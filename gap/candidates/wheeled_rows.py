@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from bns.gap.decomposition.row import Row
 from bns.gap.recordings import command_moments
 from bns.worlds.effects import registry
 from bns.worlds.effects.common import TOP_SPEED
+from bns.worlds.effects.parameter import Parameter
 from bns.worlds.trial import Trial
 
 SIDES = ("left", "right", "both")
@@ -36,7 +38,7 @@ EXCITE = {
 # departures are what published figures and repairs of such robots show; slack is how
 # well a nominal model is known: 0.3 to 0.4 % of a length, 1 ms, 10 g, 0.5 mm of a
 # centre of mass, 0.2 mm and 1 mrad of a marker (all assumed).
-_SMOOTH = (
+_SMOOTH: tuple[tuple[str, float, float, float, bool, dict[str, Any]], ...] = (
     ("wheel_gain", 0.06, 0, 2, True, {"slack": 0.003, "levels": (0.0, 0.5, 0.85)}),
     ("wheel_diameter", 0.04, 0.7, 1.3, True, {"levels": (0.93, 0.96, 1.04, 1.07)}),
     ("axle_length", 0.04, 0.7, 1.3, False, {"slack": 0.004}),
@@ -67,7 +69,7 @@ _SMOOTH = (
 )  # fmt: skip
 # a mass that is carried and its moments about the middle of the axle, and about the top
 # plate
-_LOAD = (
+_LOAD: tuple[tuple[str, float, float, float, str, dict[str, Any]], ...] = (
     ("payload.mass", 0.4, 0.0, 2.0, "kg", {"slack": 0.01, "levels": (0.3, 0.8)}),
     ("payload.mx", 0.015, -0.1, 0.1, "kg m", {"slack": 4e-4}),
     ("payload.my", 0.015, -0.1, 0.1, "kg m", {"slack": 4e-4}),
@@ -149,7 +151,7 @@ def _smooth(
         )
 
 
-def parameter(name: str):
+def parameter(name: str) -> Parameter:
     """The parameter that a row's name, without its wheel, stands for."""
     stem, _, wanted = name.partition(".")
     every = registry.get(stem).parameters

@@ -1,7 +1,7 @@
 """From a start to a set of explanations that stays when the problem is made linear
 around it; and which of several is the best."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -65,13 +65,15 @@ def descend(
     Returns:
         the last point, after `TURNS` searches at most.
     """
-    support, slopes, at = frozenset(support), None, None
+    support, at = frozenset(support), None
+    slopes: Mapping[int, np.ndarray] = {}
     for _ in range(TURNS):
         values, rest = newton(problem, values, _fitted(problem, support), known)
         values, rest = levels.zoomed(problem, values, rest, support, known)
         near = at is not None and np.abs((values - at) / problem.sd).max() <= fit.FAR
-        slopes, at = (slopes, at) if near else (None, values.copy())
-        linear, known, slopes = linearised(problem, values, rest, known, slopes)
+        at = at if near else values.copy()
+        kept = slopes if near else None
+        linear, known, slopes = linearised(problem, values, rest, known, kept)
         found = linear.search(start=support, backward=not problem.model.singly)[1]
         if found == support:
             break
@@ -101,7 +103,7 @@ def costs(problem: Problem, points: Sequence[Point]) -> list[float]:
     for point in points:
         known = replace(point.noise, lam=lam)
         cost = relinearised(problem, point, known).cost(point.support)
-        size = np.log(known.sd[problem.seen]).sum() / lam
+        size = (np.log(known.sd[problem.seen]).sum() + known.starts.size) / lam
         found.append(float(cost + size))
     return found
 
@@ -117,9 +119,9 @@ def relinearised(problem: Problem, point: Point, known: Noise) -> Linear:
     whole = fit.target(problem, point.values, point.rest, point.slopes)
     linear = Linear.of(
         problem,
-        {k: known.memory(slope) for k, slope in point.slopes.items()},
+        {k: known.innovations(slope) for k, slope in point.slopes.items()},
         fit.units(problem, point.values),
-        known.memory(whole),
+        known.innovations(whole),
         known.weights(point.rest, problem.seen),
     )
     return linear.correlated(known.lam)
@@ -276,8 +278,8 @@ def _simple(problem: Problem, start: Point) -> list[Point]:
     order = sorted(linear.free, key=lambda name: linear.cost({name}))
     wide = [name for name in order if len(linear.terms[name]) >= WIDE][: SINGLES // 2]
     order = [*dict.fromkeys((*order[:SINGLES], *wide))]
-    few = problem.sample(fit.ROUGH)
-    few = None if len(few) == len(problem.trials) else few
+    sample = problem.sample(fit.ROUGH)
+    few = None if len(sample) == len(problem.trials) else sample
     starts = [(n, placed(problem, linear, {n}, start.values)) for n in order]
     starts += levels.alone(problem, start, SINGLES)
     tried = []
@@ -320,7 +322,9 @@ def _prior(problem: Problem, values: np.ndarray) -> float:
     return float((((values - problem.nominal) / problem.sd)[rows] ** 2).sum())
 
 
-def _with_level(problem: Problem, name: str, values, start: Point) -> Point | None:
+def _with_level(
+    problem: Problem, name: str, values: np.ndarray, start: Point
+) -> Point | None:
     """A point from a single explanation and a level on top of it: through a tangent
     that lacks the level, the rest of it looks like several others."""
     single = _fitted_at(problem, replace(start, values=values), frozenset({name}))

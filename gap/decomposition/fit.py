@@ -1,6 +1,6 @@
 """The nonlinear fit: damped Gauss-Newton, linear models around it, and its starts."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,6 +9,7 @@ from bns.gap.decomposition import noise
 from bns.gap.decomposition.linear import Linear, Support, inflation
 from bns.gap.decomposition.noise import Memory
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.starts import Starts
 
 DAMPING = (0.0, 2.0, 20.0, 200.0)  # added to the curvature, in units of the prior
 LONGEST = 4.0  # prior standard deviations of one step
@@ -22,12 +23,23 @@ ROUGH = 20.0  # [s] of recording for comparing these
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """What the residuals scatter: `sd` ``(N, C)``, their memory, and how many count as
-    one (`lam`)."""
+    """What the residuals scatter.
+
+    Attributes:
+        sd: of each, ``(N, C)``, once starts and memory are taken out.
+        starts: what the states in which trials began may make of them.
+        memory: their autoregression.
+        lam: how many count as one.
+    """
 
     sd: np.ndarray
+    starts: Starts
     memory: Memory
     lam: float
+
+    def innovations(self, values: np.ndarray) -> np.ndarray:
+        """Residuals or slopes ``(N, C)`` without what starts and memory explain."""
+        return self.memory(self.starts(values))
 
     @property
     def order(self) -> int:
@@ -36,11 +48,11 @@ class Noise:
 
     def loss(self, rest: np.ndarray) -> float:
         """Pseudo-Huber loss of residuals."""
-        return noise.loss(self.memory(np.nan_to_num(rest)), self.sd)
+        return noise.loss(self.innovations(np.nan_to_num(rest)), self.sd)
 
     def weights(self, rest: np.ndarray, seen: np.ndarray) -> np.ndarray:
         """Weights of the squares, ``(N, C)``."""
-        return noise.weights(self.memory(np.nan_to_num(rest)), self.sd, seen)
+        return noise.weights(self.innovations(np.nan_to_num(rest)), self.sd, seen)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,8 +160,10 @@ def first_noise(problem: Problem, rest: np.ndarray, motion: np.ndarray) -> Noise
         motion: predicted features, with whose motion noise may grow, ``(N, C)``.
     """
     memory = Memory.none(problem.trial, rest.shape[1])
-    sd = noise.scale(rest, problem.model.motion(motion), problem.model.least)
-    return Noise(sd, memory, 2.0)
+    starts = Starts.of(problem, problem.nominal)
+    left = np.where(problem.seen, starts(np.nan_to_num(rest)), np.nan)
+    sd = noise.scale(left, problem.model.motion(motion), problem.model.least)
+    return Noise(sd, starts, memory, 2.0)
 
 
 def linearised(
@@ -177,6 +191,7 @@ def linearised(
     wanted = smooth(problem, values)
     if slopes is None or any(k not in slopes for k in wanted):
         slopes = columns(problem, values)
+        known = replace(known, starts=Starts.of(problem, values))
     whole = target(problem, values, rest, slopes)
     predicted = np.where(problem.seen, problem.recorded, 0.0) - np.nan_to_num(rest)
     motion = problem.model.motion(predicted)
@@ -186,14 +201,14 @@ def linearised(
         made = _linear(problem, values, slopes, whole, known, left)
         found = made.solve(made.free)
         left = whole - _summed(problem, values, slopes, made, found)
-        memory = known.memory
         if order and turn < MEASURED - 1:
-            memory = Memory.of(left, problem.trial, order)
-        seen = np.where(problem.seen, memory(left), np.nan)
-        change = np.abs(memory(moved))
+            memory = Memory.of(known.starts(left), problem.trial, order)
+            known = replace(known, memory=memory)
+        seen = np.where(problem.seen, known.innovations(left), np.nan)
+        change = np.abs(known.innovations(moved))
         felt = None if problem.model.many else change
         sd = noise.scale(seen, motion, problem.model.least, felt)
-        known = Noise(np.hypot(sd, INEXACT * change), memory, 1.0)
+        known = replace(known, sd=np.hypot(sd, INEXACT * change), lam=1.0)
     made = _linear(problem, values, slopes, whole, known, left)
     found = made.solve(made.free)
     whitened = np.sqrt(made.weight) * made.rest(found)
@@ -201,15 +216,28 @@ def linearised(
     return made.correlated(lam), replace(known, lam=lam), slopes
 
 
-def _linear(problem, values, slopes, whole, known: Noise, left) -> Linear:
-    design = {number: known.memory(slope) for number, slope in slopes.items()}
+def _linear(
+    problem: Problem,
+    values: np.ndarray,
+    slopes: Mapping[int, np.ndarray],
+    whole: np.ndarray,
+    known: Noise,
+    left: np.ndarray,
+) -> Linear:
+    design = {number: known.innovations(slope) for number, slope in slopes.items()}
     weight = known.weights(left, problem.seen)
     return Linear.of(
-        problem, design, units(problem, values), known.memory(whole), weight
+        problem, design, units(problem, values), known.innovations(whole), weight
     )
 
 
-def _summed(problem, values, slopes, made: Linear, found: np.ndarray) -> np.ndarray:
+def _summed(
+    problem: Problem,
+    values: np.ndarray,
+    slopes: Mapping[int, np.ndarray],
+    made: Linear,
+    found: np.ndarray,
+) -> np.ndarray:
     sizes = units(problem, values)
     total = np.zeros_like(problem.recorded)
     for number, value in zip(made.columns, found, strict=True):
@@ -269,19 +297,26 @@ def _kept(problem: Problem, only: list[int]) -> np.ndarray:
     return np.where(inside[:, None], problem.recorded, np.nan)
 
 
-def _rest(problem: Problem, values: np.ndarray, only) -> np.ndarray:
+def _rest(problem: Problem, values: np.ndarray, only: list[int] | None) -> np.ndarray:
     if only is None:
         return problem.residual(values)[0]
     (made,) = problem.predict([values], only=only)
     return np.where(problem.seen, problem.recorded - np.nan_to_num(made, nan=1e3), 0.0)
 
 
-def _step(problem, values, rest, which, known: Noise, only):
+def _step(
+    problem: Problem,
+    values: np.ndarray,
+    rest: np.ndarray,
+    chosen: Sequence[int],
+    known: Noise,
+    only: list[int] | None,
+) -> tuple[np.ndarray, np.ndarray] | None:
     """One damped step that lowers the loss; None if there is none."""
-    which = np.array(which)
-    slopes = problem.slopes(values, which, only=only)
+    which = np.array(chosen)
+    slopes = problem.slopes(values, chosen, only=only)
     weight = known.weights(rest, problem.seen).ravel()
-    design = np.stack([known.memory(slopes[k]).ravel() for k in which], axis=-1)
+    design = np.stack([known.innovations(slopes[k]).ravel() for k in which], axis=-1)
     design = design * problem.sd[which]
     # what was found by its level has a flat prior
     flat = np.array([1.0 if problem.rows[k].smooth else 0.2 for k in which])
@@ -295,7 +330,7 @@ def _step(problem, values, rest, which, known: Noise, only):
 
     heavy = design * weight[:, None]
     curvature = heavy.T @ design / known.lam + np.diag(flat**2)
-    pull = heavy.T @ known.memory(np.nan_to_num(rest)).ravel() / known.lam
+    pull = heavy.T @ known.innovations(np.nan_to_num(rest)).ravel() / known.lam
     pull -= flat**2 * departure(values)
     now = height(values, rest)
     low, high = problem.bounds

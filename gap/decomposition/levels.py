@@ -1,7 +1,7 @@
 """Starts over the whole range of what has no slope at the nominal: dead bands, limits,
 lags that are long, wheels that stop."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -135,7 +135,9 @@ def _departures(row: Row, spread: Sequence[float]) -> list[float]:
     return sorted(found)
 
 
-def _level(problem, point: Point, number: int, value: float, linear: Linear) -> Level:
+def _level(
+    problem: Problem, point: Point, number: int, value: float, linear: Linear
+) -> Level:
     known = min((point.support, frozenset()), key=lambda s: linear.cost(_in(linear, s)))
     cost, support = linear.search(start=known, quick=True)
     row = problem.rows[number]
@@ -144,7 +146,14 @@ def _level(problem, point: Point, number: int, value: float, linear: Linear) -> 
     return Level(float(paid), values, support | {row.term})
 
 
-def _values(problem, point: Point, number: int, value: float, linear: Linear, support):
+def _values(
+    problem: Problem,
+    point: Point,
+    number: int,
+    value: float,
+    linear: Linear,
+    support: Support,
+) -> np.ndarray:
     """Values of all rows with a row at a level, the others by the linear model."""
     values = problem.nominal.copy()
     found = linear.solve(support)
@@ -171,7 +180,12 @@ def _weighed(problem: Problem, point: Point, only: list[int] | None) -> Linear:
     return point.linear.of_blocks(stretches(len(point.linear.square), inside))
 
 
-def _scored(problem: Problem, point: Point, todo, only: list[int] | None):
+def _scored(
+    problem: Problem,
+    point: Point,
+    todo: Sequence[tuple[int, float]],
+    only: list[int] | None,
+) -> list[tuple[float, tuple[int, float], Linear]]:
     """Cost of each level with the present explanations or none, best first, with the
     linear model in which it is set."""
     if not todo:
@@ -195,7 +209,7 @@ def _scored(problem: Problem, point: Point, todo, only: list[int] | None):
         if problem.rows[number].smooth:  # what it did before is in the target
             off = point.values[number] - problem.nominal[number]
             change = change + point.slopes[number] * off
-        change = point.noise.memory(change)
+        change = point.noise.innovations(change)
         if (point.linear.weight * change**2).sum() < FELT:
             continue
         term = problem.rows[number].term
@@ -208,7 +222,11 @@ def _scored(problem: Problem, point: Point, todo, only: list[int] | None):
 
 
 def zoomed(
-    problem: Problem, values: np.ndarray, rest: np.ndarray, support, known: Noise
+    problem: Problem,
+    values: np.ndarray,
+    rest: np.ndarray,
+    support: Collection[str],
+    known: Noise,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The best values of rows set to levels, between the levels beside.
 
@@ -229,7 +247,9 @@ def zoomed(
     return values, rest
 
 
-def _zoom(problem: Problem, values, rest, number: int, known: Noise):
+def _zoom(
+    problem: Problem, values: np.ndarray, rest: np.ndarray, number: int, known: Noise
+) -> tuple[np.ndarray, np.ndarray]:
     row = problem.rows[number]
     marks = np.unique([*row.levels, row.low, row.high])
     low = marks[marks < values[number]].max(initial=row.low)

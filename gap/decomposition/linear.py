@@ -10,8 +10,9 @@ sets in cost no simulation.
 """
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -149,7 +150,7 @@ class Linear:
             design=design, target=target, normal=normal, slope=slope, square=square
         )
 
-    def _with(self, **changes) -> "Linear":
+    def _with(self, **changes: Any) -> "Linear":
         return replace(self, **changes, _costs={}, _sums={})
 
     def moved(self, change: np.ndarray, drop: str = "") -> "Linear":
@@ -218,7 +219,9 @@ class Linear:
         )
         return made
 
-    def _curvature(self, normal, prior, used) -> np.ndarray:
+    def _curvature(
+        self, normal: np.ndarray, prior: np.ndarray, used: np.ndarray
+    ) -> np.ndarray:
         return normal[np.ix_(used, used)] / self.lam + np.diag(prior[used] ** -2)
 
     def covariance(self, support: Iterable[str]) -> np.ndarray:
@@ -251,7 +254,7 @@ class Linear:
         used = np.flatnonzero(prior)
         factor = np.linalg.cholesky(self._curvature(normal, prior, used))
         half = np.linalg.solve(factor, slope[used] / self.lam)
-        value = 0.5 * square / self.lam - 0.5 * half @ half
+        value = 0.5 * square / self.lam - float(0.5 * half @ half)
         value += np.log(np.diag(factor)).sum() + np.log(prior[used]).sum()
         value += self._paid(key)
         found = np.zeros(len(prior))
@@ -289,7 +292,7 @@ class Linear:
         Returns:
             its cost, and the set.
         """
-        starts = [] if quick else [frozenset()]
+        starts: list[Support] = [] if quick else [frozenset()]
         if backward and not quick:
             starts.insert(0, self._backward())
         if start is not None:
@@ -417,7 +420,7 @@ def inflation(linear: Linear, values: np.ndarray) -> float:
     return float(np.median(sums[told] / size[told])) * count / max(count - 1, 1)
 
 
-def stretches(count: int, kept: Sequence[int]) -> np.ndarray:
+def stretches(count: int, kept: Iterable[int]) -> np.ndarray:
     """Which of so many stretches are kept, ``(count,)``."""
     made = np.zeros(count, dtype=bool)
     made[list(kept)] = True

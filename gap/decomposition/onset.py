@@ -103,9 +103,11 @@ def _late(linear: Linear, cut: _Cut) -> Linear:
     return replace(made, penalty={**made.penalty, LATE: KAPPA + cut.paid})
 
 
-def _best(linear: Linear, base: Support, support: Support, cuts: Sequence[_Cut]):
+def _best(
+    linear: Linear, base: Support, support: Support, cuts: Sequence[_Cut]
+) -> tuple[float, _Cut, Support]:
     """Cost, moment and set of the best explanation that sets in."""
-    found = (np.inf, cuts[0], frozenset())
+    found: tuple[float, _Cut, Support] = (np.inf, cuts[0], frozenset())
     for name in linear.free:
         for each in cuts:
             cut = replace(each, name=name)
@@ -119,7 +121,7 @@ def _best(linear: Linear, base: Support, support: Support, cuts: Sequence[_Cut])
     return found
 
 
-def _lasting(linear: Linear, base, cut: _Cut, support: Support) -> bool:
+def _lasting(linear: Linear, base: Support, cut: _Cut, support: Support) -> bool:
     """Whether the date brings as much with each trial left out."""
     late = _late(linear, cut)
     count = len(linear.square)
@@ -131,7 +133,7 @@ def _lasting(linear: Linear, base, cut: _Cut, support: Support) -> bool:
     return True
 
 
-def _values(problem: Problem, point: Point, cut: _Cut, support: Support):
+def _values(problem: Problem, point: Point, cut: _Cut, support: Support) -> np.ndarray:
     """Values of the rows by the linear model, those that set in at theirs."""
     late = _late(point.linear, cut)
     found = late.solve(support)

@@ -151,6 +151,31 @@ class Problem:
         rest = np.where(self.seen & lost, FAR, self.recorded - made)
         return rest, made
 
+    def begun(self, values: np.ndarray) -> np.ndarray:
+        """What a standard deviation of each number of the state in which a trial began
+        changes of the features of that trial, ``(K, N, C)``.
+
+        Args:
+            values: of all rows, ``(R,)``.
+        """
+        unsure = [self.model.begun(trial) for trial in self.trials]
+        names = list(dict.fromkeys(name for row in unsure for name in row))
+        shape = (0, *self.recorded.shape)
+        if not names:
+            return np.zeros(shape)
+        known = [self.changed(values, number) for number in range(len(unsure))]
+        off: list[list[dict[str, float]]] = [[{}] * len(unsure)]
+        off += [[{n: row[n]} if n in row else {} for row in unsure] for n in names]
+        sets = [[a | b for a, b in zip(known, row, strict=True)] for row in off]
+        made = self.model.paths(self.trials, sets, fine=False)
+        base, *moved = (self._features(paths) for paths in made)
+        return np.nan_to_num(np.stack(moved) - base)
+
+    def _features(self, paths: Sequence[np.ndarray]) -> np.ndarray:
+        """Features of a path of each trial, ``(N, C)``."""
+        parts = zip(self.trials, paths, self.windows, strict=True)
+        return np.concatenate([self.model.compare(*part) for part in parts])
+
     def without(self, left_out: np.ndarray) -> "Problem":
         """The same, some windows ``(N,)`` taken as not seen."""
         recorded = np.where(left_out[:, None], np.nan, self.recorded)
@@ -220,7 +245,8 @@ class Problem:
         count = len(self.trials)
         order = sorted(range(count), key=lambda n: ((7 * n) % count, n))
         told: set[bytes] = set()
-        fresh, again = [], []
+        fresh: list[int] = []
+        again: list[int] = []
         for number in order:
             key = self.trials[number].commands.values.round(3).tobytes()
             (again if key in told else fresh).append(number)

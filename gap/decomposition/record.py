@@ -1,6 +1,7 @@
 """A decomposition written down as a diagnosis: verdict, statements, fits."""
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,7 +19,12 @@ SINGLES = 8  # explanations whose share alone is reported
 
 
 def recorded(
-    made: Decomposition, *, faults, seed: int, seconds: dict[str, float], full: bool
+    made: Decomposition,
+    *,
+    faults: Sequence[str],
+    seed: int,
+    seconds: dict[str, float],
+    full: bool,
 ) -> Diagnosis:
     """A decomposition written down.
 
@@ -133,7 +139,6 @@ def statements(made: Decomposition) -> list[str]:
     )
     if made.kind == "no gap":
         return ["No gap beyond what the recording scatters by itself." + apart]
-    window = float(np.median(np.concatenate([w.durations for w in problem.windows])))
     before, beyond = _sizes(made, made.start.rest)
     _, left = _sizes(made, made.point.rest)
     listed = [words.part(part, *_main(made, part)) for part in made.parts]
@@ -142,11 +147,20 @@ def statements(made: Decomposition) -> list[str]:
         date = f"{made.onset.name} sets in at trial {made.onset.trial}."
     swapped = [" with ".join(_ordered(made, s)) for s in made.tied[1:]]
     return [
-        words.size(before, beyond, features, window),
+        words.size(before, beyond, features, _over(problem)),
         words.explained(listed, made.closed, date, swapped),
         words.left(made.left, made.lasting, made.recurring, words.sized(left, features))
         + apart,
     ]
+
+
+def _over(problem: Problem) -> str:
+    """In what time a gap has grown, in words."""
+    if problem.model.whole:
+        spans = [float(trial.times[-1] - trial.times[0]) for trial in problem.trials]
+        return f"in trials of {np.median(spans):.2g} s"
+    window = np.median(np.concatenate([w.durations for w in problem.windows]))
+    return f"over {window:.2g} s"
 
 
 def _sizes(made: Decomposition, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -210,7 +224,9 @@ def _at_bound(problem: Problem, part: Part) -> bool:
     return any(value in (rows[n].low, rows[n].high) for n, value in part.values.items())
 
 
-def shown_effect(problem: Problem, name: str, part: Part):
+def shown_effect(
+    problem: Problem, name: str, part: Part
+) -> tuple[str, float, tuple[float, float], str]:
     """Text, magnitude, interval and unit of an explanation.
 
     Args:

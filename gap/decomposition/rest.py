@@ -7,6 +7,7 @@ import numpy as np
 
 from bns import seeding
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.starts import Starts
 
 THIRD = np.sqrt(20.0)  # third differences of noise: 1 + 9 + 9 + 1
 NORMAL = 1.4826
@@ -36,11 +37,16 @@ class Floor:
     sd: np.ndarray
 
 
-def floor(problem: Problem, *, seed: int = 0) -> Floor:
+def floor(problem: Problem, starts: Starts, *, seed: int = 0) -> Floor:
     """The measurement's scatter, from third differences of the recording.
 
     What moves slowly against the sampling drops out of these, jitter of the time stamps
-    does not.
+    does not. To it comes what is not known of how trials began.
+
+    Args:
+        problem: the recording.
+        starts: of its trials.
+        seed: of the noise that is drawn.
     """
     count = len(problem.model.channels)
     found = []
@@ -60,7 +66,8 @@ def floor(problem: Problem, *, seed: int = 0) -> Floor:
         squares += (np.concatenate(parts) - problem.recorded) ** 2
     mean = np.nanmean(squares / DRAWS, axis=0)
     sd = np.sqrt(np.broadcast_to(mean, squares.shape))
-    return Floor(sigma, np.maximum(sd, problem.model.least))
+    sd = np.hypot(np.maximum(sd, problem.model.least), starts.spread)
+    return Floor(sigma, sd)
 
 
 def kept(problem: Problem, left: np.ndarray, sd: np.ndarray) -> np.ndarray:
@@ -183,7 +190,9 @@ def recurrence(
     return max(_errors(np.sum(every, axis=0)), _errors(same), alone)
 
 
-def scattered(problem: Problem, rest: np.ndarray, known: Floor, inside) -> float:
+def scattered(
+    problem: Problem, rest: np.ndarray, known: Floor, inside: np.ndarray
+) -> float:
     """Excess over the floor, per residual, of what differs between repeats: the
     robot's own scatter; 0 where there are no repeats.
 

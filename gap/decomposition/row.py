@@ -66,7 +66,7 @@ class Row:
     fixed: Mapping[str, Any] = field(default_factory=dict)
     aliases: tuple[str, ...] = ()
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not (self.low <= self.nominal <= self.high and self.sd > 0):
             raise BnsError(
                 f"Row {self.name!r}: the nominal value has to lie between low and "

@@ -62,7 +62,10 @@ def parts(problem: Problem, point: Point) -> list[Part]:
     return sorted(made, key=lambda part: (-part.last, part.name))
 
 
-def _values(problem: Problem, point: Point, name: str, spread: np.ndarray):
+def _values(
+    problem: Problem, point: Point, name: str, spread: np.ndarray
+) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
+    """Values of the rows of an explanation, and their 90 % intervals, by name."""
     place = {number: at for at, number in enumerate(point.linear.columns)}
     values, low, high = {}, {}, {}
     edges = problem.bounds
@@ -122,13 +125,13 @@ class HeldOut:
         units = fit.units(problem, point.values)
         whole = fit.target(problem, point.values, point.rest, point.slopes)
         plain = Linear.of(problem, point.slopes, units, whole, weight)
-        fixed = {}
+        fixed: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         for number, slope in point.slopes.items():
             row = problem.rows[number]
             if not row.smooth:
                 change = slope * (point.values[number] - row.nominal)
                 one, other = fixed.get(row.term, (0.0, 0.0))
-                change = (one + point.noise.memory(change), other + change)
+                change = (one + point.noise.innovations(change), other + change)
                 fixed[row.term] = change
         return cls(linear, plain, weight, fixed)
 

@@ -1,5 +1,7 @@
 """Sets of explanations that the data can hardly tell from the one that was found."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bns.gap.decomposition import levels
@@ -87,7 +89,9 @@ def _others(problem: Problem, point: Point, bare: np.ndarray) -> list[np.ndarray
     return made
 
 
-def _scored(problem: Problem, point: Point, sets, only: list[int] | None):
+def _scored(
+    problem: Problem, point: Point, sets: Sequence[np.ndarray], only: list[int] | None
+) -> list[tuple[float, str, np.ndarray]]:
     """Nats that sets of values cost beyond the point's, the best of each explanation,
     with that and the values; the best first."""
     if not sets or only == []:

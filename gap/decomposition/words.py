@@ -2,34 +2,51 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from bns.gap.decomposition.shares import Part
+from bns.worlds.trial import Channel
 
 WORDS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3)}
-LISTED = 4  # alternatives in a sentence
+LISTED = 4  # alternatives, or channels, in a sentence
 
 
-def sized(sizes: Sequence[float], channels: Sequence) -> str:
-    """Sizes of features in units that are read, "1.2 mm forward"."""
-    found = []
-    for value, channel in zip(sizes, channels, strict=True):
-        unit, factor = WORDS.get(channel.unit, (channel.unit, 1.0))
-        found.append(f"{factor * value:.2g} {unit} {channel.name}")
-    return ", ".join(found)
+def sized(sizes: Sequence[float] | np.ndarray, channels: Sequence[Channel]) -> str:
+    """Sizes of features in units that are read, "1.2 mm forward"; of many the
+    largest."""
+    order = sorted(range(len(channels)), key=lambda n: -sizes[n])
+    kept = sorted(order[: LISTED if len(order) > LISTED + 1 else None])
+    found = [_one(sizes[n], channels[n]) for n in kept]
+    more = len(channels) - len(kept)
+    return ", ".join(found) + (f" and less in {more} more" if more else "")
 
 
-def size(before: Sequence[float], beyond: Sequence[float], channels, window) -> str:
+def _one(value: float, channel: Channel) -> str:
+    """A size with two digits, never as a power of ten where it need not be."""
+    unit, factor = WORDS.get(channel.unit, (channel.unit, 1.0))
+    if value >= 1.0:
+        unit, factor = channel.unit, 1.0
+    shown = float(f"{factor * value:.2g}")
+    return f"{shown:.4g} {unit} {channel.name}"
+
+
+def size(
+    before: np.ndarray,
+    beyond: np.ndarray,
+    channels: Sequence[Channel],
+    over: str,
+) -> str:
     """First statement: how large the gap is beyond what measuring scatters.
 
     Args:
         before: size of the gap by feature, in its unit.
         beyond: the same without what measuring scatters.
         channels: the features.
-        window: length of a window [s].
+        over: in what time it has grown, in words.
     """
     return (
-        f"Recorded and predicted motion differ by {sized(before, channels)} over "
-        f"{window:.2g} s; beyond what measuring scatters that is "
-        f"{sized(beyond, channels)}."
+        f"Recorded and predicted motion differ by {sized(before, channels)} {over}; "
+        f"beyond what measuring scatters that is {sized(beyond, channels)}."
     )
 
 

@@ -55,7 +55,8 @@ def read(directory: str | Path) -> list[Trial]:
     files = sorted(Path(directory).glob("*.json"))
     if not files:
         raise FormatError(f"{directory} holds no .json file; give a directory of runs.")
-    trials, seen = [], {}
+    trials = []
+    seen: dict[tuple[object, ...], int] = {}
     for file in files:
         trial = _trial(file)
         told = trial.conditions

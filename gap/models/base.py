@@ -59,6 +59,7 @@ class GapModel(ABC):
             channel that is believed, ``(n_channels,)``.
         limits: lowest and highest command and its unit, by channel; empty = not known.
         dt: physics step [s]; 0 = none.
+        whole: whether motion is compared since its trial began, not over windows.
         timed: whether commands last as long as they are told.
         logs: whether `read_log` reads logs.
         memory: order of the autoregression that residuals may have; 0 = none.
@@ -82,6 +83,7 @@ class GapModel(ABC):
     resolution: np.ndarray
     limits: Mapping[str, tuple[float, float, str]] = {}
     dt: float = 0.0
+    whole: bool = False
     timed: bool = True
     logs: bool = False
     memory: int = 0
@@ -181,6 +183,12 @@ class GapModel(ABC):
         heading, position, time.
         """
         del trial, windows
+        return {}
+
+    def begun(self, trial: Trial) -> Mapping[str, float]:
+        """Numbers of the state in which a trial began that are not known, each with its
+        standard deviation; `paths` takes them by these names. Empty = it is known."""
+        del trial
         return {}
 
     def motion(self, features: np.ndarray) -> np.ndarray:

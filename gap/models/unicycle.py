@@ -13,7 +13,13 @@ from bns.gap.candidates import unicycle_rows
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, Windows
 from bns.gap.recordings import segments
-from bns.worlds.effects.base import ControlSignal, Effect, PoseSignal
+from bns.worlds.effects.base import (
+    CommandEffect,
+    ControlSignal,
+    Effect,
+    PoseSignal,
+    TrackingEffect,
+)
 from bns.worlds.effects.command import TWIST
 from bns.worlds.physics import control
 from bns.worlds.trial import POSE_CHANNELS, Channel, Trial, body_displacement
@@ -135,7 +141,7 @@ def _path(trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
     command = np.repeat(np.arange(-1, len(counts)), [lead, *counts])
     times = np.arange(len(values)) * STEP
     for effect in effects:
-        if effect.stage == "command":
+        if isinstance(effect, CommandEffect) and effect.stage == "command":
             signal = ControlSignal(times, values, command, TWIST, STEP)
             values = effect.apply(signal, on, rng)
     speed, rate = values[lead:].T
@@ -153,7 +159,7 @@ def _path(trial: Trial, effects: Sequence[Effect]) -> np.ndarray:
     grid = np.arange(made.shape[1]) * STEP
     poses, always = made.T, np.ones(len(grid), bool)
     for effect in effects:
-        if effect.stage == "tracking":
+        if isinstance(effect, TrackingEffect):
             _, poses = effect.apply(PoseSignal(grid, poses, grid, poses), always, rng)
     at = trial.times - trial.times[trial.boundaries[0]]
     return np.stack([np.interp(at, grid, axis) for axis in poses.T], axis=1)

@@ -52,15 +52,11 @@ class WheeledModel(GapModel):
         if self._robot.kind != "wheeled":
             raise BnsError(f"{robot!r} has no wheels; take a wheeled robot.")
         self.name = robot
+        self.dt = float(compile.compiled(robot).model.opt.timestep)
         self.process = np.array(process, dtype=float)
         self.resolution = np.array(resolution, dtype=float)
         self.limits = {c.name: (c.low, c.high, c.unit) for c in self._robot.commands}
         self._drives = wheeled_drives.Drives(robot, Pool(threads))
-
-    @property
-    def dt(self) -> float:
-        """Physics step [s]."""
-        return float(compile.compiled(self.name).model.opt.timestep)
 
     @property
     def least(self) -> np.ndarray:

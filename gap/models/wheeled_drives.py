@@ -13,7 +13,7 @@ from bns.gap.candidates.wheeled_rows import LEAD, parameter
 from bns.gap.recordings import trial_labels
 from bns.gap.recordings.segments import moved
 from bns.worlds.effects import bodies, registry
-from bns.worlds.effects.base import BodyEffect, ControlSignal, Effect
+from bns.worlds.effects.base import CommandEffect, ControlSignal, Effect, ModelEdit
 from bns.worlds.physics import compile, observe, servo_joint
 from bns.worlds.physics.rollout import Compiled, Job, Pool, Segment
 from bns.worlds.trial import Commands, Trial
@@ -56,8 +56,8 @@ class Changes:
         seen: values of what the tracker does, by row.
     """
 
-    body: tuple[BodyEffect, ...]
-    command: tuple[Effect, ...]
+    body: tuple[ModelEdit, ...]
+    command: tuple[CommandEffect, ...]
     late: float
     lost: float
     seen: Mapping[str, float]
@@ -79,8 +79,8 @@ class Changes:
             whole = name.startswith(PLANES)
             parts = [rows] if whole else [{row: rows[row]} for row in rows]
             made += [effect(name, part) for part in parts]
-        body = tuple(item for item in made if item.stage == "body")
-        told = [item for item in made if item.stage != "body"]
+        body = _edits(made)
+        told = [item for item in made if isinstance(item, CommandEffect)]
         told.sort(key=lambda item: ORDER.index(item.name))
         return cls(body, tuple(told), late, lost, seen)
 
@@ -93,7 +93,7 @@ class Changes:
             number: of the trial, for what grows with it.
         """
         held = [item.in_trial(number) for item in effects if not item.is_nominal]
-        told = [item for item in held if item.stage in ("command", "actuator")]
+        told = [item for item in held if isinstance(item, CommandEffect)]
         late = sum(item["delay"] for item in told if item.name == LATENCY)
         told = [item for item in told if item.name != LATENCY]
         told.sort(key=lambda item: _place(item.name))
@@ -103,8 +103,13 @@ class Changes:
             for name in strengths if item.name in TRACKING else ():
                 full = f"{item.name}.{name}" if len(strengths) > 1 else item.name
                 seen[full] = item[name]
-        body = tuple(item for item in held if item.stage == "body")
-        return cls(body, tuple(told), late, 0.0, seen)
+        return cls(_edits(held), tuple(told), late, 0.0, seen)
+
+
+def _edits(effects: Sequence[Effect]) -> tuple[ModelEdit, ...]:
+    """Those on the body."""
+    edits = (item for item in effects if isinstance(item, ModelEdit))
+    return tuple(item for item in edits if item.stage == "body")
 
 
 def _place(name: str) -> int:
@@ -165,7 +170,7 @@ def carried(values: Mapping[str, float]) -> Effect:
     return registry.make("payload", mass=mass, **place)
 
 
-def load(values: Mapping[str, float], robot: str) -> list[BodyEffect]:
+def load(values: Mapping[str, float], robot: str) -> list[Effect]:
     """The edits that a payload is simulated by.
 
     A light one, whose place would be far off for its moments, is a mass above the axle
@@ -195,9 +200,7 @@ def base_mass(robot: str) -> float:
 
 
 @lru_cache(maxsize=4000)
-def begun(
-    robot: str, body: tuple[BodyEffect, ...], dt: float, yaw: float
-) -> np.ndarray:
+def begun(robot: str, body: tuple[ModelEdit, ...], dt: float, yaw: float) -> np.ndarray:
     """Full physics state at rest at the origin with a heading.
 
     Args:
@@ -210,7 +213,7 @@ def begun(
 
 
 @lru_cache(maxsize=2000)
-def scene(robot: str, body: tuple[BodyEffect, ...], dt: float) -> Compiled:
+def scene(robot: str, body: tuple[ModelEdit, ...], dt: float) -> Compiled:
     """The robot's scene with edits, at a step [s].
 
     Args:
@@ -346,7 +349,10 @@ def start(trial: Trial) -> np.ndarray:
 
 
 def told(
-    commands: Commands, effects: Sequence[Effect], dt: float, late: float = 0.0
+    commands: Commands,
+    effects: Sequence[CommandEffect],
+    dt: float,
+    late: float = 0.0,
 ) -> np.ndarray:
     """Speeds told to both wheels at each physics step after effects, ``(S, 2)``.
 
@@ -377,7 +383,9 @@ def told(
     return signal.values
 
 
-def _averaged(commands: Commands, begins, edges, held) -> np.ndarray:
+def _averaged(
+    commands: Commands, begins: np.ndarray, edges: np.ndarray, held: np.ndarray
+) -> np.ndarray:
     way = np.cumsum(commands.values * commands.durations[:, None], axis=0)
     way = np.concatenate([np.zeros((1, 2)), way])
     area = np.stack([np.interp(edges, begins, column) for column in way.T], axis=1)

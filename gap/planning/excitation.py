@@ -122,13 +122,17 @@ def general(
     return tuple(made)
 
 
-def _alone(rest, up, down, at: int) -> list[np.ndarray]:
+def _alone(
+    rest: np.ndarray, up: np.ndarray, down: np.ndarray, at: int
+) -> list[np.ndarray]:
     steps = [rest.copy() for _ in range(4)]
     steps[0][at], steps[2][at] = up[at], down[at]
     return steps
 
 
-def _swept(rest, up, down, at: int) -> tuple[np.ndarray, np.ndarray]:
+def _swept(
+    rest: np.ndarray, up: np.ndarray, down: np.ndarray, at: int
+) -> tuple[np.ndarray, np.ndarray]:
     count = round(LENGTH / SWEEP)
     phase = np.arange(count) / count
     wave = np.sin(2 * np.pi * (1.5 * phase + 12 * phase**2))
@@ -148,12 +152,16 @@ def _long(name: str, steps: Sequence[np.ndarray], held: float) -> Excitation:
     return _made(name, np.array(steps), np.full(len(steps), held), WHEEL_CHANNELS)
 
 
-def _random(rng, channels: int, largest: float) -> tuple[np.ndarray, np.ndarray]:
+def _random(
+    rng: np.random.Generator, channels: int, largest: float
+) -> tuple[np.ndarray, np.ndarray]:
     count = int(rng.integers(8, 14))
     held = rng.uniform(0.3, 1.6, count)
     return rng.uniform(-largest, largest, (count, channels)), held * LENGTH / held.sum()
 
 
-def _made(name: str, values, times, channels: tuple[Channel, ...]) -> Excitation:
+def _made(
+    name: str, values: np.ndarray, times: np.ndarray, channels: tuple[Channel, ...]
+) -> Excitation:
     held = np.maximum(np.rint(np.asarray(times) / HELD), 1) * HELD
     return Excitation(name, Commands(np.asarray(values, float), held, channels))

@@ -219,7 +219,8 @@ def _option(
     unsure = _unsure(trial, model)
     sets = [*effects, *(row for rows in moved for row in rows)]
     made = _whitened(found, trial, model, sets, unsure)
-    shapes, slopes, at = made[: len(fits)], [], len(fits)
+    slopes: list[np.ndarray] = []
+    shapes, at = made[: len(fits)], len(fits)
     slack = made[len(sets) :] - made[-1]
     for rows in moved:
         own = [made[at + k] - shapes[len(slopes)] for k in range(len(rows))]
@@ -264,7 +265,7 @@ def _whitened(
     return (features / sd).reshape(len(features), -1)
 
 
-def _apart(shapes, slopes, i: int, j: int) -> float:
+def _apart(shapes: np.ndarray, slopes: Sequence[np.ndarray], i: int, j: int) -> float:
     """Distance of i's prediction to j's, j's magnitudes free within what is known."""
     gap = np.nan_to_num(shapes[i] - shapes[j])
     if not len(slopes[j]):

@@ -1,9 +1,15 @@
 """A plan in words."""
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.stats import norm
 
 from bns.gap.records import Diagnosis
+
+if TYPE_CHECKING:
+    from bns.gap.planning.plan import Option
 
 
 def nothing(found: Diagnosis) -> str:
@@ -16,7 +22,12 @@ def nothing(found: Diagnosis) -> str:
     return f"Nothing is tied: {reason}."
 
 
-def sentence(names, steps, open_, alike) -> str:
+def sentence(
+    names: Sequence[tuple[str, ...]],
+    steps: Sequence[tuple["Option", int]],
+    open_: np.ndarray,
+    alike: Sequence[tuple[int, int]],
+) -> str:
     """What to run, and what it will tell.
 
     Args:

@@ -5,7 +5,7 @@ have them, the rest is slower than `SWIFT`. Each is offered at the gain that was
 and at a quarter of it: soft control shows the load that stiff control hides.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -69,7 +69,7 @@ def _random(rng: np.random.Generator, t: np.ndarray) -> np.ndarray:
     return np.clip(goals, -REACH, REACH)
 
 
-def _goals(goals: Sequence[float], on: np.ndarray | None = None) -> Commands:
+def _goals(goals: np.ndarray, on: np.ndarray | None = None) -> Commands:
     on = np.ones(len(goals)) if on is None else on
     held = np.full(len(goals), HELD)
     return Commands(np.stack([goals, on], axis=1), held, CHANNELS)

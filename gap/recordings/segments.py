@@ -16,12 +16,12 @@ class Told(NamedTuple):
     """What a robot was told in each of W windows.
 
     Attributes:
-        index: number of the command, ``(W,)``.
+        command: its number, ``(W,)``.
         since: time since it began [s].
         at: time in the trial [s].
     """
 
-    index: np.ndarray
+    command: np.ndarray
     since: np.ndarray
     at: np.ndarray
 

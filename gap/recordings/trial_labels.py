@@ -31,6 +31,7 @@ def of(trial: Trial, place: int) -> str:
 def numbers(trials: Sequence[Trial]) -> list[int]:
     """The number of each, or the places where they have none or share one."""
     own = [trial.conditions.get(NUMBER) for trial in trials]
-    if all(isinstance(number, int) for number in own) and len(set(own)) > 1:
-        return own  # type: ignore[return-value]
+    known = [number for number in own if isinstance(number, int)]
+    if len(known) == len(own) and len(set(known)) > 1:
+        return known
     return list(range(len(trials)))

@@ -130,17 +130,17 @@ def terms(units: np.ndarray) -> np.ndarray:
 
 def coarser(windows: Windows, length: float) -> Windows:
     """Windows of at least a length [s], made of whole given ones."""
-    first, last, begin = [], [], 0
+    begins, closes, begin = [], [], 0
     ends = windows.times + windows.durations / 2
     starts = windows.times - windows.durations / 2
     for end in range(len(windows)):
         if ends[end] - starts[begin] >= 0.97 * length or (
             np.isinf(length) and end == len(windows) - 1
         ):
-            first.append(begin)
-            last.append(end)
+            begins.append(begin)
+            closes.append(end)
             begin = end + 1
-    first, last = np.array(first, dtype=int), np.array(last, dtype=int)
+    first, last = np.array(begins, dtype=int), np.array(closes, dtype=int)
     span = ends[last] - starts[first]
     return Windows(
         windows.first[first], windows.last[last], starts[first] + span / 2, span

@@ -28,12 +28,15 @@ def residuals(
     squares = [by_trial(compared, effects, horizon) for horizon in HORIZONS]
     rng = seeding.generator(seed, "gap", "residuals")
     chosen = rng.integers(0, len(compared.trials), (DRAWS, len(compared.trials)))
-    rms, low, high = [], [], []
+    rms: list[np.ndarray] = []
+    low: list[np.ndarray] = []
+    high: list[np.ndarray] = []
     for square in squares:
-        rms.append(np.sqrt(_mean(square, 0)))
-        drawn = np.sqrt(_mean(square[chosen], 1))
-        low.append(np.nanquantile(drawn, 0.05, axis=0))
-        high.append(np.nanquantile(drawn, 0.95, axis=0))
+        rms.append(np.sqrt(mean(square, 0)))
+        drawn = np.sqrt(mean(square[chosen], 1))
+        some = drawn[np.isfinite(drawn).all(axis=1)]
+        for edge, share in ((low, 0.05), (high, 0.95)):
+            edge.append(np.quantile(some, share, axis=0) if len(some) else 0 * rms[-1])
     return Residuals(
         horizons=HORIZONS,
         rms=np.array(rms),
@@ -44,7 +47,7 @@ def residuals(
     )
 
 
-def _mean(square: np.ndarray, axis: int) -> np.ndarray:
+def mean(square: np.ndarray, axis: int) -> np.ndarray:
     """Mean of what is there; NaN where nothing is (trials shorter than a horizon)."""
     there = ~np.isnan(square)
     count, total = there.sum(axis), np.where(there, square, 0.0).sum(axis)
@@ -99,7 +102,7 @@ def plain_gap(compared: Compared, effects: Sequence[Effect]) -> dict[str, Any]:
 
     def rms(chosen: Sequence[Effect]) -> list[float]:
         squares = by_trial(compared, chosen, PLAIN)
-        return np.sqrt(_mean(squares, 0)).tolist()
+        return np.sqrt(mean(squares, 0)).tolist()
 
     return {
         "horizon": PLAIN,

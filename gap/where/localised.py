@@ -13,6 +13,7 @@ from bns.worlds.effects.base import Effect
 DRAWS = 400
 TRACK = 0.045  # [m] half the track: a turn as travel of the wheels
 FLAT, GROWING = 0.35, 0.7  # growth of the error with the horizon: sensor; motion
+TOO_SMALL, TOO_SHORT = "too small to say", "too short to say"
 GROWN = (0.3, 1.0, 3.0)  # [s] horizons over which an error may grow
 BANDS = (0.3, 2.0)  # [Hz] where the phase is taken
 
@@ -93,16 +94,22 @@ def nature(compared: Compared) -> dict[str, Any]:
         growth: exponent of the error with the horizon, floor taken off (0 = the same
         at every horizon: a sensor; 1 = in proportion: motion); and the verdict.
     """
-    excess = []
+    excess: list[float] = []
+    unit = horizons.noise(compared, 1.0)
+    unit = unit if np.isfinite(unit).all() else horizons.noise(compared, GROWN[0])
     for horizon in GROWN:
-        square = np.nanmean(horizons.by_trial(compared, (), horizon), axis=0)
+        square = horizons.mean(horizons.by_trial(compared, (), horizon), 0)
         floor = horizons.noise(compared, horizon)
-        excess.append(np.maximum(square - floor, 0) / floor)
-        excess[-1] = float((excess[-1] * floor / horizons.noise(compared, 1.0)).sum())
+        if not np.isfinite(square + floor).all():
+            break  # no trial is that long
+        excess.append(float((np.maximum(square - floor, 0) / unit).sum()))
     values = np.sqrt(np.maximum(excess, 1e-12))
-    if values.max() < 0.1:
-        return {"growth": 0.0, "verdict": "too small to say"}
-    growth = float(np.polyfit(np.log(GROWN), np.log(values + 1e-6), 1)[0])
+    if values.max(initial=0.0) < 0.1:
+        return {"growth": 0.0, "verdict": TOO_SMALL}
+    if len(values) < 2:
+        return {"growth": 0.0, "verdict": TOO_SHORT}
+    spans = np.log(GROWN[: len(values)])
+    growth = float(np.polyfit(spans, np.log(values + 1e-6), 1)[0])
     named = "sensor or timing" if growth < FLAT else "motion"
     named = named if growth < FLAT or growth > GROWING else "motion or timing"
     return {"growth": growth, "verdict": named}
@@ -117,7 +124,8 @@ def phase(compared: Compared) -> dict[str, Any]:
     names = [channel.name for channel in compared.model.features]
     made: dict[str, Any] = {}
     for column, name in enumerate(names):
-        cross, power = {}, {}
+        cross: dict[float, np.ndarray] = {}
+        power: dict[float, np.ndarray] = {}
         for seen, told, windows in zip(
             compared.recorded, compared.nominal, compared.windows, strict=True
         ):

@@ -45,8 +45,8 @@ def regime(compared: Compared, *, seed: int = 0) -> dict[str, Any]:
     table = {name: np.concatenate(value) for name, value in columns.items()}
     if not table:
         return {}
-    target, trial = np.concatenate(energy), np.concatenate(owner)
-    held_out = trial % 3 == seed % 3
+    target, owners = np.concatenate(energy), np.concatenate(owner)
+    held_out = owners % 3 == seed % 3
     if held_out.all() or not held_out.any():
         return {}
     tree = grow({k: v[~held_out] for k, v in table.items()}, target[~held_out], DEPTH)
@@ -109,7 +109,7 @@ def grow(
 def predict(tree: Node, table: Mapping[str, np.ndarray]) -> np.ndarray:
     """Mean of the leaf that each window falls into, ``(W,)``."""
     width = len(next(iter(table.values())))
-    if not tree.name:
+    if tree.below is None or tree.above is None:
         return np.full(width, tree.mean)
     above = table[tree.name] > tree.cut
     return np.where(above, predict(tree.above, table), predict(tree.below, table))
@@ -117,7 +117,7 @@ def predict(tree: Node, table: Mapping[str, np.ndarray]) -> np.ndarray:
 
 def worst(tree: Node) -> tuple[list[str], Sequence[float]]:
     """The leaf with the largest mean: conditions in words, (mean, share)."""
-    if not tree.name:
+    if tree.below is None or tree.above is None:
         return [], (tree.mean, tree.share)
     options = []
     for node, side in ((tree.below, "at most"), (tree.above, "above")):

@@ -48,7 +48,7 @@ def where(found: Diagnosis) -> str:
     if found.where.get("wheels"):
         said.append(_largest(found.where["wheels"], "wheels"))
     nature = found.where["nature"]["verdict"]
-    if found.where.get("wheels") and nature != "too small to say":
+    if found.where.get("wheels") and not nature.startswith("too "):
         said.append(f"its growth with time says {nature}")
     text = "; ".join(said)
     text = text[0].upper() + text[1:] + "."

@@ -92,12 +92,12 @@ class Inertial:
         """As compiled, whether the model gives them or its geoms imply them."""
         import mujoco
 
+        if _given(spec, body):
+            inertia = _turned(body.inertia, body.iquat)
+            return cls(float(body.mass), np.array(body.ipos), inertia)
         model = spec.copy().compile()
         index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body.name)
-        rotation = np.empty(9)
-        mujoco.mju_quat2Mat(rotation, model.body_iquat[index])
-        axes = rotation.reshape(3, 3)
-        inertia = axes @ np.diag(model.body_inertia[index]) @ axes.T
+        inertia = _turned(model.body_inertia[index], model.body_iquat[index])
         return cls(float(model.body_mass[index]), model.body_ipos[index], inertia)
 
     def plus_point(self, mass: float, position: np.ndarray) -> "Inertial":
@@ -120,6 +120,29 @@ class Inertial:
         body.iquat = [1, 0, 0, 0]
         body.inertia = [0, 0, 0]  # the full matrix replaces it
         body.fullinertia = [i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
+
+
+def _given(spec: Any, body: Any) -> bool:
+    """Whether a model gives a body's mass, main inertias and their axes, and has them
+    taken as they are."""
+    import mujoco
+
+    alone = (
+        spec.compiler.inertiafromgeom
+        == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    )
+    return bool(alone and body.explicitinertial and np.any(body.inertia))
+
+
+def _turned(inertia: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
+    """Main inertias ``(3,)`` along axes that a quaternion turns, as a matrix."""
+    import mujoco
+
+    rotation = np.empty(9)
+    mujoco.mju_quat2Mat(rotation, np.array(quaternion, dtype=float))
+    axes = rotation.reshape(3, 3)
+    made: np.ndarray = axes @ np.diag(inertia) @ axes.T
+    return made
 
 
 def _point(mass: float, offset: np.ndarray) -> np.ndarray:

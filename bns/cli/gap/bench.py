@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -162,6 +163,10 @@ def _figures(rows: list[dict]) -> list[list[str]]:
     for kind, verdict in (("none", "no gap"), ("off-library", "none of the library")):
         found = scoring.of(rows, kind)
         if found:
-            share = scoring.share(found, lambda r, v=verdict: r["said"]["verdict"] == v)
+            share = scoring.share(found, partial(_says, verdict))
             made.append([kind, str(len(found)), f'said "{verdict}"', f"{share:.2f}"])
     return made
+
+
+def _says(verdict: str, row: dict[str, Any]) -> bool:
+    return bool(row["said"]["verdict"] == verdict)

@@ -17,6 +17,7 @@ from bns.gap.models.legged import scatter, where
 from bns.gap.models.legged import signs as walk_signs
 from bns.gap.models.legged.signs import Signs
 from bns.gap.recordings import segments
+from bns.gap.recordings.conditions import as_number
 from bns.worlds.active import Stages, as_damage
 from bns.worlds.damage import Damage
 from bns.worlds.effects.base import Effect
@@ -162,7 +163,7 @@ class WalkModel(LibraryModel):
             trial.commands,
             stages,
             start=start,
-            speed=float(trial.conditions.get("speed", SPEED)),  # type: ignore[arg-type]
+            speed=as_number(trial.conditions, "speed", SPEED),
             seed=0,
             trial=0,
             counts=np.maximum(counts, 1),

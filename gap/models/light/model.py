@@ -14,6 +14,7 @@ from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, LibraryModel, Windows
 from bns.gap.models.light.reader import Reader, Reads, extra
 from bns.gap.recordings import trial_labels
+from bns.gap.recordings.conditions import as_number
 from bns.worlds.effects.base import Effect
 from bns.worlds.light import sensors
 from bns.worlds.light.field import Lamp, LightField
@@ -55,6 +56,12 @@ def sees(trials: Sequence[Trial]) -> bool:
     )
 
 
+def _rows(conditions: Mapping[str, object], name: str) -> Sequence[Mapping[str, float]]:
+    """A condition that is a list of tables; empty where there is none."""
+    found = conditions.get(name)
+    return found if isinstance(found, Sequence) else ()
+
+
 class SightModel(LibraryModel):
     """The light sensors of a robot, as `GapModel`.
 
@@ -85,10 +92,9 @@ class SightModel(LibraryModel):
         singles = all(set(known.names) <= names for names in seen)
         names = known.names if singles else tuple(item.name for item in VIRTUAL)
         about = trials[0].conditions
-        lights = about.get("lights")
-        lamps = tuple(Lamp(**row) for row in lights) if lights else (Lamp(),)  # type: ignore[union-attr]
-        posts = tuple(Post(**row) for row in about.get("objects", ()))  # type: ignore[union-attr]
-        ambient = float(about.get("ambient", LightField().ambient))  # type: ignore[arg-type]
+        lamps = tuple(Lamp(**row) for row in _rows(about, "lights")) or (Lamp(),)
+        posts = tuple(Post(**row) for row in _rows(about, "objects"))
+        ambient = as_number(about, "ambient", LightField().ambient)
         self.reader = Reader(
             LightField(lamps, ambient),
             known,

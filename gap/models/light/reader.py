@@ -17,7 +17,7 @@ from bns import seeding
 from bns.worlds.effects.base import Effect, OpticsEffect, SensorEffect
 from bns.worlds.light import law as light_law
 from bns.worlds.light.field import LightField
-from bns.worlds.light.law import Screen
+from bns.worlds.light.law import Law, Screen
 from bns.worlds.light.sensors import LightSensors
 
 DRAWS = 16  # of each reading's noise
@@ -158,7 +158,7 @@ class Reader:
         read = light_law.counts(law, moved.reshape(-1, shape[2]), noise)
         return read.reshape(shape)
 
-    def _light(self, law, reads: Reads, poses: np.ndarray) -> np.ndarray:
+    def _light(self, law: Law, reads: Reads, poses: np.ndarray) -> np.ndarray:
         return light_law.irradiance(
             law, poses, reads.moments, sight=self.sensors.sight, screen=self.screen
         )

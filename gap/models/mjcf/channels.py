@@ -1,6 +1,6 @@
 """Which column of a log is told to which actuator, or seen of which part of a model."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,12 +12,14 @@ from bns.gap.importers import tables
 from bns.gap.importers.tables import Column, Table
 from bns.gap.models.mjcf import guesses, matching, prepared, rehearsal
 from bns.gap.models.mjcf.config import OwnConfig, Told
-from bns.gap.models.mjcf.rehearsal import Part
+from bns.gap.models.mjcf.rehearsal import Fit, Part
 from bns.worlds.data.column_map import FACTORS
 from bns.worlds.trial import Channel
 
 REHEARSED = 5.0  # [s] of the first trial that the nominal model moves along
 AGREES = 0.5  # score from which on a column moves as the model says
+GOAL = {"goal", "des", "desired", "target"}
+"""words for a position that a joint is told"""
 ALIKE = 0.1  # two parts whose scores are nearer cannot be told apart
 
 
@@ -175,17 +177,13 @@ def _no_loop(work: Work, column: Column, seen: Sequence[Column]) -> None:
         if matching.quantity(other) == tables.POSITION
         and matching.core(other.part or other.name) == name
     ]
-    goal = column.quantity == tables.POSITION or set(matching.words(column.name)) & {
-        "goal",
-        "des",
-        "desired",
-        "target",
-    }
+    said = set(matching.words(column.name))
+    goal = column.quantity == tables.POSITION or bool(said & GOAL)
     for other in measured[:1]:
         good = np.isfinite(other.values) & np.isfinite(column.values)
         pair = column.values[good], other.values[good]
         follows = len(pair[0]) > 5 and min(np.ptp(pair[0]), np.ptp(pair[1])) > 0
-        goal = bool(goal) or (follows and np.corrcoef(*pair)[0, 1] > 0.95)
+        goal = goal or (follows and np.corrcoef(*pair)[0, 1] > 0.95)
     if goal:
         raise BnsError(
             f"{column.name!r} is a goal of a joint, but its actuator in {work.path} is "
@@ -203,7 +201,8 @@ def tolds(work: Work) -> list[Told]:
         if actuator in names and not work.loop:
             number = names.index(actuator)
             if work.model.actuator_ctrllimited[number]:
-                allowed = tuple(map(float, work.model.actuator_ctrlrange[number]))
+                edges = work.model.actuator_ctrlrange[number]
+                allowed = float(edges[0]), float(edges[1])
         low, high = guesses.limits(values, allowed)
         channel = Channel(column.name, si_unit(unit))
         made.append(Told(channel, actuator, low, high, **work.loop))
@@ -231,7 +230,8 @@ def observed(work: Work, seen: list[Column]) -> None:
     model = work.model
     driven = [joint_of(model, model.actuator(a).id) for _, a, _ in work.told]
     driven = [joint for joint in joints(model) if joint in driven]
-    found, why = {}, {}
+    found: dict[str, Part] = {}
+    why: dict[str, str] = {}
     places = {
         kind: [getattr(model, kind)(n).name for n in range(count)]
         for kind, count in (("site", model.nsite), ("body", model.nbody))
@@ -250,7 +250,13 @@ def observed(work: Work, seen: list[Column]) -> None:
     _rehearsed(work, seen, found, why, named)
 
 
-def _rehearsed(work: Work, seen, found, why, named) -> None:
+def _rehearsed(
+    work: Work,
+    seen: Sequence[Column],
+    found: dict[str, Part],
+    why: Mapping[str, str],
+    named: Mapping[str, tuple[str, str, str]],
+) -> None:
     """Fill in what names do not tell by the nominal motion, units too."""
     rows = _first(work)
     moved = _moved(work, rows, found)
@@ -289,7 +295,14 @@ def _units(model: mujoco.MjModel, part: Part, column: Column) -> dict[str, float
     return {said: known[said]} if said in known else known
 
 
-def _chosen(work: Work, column: Column, fits, found, why, named: bool) -> None:
+def _chosen(
+    work: Work,
+    column: Column,
+    fits: Mapping[Part, Fit],
+    found: dict[str, Part],
+    why: Mapping[str, str],
+    named: bool,
+) -> None:
     if not fits:
         work.unsure.append(f"{column.name}: of no part of the model, left out")
         return
@@ -328,7 +341,9 @@ def _first(work: Work) -> np.ndarray:
     return rows[work.times[rows] <= work.times[rows[0]] + REHEARSED]
 
 
-def _moved(work: Work, rows: np.ndarray, found) -> dict[Part, np.ndarray]:
+def _moved(
+    work: Work, rows: np.ndarray, found: Mapping[str, Part]
+) -> dict[Part, np.ndarray]:
     model, data = work.model, mujoco.MjData(work.model)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)

@@ -1,11 +1,12 @@
 """One long recording as trials of a few seconds, each begun in the state it was in.
 
 The state is taken from the data: a parabola through the samples around the start gives
-each observed joint's position and speed. What was told in the second before goes along,
-so that what comes late has something before it.
+each observed joint's position and speed, which the model's own motion makes exact. What
+was told in the second before goes along, so that what comes late has something before
+it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -19,10 +20,15 @@ HALF = 0.03  # [s] on each side of a start, of the samples that tell its state
 LEAST = 4  # samples on each side at least
 BEFORE = 0.5  # [s] of commands before a piece
 GRID = 0.005  # [s] between them
+REFINED = 2  # times that starts are fitted to the nominal motion
+
+Simulate = Callable[[Sequence[Trial]], list[np.ndarray]]
+"""nominal samples of trials, each ``(T, C)``"""
 
 
 def pieces(trial: Trial, config: OwnConfig) -> list[Trial]:
-    """A trial in pieces of about `config.cut` seconds; itself if it is not longer.
+    """A trial in pieces of about `config.cut` seconds; itself if it is not longer. The
+    first begins as the trial did.
 
     Args:
         trial: recorded; each change of its commands is a command.
@@ -31,19 +37,71 @@ def pieces(trial: Trial, config: OwnConfig) -> list[Trial]:
     span = float(trial.times[-1] - trial.times[0])
     count = round(span / config.cut)
     if count < 2:
-        return [_begun(trial, trial, 0, config)]
+        return [_begun(trial, trial, 0, config) if config.recorded else trial]
     seen = np.flatnonzero(np.isfinite(trial.observed).all(axis=1))
     wanted = trial.times[0] + np.arange(count + 1) * span / count
     rows = seen[np.clip(np.searchsorted(trial.times[seen], wanted), 0, len(seen) - 1)]
     rows = np.unique(np.append(rows[:-1], len(trial.times) - 1))
+    made = [piece(trial, first, last) for first, last in pairwise(rows)]
     return [
-        _begun(piece(trial, first, last), trial, first, config)
-        for first, last in pairwise(rows)
+        _begun(part, trial, first, config) if first or config.recorded else part
+        for part, first in zip(made, rows[:-1], strict=True)
     ]
 
 
+def refined(
+    trials: Sequence[Trial], config: OwnConfig, simulate: Simulate
+) -> list[Trial]:
+    """Trials whose starts are those from which the nominal model comes nearest to what
+    was seen of the joints, within what the data leave open.
+
+    A joint that is thrown follows no parabola. What an effect changes in these ways
+    counts for nothing anyway: it may be the start's.
+
+    Args:
+        trials: pieces, with a state and how unsure it is.
+        config: of the robot.
+        simulate: nominal samples of trials, each ``(T, C)``.
+    """
+    joints = [k for k, item in enumerate(config.seen) if item.quantity == "joint"]
+    made, noise = list(trials), np.array([config.seen[k].noise for k in joints])
+    for _ in range(REFINED):
+        unsure = [start.unsure(trial, config) for trial in made]
+        names = list(dict.fromkeys(name for row in unsure for name in row))
+        base = simulate(made)
+        ways = []
+        for name in names:
+            off = [{name: row[name]} if name in row else {} for row in unsure]
+            ways.append(simulate(_moved(made, off, config)))
+        off = []
+        for number, (trial, known) in enumerate(zip(made, base, strict=True)):
+            change = (
+                np.stack([way[number] - known for way in ways])[..., joints] / noise
+            )
+            units = (trial.observed - known)[:, joints] / noise
+            seen = np.isfinite(units) & np.isfinite(change).all(axis=0)
+            design = change[:, seen].T
+            curvature = design.T @ design + np.eye(len(names))
+            size = np.linalg.solve(curvature, design.T @ units[seen])
+            row = unsure[number]
+            found = zip(names, size, strict=True)
+            off.append({n: float(z) * row[n] for n, z in found if n in row})
+        made = _moved(made, off, config)
+    return made
+
+
+def _moved(
+    trials: Sequence[Trial], off: Sequence[Mapping[str, float]], config: OwnConfig
+) -> list[Trial]:
+    pairs = zip(trials, off, strict=True)
+    return [start.moved(trial, row, config) if row else trial for trial, row in pairs]
+
+
 def _begun(part: Trial, whole: Trial, first: int, config: OwnConfig) -> Trial:
-    conditions = {**part.conditions, start.STATE: state(whole, first, config)}
+    found = state(whole, first, config)
+    known = {joint: numbers[:2] for joint, numbers in found.items()}
+    unsure = {joint: numbers[2:] for joint, numbers in found.items()}
+    conditions = {**part.conditions, start.STATE: known, start.UNSURE: unsure}
     past = commands_before(whole, first)
     if past:
         conditions |= {start.BEFORE: past, start.STEP: GRID}
@@ -61,7 +119,7 @@ def commands_before(trial: Trial, row: int) -> list[list[float]]:
 
 
 def state(trial: Trial, row: int, config: OwnConfig) -> dict[str, list[float]]:
-    """Position and speed of each observed joint at a sample.
+    """Position and speed of each observed joint at a sample, and how sure these are.
 
     A speed that is observed itself is taken as the mean around the sample.
 
@@ -71,20 +129,20 @@ def state(trial: Trial, row: int, config: OwnConfig) -> dict[str, list[float]]:
         config: which joint each column observes.
 
     Returns:
-        position [rad or m] and speed, per second, by joint.
+        position [rad or m], speed, per second, and the standard deviations of both, by
+        joint.
     """
     found: dict[str, list[float]] = {}
     near = around(trial.times, np.isfinite(trial.observed).all(axis=1), row)
     at = trial.times[near] - trial.times[row]
     for column, item in enumerate(config.seen):
         if item.quantity == "joint":
-            position, speed = parabola(at, trial.observed[near, column])
-            found[item.part] = [position, found.get(item.part, [0.0, speed])[1]]
+            found[item.part] = parabola(at, trial.observed[near, column], item.noise)
     for column, item in enumerate(config.seen):
         if item.quantity == "speed":
-            mean = float(parabola(at, trial.observed[near, column])[0])
+            mean, _, sd, _ = parabola(at, trial.observed[near, column], item.noise)
             if item.part in found:
-                found[item.part][1] = mean
+                found[item.part][1::2] = mean, sd
     return found
 
 
@@ -106,11 +164,24 @@ def around(times: np.ndarray, seen: np.ndarray, row: int) -> np.ndarray:
     return rows[inside]
 
 
-def parabola(at: np.ndarray, values: Sequence[float]) -> tuple[float, float]:
-    """Value and slope at 0 of the parabola nearest to samples (a line through few)."""
+def parabola(at: np.ndarray, values: np.ndarray, noise: float) -> list[float]:
+    """Value and slope at 0 of the parabola nearest to samples (a line through few).
+
+    Args:
+        at: times of the samples [s], ``(n,)``.
+        values: of them, ``(n,)``.
+        noise: standard deviation of a sample. Where the samples lie farther from the
+            parabola than that, it is as unsure as they say.
+
+    Returns:
+        value; slope, per second; standard deviations of both.
+    """
     degree = min(2, len(at) - 1)
     if degree < 1:
-        return float(values[0]), 0.0
+        return [float(values[0]), 0.0, noise, 0.0]
     basis = np.vander(at, degree + 1, increasing=True)
     found = np.linalg.lstsq(basis, np.asarray(values, float), rcond=None)[0]
-    return float(found[0]), float(found[1])
+    free = len(at) - degree - 1
+    left = np.sum((values - basis @ found) ** 2) / free if free else 0.0
+    sd = np.sqrt(np.diag(np.linalg.inv(basis.T @ basis)) * max(noise**2, left))
+    return [float(number) for number in (found[0], found[1], sd[0], sd[1])]

@@ -77,11 +77,7 @@ def rests(
     names = ["", *(model.key(k).name for k in range(model.nkey) if model.key(k).name)]
     for settle in (0.0, SETTLE):
         for name in reversed(names):  # keyframes before the model's own pose
-            data = mujoco.MjData(model)
-            if name:
-                mujoco.mj_resetDataKeyframe(model, data, model.key(name).id)
-            for _ in range(round(settle / model.opt.timestep)):
-                mujoco.mj_step(model, data)
+            data = posed(model, name, settle)
             off = [
                 abs(float(data.joint(joint).qpos[0]) - at) <= tolerance[joint]
                 for joint, at in first.items()
@@ -89,6 +85,23 @@ def rests(
             if off and all(off):
                 return name, SETTLE if settle or _sinks(model, data) else 0.0
     return None, 0.0
+
+
+def posed(model: mujoco.MjModel, pose: str, settle: float) -> mujoco.MjData:
+    """A model that has settled in a pose.
+
+    Args:
+        model: that is recorded.
+        pose: name of the keyframe; "" = the model's own.
+        settle: for how long [s].
+    """
+    data = mujoco.MjData(model)
+    if pose:
+        mujoco.mj_resetDataKeyframe(model, data, model.key(pose).id)
+    for _ in range(round(settle / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+    data.time = 0.0
+    return data
 
 
 def _sinks(model: mujoco.MjModel, data: mujoco.MjData) -> bool:

@@ -52,7 +52,9 @@ def channels(table: Table, config: OwnConfig, path: str) -> dict[str, np.ndarray
         FormatError: a column is missing.
     """
     found = {}
-    for name in (TIME, *(i.channel.name for i in (*config.told, *config.seen))):
+    told = [item.channel.name for item in config.told]
+    seen = [item.channel.name for item in config.seen]
+    for name in (TIME, *told, *seen):
         source = config.log.get(name)
         column = source.column if source else name
         if column not in table:

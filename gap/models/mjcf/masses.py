@@ -77,7 +77,9 @@ def rows(item: Row, body: Body, excite: str) -> list[Row]:
     return made
 
 
-def changes(name: str, values: Mapping[str, float], part: str, body: Body):
+def changes(
+    name: str, values: Mapping[str, float], part: str, body: Body
+) -> list[Effect]:
     """The effects that an explanation is simulated by.
 
     A light mass, which would sit far off for its moments, is one at the centre and a

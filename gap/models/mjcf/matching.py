@@ -1,7 +1,7 @@
 """What a column of a log is, by its name: told or seen, which part, which unit."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column
@@ -98,22 +98,25 @@ def roles(
 ) -> tuple[list[Column], list[Column]]:
     """Columns that are told, and those that are seen.
 
-    By the format; by words in the name; an actuator's own name, where a joint has
-    another one or is seen in another column.
+    By the format; by a joint's own name; by words in the name; an actuator's own name,
+    where a joint has another one or is seen in another column.
 
     Args:
         columns: of the log.
         actuators: names in the model.
         joints: names in the model.
     """
-    told, seen = [], []
-    own = set(actuators) - set(joints)
+    told: list[Column] = []
+    seen: list[Column] = []
+    own, joint = set(actuators) - set(joints), set(joints) - set(actuators)
     for column in columns:
         said = set(words(column.name))
         measured = bool(said & (SEEN | SPEED | EFFORT))
         if column.role:
             (told if column.role == tables.TOLD else seen).append(column)
-        elif not measured and (said & TOLD or column.name in own):
+        elif column.name in joint or measured:
+            seen.append(column)
+        elif said & TOLD or column.name in own:
             told.append(column)
         else:
             seen.append(column)
@@ -156,7 +159,14 @@ def match(
     return found, why
 
 
-def _unique(columns, parts, fits, found, why, reason) -> None:
+def _unique(
+    columns: Sequence[Column],
+    parts: Sequence[str],
+    fits: Callable[[Column, str], bool],
+    found: dict[str, str],
+    why: dict[str, str],
+    reason: str,
+) -> None:
     for column in columns:
         free = [part for part in parts if part not in found.values()]
         hits = [part for part in free if fits(column, part)]
@@ -176,7 +186,9 @@ def _ends(one: str, other: str) -> bool:
     return len(short) > 2 and not short.isdigit() and long.endswith(short)
 
 
-def by_place(columns: Sequence[Column], table: Mapping[str, Sequence[str]]):
+def by_place(
+    columns: Sequence[Column], table: Mapping[str, Sequence[str]]
+) -> dict[str, tuple[str, str, str]]:
     """Columns that are called as a site or body, with an axis in the name or not.
 
     Args:
@@ -186,7 +198,7 @@ def by_place(columns: Sequence[Column], table: Mapping[str, Sequence[str]]):
     Returns:
         by column: kind, part, axis ("" = not said).
     """
-    found = {}
+    found: dict[str, tuple[str, str, str]] = {}
     for column in columns:
         name, axis = column.name, ""
         stem, _, last = name.rpartition("_")

@@ -3,6 +3,7 @@
 import math
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 
 import mujoco
@@ -12,20 +13,28 @@ from bns.errors import FormatError, UnknownNameError
 from bns.gap.candidates import mjcf, mjcf_rows
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, Windows
+from bns.gap.models.mjcf import cuts, horizon, lean, log, masses, prepared, start, view
 from bns.gap.models.mjcf import effects as own_effects
-from bns.gap.models.mjcf import log, masses, prepared, start, view
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.recordings import segments
 from bns.models import mjcf as mjcf_file
 from bns.storage import files
-from bns.worlds.effects.base import ControlSignal, Effect
+from bns.worlds.effects.base import (
+    CommandEffect,
+    ControlSignal,
+    Effect,
+    ModelEdit,
+    SensorEffect,
+)
 from bns.worlds.physics.rollout import STATE, Compiled, Job, Pool, Segment
 from bns.worlds.trial import Trial
 
 LEAD = 1.0  # [s] of rest before a trial, so that what is late has something before it
 KEPT, MODELS = 20_000, 2000  # simulated trials and compiled models kept in memory
 FINE = 0.005  # [s] between kept states; the step if that is longer
-FINEST = 0.0025  # [s] steps beyond which a simulation lags visibly; assumed
+FINEST = 0.0025  # [s] steps beyond which a simulation lags or limits soften visibly
+EXACT = 0.2  # of the noise: predictions that differ by less are alike
+TRIED = 4  # trials on which steps are compared
 LEAST = 0.3  # of the noise that is told: the smallest that is believed
 
 
@@ -46,6 +55,7 @@ class OwnModel(GapModel):
 
     memory = 2
     many = True
+    whole = True
     logs = True
 
     def __init__(self, config: OwnConfig, *, threads: int = 2):
@@ -61,7 +71,10 @@ class OwnModel(GapModel):
         self._pool = Pool(threads)
         self._compiled: OrderedDict[tuple, Compiled] = OrderedDict()
         self._cache: OrderedDict[tuple, np.ndarray] = OrderedDict()
+        self._starts: dict[tuple, np.ndarray] = {}
         model = self.compiled(()).model
+        self.dt = float(model.opt.timestep)
+        self._parts = self._finest
         self.actuators = [_index(model, "actuator", t.actuator) for t in config.told]
         if config.keyframe:
             _index(model, "key", config.keyframe)  # there, before anything runs
@@ -87,8 +100,16 @@ class OwnModel(GapModel):
         return own_effects.parse(text)
 
     def read_log(self, path: str) -> list[Trial]:
-        """Trials of a CSV log."""
-        return log.read(path, self.config)
+        """Trials of a log, none longer than the model foresees."""
+        trials = log.read(path, self.config)
+        if self.config.cut:
+            return cuts.refined(trials, self.config, self._nominal)
+        model = self.compiled(()).model
+        return horizon.foreseen(trials, self.config, model, self._nominal)
+
+    def _nominal(self, trials: Sequence[Trial]) -> list[np.ndarray]:
+        """Nominal samples of trials."""
+        return self.simulate(trials, [()])[0]
 
     def spec(self, effects: Sequence[Effect]) -> mujoco.MjSpec:
         """The model with the effects on its parts written into it.
@@ -100,10 +121,13 @@ class OwnModel(GapModel):
             raise FormatError(f"There is no model file {self.config.model}.")
         made = prepared.spec(self.config)
         mjcf_file.compiled(made.copy(), self.config.model)
-        for effect in effects:
-            if effect.stage == "body" and not effect.is_nominal:
-                effect.edit(made)
+        _edit(made, effects)
         return made
+
+    @cached_property
+    def _lean(self) -> mujoco.MjSpec:
+        """The model without what only draws it."""
+        return lean.lean(self.spec(()))
 
     def compiled(self, effects: Sequence[Effect], parts: int = 1) -> Compiled:
         """The compiled model with the effects on its parts.
@@ -115,19 +139,32 @@ class OwnModel(GapModel):
         body = tuple(str(e) for e in effects if e.stage == "body" and not e.is_nominal)
         key = (parts, *body)
         if key not in self._compiled:
-            made = self.spec(effects).compile()
-            made.opt.timestep /= parts
-            self._compiled[key] = Compiled(made)
+            made = self._lean.copy()
+            _edit(made, effects)
+            model = made.compile()
+            model.opt.timestep /= parts
+            self._compiled[key] = Compiled(model)
             while len(self._compiled) > MODELS:
                 self._compiled.popitem(last=False)
         return self._compiled[key]
 
-    def _parts(self) -> int:
+    @property
+    def _finest(self) -> int:
         """Into how many parts the step is cut where a simulation has to be fine."""
-        model = self.compiled(()).model
-        if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
-            return 1
-        return math.ceil(model.opt.timestep / FINEST - 1e-9)
+        return math.ceil(self.dt / FINEST - 1e-9)
+
+    def _needed(self, trials: Sequence[Trial]) -> int:
+        """Into how many parts it has to be cut for the nominal motion of trials."""
+        few = [(trial, ()) for trial in trials[:: max(len(trials) // TRIED, 1)]]
+        exact = self._predicted(few, self._finest)
+        parts = 1
+        while parts < self._finest:
+            made = self._predicted(few, parts)
+            apart = [np.abs(a - b) for a, b in zip(made, exact, strict=True)]
+            if (np.concatenate(apart) < EXACT * self.resolution).all():
+                break
+            parts *= 2
+        return min(parts, self._finest)
 
     @property
     def least(self) -> np.ndarray:
@@ -135,7 +172,11 @@ class OwnModel(GapModel):
         return LEAST * self.resolution
 
     def rows(self, trials: Sequence[Trial]) -> tuple[Row, ...]:
-        """All numbers that may be off, those of all joints alike included."""
+        """All numbers that may be off, those of all joints alike included.
+
+        From then on fine paths are simulated as finely as these trials need.
+        """
+        self._parts = self._needed(trials)
         items = tuple(self._terms.values())
         return mjcf_rows.rows(items, trials, self.dt, self._bodies)
 
@@ -175,15 +216,21 @@ class OwnModel(GapModel):
         pairs, leads = [], []
         for row in sets:
             for trial, values in zip(trials, row, strict=True):
-                pairs.append((trial, self._changes(values)))
+                off = {n: v for n, v in values.items() if n.startswith(start.NUMBERS)}
+                begun = start.moved(trial, off, self.config) if off else trial
+                pairs.append((begun, self._changes(values)))
                 leads.append(values.get(mjcf_rows.LEAD, 0.0))
-        seen = self._predicted(pairs, self._parts() if fine else 1)
+        seen = self._predicted(pairs, self._parts if fine else 1)
         moved = [
             _led(trial, path, lead)
             for (trial, _), path, lead in zip(pairs, seen, leads, strict=True)
         ]
         count = len(trials)
         return [moved[at * count : (at + 1) * count] for at in range(len(sets))]
+
+    def begun(self, trial: Trial) -> Mapping[str, float]:
+        """See `GapModel.begun`: joints that began where they were recorded."""
+        return start.unsure(trial, self.config)
 
     def joint_windows(self, trial: Trial) -> Windows:
         """Windows between samples that were seen."""
@@ -198,7 +245,7 @@ class OwnModel(GapModel):
     ) -> list[list[np.ndarray]]:
         """See `GapModel.simulate`: predicted samples, each ``(T, n_channels)``."""
         pairs = [(trial, items) for items in effects for trial in trials]
-        made = self._predicted(pairs, self._parts())
+        made = self._predicted(pairs, self._parts)
         count = len(trials)
         return [made[at * count : (at + 1) * count] for at in range(len(effects))]
 
@@ -224,18 +271,13 @@ class OwnModel(GapModel):
             self._cache.popitem(last=False)
         return made
 
-    @property
-    def dt(self) -> float:
-        """Physics step [s]."""
-        return float(self.compiled(()).model.opt.timestep)
-
     def _lead(self, dt: float) -> int:
         return round(self.config.settle / dt)
 
     def _job(self, trial: Trial, effects: Sequence[Effect], parts: int) -> Job:
         scene = self.compiled(effects, parts)
         told = self._told(trial, effects, self.dt / parts)
-        begin = self._start(trial, scene.model)
+        begin = self._start(trial)
         ctrl = np.tile(self._rest(scene.model), (len(told), 1))
         ctrl[:, self.actuators] = told
         return Job(begin, (Segment(scene, ctrl),))
@@ -264,19 +306,27 @@ class OwnModel(GapModel):
         )
         on, rng = np.ones(len(values), bool), np.random.default_rng(0)
         for effect in effects:
-            if effect.stage == "command":
+            if isinstance(effect, CommandEffect) and effect.stage == "command":
                 made = effect.apply(signal, on, rng)
                 signal = ControlSignal(
                     signal.times, made, signal.command, signal.channels, dt
                 )
         return signal.values[extra:]
 
-    def _start(self, trial: Trial, model: mujoco.MjModel) -> np.ndarray:
+    def _start(self, trial: Trial) -> np.ndarray:
+        """The state that a trial begins in, kept: effects do not change it."""
+        key = (trial.observed[:1].tobytes(), str(trial.conditions.get(start.STATE)))
+        if key not in self._starts:
+            self._starts[key] = self._begun_in(trial)
+        return self._starts[key]
+
+    def _begun_in(self, trial: Trial) -> np.ndarray:
+        model = self.compiled(()).model
         data = mujoco.MjData(model)
         if self.config.keyframe:
             key = _index(model, "key", self.config.keyframe)
             mujoco.mj_resetDataKeyframe(model, data, key)
-        if self.config.recorded:
+        if self.config.recorded or start.STATE in trial.conditions:
             start.place(data, trial, self.view)
         state = np.empty(mujoco.mj_stateSize(model, STATE))
         data.time = 0.0
@@ -298,7 +348,7 @@ class OwnModel(GapModel):
         names = tuple(channel.name for channel in self.channels)
         on, rng = np.ones(len(times), bool), np.random.default_rng(0)
         for effect in effects:
-            if effect.stage == "sensor":
+            if isinstance(effect, SensorEffect):
                 read = effect.apply(times, read, names, on, rng)
         at = trial.times - trial.times[trial.boundaries[0]]
         return np.stack([np.interp(at, times, column) for column in read.T], axis=1)
@@ -348,6 +398,14 @@ class OwnModel(GapModel):
         spec.compile()
         files.write_text(path, spec.to_xml())
         return [str(effect) for effect in made if effect.stage != "body"]
+
+
+def _edit(made: mujoco.MjSpec, effects: Sequence[Effect]) -> None:
+    """Write effects on parts into a spec."""
+    for effect in effects:
+        wanted = effect.stage == "body" and not effect.is_nominal
+        if wanted and isinstance(effect, ModelEdit):
+            effect.edit(made)
 
 
 def _led(trial: Trial, path: np.ndarray, lead: float) -> np.ndarray:

@@ -195,11 +195,11 @@ def _shares(problem: Problem, names: tuple[str, ...]) -> dict[str, tuple[float, 
         return problem.fit(support, slack=0.0).loss
 
     nothing, whole = loss(()), loss(names)
-    made = {}
+    made: dict[str, tuple[float, float]] = {}
     for name in names:
         without = tuple(other for other in names if other != name)
-        shares = (nothing - loss((name,)), loss(without) - whole)
-        made[name] = tuple(share / (nothing - whole) for share in shares)
+        alone, last = nothing - loss((name,)), loss(without) - whole
+        made[name] = alone / (nothing - whole), last / (nothing - whole)
     return made
 
 
@@ -217,7 +217,13 @@ def _plan(
     return tuple(sorted(separations.items(), key=lambda item: -item[1]))
 
 
-def _verdict(tied, fits, gain, plan, unseen) -> Verdict:
+def _verdict(
+    tied: Sequence[tuple[str, ...]],
+    fits: Mapping[tuple[str, ...], OdometryFit],
+    gain: tuple[float, float],
+    plan: Sequence[tuple[str, float]],
+    unseen: Sequence[str],
+) -> Verdict:
     best = tied[0]
     kind = (
         "no gap"

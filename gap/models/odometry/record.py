@@ -4,10 +4,11 @@ import numpy as np
 from scipy.stats import norm
 
 from bns.gap.models.odometry.diagnosis import DRIVES, OdometryDiagnosis, diagnose
-from bns.gap.models.odometry.fit import TERMS
+from bns.gap.models.odometry.fit import TERMS, OdometryFit
 from bns.gap.models.odometry.motions import Motions
 from bns.gap.planning.excitation import Excitation
-from bns.gap.planning.plan import Option, Plan, repeats
+from bns.gap.planning.plan import Option, Plan
+from bns.gap.planning.plan_runs import repeats
 from bns.gap.records import Diagnosis, Fit
 from bns.worlds.trial import Commands, Trial
 
@@ -87,7 +88,7 @@ def planned(found: Diagnosis) -> Plan:
     )
 
 
-def _fit(names: tuple[str, ...], fit) -> Fit:
+def _fit(names: tuple[str, ...], fit: OdometryFit) -> Fit:
     values = [fit.magnitudes[name] for name in names]
     half = [LEVEL * fit.deviations[name] for name in names]
     return Fit(

@@ -45,7 +45,7 @@ def curves(
     runs: Runs,
     nominal: Nominal,
     candidates: Sequence[Row],
-    magnitudes: Mapping[str, Sequence[float]] | None = None,
+    magnitudes: Mapping[str, Sequence[float] | np.ndarray] | None = None,
 ) -> list[Curve]:
     """Simulate candidates at their magnitudes, all runs in one batch.
 
@@ -59,7 +59,8 @@ def curves(
         np.unique(magnitudes[c.name] if magnitudes else (*c.levels, c.nominal))
         for c in candidates
     ]
-    law, made = nominal.told(runs), [None] * len(candidates)
+    law = nominal.told(runs)
+    made: dict[int, Curve] = {}
     for slow in (False, True):  # play costs more a step: in a batch of its own
         mine = [i for i, c in enumerate(candidates) if (c.name in SLOW) == slow]
         sets = [(), *([candidates[i].make(v)] for i in mine for v in grids[i])]
@@ -70,7 +71,7 @@ def curves(
         for i, low, high in zip(mine, ends[:-1], ends[1:], strict=True):
             departures = batch[:, low:high] - batch[:, :1]
             made[i] = Curve(candidates[i], grids[i], departures)
-    return made
+    return [made[i] for i in range(len(candidates))]
 
 
 def nearest(

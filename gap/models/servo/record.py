@@ -1,6 +1,6 @@
 """A servo's diagnosis against its own unchanged recordings, as a `Diagnosis`."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -115,7 +115,9 @@ def _spread(others: Runs) -> np.ndarray:
     return np.array([distinct[place] for place in places])
 
 
-def _fits(scores: Scores, candidates: dict[str, Row], slack: float) -> tuple[Fit, ...]:
+def _fits(
+    scores: Scores, candidates: Mapping[str, Row], slack: float
+) -> tuple[Fit, ...]:
     size = scores.size
     nothing = scores.nothing
     made = [Fit((), (), (), (), (), nothing, nothing / size, 0.0, nothing)]

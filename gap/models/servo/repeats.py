@@ -29,7 +29,7 @@ def odd(runs: Runs) -> dict[int, str]:
     groups: dict[tuple, list[int]] = {}
     for index, key in enumerate(keys(runs)):
         groups.setdefault(key, []).append(index)
-    found = {}
+    found: dict[int, str] = {}
     for members in groups.values():
         found |= _odd_of(runs, members)
     return found

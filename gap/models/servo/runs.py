@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bns.errors import BnsError
+from bns.gap.recordings.conditions import as_number
 from bns.worlds.physics.servo_law import NUMBERS
 from bns.worlds.physics.servo_rollout import DT, Drive
 from bns.worlds.trial import Trial
@@ -95,7 +96,7 @@ def runs(trials: Sequence[Trial], *, seconds: float, dt: float = DT) -> Runs:
             every=every,
         ),
         angles=angles,
-        told={n: np.array([float(c[n]) for c in conditions]) for n in known},
+        told={n: np.array([as_number(c, n) for c in conditions]) for n in known},
         labels={n: tuple(c[n] for c in conditions) for n in names if n not in NUMBERS},
     )
 

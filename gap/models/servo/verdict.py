@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.stats import t as student
@@ -126,15 +127,16 @@ def verdict(
     left = scores.costs[best] / scores.size
     p_misfit = float((1 + (null.left >= left).sum()) / (1 + len(null.left)))
     second = next((n for n in ranked if n not in _class(best, candidates)), best)
-    common = {
-        "p_gap": p_gap,
-        "p_misfit": p_misfit,
-        "second": (second,),
-        "margin": scores.worse(second),
-    }
+    said = partial(
+        Verdict,
+        p_gap=p_gap,
+        p_misfit=p_misfit,
+        second=(second,),
+        margin=scores.worse(second),
+    )
     most = EXCESS * null.left.max()
     if p_gap > LEVEL and scores.nothing / scores.size <= most:
-        return Verdict(
+        return said(
             kind="no gap",
             named=(),
             sets=((),) if p_gap > 1 - COVERAGE else ((), (best,)),
@@ -142,10 +144,9 @@ def verdict(
             sentence="These runs differ from the nominal law by no more than runs "
             f"without a change do; the nearest explanation would be {best}.",
             change=_excite(inside, candidates),
-            **common,
         )
     if left > most:
-        return Verdict(
+        return said(
             kind="none of the library",
             named=(),
             sets=tuple((name,) for name in inside),
@@ -153,26 +154,30 @@ def verdict(
             sentence=f"There is a gap; {best} comes nearest, but leaves "
             f"{left / null.left.max():.1f} times what the worst setting without a "
             "change leaves.",
-            **common,
         )
-    return _named(scores, inside, candidates, common)
+    return _named(scores, inside, candidates, said, second)
 
 
-def _named(scores: Scores, inside, candidates, common) -> Verdict:
+def _named(
+    scores: Scores,
+    inside: Sequence[str],
+    candidates: Mapping[str, Row],
+    said: partial[Verdict],
+    second: str,
+) -> Verdict:
     best, text = inside[0], _text(scores, inside[0], candidates)
     sets = tuple((name,) for name in inside)
     if len(inside) == 1:
-        return Verdict(
+        return said(
             kind="effect",
             named=sets,
             sets=sets,
             angle=float("nan"),
-            sentence=f"{text} explains the gap; {common['second'][0]} comes second.",
-            **common,
+            sentence=f"{text} explains the gap; {second} comes second.",
         )
     angle = _angle(scores.signatures[best], scores.signatures[inside[1]])
     others = " or ".join(_text(scores, name, candidates) for name in inside[1:])
-    return Verdict(
+    return said(
         kind="either",
         named=sets,
         sets=sets,
@@ -180,7 +185,6 @@ def _named(scores: Scores, inside, candidates, common) -> Verdict:
         sentence=f"{text}, or {others}: these runs can not tell (the first two differ "
         f"by {angle:.0f} deg).",
         change=_excite(inside, candidates),
-        **common,
     )
 
 

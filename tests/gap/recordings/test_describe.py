@@ -145,9 +145,15 @@ def test_a_log_without_times_or_commands_is_said(tmp_path):
         describe(tmp_path / "arm.xml", tmp_path / "b.csv")
 
 
-def test_a_parabola_gives_value_and_slope():
+def test_a_parabola_gives_value_and_slope_and_how_sure_they_are():
     at = np.linspace(-1, 1, 7)
-    assert cuts.parabola(at, 2 + 3 * at - at**2) == pytest.approx((2, 3))
+    exact = cuts.parabola(at, 2 + 3 * at - at**2, 0.1)
+    assert exact[:2] == pytest.approx((2, 3))
+    rng = np.random.default_rng(0)
+    drawn = rng.normal(2 + 3 * at - at**2, 0.1, (500, 7))
+    found = np.array([cuts.parabola(at, row, 0.1)[:2] for row in drawn])
+    assert found.std(axis=0) == pytest.approx(exact[2:], rel=0.1)
+    assert cuts.parabola(at, at**3, 1e-6)[3] > 0.01  # not a parabola: less sure
 
 
 def test_command_time_dates_a_command_between_samples(tmp_path):

@@ -1,0 +1,108 @@
+"""A pole on a cart, which its commands alone do not hold upright; and lean models."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from bns.gap.describe import describe
+from bns.gap.diagnose import diagnose
+from bns.gap.models.mjcf import lean
+from bns.gap.models.mjcf.model import OwnModel
+
+CART = """<mujoco model="cart"><option timestep="0.01" integrator="RK4"/>
+  <visual><global offwidth="64"/></visual>
+  <asset><texture name="sky" type="skybox" builtin="gradient" rgb1="0 0 1" rgb2="1 1 1"
+      width="256" height="256"/>
+    <texture name="grid" type="2d" builtin="checker" width="128" height="128"/>
+    <material name="grey" texture="grid"/>
+    <mesh name="hull" vertex="0 0 0 .1 0 0 0 .1 0 0 0 .1 .1 .1 .1"/></asset>
+  <worldbody><body name="cart" pos="0 0 1">
+    <joint name="rail" type="slide" axis="1 0 0" damping="0.5"/>
+    <geom type="box" size="0.1 0.1 0.05" mass="1" material="grey"/>
+    <geom type="mesh" mesh="hull" mass="0.2" contype="0" conaffinity="0"/>
+    <body name="pole"><joint name="pivot" axis="0 1 0" damping="1e-4"/>
+      <geom type="capsule" fromto="0 0 0 0 0 0.8" size="0.02" mass="0.1"
+        contype="0" conaffinity="0"/></body></body></worldbody>
+  <actuator><motor name="push" joint="rail" gear="10" ctrllimited="true"
+    ctrlrange="-1 1"/></actuator></mujoco>"""
+NOISE, RATE = 5e-4, 50
+
+
+def recorded(path, friction=0.0, trials=5, seconds=3.0):
+    """A log at 50 Hz of a cart with dry friction [N], simulated at 1 ms."""
+    model = mujoco.MjModel.from_xml_string(CART)
+    model.opt.timestep = 0.001
+    model.dof_frictionloss[0] = friction
+    rng, lines = np.random.default_rng(3), ["time,push_cmd,rail,pivot,trial"]
+    for trial in range(trials):
+        data, goal = mujoco.MjData(model), 0.0
+        for sample in range(round(seconds * RATE)):
+            if sample % 20 == 10:
+                goal = np.round(rng.uniform(-0.5, 0.5), 3)
+            seen = data.qpos + rng.normal(0, NOISE, 2)
+            cells = (sample / RATE, goal, *seen, trial)
+            lines.append(",".join(f"{cell:.7g}" for cell in cells))
+            data.ctrl[0] = goal
+            mujoco.mj_step(model, data, 1000 // RATE)
+    path.write_text("\n".join(lines) + "\n")
+
+
+@pytest.fixture
+def said(tmp_path):
+    def run(friction):
+        (tmp_path / "cart.xml").write_text(CART)
+        recorded(tmp_path / "log.csv", friction)
+        own = tmp_path / "own.toml"
+        described = describe(tmp_path / "cart.xml", tmp_path / "log.csv", out=own)
+        described.write(own)
+        model = OwnModel.read(own, threads=1)
+        trials = model.read_log(str(tmp_path / "log.csv"))
+        return trials, diagnose(trials, model, full=False)
+
+    return run
+
+
+def test_an_unstable_robot_without_an_effect_has_no_gap(said):
+    trials, found = said(0.0)
+    spans = [trial.times[-1] for trial in trials]
+    assert len(trials) > 5 and max(spans) < 2.0  # cut to what is foreseen
+    assert found.verdict.kind == "no gap"
+
+
+def test_friction_of_an_unstable_robot_is_named(said):
+    _, found = said(0.4)
+    assert found.verdict.named[0] == ("joint_friction[rail]",)
+    assert found.best.magnitudes[0] == pytest.approx(0.4, abs=0.02)
+
+
+def test_a_lean_model_moves_alike_and_holds_no_pictures():
+    spec = mujoco.MjSpec.from_string(CART)
+    whole, small = spec.compile(), lean.lean(spec).compile()
+    assert small.nmesh == small.ntex == small.nmat == 0 < whole.nmesh
+    assert small.nbuffer < 0.1 * whole.nbuffer
+    ends = []
+    for model in (whole, small):
+        data = mujoco.MjData(model)
+        data.ctrl[:] = 0.3
+        mujoco.mj_step(model, data, 100)
+        ends.append(data.qpos.copy())
+    assert np.array_equal(*ends)
+
+
+def test_a_mesh_that_a_sensor_needs_stays():
+    sensor = '<sensor><framepos objtype="geom" objname="shell"/></sensor></mujoco>'
+    named = CART.replace('mesh="hull" mass', 'mesh="hull" name="shell" mass')
+    spec = mujoco.MjSpec.from_string(named.replace("</mujoco>", sensor))
+    assert lean.lean(spec).compile().nmesh == 1
+
+
+def test_a_model_that_weighs_by_its_geoms_alone_can_be_loaded(tmp_path):
+    text = CART.replace("<option", '<compiler inertiafromgeom="true"/><option')
+    (tmp_path / "cart.xml").write_text(text)
+    recorded(tmp_path / "log.csv", trials=1)
+    own = tmp_path / "own.toml"
+    describe(tmp_path / "cart.xml", tmp_path / "log.csv", out=own).write(own)
+    model = OwnModel.read(own, threads=1)
+    plain = model.compiled(()).model.body("cart").mass[0]
+    heavy = model.parse("body_mass:part=cart,added=0.3,dx=0,dy=0,dz=0")
+    assert model.compiled((heavy,)).model.body("cart").mass[0] == plain + 0.3
