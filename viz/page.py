@@ -55,11 +55,11 @@ def portrait(robot: str) -> str:
     Args:
         robot: its name or its directory.
     """
-    from bns import models
     from bns.errors import BnsError
+    from bns.models.robot_model import find
 
     try:
-        directory = models.find(robot)
+        directory = find(robot)
     except BnsError:  # a run of another machine, whose robot is not here
         return ""
     file = directory / f"{directory.name}.png"
