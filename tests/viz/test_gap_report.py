@@ -9,6 +9,8 @@ from bns.__main__ import main
 from bns.gap import store
 from bns.gap.bench.wheeled_cases import commands
 from bns.gap.candidates import wheeled_rows
+from bns.gap.recordings import load_recordings
+from bns.viz.gap import report
 from bns.worlds import corrected
 from bns.worlds.data import dataset
 from bns.worlds.physics.wheeled_world import MujocoWorld
@@ -65,6 +67,13 @@ def test_the_report_answers_the_questions_in_one_file(home):
         assert said in page, said
     assert page.count("data:image/svg+xml;base64,") == 2 * 5  # wide and narrow
     assert not re.findall(r'(?:src|href)="(?!data:)', page)
+
+
+def test_all_that_is_written_in_figures_can_be_read(home, tmp_path, illegible):
+    found, trials = store.load(home / "out"), dataset.read(home / "data")
+    model = load_recordings.model(found.model)
+    report.write(found, trials, model, tmp_path / "report.html")
+    assert illegible == [], "\n".join(illegible)
 
 
 def test_the_recording_shows_three_robots(home):
