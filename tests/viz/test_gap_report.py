@@ -70,7 +70,7 @@ def test_the_report_answers_the_questions_in_one_file(home):
 
 
 def test_all_that_is_written_in_figures_can_be_read(home, tmp_path, illegible):
-    found, trials = store.load(home / "out"), dataset.read(home / "data")
+    found, trials = store.load(home / "out"), dataset.read(home / "data").trials
     model = load_recordings.model(found.model)
     report.write(found, trials, model, tmp_path / "report.html")
     assert illegible == [], "\n".join(illegible)

@@ -124,7 +124,13 @@ class Stage:
 
 
 def log_static(stream: "RecordingStream", seen: View, stage: Stage) -> None:
-    """Log coordinates, the ground, shapes and names."""
+    """Log coordinates, the ground, shapes and names.
+
+    Args:
+        stream: Rerun's recording stream.
+        seen: the recording beside its predictions.
+        stage: where the robots are drawn.
+    """
     import rerun as rr
 
     stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
