@@ -147,6 +147,8 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         point = descent.refitted(problem, point, support)
     if _worse(problem, start, point, known):
         point = descent.refitted(problem, point, frozenset())
+    if late and late.name not in point.support:
+        late = None
     full = point.linear.rest(point.linear.solve(point.linear.free))
     inside = rest.kept(problem, full, point.noise.sd)
     strayed = rest.strayed(problem, point.rest, known)
