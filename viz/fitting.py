@@ -88,16 +88,16 @@ def fit(figure: "Figure") -> None:
 
 def _moved(axes: "Axes") -> None:
     """The legend of a panel put below the figure, where it would hide the panel."""
-    legend = axes.get_legend()
-    if legend is None:
+    legend, place, figure = axes.get_legend(), axes.get_subplotspec(), axes.figure
+    if legend is None or place is None:
         return
-    panel = axes.get_subplotspec().get_position(axes.figure).width  # type: ignore[union-attr]
-    room = panel * axes.figure.bbox.width
+    whole: Any = figure
+    room = place.get_position(whole).width * whole.bbox.width
     if legend.get_window_extent().width <= INSIDE * room:
         return
     handles, labels = _shown(legend)
     legend.remove()
-    _put(axes.figure, handles, labels, len(labels))
+    _put(figure, handles, labels, len(labels))
 
 
 def _shown(legend: "Legend") -> tuple[list, list[str]]:
@@ -154,7 +154,7 @@ def _broken(text: "Text", room: float, *, upright: bool) -> None:
     else:
         fits = low >= EDGE and high <= room - EDGE
         middle = (low + high) / 2
-        centred = text.get_ha() == "center"
+        centred = text.get_horizontalalignment() == "center"
         room = 2 * min(middle, room - middle) if centred else room - low
     if fits:
         return
