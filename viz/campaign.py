@@ -12,7 +12,7 @@ from bns.errors import BnsError
 from bns.stats import resampling
 from bns.stats.compare import MEASURES, values
 from bns.storage import files
-from bns.viz import style
+from bns.viz import fitting, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,7 +41,9 @@ def write(found: Results, folder: Path, measure: str) -> list[Path]:
         ("sensitivity.png", sensitivity(found, measure)),
     ):
         if figure is not None:
-            files.replace(folder / name, figure.savefig)
+            with style.plotting():
+                fitting.fit(figure)
+                files.replace(folder / name, figure.savefig)
             made.append(folder / name)
     if not made:
         raise BnsError(f"{found.store.directory} has no runs yet: let it run.")

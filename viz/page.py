@@ -5,10 +5,7 @@ import io
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from bns.viz import style
-
-NARROW = 3.8
-"""width of a figure for a telephone [inch]"""
+from bns.viz import fitting, style
 
 
 def render(template: str, content: Mapping[str, Any]) -> bytes:
@@ -44,9 +41,11 @@ class Picture(NamedTuple):
 
 def picture(figure: Any) -> Picture:
     """A figure in two layouts, the same bytes every time; the figure is used up."""
-    wide = _address(figure)
-    _stack(figure)
-    return Picture(wide, _address(figure))
+    with style.plotting():
+        fitting.fit(figure)
+        wide = _address(figure)
+        fitting.stack(figure)
+        return Picture(wide, _address(figure))
 
 
 def portrait(robot: str) -> str:
@@ -70,35 +69,5 @@ def portrait(robot: str) -> str:
 
 def _address(figure: Any) -> str:
     buffer = io.BytesIO()
-    with style.plotting():
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    figure.savefig(buffer, format="svg", metadata={"Date": None})
     return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
-
-
-def _stack(figure: Any) -> None:
-    """Panels beside each other brought below each other, on a narrow figure."""
-    from matplotlib.gridspec import GridSpec
-
-    width, height = figure.get_size_inches()
-    places = [(axes, axes.get_subplotspec()) for axes in figure.axes]
-    rows = {place.rowspan.start for _, place in places if place}
-    beside = [axes for axes, place in places if place]
-    shown = min(1.0, NARROW / width)
-    if len(beside) < 2 or len(rows) > 1 or len(beside) < len(figure.axes):
-        figure.set_size_inches(NARROW, max(height * shown, min(height, NARROW * 0.8)))
-        return
-    ratio = beside[0].get_position().height * height
-    ratio /= max(beside[0].get_position().width * width, 0.1)
-    tall = NARROW * min(ratio, 1.0) * 0.85 + 0.7
-    figure.set_size_inches(NARROW, tall * len(beside))
-    grid = GridSpec(len(beside), 1, figure)
-    for number, axes in enumerate(beside):
-        axes.set_subplotspec(grid[number])
-        axes.tick_params(labelleft=True, labelbottom=True)
-        axes.set_ylabel(axes.get_ylabel() or beside[0].get_ylabel())
-    for legend in list(figure.legends):
-        handles = legend.legend_handles
-        labels = [text.get_text() for text in legend.get_texts()]
-        legend.remove()
-        place = "outside lower center"
-        figure.legend(handles, labels, loc=place, ncols=2, frameon=False)

@@ -36,12 +36,12 @@ CAPTIONS = {
         "which a few failing runs dominate. {band}"
     ),
     "solved": (
-        "Left: objectives reached in order, of {goals}. Right: share of runs whose "
+        "First: objectives reached in order, of {goals}. Then: share of runs whose "
         "trial reached them all. {band}"
     ),
     "waits": (
-        "Share of runs that had solved the task before the damage (left), and, "
-        "counted from the first damaged trial, that had solved it again (right). A "
+        "Share of runs that had solved the task before the damage, and then, "
+        "counted from the first damaged trial, that had solved it again. A "
         "curve that ends below 100 % tells of runs that never did. The dotted line "
         "drops from the median."
     ),

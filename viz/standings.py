@@ -10,7 +10,7 @@ from bns.standings import figures
 from bns.standings.design import PRIORS
 from bns.standings.figures import Cell
 from bns.storage import files
-from bns.viz import style
+from bns.viz import fitting, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,7 +31,10 @@ def write(cells: Sequence[Cell], folder: Path) -> list[Path]:
     for task in dict.fromkeys(cell.entry.task for cell in cells):
         path = folder / f"standings-{task}.png"
         some = [cell for cell in cells if cell.entry.task == task]
-        files.replace(path, curves(some).savefig)
+        figure = curves(some)
+        with style.plotting():
+            fitting.fit(figure)
+            files.replace(path, figure.savefig)
         made.append(path)
     return made
 

@@ -8,7 +8,10 @@ import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    from matplotlib.axis import Axis
 
 BLACK = "#222222"
 GREY = "#7a7a7a"
@@ -92,6 +95,24 @@ def _figure_class() -> Any:
             return buffer.getvalue()
 
     return Shown
+
+
+def logarithmic(axis: "Axis", set_scale: Any) -> None:
+    """A logarithmic axis with plain numbers.
+
+    Args:
+        axis: of which data are drawn.
+        set_scale: of the same axis, `Axes.set_xscale` or `Axes.set_yscale`.
+    """
+    from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
+
+    set_scale("log")
+    low, high = sorted(axis.get_view_interval())
+    subs = (1.0, 2.0, 5.0) if high / max(low, 1e-300) < 300 else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs))
+    axis.set_minor_locator(NullLocator())
+    axis.set_minor_formatter(NullFormatter())
+    axis.set_major_formatter("{x:g}")
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

@@ -94,6 +94,12 @@ def gap_sensors(quick: bool) -> Result:
             "no-effect cases": len(none),
             "effects on wheels": _wheels(scoring.of(found, "motion", scoring.LARGE)),
             "outside the library, called so": scoring.share(off, scoring.strange),
+            "outside the library, a rest that recurs told": scoring.share(
+                off, scoring.unexplained
+            ),
+            "outside the library, share left, median": _middle(
+                [row["said"]["left"] for row in off]
+            ),
             "outside the library": len(off),
             "by size": scoring.by_size(every),
             "seconds of processor time": _middle([row["cpu"] for row in found]),

@@ -92,7 +92,8 @@ def shown(record: RunRecord) -> tuple[int, dict[int, Any]]:
 def summary(record: RunRecord) -> str:
     """What happened, in words."""
     solved = stats.trials_to_solve(record)
-    lines = [f"{record.trials} trials of {record.replicates} runs, numbered from 0."]
+    runs = "1 run" if record.replicates == 1 else f"{record.replicates} runs"
+    lines = [f"{record.trials} trials of {runs}, numbered from 0."]
     lines.append(sentence("Solved", solved, "after {} trials"))
     onset, damage = int(record.damage_onset.max()), record.config.world.damage
     if onset < 0:

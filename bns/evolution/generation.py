@@ -148,6 +148,8 @@ class Breeder:
             eta=config.sbx_eta,
             fixed_length=self.fixed_length,
         )
+        if config.crossover == "sbx":  # its children lie beyond their parents as well
+            children = self._bounded(children)
         children = self._mutate(children, rates, coins)
         return self._with_elites(population, cost, children)
 
@@ -170,6 +172,11 @@ class Breeder:
             torch.where(chosen[:, :, None, None], fresh.genes, second.genes),
             torch.where(chosen, fresh.lengths, second.lengths),
         )
+
+    def _bounded(self, children: Population) -> Population:
+        low, high = self.encoding.low, self.encoding.high
+        genes = torch.minimum(torch.maximum(children.genes, low), high)
+        return children._replace(genes=genes)
 
     def _mutate(self, children: Population, rates: Rates, coins: Coins) -> Population:
         genes = variation.mutate(

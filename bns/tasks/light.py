@@ -364,7 +364,7 @@ CAPTIONS = {
         "line is the mean. {band}"
     ),
     "solved": (
-        "Left: whether the robot came to the goal radius. Right: share of runs whose "
+        "First: whether the robot came to the goal radius. Then: share of runs whose "
         "trial ended with the robot circling the lamp. {band}"
     ),
     "snn_error": (

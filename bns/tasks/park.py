@@ -126,7 +126,7 @@ class ParkTask(WheeledTask):
                     "5 cm per command. {band}"
                 ),
                 "solved": (
-                    "Left: whether the robot ended at the place. Right: share of runs "
+                    "First: whether the robot ended at the place. Then: share of runs "
                     "whose trial ended there, heading the right way. {band}"
                 ),
             },

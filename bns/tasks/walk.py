@@ -211,12 +211,12 @@ CAPTIONS = {
         "stored is its square with the sign turned (equation 7.4). {band}"
     ),
     "solved": (
-        "Left: whether the gait was adequate ({adequate:g} m). Right: share of runs "
+        "First: whether the gait was adequate ({adequate:g} m). Then: share of runs "
         "whose trial was. {band}"
     ),
     "waits": (
-        "Share of runs that had found an adequate gait before the damage (left), and, "
-        "counted from the first damaged trial, again (right). A curve that ends below "
+        "Share of runs that had found an adequate gait before the damage, and then, "
+        "counted from the first damaged trial, again. A curve that ends below "
         "100 % tells of runs that never did. The dotted line drops from the median."
     ),
 }

@@ -67,6 +67,7 @@ def said_of(found: Mapping[str, Any]) -> dict[str, Any]:
         **{key: found["closed"].get(key) for key in ("closed", "before", "after")},
         "parts": [part["name"] for part in parts],
         "left": found.get("decomposition", {}).get("left"),
+        "recurs": found.get("decomposition", {}).get("recurs"),
         "seconds": dict(found.get("seconds", {})),
     }
 
@@ -181,6 +182,14 @@ def claims(row: dict[str, Any]) -> bool:
 def strange(row: dict[str, Any]) -> bool:
     """Whether a gap is claimed that no effect of the library explains."""
     return bool(row["said"]["verdict"] == "none of the library")
+
+
+def unexplained(row: dict[str, Any]) -> bool:
+    """Whether it is said that something is left that no effect of the library explains,
+    be it most of the gap or not."""
+    from bns.gap.decomposition.rest import SURE
+
+    return strange(row) or (row["said"]["recurs"] or 0.0) > SURE
 
 
 def confusion(rows: Sequence[dict]) -> dict[str, int]:

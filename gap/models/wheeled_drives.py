@@ -201,7 +201,8 @@ def base_mass(robot: str) -> float:
 
 @lru_cache(maxsize=4000)
 def begun(robot: str, body: tuple[ModelEdit, ...], dt: float, yaw: float) -> np.ndarray:
-    """Full physics state at rest at the origin with a heading.
+    """Full physics state at rest at the origin with a heading. On a level floor a robot
+    comes to rest alike at every heading.
 
     Args:
         robot: by name.
@@ -209,7 +210,14 @@ def begun(robot: str, body: tuple[ModelEdit, ...], dt: float, yaw: float) -> np.
         dt: physics step [s].
         yaw: the heading [rad].
     """
-    return compile.start_state(scene(robot, body, dt), (0.0, 0.0, yaw))
+    compiled = scene(robot, body, dt)
+    if np.any(compiled.model.opt.gravity[:2]):
+        return compile.start_state(compiled, (0.0, 0.0, yaw))
+    state = compile.start_state(compiled, (0.0, 0.0, 0.0)).copy()
+    place = compile.free_joint(compiled.model)
+    free = slice(1 + place.start, 1 + place.stop)
+    state[free] = compile.posed(state[free], (0.0, 0.0, yaw))
+    return state
 
 
 @lru_cache(maxsize=2000)

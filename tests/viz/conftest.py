@@ -9,7 +9,9 @@ from bns.experiment.config import RunConfig, WorldConfig
 from bns.experiment.record import RunRecord
 from bns.experiment.task_settings import TaskConfig
 from bns.seeding import generator
+from bns.viz import page
 from bns.worlds.trial import Commands, Trial
+from tests.viz.legible import flaws
 
 os.environ["RERUN_ANALYTICS"] = "0"
 
@@ -195,3 +197,16 @@ def record():
 def trials(record):
     """The dense trials of replicate 0."""
     return [make_trial(record, 0, trial) for trial in range(record.trials)]
+
+
+@pytest.fixture
+def illegible(monkeypatch):
+    """What cannot be read of figures that went into pages since, wide and narrow."""
+    found, drawn = [], page._address
+
+    def looked_at(figure):
+        found.extend(flaws(figure))
+        return drawn(figure)
+
+    monkeypatch.setattr(page, "_address", looked_at)
+    return found

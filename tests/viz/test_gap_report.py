@@ -1,6 +1,7 @@
 """Report and recording of a diagnosis: they say what was found, in one file each."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,9 +10,13 @@ from bns.__main__ import main
 from bns.gap import store
 from bns.gap.bench.wheeled_cases import commands
 from bns.gap.candidates import wheeled_rows
+from bns.gap.recordings import load_recordings
+from bns.viz.gap import report, scene
+from bns.viz.gap.view import view
 from bns.worlds import corrected
 from bns.worlds.data import dataset
 from bns.worlds.physics.wheeled_world import MujocoWorld
+from tests.viz.test_recording import columns
 
 NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.01"
 GAIN = "wheel_gain:wheel=left,factor=0.85"
@@ -67,6 +72,13 @@ def test_the_report_answers_the_questions_in_one_file(home):
     assert not re.findall(r'(?:src|href)="(?!data:)', page)
 
 
+def test_all_that_is_written_in_figures_can_be_read(home, tmp_path, illegible):
+    found, trials = store.load(home / "out"), dataset.read(home / "data").trials
+    model = load_recordings.model(found.model)
+    report.write(found, trials, model, tmp_path / "report.html")
+    assert illegible == [], "\n".join(illegible)
+
+
 def test_the_recording_shows_three_robots(home):
     from rerun.chunk import RrdReader
 
@@ -79,6 +91,30 @@ def test_the_recording_shows_three_robots(home):
         "/world/paths/arrows",
         "/residuals/turn/corrected",
     } <= paths
+
+
+def test_enlarged_robots_stand_where_they_were(home):
+    found, trials = store.load(home / "out"), dataset.read(home / "data").trials
+    seen = view(found, trials, load_recordings.model(found.model))
+    stage = scene.Stage(seen, range(len(trials)))
+    file = home / "out" / "recording.rrd"
+    (scale,) = columns(file, "/world/corrected")["Transform3D:scale"]
+    assert np.allclose(scale, stage.times) and stage.times >= 1
+    places = columns(file, "/world/corrected/khepera3")["Transform3D:translation"]
+    places = stage.times * np.array([row[0][:2] for row in places])
+    for path in seen.corrected:
+        end = path[-1, :2] + stage.lane("corrected")[:2]
+        assert np.hypot(*(places - end).T).min() < 1e-5
+
+
+def test_a_robot_that_drove_far_is_enlarged_and_one_that_did_not_is_not(home):
+    found, trials = store.load(home / "out"), dataset.read(home / "data").trials
+    seen = view(found, trials, load_recordings.model(found.model))
+    drawn = [
+        scene.Stage(replace(seen, corrected=[factor * p for p in seen.corrected]), [0])
+        for factor in (0.1, 100.0)
+    ]
+    assert [stage.times for stage in drawn] == [1, scene.LARGEST]
 
 
 def test_without_the_effect_the_edited_model_is_right(home, capsys):

@@ -141,3 +141,8 @@ def test_paths_begin_at_their_starts(record):
 def test_a_recording_is_written(record, tmp_path):
     made = recording.write(record, {}, tmp_path / "recording.rrd")
     assert made.stat().st_size > 10_000
+
+
+def test_all_that_is_written_in_figures_can_be_read(record, tmp_path, illegible):
+    report.write(record, tmp_path / "report.html")
+    assert illegible == [], "\n".join(illegible)

@@ -10,8 +10,9 @@ import pytest
 
 from bns.errors import BnsError, FormatError
 from bns.stats import Interval
-from bns.viz import comparison, facts, figures, recording, report
+from bns.viz import comparison, facts, figures, recording, report, style
 from bns.viz.page import Picture
+from tests.viz.legible import flaws
 
 
 @pytest.fixture(scope="module")
@@ -206,3 +207,21 @@ def test_none_recovered_is_said(record, tmp_path, monkeypatch):
     text = report.write(never(record), tmp_path / "a.html").read_text("utf-8")
     assert "None solved the task before the damage." in text
     assert "None recovered within the 20 trials that were left." in text
+
+
+def test_all_that_is_written_in_figures_can_be_read(record, tmp_path, illegible):
+    report.write(record, tmp_path / "one.html")
+    long = "window 150, mutation magnitude 0.05, tournament of three"
+    report.write({"a": record, long: record}, tmp_path / "two.html")
+    assert illegible == [], "\n".join(illegible)
+
+
+def test_what_cannot_be_read_is_found():
+    with style.plotting() as figure_class:
+        figure = figure_class(figsize=(2.0, 2.0))
+        figure.text(0.9, 0.5, "beyond the edge")
+        figure.text(0.1, 0.2, "one"), figure.text(0.12, 0.22, "two")
+        assert flaws(figure) == [
+            "beyond the edge: 'beyond the edge'",
+            "on one another: 'one' and 'two'",
+        ]

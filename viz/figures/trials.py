@@ -242,12 +242,11 @@ def curves(runs: Mapping[str, RunRecord], shown: Curves) -> "Figure":
                 values = record[panel.column] * panel.factor
                 band(axes, values, colour, label)
             if shown.log:
-                axes.set_yscale("log")
+                style.logarithmic(axes.yaxis, axes.set_yscale)
             axes.set_title(panel.title, pad=14)
             if not shown.log:
                 axes.set_ylim(bottom=0)
-                axes.ticklabel_format(axis="y", scilimits=(-2, 3), useMathText=True)
-                axes.yaxis.get_offset_text().set_visible(True)
+                axes.ticklabel_format(axis="y", style="plain", useOffset=False)
             mark_damage(axes, runs, text=False)
             finish(axes, runs, legend=axes is panels[-1])
         panels[0].set_ylabel(shown.label)

@@ -9,7 +9,6 @@ from bns.viz import style
 from bns.viz.gap.view import View
 
 if TYPE_CHECKING:
-    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 
@@ -30,7 +29,9 @@ def shares(found: Diagnosis) -> "Figure":
     alone = [100 * part["alone"] for part in parts] + [0.0]
     place = np.arange(len(names))
     with style.plotting() as figure_class:
-        figure = figure_class(figsize=(7.0, 1.2 + 0.42 * len(names)), layout="tight")
+        figure = figure_class(
+            figsize=(7.0, 1.2 + 0.42 * len(names)), layout="constrained"
+        )
         axes = figure.subplots()
         axes.barh(place - 0.18, alone, height=0.34, color=style.GREY, label="alone")
         axes.barh(place + 0.18, last, height=0.34, color=CORRECTED, label="added last")
@@ -56,14 +57,16 @@ def closing(found: Diagnosis) -> "Figure":
         rows.append((f"with {named}", closed["after"], CORRECTED))
     rows = [(name, max(value, 1e-3), colour) for name, value, colour in rows]
     with style.plotting() as figure_class:
-        figure = figure_class(figsize=(7.0, 0.9 + 0.28 * len(rows)), layout="tight")
+        figure = figure_class(
+            figsize=(7.0, 0.9 + 0.28 * len(rows)), layout="constrained"
+        )
         axes = figure.subplots()
         names, values, colours = zip(*rows, strict=True)
         axes.barh(range(len(rows)), values, color=colours, height=0.62, left=0)
         axes.set_yticks(range(len(rows)), names)
         axes.axvline(closed["floor"], color=style.GREEN, ls="--", lw=1.4)
         axes.set_ylim(len(rows) - 0.4, -0.6)
-        _log(axes.xaxis, axes.set_xscale)
+        style.logarithmic(axes.xaxis, axes.set_xscale)
         axes.set_xlim(left=0.7 * min(closed["floor"], *values))
         axes.text(
             closed["floor"],
@@ -119,25 +122,12 @@ def horizons(found: Diagnosis, view: View) -> "Figure":
                 label="floor",
             )
             axes.set_xticks(place, labels)
-            _log(axes.yaxis, axes.set_yscale)
+            style.logarithmic(axes.yaxis, axes.set_yscale)
             axes.set_title(f"{feature.name} [{unit}]")
             axes.set_xlabel("predicted over")
         handles, names = panels[0].get_legend_handles_labels()
         figure.legend(handles, names, loc="outside lower center", ncols=3)
     return figure
-
-
-def _log(axis: "Axis", set_scale: Any) -> None:
-    """A logarithmic axis with plain numbers."""
-    from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
-
-    set_scale("log")
-    low, high = sorted(axis.get_view_interval())
-    subs = (1.0, 2.0, 5.0) if high / max(low, 1e-300) < 300 else (1.0,)
-    axis.set_major_locator(LogLocator(subs=subs))
-    axis.set_minor_locator(NullLocator())
-    axis.set_minor_formatter(NullFormatter())
-    axis.set_major_formatter("{x:g}")
 
 
 def _horizon(value: float | None) -> str:

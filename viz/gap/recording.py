@@ -48,19 +48,19 @@ def write(
     stream = rr.RecordingStream("bns", recording_id=identity, send_properties=False)
     stream.set_log_time_enabled(False)
     stream.set_log_tick_enabled(False)
-    planar = scene.planar(seen)
+    stage = scene.Stage(seen, chosen) if scene.planar(seen) else None
     length = starts[-1] + _length(seen.trials[chosen[-1]])
-    with rrd.saved(stream, path, _layout(seen, planar, length)):
+    with rrd.saved(stream, path, _layout(seen, stage, length)):
         stream.send_recording_name(f"gap of {found.model}: {found.verdict.kind}")
         _styles(stream, seen)
-        if planar:
-            scene.log_static(stream, seen)
+        if stage:
+            scene.log_static(stream, seen, stage)
         for number, start in zip(chosen, starts, strict=True):
             _residuals(stream, seen, number, start)
             _observed(stream, seen, number, start)
-            if planar:
-                scene.send(stream, seen, number, start)
-        stream.log("about", _about(found, chosen), static=True)
+            if stage:
+                scene.send(stream, seen, stage, number, start)
+        stream.log("about", _about(found, chosen, stage), static=True)
     return Path(path)
 
 
@@ -135,7 +135,7 @@ def _channels(seen: View) -> list[Channel]:
     return channels if len(channels) <= MOST else few
 
 
-def _layout(seen: View, planar: bool, length: float) -> Any:
+def _layout(seen: View, stage: scene.Stage | None, length: float) -> Any:
     import rerun.blueprint as rrb
 
     span = rrb.TimeRange(
@@ -161,9 +161,9 @@ def _layout(seen: View, planar: bool, length: float) -> Any:
     residuals = plots("residuals", ": recorded minus predicted", _features(seen))
     observed = plots("observed", "", _channels(seen))
     about = rrb.TextDocumentView(origin="/about", name="How to read this")
-    if planar:
+    if stage:
         parts = rrb.Horizontal(
-            scene.view_3d(seen, BACKGROUND),
+            scene.view_3d(stage, BACKGROUND),
             rrb.Tabs(residuals, observed, about, active_tab=0),
             column_shares=[3, 2],
         )
@@ -181,21 +181,21 @@ def _layout(seen: View, planar: bool, length: float) -> Any:
     )
 
 
-def _about(found: Diagnosis, chosen: Sequence[int]) -> Any:
+def _about(found: Diagnosis, chosen: Sequence[int], stage: scene.Stage | None) -> Any:
     import rerun as rr
 
-    lines = [
-        f"# {found.verdict.kind}",
-        "",
-        found.verdict.sentence,
-        "",
-        "**World.** Side by side, on the same commands from the same start: the "
-        "nominal model (orange), the recorded robot in its own colours, the corrected "
-        "model (blue). Beside the models' paths the recorded one is drawn thin. The "
-        "recorded path is grey where the nominal model is right and red where it "
-        "fails; arrows show by how much its motion is wrong there, five times "
-        "enlarged.",
-        "",
+    lines = [f"# {found.verdict.kind}", "", found.verdict.sentence, ""]
+    if stage:
+        lines += [
+            "**Robots.** Side by side, on the same commands from the same start: the "
+            "nominal model (orange), the recorded robot in its own colours, the "
+            "corrected model (blue). Beside the models' paths the recorded one is "
+            "drawn thin. The recorded path is black where the nominal model is right "
+            "and red where it fails. Arrows show how its motion is wrong there, "
+            f"{stage.longer:g} times enlarged.",
+            "",
+        ]
+    lines += [
         "**Residuals.** Recorded minus predicted motion, window by window; the green "
         "line is two deviations of what the recording scatters by itself.",
         "",

@@ -184,9 +184,9 @@ def detectable(found: Diagnosis, known: Sequence[Row]) -> dict[str, Any]:
     rows = []
     for name, least in found.signatures.get("detectability", {}).items():
         item = items.get(name)
-        unit = _unit(item.unit) if item else ""
+        unit = f"\u00a0{_unit(item.unit)}" if item else ""
         missing = least is None or (isinstance(least, float) and math.isnan(least))
-        size = "not excited" if missing else f"{_number(least)} {unit}".strip()
+        size = "not excited" if missing else f"{_number(least)}{unit}".strip()
         rows.append([name, size, item.excite if item and missing else ""])
     rows.sort(key=lambda row: (row[1] != "not excited", row[0]))
     head = ["effect", "smallest that would be found", "what would excite it"]
@@ -215,4 +215,5 @@ def _number(value: float) -> str:
 
 
 def _unit(unit: str) -> str:
-    return "" if unit == "1" else unit
+    """As it is written after a number, from which no line parts it."""
+    return "" if unit == "1" else unit.replace(" ", "\u00a0")

@@ -48,7 +48,7 @@ SNN_ERROR = Curves(
     label="RMS error per command",
     panels=(
         Panel("snn_forward", "forward [mm]", MILLIMETRES),
-        Panel("snn_left", "sideways [mm]", MILLIMETRES),
+        Panel("snn_left", "left [mm]", MILLIMETRES),
         Panel("snn_turn", "turn [deg]", DEGREES),
     ),
     log=True,

@@ -234,6 +234,17 @@ def test_evolution_reaches_a_known_optimum(kind):
     assert cost(now).min().item() < 0.05
 
 
+@pytest.mark.parametrize("kind", ["single-point", "n-point", "uniform", "sbx"])
+def test_children_stay_within_bounds(kind):
+    made, rates = breeder(crossover=kind)
+    draws = Draws(9)
+    now = made.encoding.random(1, 60, draws)
+    for _ in range(5):
+        now = made.breed(now, torch.zeros(1, 60), rates, made.draw(draws, rates))
+    genes = now.genes[now.valid]
+    assert (genes >= made.encoding.low).all() and (genes <= made.encoding.high).all()
+
+
 class TestGoals:
     def test_a_tick_is_what_the_maker_says(self):
         assert math.degrees(TICK) == pytest.approx(0.2933, abs=1e-4)

@@ -92,13 +92,17 @@ def test_every_effect_is_nothing_at_its_nominal_value_and_reads_back(name):
 
 
 def test_effects_act_on_their_part_alone(arm):
-    plain = arm.compiled(()).model
-    doubled = arm.compiled([arm.parse("joint_damping:part=elbow,added=0.06")]).model
+    plain = arm.physics.model
+    doubled = arm.physics.compiled(
+        [arm.parse("joint_damping:part=elbow,added=0.06")]
+    ).model
     np.testing.assert_allclose(plain.dof_damping.ravel()[:2], [0.15, 0.06])
     np.testing.assert_allclose(doubled.dof_damping.ravel()[:2], [0.15, 0.12])
-    heavy = arm.compiled([arm.parse("body_mass:part=forearm,added=0.1")]).model
+    heavy = arm.physics.compiled([arm.parse("body_mass:part=forearm,added=0.1")]).model
     np.testing.assert_allclose(heavy.body_mass, plain.body_mass + np.eye(3)[2] / 10)
-    weak = arm.compiled([arm.parse("actuator_gain:part=elbow_servo,factor=0.5")])
+    weak = arm.physics.compiled(
+        [arm.parse("actuator_gain:part=elbow_servo,factor=0.5")]
+    )
     np.testing.assert_allclose(weak.model.actuator_gainprm[:, 0], [30, 6])
 
 
@@ -181,7 +185,7 @@ def test_every_effect_can_be_a_candidate(arm, name):
     channel = "elbow" if name.startswith("reading") else "elbow_goal"
     part = PARTS.get(OWNERS.get(name, ""), channel)
     config = replace(OwnConfig.read(ARM), effects={name: (part,)}, bounds={})
-    made = mjcf.candidates(config, arm.compiled(()).model)
+    made = mjcf.candidates(config, arm.physics.model)
     strengths = [item.name for item in CLASSES[name].parameters if item.scales]
     assert [item.parameter for item in made] == strengths
     for item in made:
@@ -196,7 +200,7 @@ def test_former_names_in_a_description_are_read(arm):
         effects={"sensor_gain": ("elbow",)},
         bounds={"sensor_gain[elbow]": {"high": 1.5}},
     )
-    (made,) = mjcf.candidates(config, arm.compiled(()).model)
+    (made,) = mjcf.candidates(config, arm.physics.model)
     assert (made.name, made.high) == ("sensor_gain[elbow]", 1.5)  # as it was written
     assert str(made.make(1.2)) == "reading_gain:part=elbow,factor=1.2"
 

@@ -103,6 +103,6 @@ def test_a_model_that_weighs_by_its_geoms_alone_can_be_loaded(tmp_path):
     own = tmp_path / "own.toml"
     describe(tmp_path / "cart.xml", tmp_path / "log.csv", out=own).write(own)
     model = OwnModel.read(own, threads=1)
-    plain = model.compiled(()).model.body("cart").mass[0]
+    plain = model.physics.model.body("cart").mass[0]
     heavy = model.parse("body_mass:part=cart,added=0.3,dx=0,dy=0,dz=0")
-    assert model.compiled((heavy,)).model.body("cart").mass[0] == plain + 0.3
+    assert model.physics.compiled((heavy,)).model.body("cart").mass[0] == plain + 0.3

@@ -1,0 +1,254 @@
+"""The physics of a description: trials run under effects, and what was run is kept."""
+
+import math
+from collections import OrderedDict
+from collections.abc import Sequence
+from functools import cached_property
+
+import mujoco
+import numpy as np
+
+from bns.errors import FormatError, UnknownNameError
+from bns.gap.models.mjcf import lean, prepared, start, view
+from bns.gap.models.mjcf.config import OwnConfig
+from bns.models import mjcf as mjcf_file
+from bns.worlds.effects.base import (
+    CommandEffect,
+    ControlSignal,
+    Effect,
+    ModelEdit,
+    SensorEffect,
+)
+from bns.worlds.physics.rollout import STATE, Compiled, Job, Pool, Segment
+from bns.worlds.trial import Trial
+
+LEAD = 1.0  # [s] of rest before a trial, so that what is late has something before it
+KEPT, MODELS = 20_000, 2000  # simulated trials and compiled models kept in memory
+FINE = 0.005  # [s] between kept states; the step if that is longer
+FINEST = 0.0025  # [s] steps beyond which a simulation lags or limits soften visibly
+EXACT = 0.2  # of the noise: predictions that differ by less are alike
+BY_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+TRIED = 4  # trials on which steps are compared
+
+
+class Simulation:
+    """Runs recorded commands on a described robot again.
+
+    Args:
+        config: the description.
+        threads: of the physics.
+
+    Attributes:
+        dt: step of the model [s].
+        actuators: number of each command channel's actuator.
+        finest: into how many parts a step is cut where a simulation has to be fine.
+
+    Raises:
+        FormatError: the MJCF file is missing or MuJoCo refuses it.
+        UnknownNameError: a part that the model lacks.
+    """
+
+    def __init__(self, config: OwnConfig, *, threads: int = 2):
+        self.config = config
+        self._pool = Pool(threads)
+        self._compiled: OrderedDict[tuple, Compiled] = OrderedDict()
+        self._kept: OrderedDict[tuple, np.ndarray] = OrderedDict()
+        self._starts: dict[tuple, np.ndarray] = {}
+        model = self.model
+        self.dt = float(model.opt.timestep)
+        self.finest = math.ceil(self.dt / FINEST - 1e-9)
+        self.actuators = [_index(model, "actuator", t.actuator) for t in config.told]
+        if config.keyframe:
+            _index(model, "key", config.keyframe)  # there, before anything runs
+        self.view = view.View.of(config, model)
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The nominal model, compiled."""
+        return self.compiled(()).model
+
+    def spec(self, effects: Sequence[Effect]) -> mujoco.MjSpec:
+        """The model with the effects on its parts written into it.
+
+        Raises:
+            FormatError: the MJCF file is missing or MuJoCo refuses it.
+        """
+        if not self.config.model.exists():
+            raise FormatError(f"There is no model file {self.config.model}.")
+        made = prepared.spec(self.config)
+        model = mjcf_file.compiled(made, self.config.model)
+        if effects and made.compiler.inertiafromgeom == BY_GEOMS:
+            lean.weighed(made, model)  # else what effects say of masses is not heard
+        _edit(made, effects)
+        return made
+
+    @cached_property
+    def _lean(self) -> mujoco.MjSpec:
+        """The model without what only draws it."""
+        return lean.lean(self.spec(()))
+
+    def compiled(self, effects: Sequence[Effect], parts: int = 1) -> Compiled:
+        """The compiled model with the effects on its parts.
+
+        Args:
+            effects: of any stage.
+            parts: into how many its step is cut.
+        """
+        body = tuple(str(e) for e in effects if e.stage == "body" and not e.is_nominal)
+        key = (parts, *body)
+        if key not in self._compiled:
+            made = self._lean.copy()
+            _edit(made, effects)
+            model = made.compile()
+            model.opt.timestep /= parts
+            self._compiled[key] = Compiled(model)
+            while len(self._compiled) > MODELS:
+                self._compiled.popitem(last=False)
+        return self._compiled[key]
+
+    def needed(self, trials: Sequence[Trial]) -> int:
+        """Into how many parts a step has to be cut for the nominal motion of trials."""
+        noise = np.array([item.noise for item in self.config.seen])
+        few = [(trial, ()) for trial in trials[:: max(len(trials) // TRIED, 1)]]
+        exact = self.predicted(few, self.finest)
+        parts = 1
+        while parts < self.finest:
+            made = self.predicted(few, parts)
+            apart = [np.abs(a - b) for a, b in zip(made, exact, strict=True)]
+            if (np.concatenate(apart) < EXACT * noise).all():
+                break
+            parts *= 2
+        return min(parts, self.finest)
+
+    def predicted(
+        self, pairs: Sequence[tuple[Trial, Sequence[Effect]]], parts: int = 1
+    ) -> list[np.ndarray]:
+        """Predicted samples of trials, each under effects of its own."""
+        keys = [(parts, *_key(trial, items)) for trial, items in pairs]
+        wanted = {
+            key: pair
+            for key, pair in zip(keys, pairs, strict=True)
+            if key not in self._kept
+        }
+        jobs = [self._job(trial, items, parts) for trial, items in wanted.values()]
+        motions = self._pool.map(jobs) if jobs else []
+        fresh = {}
+        for (key, (trial, items)), motion in zip(wanted.items(), motions, strict=True):
+            states = motion.states[self._lead(self.dt / parts) :]
+            fresh[key] = self._samples(trial, items, states, self.dt / parts)
+        made = [fresh[key] if key in fresh else self._kept[key] for key in keys]
+        self._kept.update(fresh)
+        while len(self._kept) > KEPT:
+            self._kept.popitem(last=False)
+        return made
+
+    def _lead(self, dt: float) -> int:
+        return round(self.config.settle / dt)
+
+    def _job(self, trial: Trial, effects: Sequence[Effect], parts: int) -> Job:
+        scene = self.compiled(effects, parts)
+        told = self._told(trial, effects, self.dt / parts)
+        begin = self._start(trial)
+        ctrl = np.tile(self._rest(scene.model), (len(told), 1))
+        ctrl[:, self.actuators] = told
+        return Job(begin, (Segment(scene, ctrl),))
+
+    def _rest(self, model: mujoco.MjModel) -> np.ndarray:
+        if self.config.keyframe:
+            key = _index(model, "key", self.config.keyframe)
+            return np.array(model.key_ctrl[key])
+        return np.zeros(model.nu)
+
+    def _told(self, trial: Trial, effects: Sequence[Effect], dt: float) -> np.ndarray:
+        """Commands at each physics step after the effects, settling included."""
+        ends = np.rint(np.cumsum(trial.commands.durations) / dt).astype(int)
+        counts = np.diff(ends, prepend=0)  # steps add up to the whole trial
+        lead, extra = self._lead(dt), round(LEAD / dt)
+        rest = self._rest(self.model)[self.actuators]
+        values = np.repeat(trial.commands.values, counts, axis=0)
+        before = start.before(trial, rest, lead + extra, self.config, dt)
+        values = np.concatenate([before, values])
+        signal = ControlSignal(
+            times=np.arange(len(values)) * dt,
+            values=values,
+            command=np.repeat(np.arange(-1, len(counts)), [len(before), *counts]),
+            channels=tuple(item.channel.name for item in self.config.told),
+            dt=dt,
+        )
+        on, rng = np.ones(len(values), bool), np.random.default_rng(0)
+        for effect in effects:
+            if isinstance(effect, CommandEffect) and effect.stage == "command":
+                made = effect.apply(signal, on, rng)
+                signal = ControlSignal(
+                    signal.times, made, signal.command, signal.channels, dt
+                )
+        return signal.values[extra:]
+
+    def _start(self, trial: Trial) -> np.ndarray:
+        """The state that a trial begins in, kept: effects do not change it."""
+        key = (trial.observed[:1].tobytes(), str(trial.conditions.get(start.STATE)))
+        if key not in self._starts:
+            self._starts[key] = self._begun_in(trial)
+        return self._starts[key]
+
+    def _begun_in(self, trial: Trial) -> np.ndarray:
+        model = self.model
+        data = mujoco.MjData(model)
+        if self.config.keyframe:
+            key = _index(model, "key", self.config.keyframe)
+            mujoco.mj_resetDataKeyframe(model, data, key)
+        if self.config.recorded or start.STATE in trial.conditions:
+            start.place(data, trial, self.view)
+        state = np.empty(mujoco.mj_stateSize(model, STATE))
+        data.time = 0.0
+        mujoco.mj_getState(model, data, state, STATE)
+        return state
+
+    def _samples(
+        self,
+        trial: Trial,
+        effects: Sequence[Effect],
+        states: np.ndarray,
+        dt: float,
+    ) -> np.ndarray:
+        every = max(1, int(FINE / dt + 1e-9))
+        grid = np.arange(0, len(states), every)
+        times = grid * dt
+        scene = self.compiled(effects)
+        read = self.view.read(scene.model, states[grid])
+        names = tuple(item.channel.name for item in self.config.seen)
+        on, rng = np.ones(len(times), bool), np.random.default_rng(0)
+        for effect in effects:
+            if isinstance(effect, SensorEffect):
+                read = effect.apply(times, read, names, on, rng)
+        at = trial.times - trial.times[trial.boundaries[0]]
+        return np.stack([np.interp(at, times, column) for column in read.T], axis=1)
+
+
+def _edit(made: mujoco.MjSpec, effects: Sequence[Effect]) -> None:
+    """Write effects on parts into a spec."""
+    for effect in effects:
+        wanted = effect.stage == "body" and not effect.is_nominal
+        if wanted and isinstance(effect, ModelEdit):
+            effect.edit(made)
+
+
+def _key(trial: Trial, effects: Sequence[Effect]) -> tuple:
+    told = trial.commands
+    return (
+        told.values.tobytes(),
+        told.durations.tobytes(),
+        trial.times.tobytes(),
+        trial.observed[:1].tobytes(),
+        str(trial.conditions.get(start.STATE)),
+        tuple(str(effect) for effect in effects),
+    )
+
+
+def _index(model: mujoco.MjModel, kind: str, name: str) -> int:
+    try:
+        return int(getattr(model, kind)(name).id)
+    except KeyError:
+        count = {"actuator": model.nu, "key": model.nkey}[kind]
+        known = [getattr(model, kind)(number).name for number in range(count)]
+        raise UnknownNameError(f"{kind} of the model", name, known) from None
