@@ -93,21 +93,11 @@ def gap_sensors(quick: bool) -> Result:
             "false alarms": scoring.share(none, scoring.claims),
             "no-effect cases": len(none),
             "effects on wheels": _wheels(scoring.of(found, "motion", scoring.LARGE)),
-            "outside the library, called so": scoring.share(off, scoring.strange),
-            "outside the library, a rest that recurs told": scoring.share(
-                off, scoring.unexplained
-            ),
-            "outside the library, share left, median": _middle(
-                [row["said"]["left"] for row in off]
-            ),
-            "outside the library": len(off),
+            "outside the library": _outside(off),
             "by size": scoring.by_size(every),
             "seconds of processor time": _middle([row["cpu"] for row in found]),
             "confusion": scoring.confusion(large),
             "failures": scoring.failures(large, scoring.right),
-            "outside the library, called otherwise": scoring.failures(
-                off, scoring.strange
-            ),
             "called outside the library, and wrongly": scoring.share(
                 large, scoring.strange
             ),
@@ -116,6 +106,19 @@ def gap_sensors(quick: bool) -> Result:
             ],
         },
     )
+
+
+def _outside(found: list[dict]) -> dict[str, Any]:
+    """What is said of effects that the library lacks."""
+    from bns.gap.bench import scoring
+
+    return {
+        "n": len(found),
+        "called so": scoring.share(found, scoring.strange),
+        "a rest that recurs told": scoring.share(found, scoring.unexplained),
+        "share left, median": _middle([row["said"]["left"] for row in found]),
+        "called otherwise": scoring.failures(found, scoring.strange),
+    }
 
 
 def _of_recording(found: list[dict], singles: bool) -> dict[str, float]:

@@ -17,12 +17,15 @@ from typing import Any
 import numpy as np
 
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.spread import Spread
 
 KAPPA = 3.0
 """what an explanation costs: the log odds against it; e^3 = 20, the number of
 explanations of a usual model, so that about one in all is expected"""
 EDGE = 0.1  # of a level's departure, by which a fit may leave its bounds: whole losses
 # are at theirs
+FEW = 12  # explanations of which each is dropped by way of trial on the way backward
+TRIED = 3  # of more: those that look weakest
 MERGED = 5  # explanations up to which two are tried against one
 
 Support = frozenset[str]
@@ -249,22 +252,26 @@ class Linear:
         for name, covered in self.covers.items():
             if name in key and covered & key:
                 return self.cost(key - covered) + KAPPA * len(covered & key)
-        normal, slope, square = self._total()
-        prior = self.prior(key)
-        used = np.flatnonzero(prior)
-        factor = np.linalg.cholesky(self._curvature(normal, prior, used))
-        half = np.linalg.solve(factor, slope[used] / self.lam)
-        value = 0.5 * square / self.lam - float(0.5 * half @ half)
-        value += np.log(np.diag(factor)).sum() + np.log(prior[used]).sum()
+        rows = [row for name in key for row in self.terms[name]]
+        plain = self._spread(frozenset())
+        value, found = plain.changed(rows, 1.0 - self.slack[rows] ** 2)
         value += self._paid(key)
-        found = np.zeros(len(prior))
-        found[used] = np.linalg.solve(factor.T, half)
-        beyond = (found < self.low - 1e-6) | (found > self.high + 1e-6)
+        beyond = (found < self.low[rows] - 1e-6) | (found > self.high[rows] + 1e-6)
         if beyond.any():
-            out = {name for name in key if beyond[list(self.terms[name])].any()}
-            if out:
-                value = max(value, self.cost(key - out) + KAPPA * len(out))
+            far = {row for row, out in zip(rows, beyond, strict=True) if out}
+            out = {name for name in key if far & set(self.terms[name])}
+            value = max(value, self.cost(key - out) + KAPPA * len(out))
         return float(value)
+
+    def _spread(self, support: Support) -> Spread:
+        """What was recorded, as it may spread under a set's prior; kept for none."""
+        if "none" in self._sums and not support:
+            return self._sums["none"]
+        normal, slope, square = self._total()
+        made = Spread.of(normal, slope, square, self.lam, self.prior(support))
+        if not support:
+            self._sums["none"] = made
+        return made
 
     def _paid(self, support: Support) -> float:
         """What a set costs: each family once, its dearest member."""
@@ -303,11 +310,31 @@ class Linear:
     def _backward(self) -> Support:
         kept = frozenset(self.free)
         while kept:
-            best = min((self.cost(kept - {n}), n) for n in sorted(kept))
+            tried = kept if len(kept) <= FEW else self._weakest(kept)
+            best = min((self.cost(kept - {n}), n) for n in sorted(tried))
             if best[0] > self.cost(kept):
                 break
             kept -= {best[1]}
         return kept
+
+    def _weakest(self, kept: Support) -> set[str]:
+        """The explanations of a set that look as if they cost least to drop: by their
+        evidence, for being beyond their bounds, or covered by others."""
+        spread, paid = self._spread(kept), self._paid(kept)
+        rising, beyond = {}, {}
+        for name in kept:
+            rows = list(self.terms[name])
+            now = spread.changed(rows, np.zeros(len(rows)))[1]
+            beyond[name] = float(
+                np.maximum(self.low[rows] - now, now - self.high[rows]).max()
+            )
+            value, _ = spread.changed(rows, self.slack[rows] ** 2 - 1.0)
+            rising[name] = value + self._paid(kept - {name}) - paid
+        order = sorted(kept, key=lambda name: (rising[name], name))[:TRIED]
+        far = [name for name in kept if beyond[name] > 0]
+        far = sorted(far, key=lambda name: (-beyond[name], name))[:TRIED]
+        covered = kept & frozenset().union(*self.covers.values())
+        return {*order, *far, *covered}
 
     def _improved(self, support: Support, merge: bool) -> tuple[float, Support]:
         best = self.cost(support)

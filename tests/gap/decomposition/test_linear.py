@@ -8,6 +8,7 @@ import pytest
 from bns.gap.decomposition import shares
 from bns.gap.decomposition.linear import KAPPA, Linear, inflation
 from bns.gap.decomposition.noise import Memory, correlated, scale, weights
+from bns.gap.decomposition.spread import Spread
 
 NAMES = ("a", "b", "c", "d", "e", "f")
 BLOCKS, EACH = 8, 60
@@ -196,3 +197,16 @@ def test_a_whole_loss_is_kept_though_noise_puts_it_beyond_its_bound(value, kept)
     found = linear.solve({"a"})[0]
     assert abs(found - value) < 0.08
     assert (linear.search()[1] == {"a"}) == kept
+
+
+def test_the_cost_of_a_set_is_that_of_its_own_normal_equations():
+    rng = np.random.default_rng(5)
+    problem = Rows(rng)
+    linear = problem.linear(planted(rng, problem, a=0.6, c=-1.2), sd=0.5, lam=2.0)
+    for names in ("", "f", "ac", "abcdef"):
+        own = Spread.of(*linear._total(), 2.0, linear.prior(names))
+        paid = KAPPA * len(names)
+        assert linear.cost(names) == pytest.approx(own.cost + paid, abs=1e-6)
+        rows = [NAMES.index(name) for name in names]
+        _, found = own.changed(rows, np.zeros(len(rows)))
+        assert found == pytest.approx(linear.solve(names)[rows], abs=1e-9)

@@ -1,0 +1,74 @@
+"""How what was recorded spreads under a prior, and what other priors cost beside it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """How what was recorded spreads under a prior, ``C = lam W^-1 + J V J'``, as far as
+    sets need it: a change of the prior of few rows costs a small matrix (Woodbury's
+    identity, the determinant's lemma).
+
+    Attributes:
+        variance: of each row, ``(K,)``.
+        inner: ``J' C^-1 J``, ``(K, K)``.
+        pull: ``J' C^-1 z``, ``(K,)``.
+        cost: minus the log evidence, but for a constant.
+    """
+
+    variance: np.ndarray
+    inner: np.ndarray
+    pull: np.ndarray
+    cost: float
+
+    @classmethod
+    def of(
+        cls,
+        normal: np.ndarray,
+        slope: np.ndarray,
+        square: float,
+        lam: float,
+        prior: np.ndarray,
+    ) -> "Spread":
+        """By the normal equations.
+
+        Args:
+            normal: ``J' W J``, ``(K, K)``.
+            slope: ``J' W z``, ``(K,)``.
+            square: ``z' W z``.
+            lam: residuals that count as one.
+            prior: standard deviation of each row, ``(K,)``; 0 = exactly nominal.
+        """
+        used = np.flatnonzero(prior)
+        curvature = normal[np.ix_(used, used)] / lam + np.diag(prior[used] ** -2)
+        factor = np.linalg.cholesky(curvature)
+        half = np.linalg.solve(
+            factor, np.column_stack([normal[used] / lam, slope[used] / lam])
+        )
+        inner = normal / lam - half[:, :-1].T @ half[:, :-1]
+        pull = slope / lam - half[:, :-1].T @ half[:, -1]
+        cost = 0.5 * square / lam - 0.5 * float(half[:, -1] @ half[:, -1])
+        cost += float(np.log(np.diag(factor)).sum() + np.log(prior[used]).sum())
+        return cls(prior**2, inner, pull, cost)
+
+    def changed(
+        self, rows: Sequence[int], more: np.ndarray
+    ) -> tuple[float, np.ndarray]:
+        """The cost where the variance of some rows is another, and their most probable
+        values.
+
+        Args:
+            rows: numbers of the rows.
+            more: added to the variance of each, ``(n,)``.
+        """
+        if not len(rows):
+            return self.cost, np.zeros(0)
+        inner, pull = self.inner[np.ix_(rows, rows)], self.pull[rows]
+        wider = np.eye(len(rows)) + inner * more
+        left = np.linalg.solve(wider, pull)
+        cost = self.cost + 0.5 * np.linalg.slogdet(wider)[1]
+        cost -= 0.5 * float((more * pull) @ left)
+        return cost, (self.variance[rows] + more) * left
