@@ -18,7 +18,8 @@ MOSTLY = (0.1, 0.9)  # but for the time in which an impact shakes it; assumed
 ASTRAY = 0.2  # [rad] off its goal (RMS) that a servo without power ends at least
 STRAYING = 2.0  # times what the model foresees, likewise; assumed
 MOST = 2  # joints of a leg that have to; the load may hold the third where it is told
-UNLOADED = 0.3  # of what the model foresees: a leg's servos are off by less; assumed
+UNLOADED = 0.5  # of what the model foresees: a leg's servos are off by less; assumed, and
+# loose, for it makes a candidate, no verdict
 
 Ends = Mapping[str, np.ndarray]
 """by joint, how far it is from its goal where each command ends [rad]"""
