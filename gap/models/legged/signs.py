@@ -18,8 +18,8 @@ MOSTLY = (0.1, 0.9)  # but for the time in which an impact shakes it; assumed
 ASTRAY = 0.2  # [rad] off its goal (RMS) that a servo without power ends at least
 STRAYING = 2.0  # times what the model foresees, likewise; assumed
 MOST = 2  # joints of a leg that have to; the load may hold the third where it is told
-UNLOADED = 0.5  # of what the model foresees: a leg's servos are off by less; assumed, and
-# loose, for it makes a candidate, no verdict
+UNLOADED = 0.3  # of what the model foresees: a leg's servos are off by less; assumed
+LIGHTER = 0.5  # the same for a leg to be a candidate: that is no verdict; assumed
 
 Ends = Mapping[str, np.ndarray]
 """by joint, how far it is from its goal where each command ends [rad]"""
@@ -34,7 +34,7 @@ class Signs:
             [rad]: they may be locked there.
         raised: legs of which all joints do.
         limp: legs most of whose servos end far from their goals.
-        unloaded: legs whose servos end at their goals as if nothing hung on them.
+        unloaded: legs whose servos end at their goals as if little hung on them.
         joints: all whose readings that explains.
     """
 
@@ -62,8 +62,10 @@ def signs(
     by_leg = {leg: joints_of(leg, names) for leg in legs_of(names)}
     raised = [leg for leg, joints in by_leg.items() if still.keys() >= {*joints}]
     limp = [leg for leg, joints in by_leg.items() if _limp(joints, seen, told)]
-    free = [leg for leg, joints in by_leg.items() if _unloaded(joints, seen, told)]
-    explained = {joint for leg in (*limp, *free) for joint in by_leg[leg]}
+    off = {leg: _loaded(joints, seen, told) for leg, joints in by_leg.items()}
+    free = [leg for leg, share in off.items() if share < LIGHTER]
+    gone = [leg for leg in free if off[leg] < UNLOADED]
+    explained = {joint for leg in (*limp, *gone) for joint in by_leg[leg]}
     return Signs(
         still, tuple(raised), tuple(limp), tuple(free), frozenset(explained | {*still})
     )
@@ -93,12 +95,13 @@ def _limp(joints: Sequence[str], seen: Ends, told: Ends) -> bool:
     return sum(astray) >= MOST
 
 
-def _unloaded(joints: Sequence[str], seen: Ends, told: Ends) -> bool:
-    """Whether a leg's servos end much nearer to their goals than foreseen."""
+def _loaded(joints: Sequence[str], seen: Ends, told: Ends) -> float:
+    """How far a leg's servos end from their goals, over what is foreseen; NaN where
+    nothing was seen."""
     own, model = (
         _rms(np.concatenate([off[j] for j in joints])) for off in (seen, told)
     )
-    return own < UNLOADED * model
+    return own / model if model else np.nan
 
 
 def _ends(names: Sequence[str], paths: Sequence[tuple[Trial, np.ndarray]]) -> Ends:
