@@ -138,7 +138,7 @@ def _diagnosed(drives: Path, out: Path) -> None:
     if (place / FILE).exists() and not (place / "request.json").exists():
         return
     given = diagnose.Diagnose(
-        data=(str(drives),), out=str(place), rerun=False, most=1, threads=1
+        data=(str(drives),), out=str(place), rerun=False, threads=1
     )
     with redirect_stdout(io.StringIO()):
         diagnose._diagnose(given)

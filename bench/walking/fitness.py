@@ -121,11 +121,11 @@ def _told(learner: "Bns", run: int, goals: np.ndarray) -> float:
 def _at_the_end(config: RunConfig) -> "Bns":
     """The learner of a batch that `experiments` has stored, after its last trial."""
     from bns.learners.bns.learner import Bns
-    from bns.storage import files
+    from bns.storage import arrays
 
     count = config.replicates
     learner = Bns([config] * count, replicates=range(count), onsets=[-1] * count)
-    learner.restore(files.read_npz(experiments.directory(config) / "state.npz"))
+    learner.restore(arrays.read_npz(experiments.directory(config) / "state.npz"))
     return learner
 
 
