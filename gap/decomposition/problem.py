@@ -158,16 +158,10 @@ class Problem:
         Args:
             values: of all rows, ``(R,)``.
         """
-        unsure = [self.model.begun(trial) for trial in self.trials]
-        names = list(dict.fromkeys(name for row in unsure for name in row))
-        shape = (0, *self.recorded.shape)
-        if not names:
-            return np.zeros(shape)
-        known = [self.changed(values, number) for number in range(len(unsure))]
-        off: list[list[dict[str, float]]] = [[{}] * len(unsure)]
-        off += [[{n: row[n]} if n in row else {} for row in unsure] for n in names]
-        sets = [[a | b for a, b in zip(known, row, strict=True)] for row in off]
-        made = self.model.paths(self.trials, sets, fine=False)
+        if not any(map(self.model.begun, self.trials)):
+            return np.zeros((0, *self.recorded.shape))
+        known = [self.changed(values, number) for number in range(len(self.trials))]
+        _, made = self.model.started(self.trials, known, fine=False)
         base, *moved = (self._features(paths) for paths in made)
         return np.nan_to_num(np.stack(moved) - base)
 

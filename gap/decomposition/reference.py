@@ -7,6 +7,7 @@ learnt from no-change data, after Kennedy and O'Hagan 2001).
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -32,14 +33,8 @@ class Corrected(GapModel):
     ):
         self.model, self.moved, self.slack = model, dict(moved), dict(slack)
         self._nominal: dict[str, float] = {}
-        self.name, self.channels = model.name, model.channels
-        self.features, self.process = model.features, model.process
-        self.resolution, self.limits = model.resolution, model.limits
-        self.dt, self.timed, self.logs = model.dt, model.timed, model.logs
-        self.memory, self.many = model.memory, model.many
-        self.starts, self.singly, self.odds = model.starts, model.singly, model.odds
-        self.spread, self.longest = model.spread, model.longest
-        self.before = model.before
+        for name in GapModel.__annotations__:
+            setattr(self, name, getattr(model, name))
 
     @classmethod
     def of(cls, trials: Sequence[Trial], model: GapModel) -> "Corrected":
@@ -135,6 +130,20 @@ class Corrected(GapModel):
     def blocks(self, trials: Sequence[Trial], windows: Sequence[Windows]) -> np.ndarray:
         """See `GapModel.blocks`."""
         return self.model.blocks(trials, windows)
+
+    def begun(self, trial: Trial) -> Mapping[str, float]:
+        """See `GapModel.begun`."""
+        return self.model.begun(trial)
+
+    def read_log(self, path: str) -> list[Trial]:
+        """See `GapModel.read_log`."""
+        return self.model.read_log(path)
+
+    def excitations(
+        self, *, seed: int = 0, told: Mapping[str, float] | None = None
+    ) -> tuple[Any, ...]:
+        """See `GapModel.excitations`."""
+        return self.model.excitations(seed=seed, told=told)
 
     def parse(self, text: str) -> Effect:
         """See `GapModel.parse`."""

@@ -191,6 +191,32 @@ class GapModel(ABC):
         del trial
         return {}
 
+    def started(
+        self,
+        trials: Sequence[Trial],
+        known: Sequence[Mapping[str, float]],
+        *,
+        fine: bool = True,
+    ) -> tuple[list[str], list[list[np.ndarray]]]:
+        """Predicted observations, and again with each unsure number of the state in
+        which trials began off by its standard deviation.
+
+        Args:
+            trials: N recorded trials.
+            known: by trial the values of the rows that are not nominal.
+            fine: see `paths`.
+
+        Returns:
+            K names of such numbers; 1 + K sets of paths, the first of them with the
+            starts as they are. A trial whose start has no such number stays.
+        """
+        unsure = [self.begun(trial) for trial in trials]
+        names = list(dict.fromkeys(name for row in unsure for name in row))
+        off: list[list[dict[str, float]]] = [[{} for _ in unsure]]
+        off += [[{n: row[n]} if n in row else {} for row in unsure] for n in names]
+        sets = [[{**a, **b} for a, b in zip(known, row, strict=True)] for row in off]
+        return names, self.paths(trials, sets, fine=fine)
+
     def motion(self, features: np.ndarray) -> np.ndarray:
         """How fast each feature moved, ``(N, C)``: noise may grow with it."""
         return np.abs(features)

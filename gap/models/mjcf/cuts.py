@@ -6,11 +6,12 @@ was told in the second before goes along, so that what comes late has something 
 it.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 
+from bns.gap.models.base import GapModel
 from bns.gap.models.mjcf import start
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.recordings.stretches import piece
@@ -21,9 +22,6 @@ LEAST = 4  # samples on each side at least
 BEFORE = 0.5  # [s] of commands before a piece
 GRID = 0.005  # [s] between them
 REFINED = 2  # times that starts are fitted to the nominal motion
-
-Simulate = Callable[[Sequence[Trial]], list[np.ndarray]]
-"""nominal samples of trials, each ``(T, C)``"""
 
 
 def pieces(trial: Trial, config: OwnConfig) -> list[Trial]:
@@ -49,9 +47,7 @@ def pieces(trial: Trial, config: OwnConfig) -> list[Trial]:
     ]
 
 
-def refined(
-    trials: Sequence[Trial], config: OwnConfig, simulate: Simulate
-) -> list[Trial]:
+def refined(trials: Sequence[Trial], config: OwnConfig, model: GapModel) -> list[Trial]:
     """Trials whose starts are those from which the nominal model comes nearest to what
     was seen of the joints, within what the data leave open.
 
@@ -59,42 +55,39 @@ def refined(
     counts for nothing anyway: it may be the start's.
 
     Args:
-        trials: pieces, with a state and how unsure it is.
+        trials: pieces, with a state and how unsure it is; where none is unsure they
+            stay as they are.
         config: of the robot.
-        simulate: nominal samples of trials, each ``(T, C)``.
+        model: the nominal model.
     """
     joints = [k for k, item in enumerate(config.seen) if item.quantity == "joint"]
     made, noise = list(trials), np.array([config.seen[k].noise for k in joints])
     for _ in range(REFINED):
-        unsure = [start.unsure(trial, config) for trial in made]
-        names = list(dict.fromkeys(name for row in unsure for name in row))
-        base = simulate(made)
-        ways = []
-        for name in names:
-            off = [{name: row[name]} if name in row else {} for row in unsure]
-            ways.append(simulate(_moved(made, off, config)))
-        off = []
+        names, (base, *ways) = model.started(made, [{} for _ in made])
+        if not names:
+            return made
         for number, (trial, known) in enumerate(zip(made, base, strict=True)):
-            change = (
-                np.stack([way[number] - known for way in ways])[..., joints] / noise
-            )
+            change = np.stack([way[number] - known for way in ways])[..., joints]
             units = (trial.observed - known)[:, joints] / noise
-            seen = np.isfinite(units) & np.isfinite(change).all(axis=0)
-            design = change[:, seen].T
-            curvature = design.T @ design + np.eye(len(names))
-            size = np.linalg.solve(curvature, design.T @ units[seen])
-            row = unsure[number]
+            size = _nearest(units, change / noise)
+            sds = start.unsure(trial, config)
             found = zip(names, size, strict=True)
-            off.append({n: float(z) * row[n] for n, z in found if n in row})
-        made = _moved(made, off, config)
+            off = {n: float(z) * sds[n] for n, z in found if n in sds}
+            made[number] = start.moved(trial, off, config) if off else trial
     return made
 
 
-def _moved(
-    trials: Sequence[Trial], off: Sequence[Mapping[str, float]], config: OwnConfig
-) -> list[Trial]:
-    pairs = zip(trials, off, strict=True)
-    return [start.moved(trial, row, config) if row else trial for trial, row in pairs]
+def _nearest(units: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """Departures of the numbers of a start, in their standard deviations ``(K,)``.
+
+    Args:
+        units: residuals of the joints over their noise, ``(T, J)``.
+        change: what one standard deviation of each number makes of them, ``(K, T, J)``.
+    """
+    seen = np.isfinite(units) & np.isfinite(change).all(axis=0)
+    design = change[:, seen].T
+    curvature = design.T @ design + np.eye(len(change))
+    return np.linalg.solve(curvature, design.T @ units[seen])
 
 
 def _begun(part: Trial, whole: Trial, first: int, config: OwnConfig) -> Trial:

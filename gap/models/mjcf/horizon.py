@@ -12,6 +12,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
+from bns.gap.models.base import GapModel
 from bns.gap.models.mjcf import cuts, start
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.worlds.trial import Trial
@@ -21,10 +22,7 @@ SHORTEST = 0.4  # [s] of a piece
 
 
 def foreseen(
-    trials: Sequence[Trial],
-    config: OwnConfig,
-    model: mujoco.MjModel,
-    simulate: cuts.Simulate,
+    trials: Sequence[Trial], config: OwnConfig, physics: mujoco.MjModel, model: GapModel
 ) -> list[Trial]:
     """Trials, cut into pieces that begin in the states of the data if any of them is
     not foreseen to its end and all that moves is observed.
@@ -32,21 +30,21 @@ def foreseen(
     Args:
         trials: of a log, not cut.
         config: of the robot.
-        model: compiled.
-        simulate: its nominal motion.
+        physics: its MJCF, compiled.
+        model: the nominal model.
     """
-    if not _observed(config, model):
+    if not _observed(config, physics):
         return list(trials)
-    length = min(_lengths(trials, config, simulate), default=np.inf)
+    length = min(_lengths(trials, config, model), default=np.inf)
     if np.isinf(length):
         return list(trials)
     cut = replace(config, cut=max(length, SHORTEST))
     pieces = [piece for trial in trials for piece in cuts.pieces(trial, cut)]
-    return cuts.refined(pieces, config, simulate)
+    return cuts.refined(pieces, config, model)
 
 
 def _observed(config: OwnConfig, model: mujoco.MjModel) -> bool:
-    """Whether each joint is seen or has nothing that moves it."""
+    """Whether each joint turns or slides and is seen: then a state can be told."""
     seen = {item.part for item in config.seen if item.quantity == "joint"}
     kinds = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
     return all(
@@ -57,7 +55,7 @@ def _observed(config: OwnConfig, model: mujoco.MjModel) -> bool:
 
 
 def _lengths(
-    trials: Sequence[Trial], config: OwnConfig, simulate: cuts.Simulate
+    trials: Sequence[Trial], config: OwnConfig, model: GapModel
 ) -> Iterator[float]:
     """Seconds of each trial that are foreseen; infinity = all of it."""
     joints = [k for k, item in enumerate(config.seen) if item.quantity == "joint"]
@@ -65,13 +63,14 @@ def _lengths(
     names = [f"{start.NUMBERS[0]}[{config.seen[k].part}]" for k in joints]
     rng = np.random.default_rng(0)
     grown = [np.zeros(len(trial.times)) for trial in trials]
-    begun = [start.moved(t, dict.fromkeys(names, 0.0), config) for t in trials]
-    base = simulate(begun)
-    for _ in range(2):
-        way = rng.choice([-1.0, 1.0], len(joints)) * noise
-        off = dict(zip(names, way, strict=True))
-        moved = simulate([start.moved(trial, off, config) for trial in trials])
-        for size, one, other in zip(grown, base, moved, strict=True):
+    sets = [dict.fromkeys(names, 0.0)]
+    sets += [
+        dict(zip(names, noise * rng.choice([-1, 1], len(noise)), strict=True))
+        for _ in range(2)
+    ]
+    base, *moved = model.paths(trials, [[row] * len(trials) for row in sets])
+    for way in moved:
+        for size, one, other in zip(grown, base, way, strict=True):
             with np.errstate(invalid="ignore"):
                 apart = np.abs(other - one)[:, joints] / noise
             worst = np.where(np.isfinite(one[:, joints]), apart, 0.0).max(axis=1)

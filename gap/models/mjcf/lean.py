@@ -47,9 +47,8 @@ def lean(made: mujoco.MjSpec) -> mujoco.MjSpec:
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # they were told when the file was read
-        whole = made.compile()
         copy = made.copy()
-        copy.compile()  # numbers its bodies
+        whole = copy.compile()  # which numbers its bodies
         try:
             weighed(copy, whole)
             _undrawn(copy)
@@ -81,7 +80,7 @@ def _named(made: mujoco.MjSpec) -> set[str]:
         names |= {pair.geomname1, pair.geomname2}
     for sensor in made.sensors:
         names |= {sensor.objname, sensor.refname}
-    return names | _wrapped(made.tendons)
+    return (names | _wrapped(made.tendons)) - {""}
 
 
 def _wrapped(tendons: Iterable[mujoco.MjsTendon]) -> set[str]:

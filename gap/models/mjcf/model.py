@@ -77,12 +77,8 @@ class OwnModel(GapModel):
         """Trials of a log, none longer than the model foresees."""
         trials = log.read(path, self.config)
         if self.config.cut:
-            return cuts.refined(trials, self.config, self._nominal)
-        return horizon.foreseen(trials, self.config, self.physics.model, self._nominal)
-
-    def _nominal(self, trials: Sequence[Trial]) -> list[np.ndarray]:
-        """Nominal samples of trials."""
-        return self.simulate(trials, [()])[0]
+            return cuts.refined(trials, self.config, self)
+        return horizon.foreseen(trials, self.config, self.physics.model, self)
 
     @property
     def least(self) -> np.ndarray:

@@ -1,12 +1,16 @@
 """A pole on a cart, which its commands alone do not hold upright; and lean models."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
 
+from bns.gap.decomposition.reference import Corrected
 from bns.gap.describe import describe
 from bns.gap.diagnose import diagnose
-from bns.gap.models.mjcf import lean
+from bns.gap.models.base import GapModel
+from bns.gap.models.mjcf import cuts, lean
 from bns.gap.models.mjcf.model import OwnModel
 
 CART = """<mujoco model="cart"><option timestep="0.01" integrator="RK4"/>
@@ -57,22 +61,39 @@ def said(tmp_path):
         described.write(own)
         model = OwnModel.read(own, threads=1)
         trials = model.read_log(str(tmp_path / "log.csv"))
-        return trials, diagnose(trials, model, full=False)
+        return trials, diagnose(trials, model, full=False), model
 
     return run
 
 
 def test_an_unstable_robot_without_an_effect_has_no_gap(said):
-    trials, found = said(0.0)
+    trials, found, _ = said(0.0)
     spans = [trial.times[-1] for trial in trials]
     assert len(trials) > 5 and max(spans) < 2.0  # cut to what is foreseen
     assert found.verdict.kind == "no gap"
 
 
 def test_friction_of_an_unstable_robot_is_named(said):
-    _, found = said(0.4)
+    _, found, _ = said(0.4)
     assert found.verdict.named[0] == ("joint_friction[rail]",)
     assert found.best.magnitudes[0] == pytest.approx(0.4, abs=0.02)
+
+
+def test_recordings_without_a_change_keep_all_that_the_model_can(said):
+    """A pole in pieces: its unsure starts count in a model put right, too."""
+    trials, _, model = said(0.0)
+    made = Corrected(model, {}, {})
+    assert made.whole and made.begun(trials[1])
+    own = {name for name, item in vars(Corrected).items() if callable(item)}
+    whole = {n for n, item in vars(GapModel).items() if callable(item) and n[0] != "_"}
+    assert whole - own == {"started"}  # made of others
+
+
+def test_trials_that_begin_in_a_known_state_stay_as_they_are(said):
+    trials, _, model = said(0.0)
+    known = OwnModel(replace(model.config, recorded=False), threads=1)
+    plain = [trial.replace(conditions={}) for trial in trials]
+    assert cuts.refined(plain, known.config, known) == plain
 
 
 def test_a_lean_model_moves_alike_and_holds_no_pictures():
