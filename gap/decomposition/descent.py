@@ -281,7 +281,7 @@ def _simple(problem: Problem, start: Point) -> list[Point]:
     sample = problem.sample(fit.ROUGH)
     few = None if len(sample) == len(problem.trials) else sample
     starts = [(n, placed(problem, linear, {n}, start.values)) for n in order]
-    starts += levels.alone(problem, start, SINGLES)
+    starts += levels.screened(problem, start, SINGLES, only=few)
     tried = []
     for name, values in starts:
         fitted = _fitted(problem, {name})

@@ -64,38 +64,9 @@ def best(problem: Problem, point: Point) -> Level | None:
     return min(made, key=lambda level: level.cost) if made else None
 
 
-def alone(problem: Problem, point: Point, most: int) -> list[tuple[str, np.ndarray]]:
-    """Explanations that are best started from a level of one of their rows, by
-    themselves, their other rows free.
-
-    Args:
-        problem: the recording.
-        point: the nominal model.
-        most: how many.
-
-    Returns:
-        names and values of all rows, ``(R,)``; the best first.
-    """
-    todo = [(number, value) for number, row in enumerate(problem.rows)
-            for value in row.levels if row.smooth]  # fmt: skip
-    found: dict[str, tuple[float, tuple[int, float]]] = {}
-    for _, (number, value), linear in _scored(problem, point, todo, problem.sample()):
-        term = problem.rows[number].term
-        free = dict.fromkeys((*linear.free, term))
-        linear = replace(linear, free=tuple(free), _costs={})
-        cost = min(linear.cost({term}), linear.cost(()))
-        if term not in found or cost < found[term][0]:
-            found[term] = (cost, (number, value))
-    made = []
-    for term in sorted(found, key=lambda name: found[name][0])[:most]:
-        number, value = found[term][1]
-        values = problem.nominal.copy()
-        values[number] = value
-        made.append((term, values))
-    return made
-
-
-def screened(problem: Problem, point: Point, most: int) -> list[tuple[str, np.ndarray]]:
+def screened(
+    problem: Problem, point: Point, most: int, only: list[int] | None = None
+) -> list[tuple[str, np.ndarray]]:
     """Explanations that say most by themselves at one of their levels, or at one of the
     model's departures: where a tangent at the nominal says little.
 
@@ -103,6 +74,7 @@ def screened(problem: Problem, point: Point, most: int) -> list[tuple[str, np.nd
         problem: the recording.
         point: the nominal model.
         most: how many.
+        only: trials that are looked at, None = all.
 
     Returns:
         names and values of all rows, ``(R,)``, nuisances fitted; the best first.
@@ -116,13 +88,22 @@ def screened(problem: Problem, point: Point, most: int) -> list[tuple[str, np.nd
     best: dict[str, tuple[float, np.ndarray]] = {}
     for at in range(0, len(todo), AT_ONCE):
         part = todo[at : at + AT_ONCE]
-        for cost, (number, value), linear in _scored(problem, point, part, None):
+        for _, (number, value), linear in _scored(problem, point, part, only):
             term = problem.rows[number].term
+            cost, support = _by_itself(linear, term)
             if term not in best or cost < best[term][0]:
-                values = _values(problem, point, number, value, linear, frozenset())
+                values = _values(problem, point, number, value, linear, support)
                 best[term] = cost, values
     order = sorted(best, key=lambda term: best[term][0])[:most]
     return [(term, best[term][1]) for term in order]
+
+
+def _by_itself(linear: Linear, term: str) -> tuple[float, Support]:
+    """Cost of a level with the other rows of its explanation free, if that is less."""
+    free = dict.fromkeys((*linear.free, term))
+    linear = replace(linear, free=tuple(free), _costs={})
+    sets = [frozenset({term})] if term in linear.terms else []
+    return min((linear.cost(item), item) for item in (frozenset[str](), *sets))
 
 
 def _departures(row: Row, spread: Sequence[float]) -> list[float]:

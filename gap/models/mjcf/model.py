@@ -37,6 +37,7 @@ class OwnModel(GapModel):
 
     memory = 2
     many = True
+    spread = (0.1, 0.3, 1.0)
     whole = True
     logs = True
 
