@@ -22,6 +22,7 @@ from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import KAPPA
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
+from bns.gap.decomposition.singles import Singles
 from bns.gap.models.base import PLANE, GapModel
 from bns.gap.recordings.recording_faults import faulty
 from bns.worlds.effects.base import Effect
@@ -36,7 +37,7 @@ SEEN = float(np.sqrt(2 * (KAPPA + 3.0)) + 1.28)
 """whitened length of what is found nine times in ten: its evidence pays for itself"""
 ALIKE = 1.68
 """noise units between what two do at which they are confused in a fifth of the cases"""
-NEAREST = 6  # explanations that are fitted to what a hidden one does
+NEAREST = 8  # explanations that are fitted to what a hidden one does
 
 
 @dataclass(frozen=True)
@@ -381,8 +382,8 @@ def _answered(
 def alike(problem: Problem, point: Point, item: Hidden) -> tuple[str, ...]:
     """The explanations that a recording cannot tell from a hidden one, itself included.
 
-    Each of those that come near in a tangent, or by one of their levels, is fitted to
-    what the hidden one alone would do.
+    Each of those that come nearest by themselves is fitted to what the hidden one alone
+    would do.
 
     Args:
         problem: a recording; its commands and its noise count.
@@ -391,51 +392,16 @@ def alike(problem: Problem, point: Point, item: Hidden) -> tuple[str, ...]:
     """
     base, shown = _features(problem, [item.effect])
     clean = replace(problem, recorded=np.where(problem.seen, shown, np.nan))
-    found = {item.term, *_always(problem, item.term)}
-    near = []
-    weight = point.linear.weight
     change = np.where(problem.seen, np.nan_to_num(shown - base), 0.0)
-    for name in point.linear.free:
-        columns = [point.linear.columns[at] for at in point.linear.terms[name]]
-        slopes = np.stack([point.slopes[k].ravel() for k in columns], axis=1)
-        heavy = slopes * weight.ravel()[:, None]
-        pull = heavy.T @ change.ravel()
-        moved = np.linalg.lstsq(heavy.T @ slopes, pull, rcond=None)[0]
-        left = change.ravel() - slopes @ moved
-        near.append((float(weight.ravel() @ left**2), name, columns, moved))
-    near = [entry for entry in near if entry[1] != item.term]
-    for _, name, columns, departures in sorted(near, key=lambda e: e[:2])[:NEAREST]:
-        values = problem.nominal.copy()
-        values[columns] += departures
-        values = np.clip(values, *problem.bounds)
-        _, rest = fit.newton(clean, values, {name}, point.noise)
+    change = point.noise.innovations(change)
+    linear = point.linear.moved(point.linear.target - change)
+    found = {item.term, *_always(problem, item.term)}
+    for one in Singles(clean, replace(point, linear=linear)).fitted[:NEAREST]:
+        values, rest = fit.newton(clean, one.values, {one.name}, point.noise)
+        values, rest = levels.zoomed(clean, values, rest, {one.name}, point.noise)
         if point.noise.loss(rest) / point.noise.lam < ALIKE**2:
-            found.add(name)
-    return tuple(sorted(found | _by_level(problem, clean, point, item)))
-
-
-def _by_level(problem: Problem, clean: Problem, point: Point, item: Hidden) -> set[str]:
-    """Explanations without a slope one of whose values does the same."""
-    sets, rows = [], []
-    for number, row in enumerate(problem.rows):
-        for value in () if row.smooth or row.term == item.term else row.levels:
-            values = problem.nominal.copy()
-            values[number] = value
-            sets.append(values)
-            rows.append(row)
-    found: set[str] = set()
-    if not sets:
-        return found
-    made = problem.predict(sets, fine=False)
-    losses = [point.noise.loss(clean.recorded - path) for path in made]
-    for at in np.argsort(losses)[:NEAREST]:
-        values, rest = sets[at], clean.recorded - made[at]
-        if rows[at].term in found or not np.isfinite(made[at][problem.seen]).all():
-            continue
-        values, rest = levels.zoomed(clean, values, rest, {rows[at].term}, point.noise)
-        if point.noise.loss(rest) / point.noise.lam < ALIKE**2:
-            found.add(rows[at].term)
-    return found
+            found.add(one.name)
+    return tuple(sorted(found))
 
 
 def _always(problem: Problem, term: str) -> set[str]:

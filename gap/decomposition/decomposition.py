@@ -11,6 +11,7 @@ from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.onset import Onset
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.shares import Part
+from bns.gap.decomposition.singles import Singles
 from bns.gap.recordings import command_moments
 
 MOST = 0.5  # share of the gap beyond which what is left is most of it
@@ -137,7 +138,8 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
     if unstable.any() and not unstable.all():
         problem = problem.without(unstable)
         start = descent.nothing(problem)
-    point = descent.decompose(problem, start)
+    tried = Singles(problem, start)
+    point = descent.decompose(problem, tried)
     found = onset.dated(problem, start, point)
     late = None
     if found:
@@ -160,7 +162,7 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         start=start,
         point=point,
         parts=tuple(shares.parts(problem, point)),
-        tied=tuple(ties.tied(problem, point)),
+        tied=tuple(ties.tied(problem, point, tried)),
         onset=late,
         floor=known,
         before=rest.excess(start.rest, known, inside),

@@ -11,10 +11,9 @@ from bns.gap.decomposition.fit import Noise, Point, linearised, newton, placed
 from bns.gap.decomposition.linear import Linear, Support
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.shares import HeldOut
+from bns.gap.decomposition.singles import Single, Singles
 
 TURNS = 4  # of fitting and searching
-SINGLES = 4  # explanations that are tried alone
-WIDE = 3  # numbers of an explanation from which its tangent tells little of it
 FEW = 2  # explanations that need no other start if they leave little
 ENOUGH = 1.2  # times what all explanations leave: little more
 ROUNDS = 2  # of levels
@@ -127,7 +126,7 @@ def relinearised(problem: Problem, point: Point, known: Noise) -> Linear:
     return linear.correlated(known.lam)
 
 
-def decompose(problem: Problem, start: Point | None = None) -> Point:
+def decompose(problem: Problem, tried: Singles) -> Point:
     """The explanations of a recording.
 
     Started from a tangent at the nominal model, from the best single explanation (a
@@ -136,21 +135,21 @@ def decompose(problem: Problem, start: Point | None = None) -> Point:
 
     Args:
         problem: the recording.
-        start: the nominal model, None = made here.
+        tried: the nominal model, and single explanations fitted.
     """
-    start = start or nothing(problem)
+    start = tried.start
     several = not problem.model.singly
     found = start.linear.search()[1] if several else frozenset()
-    best = start if several else _alone(problem, start)
+    best = start if several else _alone(problem, tried)
     if len(found) == 1:
         best = _followed(problem, start, found)
     if several and len(found | best.support) > 1:
-        best = _several(problem, start, found, best)
+        best = _several(problem, tried, found, best)
     for _ in range(ROUNDS):
-        tried = levels.best(problem, best)
-        if tried is None or tried.cost > best.cost - WORTH:
+        level = levels.best(problem, best)
+        if level is None or level.cost > best.cost - WORTH:
             break
-        other = descend(problem, tried.values, tried.support, best.noise)
+        other = descend(problem, level.values, level.support, best.noise)
         chosen = better(problem, [best, other])
         if chosen is best:
             break
@@ -219,7 +218,7 @@ def joined(problem: Problem, point: Point) -> Point:
         values[number] = values[parts].mean()
         values[parts] = problem.nominal[parts]
         support = (point.support - set(row.joins)) | {row.term}
-        other = _fitted_at(problem, replace(point, values=values), support)
+        other = fitted_at(problem, replace(point, values=values), support)
         least, here = costs(problem, [other, point])
         if least <= here:
             point = other
@@ -235,11 +234,18 @@ def refitted(problem: Problem, point: Point, support: Support) -> Point:
         support: the smaller set.
     """
     values = placed(problem, point.linear, support, point.values)
-    return _fitted_at(problem, replace(point, values=values), support)
+    return fitted_at(problem, replace(point, values=values), support)
 
 
-def _fitted_at(problem: Problem, point: Point, support: Support) -> Point:
-    """A set fitted from a point's values, with its noise."""
+def fitted_at(problem: Problem, point: Point, support: Iterable[str]) -> Point:
+    """A set fitted from a point's values.
+
+    Args:
+        problem: the recording.
+        point: values and noise to start from.
+        support: the set.
+    """
+    support = frozenset(support)
     fitted = _fitted(problem, support)
     values, rest = newton(problem, point.values, fitted, point.noise)
     values, rest = levels.zoomed(problem, values, rest, support, point.noise)
@@ -247,15 +253,15 @@ def _fitted_at(problem: Problem, point: Point, support: Support) -> Point:
     return Point(values, support, rest, linear, slopes, known)
 
 
-def _several(problem: Problem, start: Point, found: Support, best: Point) -> Point:
+def _several(problem: Problem, tried: Singles, found: Support, best: Point) -> Point:
     """The best point where a tangent finds several explanations: from a single one, and
     if that is not enough from those several, and from all where many depart."""
-    points = _simple(problem, start) + [best] * bool(best.support)
+    points = _simple(problem, tried) + [best] * bool(best.support)
     if not any(enough(point) for point in points):
         if not best.support:
-            points.append(_followed(problem, start, found))
+            points.append(_followed(problem, tried.start, found))
         if problem.model.many:
-            points.append(_from_all(problem, start))
+            points.append(_from_all(problem, tried.start))
     return better(problem, points)
 
 
@@ -272,62 +278,30 @@ def _followed(problem: Problem, start: Point, support: Support) -> Point:
     return descend(problem, values, support, start.noise)
 
 
-def _simple(problem: Problem, start: Point) -> list[Point]:
+def _simple(problem: Problem, tried: Singles) -> list[Point]:
     """Points from the best single explanation, and from it with a level on top."""
-    linear = start.linear
-    order = sorted(linear.free, key=lambda name: linear.cost({name}))
-    wide = [name for name in order if len(linear.terms[name]) >= WIDE][: SINGLES // 2]
-    order = [*dict.fromkeys((*order[:SINGLES], *wide))]
-    sample = problem.sample(fit.ROUGH)
-    few = None if len(sample) == len(problem.trials) else sample
-    starts = [(n, placed(problem, linear, {n}, start.values)) for n in order]
-    starts += levels.screened(problem, start, SINGLES, only=few)
-    tried = []
-    for name, values in starts:
-        fitted = _fitted(problem, {name})
-        values, rest = newton(problem, values, fitted, start.noise, turns=6, only=few)
-        tried.append((start.noise.loss(rest), name, values))
-    _, name, values = min(tried, key=lambda item: item[0])
-    made = [descend(problem, values, {name}, start.noise)]
-    if not enough(made[0]) and (both := _with_level(problem, name, values, start)):
+    start, best = tried.start, tried.fitted[0]
+    made = [descend(problem, best.values, {best.name}, start.noise)]
+    if not enough(made[0]) and (both := _with_level(problem, best, start)):
         made.append(both)
     return made
 
 
-def _alone(problem: Problem, start: Point) -> Point:
-    """From the single explanation that leaves least, each fitted to the simulation;
-    nothing, if it is no better than the best of so many fits is by chance."""
-    linear, most = start.linear, problem.model.starts
-    order = sorted(linear.free, key=lambda name: linear.cost({name}))[:most]
-    starts = [(n, placed(problem, linear, {n}, start.values)) for n in order]
-    starts += levels.screened(problem, start, most)
-    tried: dict[str, tuple[float, np.ndarray]] = {}
-    for name, values in starts:
-        fitted = _fitted(problem, {name})
-        values, rest = newton(problem, values, fitted, start.noise, turns=6)
-        height = start.noise.loss(rest) / start.noise.lam + _prior(problem, values)
-        if name not in tried or height < tried[name][0]:
-            tried[name] = height, values
-    if not tried:
-        return start
-    best = min(tried, key=lambda name: tried[name][0])
-    found = descend(problem, tried[best][1], {best}, start.noise)
-    nominal, here = costs(problem, [start, found])
-    return found if here + np.log(len(tried)) < nominal else start
+def _alone(problem: Problem, tried: Singles) -> Point:
+    """From the single explanation that leaves least; nothing, if it is no better than
+    the best of so many fits is by chance."""
+    if not tried.fitted:
+        return tried.start
+    best = tried.fitted[0]
+    found = descend(problem, best.values, {best.name}, tried.start.noise)
+    nominal, here = costs(problem, [tried.start, found])
+    return found if here + np.log(len(tried.fitted)) < nominal else tried.start
 
 
-def _prior(problem: Problem, values: np.ndarray) -> float:
-    """What nuisances cost, in squared deviations."""
-    rows = [k for name in fit.nuisances(problem) for k in problem.terms[name]]
-    return float((((values - problem.nominal) / problem.sd)[rows] ** 2).sum())
-
-
-def _with_level(
-    problem: Problem, name: str, values: np.ndarray, start: Point
-) -> Point | None:
+def _with_level(problem: Problem, best: Single, start: Point) -> Point | None:
     """A point from a single explanation and a level on top of it: through a tangent
     that lacks the level, the rest of it looks like several others."""
-    single = _fitted_at(problem, replace(start, values=values), frozenset({name}))
+    single = fitted_at(problem, replace(start, values=best.values), {best.name})
     level = levels.best(problem, single)
     if level is None or level.cost > single.cost - WORTH:
         return None

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bns.gap.decomposition import noise
-from bns.gap.decomposition.linear import Linear, Support, inflation
+from bns.gap.decomposition.linear import Linear, Support, inflation, tail
 from bns.gap.decomposition.noise import Memory
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.starts import Starts
@@ -322,16 +322,17 @@ def _step(
     flat = np.array([1.0 if problem.rows[k].smooth else 0.2 for k in which])
 
     def departure(at: np.ndarray) -> np.ndarray:
-        return (at[which] - problem.nominal[which]) / problem.sd[which]
+        return flat * (at[which] - problem.nominal[which]) / problem.sd[which]
 
     def height(at: np.ndarray, left: np.ndarray) -> float:
-        prior = (flat**2 * departure(at) ** 2).sum()
-        return known.loss(left) / known.lam + float(prior)
+        far = departure(at)
+        return known.loss(left) / known.lam + float((far**2).sum()) + 2 * tail(far)
 
+    held = flat**2 / np.maximum(departure(values) ** 2, 1.0)  # by priors, see `tail`
     heavy = design * weight[:, None]
-    curvature = heavy.T @ design / known.lam + np.diag(flat**2)
+    curvature = heavy.T @ design / known.lam + np.diag(held)
     pull = heavy.T @ known.innovations(np.nan_to_num(rest)).ravel() / known.lam
-    pull -= flat**2 * departure(values)
+    pull -= held * departure(values) / flat
     now = height(values, rest)
     low, high = problem.bounds
     for damping in DAMPING:

@@ -14,6 +14,7 @@ import numpy as np
 from bns.gap.decomposition import descent, fit, shares
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
+from bns.gap.decomposition.singles import Singles
 from bns.gap.models.base import GapModel, Windows
 from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Trial
@@ -40,7 +41,7 @@ class Corrected(GapModel):
     def of(cls, trials: Sequence[Trial], model: GapModel) -> "Corrected":
         """From checked recordings in which nothing was changed."""
         problem = Problem.of(trials, model)
-        point = descent.decompose(problem)
+        point = descent.decompose(problem, Singles(problem, descent.nothing(problem)))
         support = shares.guarded(problem, point)
         values = fit.placed(problem, point.linear, support, point.values)
         linear = point.linear

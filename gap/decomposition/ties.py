@@ -1,13 +1,15 @@
 """Sets of explanations that the data can hardly tell from the one that was found."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from bns.gap.decomposition import levels
+from bns.gap.decomposition import descent, levels
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.singles import Singles
 
 TIED = 3.0  # nats within which explanations tie: odds of 20 to 1
 SEVERAL = 2  # explanations up to which levels are tried in place of one
@@ -16,18 +18,46 @@ KEPT = 3  # rivals that are looked at in full
 MARGIN = 10.0  # nats that a first look may be worse
 
 
-def tied(problem: Problem, point: Point) -> list[Support]:
+def tied(problem: Problem, point: Point, tried: Singles) -> list[Support]:
     """Sets that tie with a point's, itself first: one explanation is another.
 
     Args:
         problem: the recording.
         point: the fit.
+        tried: single explanations that were fitted on the way.
     """
     if not point.support:
         return [point.support]
-    found = [*_smooth(point), *_levels(problem, point)]
-    found.sort(key=lambda item: (item[0], sorted(item[1])))
-    return [point.support, *(swapped for _, swapped in found)]
+    found: dict[Support, float] = {}
+    for cost, swapped in (
+        *_smooth(point),
+        *_levels(problem, point),
+        *_refitted(problem, point, tried),
+    ):
+        found[swapped] = min(cost, found.get(swapped, np.inf))
+    return [point.support, *sorted(found, key=lambda s: (found[s], sorted(s)))]
+
+
+def _refitted(
+    problem: Problem, point: Point, tried: Singles
+) -> list[tuple[float, Support]]:
+    """Explanations in place of a single one, each fitted from where it was by itself: a
+    tangent at the one tells little of another that is far from nominal."""
+    if len(point.support) > 1 or problem.onset:
+        return []
+    least = min(one.height for one in tried.fitted)
+    near = [one for one in tried.fitted if one.height < least + 2 * (TIED + MARGIN)]
+    rivals = [one for one in near if one.name not in point.support][:KEPT]
+    made = [
+        descent.fitted_at(problem, replace(point, values=one.values), {one.name})
+        for one in rivals
+    ]
+    here, *costs = descent.costs(problem, [point, *made])
+    return [
+        (cost - here, other.support)
+        for cost, other in zip(costs, made, strict=True)
+        if cost - here < TIED
+    ]
 
 
 def _smooth(point: Point) -> list[tuple[float, Support]]:

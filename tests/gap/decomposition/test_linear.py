@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bns.gap.decomposition import shares
-from bns.gap.decomposition.linear import KAPPA, Linear, inflation
+from bns.gap.decomposition.linear import KAPPA, Linear, inflation, tail
 from bns.gap.decomposition.noise import Memory, correlated, scale, weights
 from bns.gap.decomposition.spread import Spread
 
@@ -206,7 +206,19 @@ def test_the_cost_of_a_set_is_that_of_its_own_normal_equations():
     for names in ("", "f", "ac", "abcdef"):
         own = Spread.of(*linear._total(), 2.0, linear.prior(names))
         paid = KAPPA * len(names)
-        assert linear.cost(names) == pytest.approx(own.cost + paid, abs=1e-6)
         rows = [NAMES.index(name) for name in names]
         _, found = own.changed(rows, np.zeros(len(rows)))
+        paid += tail(found)
+        assert linear.cost(names) == pytest.approx(own.cost + paid, abs=1e-6)
         assert found == pytest.approx(linear.solve(names)[rows], abs=1e-9)
+
+
+def test_a_large_departure_costs_the_log_of_its_size():
+    """Not its square: what moves a part may be damage of any size."""
+    assert tail(np.array([0.5, -1.0, 0.0])) == 0.0
+    assert 15.0**2 / 2 + tail(np.array([15.0])) == pytest.approx(0.5 + np.log(15.0))
+    rng = np.random.default_rng(3)
+    problem = Rows(rng)
+    problem.columns[1] = 8 * problem.columns[0]
+    linear = problem.linear(planted(rng, problem, b=1.0))
+    assert linear.cost({"a"}) == pytest.approx(linear.cost({"b"}), abs=0.2)
