@@ -312,7 +312,8 @@ def drawn(
     chosen = values(size)
     hidden = _effect(problem, row.term, chosen)
     (reached,) = _lengths(problem, point, [hidden])
-    if not LEAST * SEEN < reached < 3 * max(length, SEEN):
+    most = np.inf if row.stepped else 3 * max(length, SEEN)
+    if not LEAST * SEEN < reached < most:
         return None
     magnitude = abs(size) if plane else row.nominal + size
     return Hidden(row.term, chosen, hidden, float(magnitude))

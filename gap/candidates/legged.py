@@ -11,7 +11,7 @@ from bns.gap.models.legged.where import Suspects
 from bns.models.legs import JOINTS, LEGS, names, parts
 from bns.worlds.effects import registry
 
-SHARE = 0.05  # slack of a number over its plausible departure; assumed
+SHARE = 0.01  # slack of a number over its plausible departure; assumed
 STEP = 0.25  # of a plausible departure, for differences: feet come down in steps
 NO_SIGNS = Signs()
 SERVO_SLACK = 0.03  # of a gain or a voltage, how well all servos are known together
@@ -29,7 +29,7 @@ _SERVOS: tuple[tuple[str, str, float, float, float, dict[str, Any]], ...] = (
     ("servo_delay", "delay", 0.06, 0, 0.4, {"step": 0.012}),
     ("servo_lag", "time_constant", 0.08, 0, 0.5, {"step": 0.012}),
     ("servo_duty_limit", "factor", 0.3, 0.02, 1, {"smooth": False,
-     "levels": (0.08, 0.2, 0.4)}),
+     "levels": (0.08, 0.2, 0.4, 0.7)}),
     ("servo_offset", "angle", 0.1, -0.3, 0.3, {}),
 )  # fmt: skip
 HIDDEN = ("servo_offset",)

@@ -320,15 +320,18 @@ def _step(
     design = design * problem.sd[which]
     # what was found by its level has a flat prior
     flat = np.array([1.0 if problem.rows[k].smooth else 0.2 for k in which])
+    free = np.array([not problem.rows[k].nuisance for k in which])
 
     def departure(at: np.ndarray) -> np.ndarray:
         return flat * (at[which] - problem.nominal[which]) / problem.sd[which]
 
     def height(at: np.ndarray, left: np.ndarray) -> float:
         far = departure(at)
-        return known.loss(left) / known.lam + float((far**2).sum()) + 2 * tail(far)
+        prior = float((far**2).sum()) + 2 * tail(far[free])
+        return known.loss(left) / known.lam + prior
 
-    held = flat**2 / np.maximum(departure(values) ** 2, 1.0)  # by priors, see `tail`
+    far = np.where(free, np.maximum(np.abs(departure(values)), 1.0), 1.0)
+    held = (flat / far) ** 2  # by their priors, see `tail`
     heavy = design * weight[:, None]
     curvature = heavy.T @ design / known.lam + np.diag(held)
     pull = heavy.T @ known.innovations(np.nan_to_num(rest)).ravel() / known.lam

@@ -46,12 +46,11 @@ class WalkModel(LibraryModel):
         BnsError: the robot does not walk.
     """
 
-    timed = False
+    timed = False  # commands last until the robot rests, not as long as they are told
     starts = 8
     singly = True
     spread = SPREAD
-    odds = 12.0  # what walking scatters is alike in all servos, hardly independent
-    """commands last until the robot rests, not as long as they are told"""
+    odds = 6.0  # against each of some four hundred
 
     def __init__(self, robot: str = "phantomx", *, pose_sd: Sequence[float] = TRACKER):
         world = HexapodWorld(robot, threads=1)
@@ -89,9 +88,11 @@ class WalkModel(LibraryModel):
             trial.observed[:, 3:] - path[:, 3:]
             for trial, path in zip(trials, predicted, strict=True)
         ]
-        found = where.suspects(rests, self.joints, READING)
         lost = walk_lost.likely(trials, legged.lost(signs), self.simulate)
         self._scatter(trials, lost)
+        walks = [self._walks[_key(trial)][..., 3:] for trial in trials]
+        rests = scatter.without(rests, walks, WOBBLE)
+        found = where.suspects(rests, self.joints, READING)
         listed = legged.rows(found, self.joints, signs)
         return self.remembered((*listed, *scatter.rows()))
 

@@ -34,6 +34,27 @@ def number(name: str) -> int:
     return int(rest.rstrip("]")) if stem == "walk" else -1
 
 
+def without(
+    rests: Sequence[np.ndarray], walks: Sequence[np.ndarray], noise: float
+) -> list[np.ndarray]:
+    """What is left of departures once the walks that explain them best are taken out.
+
+    Args:
+        rests: recorded minus predicted positions of each trial, ``(T, J)`` [rad].
+        walks: what each drawn walk does otherwise, ``(WALKS, T, J)`` [rad].
+        noise: of a position, beside these [rad].
+    """
+    flat = np.concatenate([rest.ravel() for rest in rests])
+    seen = np.isfinite(flat)
+    ways = np.concatenate([made.reshape(WALKS, -1) for made in walks], axis=1)[:, seen]
+    curvature = ways @ ways.T / noise**2 + WALKS * np.eye(WALKS)
+    shares = np.linalg.solve(curvature, ways @ flat[seen] / noise**2)
+    return [
+        rest - np.tensordot(shares, made, axes=1)
+        for rest, made in zip(rests, walks, strict=True)
+    ]
+
+
 def robots(uncertain: Sequence[Row], count: int = WALKS) -> list[list[Effect]]:
     """Robots that the nominal model may stand for: what is uncertain, drawn together.
 
