@@ -20,9 +20,8 @@ from bench.storage.campaigns import held, text, tiny
 from bns import seeding
 from bns.campaign import drive
 from bns.campaign.engines import registry
-from bns.campaign.engines.base import Beat, Outcome
 from bns.campaign.engines.ray_engine import RayEngine
-from bns.campaign.engines.registry import InlineEngine
+from bns.campaign.engines.registry import Beat, InlineEngine, Outcome
 from bns.campaign.plan import Job
 from bns.campaign.store import CampaignStore
 from bns.errors import MissingDependencyError

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bns.campaign.engines.base import Engine, Outcome
+from bns.campaign.engines.registry import Engine, Outcome
 from bns.campaign.file import Campaign
 from bns.campaign.identity import changed_default
 from bns.campaign.plan import Job, plan

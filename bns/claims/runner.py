@@ -7,7 +7,7 @@ from pathlib import Path
 
 from bns.campaign import drive
 from bns.campaign.drive import Progress
-from bns.campaign.engines.base import Engine
+from bns.campaign.engines.registry import Engine
 from bns.campaign.file import Campaign, Member
 from bns.campaign.merge import adopt
 from bns.campaign.plan import Job

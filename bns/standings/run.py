@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from bns.campaign import drive
-from bns.campaign.engines.base import Engine
+from bns.campaign.engines.registry import Engine
 from bns.campaign.file import Campaign, Member
 from bns.campaign.plan import Job
 from bns.claims import schedule

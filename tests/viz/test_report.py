@@ -10,7 +10,7 @@ import pytest
 
 from bns.errors import BnsError, FormatError
 from bns.stats import Interval
-from bns.viz import comparison, facts, figures, recording, report, style
+from bns.viz import facts, figures, recording, report, style
 from bns.viz.page import Picture
 from tests.viz.legible import flaws
 
@@ -144,7 +144,7 @@ def test_intervals_in_words(value, text):
 def test_an_undamaged_run_is_compared_on_trials_to_solve(record):
     never = np.full(record.replicates, -1)
     healthy = replace(record, damage_onset=never)
-    rows = comparison.table({"a": healthy, "b": healthy})["rows"]
+    rows = report.comparison({"a": healthy, "b": healthy})["rows"]
     assert rows[1][4:8] == ["-", "-", "1.0000", "1.0000"]
 
 
