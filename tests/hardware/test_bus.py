@@ -10,8 +10,8 @@ import pytest
 from bns.errors import BnsError, FormatError
 from bns.hardware.clock import RealClock
 from bns.hardware.dynamixel import joints, packets
+from bns.hardware.emulators.hexapod import ServoBank
 from bns.hardware.emulators.pty_host import PtyHost
-from bns.hardware.emulators.servo_bank import ServoBank
 from bns.hardware.faults import LinkError, SafetyStop, Void
 
 pytest.importorskip("dynamixel_sdk")

@@ -10,13 +10,12 @@ from bns.hardware.clock import RealClock
 from bns.hardware.driving import excitation
 from bns.hardware.dynamixel import joints, zeros
 from bns.hardware.dynamixel.walker import SPEED, Walked
-from bns.hardware.emulators.hexapod_body import HexapodBody
+from bns.hardware.emulators.hexapod import HexapodBody, ServoBank
 from bns.hardware.emulators.pty_host import PtyHost
 from bns.hardware.emulators.run import phantomx
-from bns.hardware.emulators.servo_bank import ServoBank
 from bns.hardware.faults import Void
 from bns.hardware.tracking.tracker import Sighting
-from bns.hardware.worlds import hexapod, walked
+from bns.hardware.worlds import hexapod, records
 from bns.hardware.worlds.hexapod import HardwareHexapod
 from bns.models import robot
 from bns.models.legs import JOINTS
@@ -94,7 +93,7 @@ def carried_out(count, late=0.001):
 
 def made(done, given):
     channels = (*POSE_CHANNELS, Channel("left_front_coxa_position", "rad"))
-    return walked.trial(
+    return records.walked_trial(
         done,
         given,
         sample_dt=0.1,

@@ -6,8 +6,7 @@ import pytest
 from bns.errors import BnsError
 from bns.hardware.clock import VirtualClock
 from bns.hardware.emulators.device import Noise, Reply, VirtualLine
-from bns.hardware.emulators.khepera_body import KheperaBody
-from bns.hardware.emulators.khepera_device import KheperaDevice
+from bns.hardware.emulators.khepera import KheperaBody, KheperaDevice
 from bns.hardware.faults import LinkError
 from bns.hardware.khepera import protocol
 from bns.hardware.khepera.driver import Khepera3

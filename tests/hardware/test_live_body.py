@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bns.hardware.emulators.khepera_body import KheperaBody
+from bns.hardware.emulators.khepera import KheperaBody
 
 SPEED = 0.1  # m/s
 

@@ -16,7 +16,7 @@ import pytest
 
 from bns.errors import BnsError
 from bns.hardware.clock import VirtualClock
-from bns.hardware.openers import Openers
+from bns.hardware.line import Openers
 from bns.hardware.safety import watchdog
 from bns.hardware.worlds import real_robot
 

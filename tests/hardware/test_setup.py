@@ -15,8 +15,7 @@ from bns.worlds.data import dataset
 pytest.importorskip("serial")
 
 from bns.hardware import line
-from bns.hardware.emulators.khepera_body import KheperaBody
-from bns.hardware.emulators.khepera_device import KheperaDevice
+from bns.hardware.emulators.khepera import KheperaBody, KheperaDevice
 from bns.hardware.emulators.pty_host import PtyHost
 
 

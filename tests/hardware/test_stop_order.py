@@ -5,8 +5,7 @@ import pytest
 
 from bns.hardware.clock import VirtualClock
 from bns.hardware.emulators.device import Reply, VirtualLine
-from bns.hardware.emulators.khepera_body import KheperaBody
-from bns.hardware.emulators.khepera_device import KheperaDevice
+from bns.hardware.emulators.khepera import KheperaBody, KheperaDevice
 from bns.hardware.faults import LinkError, SafetyStop, Void
 from bns.hardware.khepera.driver import Khepera3
 from bns.hardware.safety.stop_order import AGAIN, insist, khepera3, phantomx

@@ -7,10 +7,9 @@ import time
 
 import pytest
 
-from bns.hardware.emulators.khepera_body import KheperaBody
-from bns.hardware.emulators.khepera_device import KheperaDevice
+from bns.hardware.emulators.hexapod import ServoBank
+from bns.hardware.emulators.khepera import KheperaBody, KheperaDevice
 from bns.hardware.emulators.pty_host import PtyHost
-from bns.hardware.emulators.servo_bank import ServoBank
 from bns.hardware.faults import SafetyStop, Void
 from bns.hardware.safety.watchdog_client import WatchdogClient
 
