@@ -104,12 +104,9 @@ def run(
     check_device("cpu")
     session = Session()
     with Lock(out) as lock:
-        store = drive.opened(_campaign((), world), out, resume=True, lock=lock)
-        if not mix:
-            store.check_versions()
-        store.tidy()
-        if retry:
-            store.forgive()
+        store = drive.opened(
+            _campaign((), world), out, resume=True, lock=lock, mix=mix, retry=retry
+        )
         while not session.stopped:
             rows = report.judged(
                 claims, out, world=world, quick=quick, own=own, runs=last
@@ -231,8 +228,6 @@ def take(
     out = directory(world, quick=False, root=root)
     with Lock(out) as lock:
         store = drive.opened(campaign, out, resume=True, lock=lock)
-        store.check_versions()
-        store.tidy()
         taken = []
         for folder in folders:
             have = held.read(out, report.identities(members.values()))

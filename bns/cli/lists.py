@@ -30,9 +30,7 @@ class Effects:
 
     filter: Positional[str] = ""
     """part of a name or of a meaning, such as wheel or friction"""
-    stage: Literal[
-        "", "command", "actuator", "body", "optics", "sensor", "tracking"
-    ] = ""
+    stage: Stage = ""
     """only effects that act there"""
     json: bool = False
     """print JSON instead of a table, parameters included"""
