@@ -23,7 +23,7 @@ VERBS = {
     "robots": ("lists", "list the robot models"),
     "models": ("models", "make, check, open or draw a robot model"),
     "effects": ("lists", "list the effects with parameters, units and ranges"),
-    "examples": ("examples", "list, print or copy the examples"),
+    "examples": ("lists", "list, print or copy the examples"),
     "schema": ("schema", "JSON Schema of the TOML files, for editors"),
     "gap": ("gap", "diagnose the gap between recordings and a model (experimental)"),
     "hardware": ("hardware", "real robots: rehearse, check, calibrate, record"),

@@ -11,7 +11,7 @@ import pytest
 from bns.errors import BnsError
 from bns.hardware.clock import RealClock, VirtualClock
 from bns.hardware.driving import excitation
-from bns.hardware.dynamixel import joints, packets, zeros
+from bns.hardware.dynamixel import joints, packets, rig
 from bns.hardware.dynamixel.walker import LIES, SPEED, STILL, Walked, Walker
 from bns.hardware.emulators.hexapod import HexapodBody, ServoBank
 from bns.hardware.emulators.pty_host import PtyHost
@@ -127,10 +127,10 @@ def test_zeros_are_where_the_servos_stand_and_end_stops_move_along(tmp_path):
     thread = threading.Thread(target=host.serve, args=(done.is_set,))
     thread.start()
     try:
-        list(zeros.calibrate(str(tmp_path / "bus"), "", tmp_path / "own.toml"))
+        list(rig.calibrate(str(tmp_path / "bus"), "", tmp_path / "own.toml"))
         bank.place[5] = 640.0
         with pytest.raises(BnsError, match="left_front_tibia reads 640"):
-            list(zeros.calibrate(str(tmp_path / "bus"), "", tmp_path / "b.toml"))
+            list(rig.calibrate(str(tmp_path / "bus"), "", tmp_path / "b.toml"))
     finally:
         done.set()
         thread.join()
