@@ -162,8 +162,7 @@ def look(port: str, camera: str, calibration: str, robot: str = "khepera3") -> E
         raise BnsError("No camera was given: give --camera NUMBER, FILE or emulated.")
     marker, crooked = MARKERS[robot], LEANING if robot == "phantomx" else CROOKED
     if camera == EMULATED:
-        from bns.hardware.emulators.camera import EmulatedCamera
-        from bns.hardware.emulators.frames import painter
+        from bns.hardware.emulators.camera import EmulatedCamera, painter
 
         known = Camera.read(calibration) if calibration else Camera.overhead(SIZE)
         ideal = replace(Camera.overhead(known.size), latency=0.0)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from bench.result import Result, bench
-from bns.hardware.emulators.frames import PLATE
+from bns.hardware.emulators.camera import PLATE
 from bns.hardware.tracking import marker as tags
 from bns.hardware.tracking.camera import Camera
 from bns.hardware.tracking.marker import CELLS, Floor, Marker

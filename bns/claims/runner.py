@@ -9,9 +9,8 @@ from bns.campaign import drive
 from bns.campaign.drive import Progress
 from bns.campaign.engines.registry import Engine
 from bns.campaign.file import Campaign, Member
-from bns.campaign.merge import adopt
 from bns.campaign.plan import Job
-from bns.campaign.store import CampaignStore
+from bns.campaign.store import CampaignStore, adopt
 from bns.claims import held, price, report, schedule, sides
 from bns.claims.claim import Claim
 from bns.claims.report import Judged

@@ -183,7 +183,7 @@ def _say(session: Any, out: Path, stopped: int) -> int:
 
 
 def _merge(given: Merge) -> int:
-    from bns.campaign.merge import merge
+    from bns.campaign.store import merge
 
     if not given.others:
         raise BnsError("No directory was given to take from: name one or more.")

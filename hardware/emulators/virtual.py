@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from bns.hardware.clock import VirtualClock
-from bns.hardware.emulators.camera import BodyPainter
+from bns.hardware.emulators.camera import BodyPainter, Painter
 from bns.hardware.emulators.device import Noise, VirtualLine
-from bns.hardware.emulators.frames import Painter
 from bns.hardware.emulators.khepera import KheperaBody, KheperaDevice
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera.driver import Khepera3

@@ -7,8 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from bns.hardware.emulators.camera import EmulatedCamera
-from bns.hardware.emulators.frames import painter
+from bns.hardware.emulators.camera import EmulatedCamera, painter
 from bns.hardware.emulators.khepera import KheperaBody
 from bns.hardware.emulators.mishaps import WORDS
 from bns.hardware.emulators.run import khepera3

@@ -14,9 +14,8 @@ from bns.campaign import drive, results
 from bns.campaign.engines import registry, worker
 from bns.campaign.engines.pool import PoolEngine
 from bns.campaign.engines.registry import InlineEngine, Outcome
-from bns.campaign.merge import merge
 from bns.campaign.plan import plan
-from bns.campaign.store import CampaignStore
+from bns.campaign.store import CampaignStore, merge
 from bns.campaign.table import table
 from bns.errors import BnsError, FormatError
 from bns.storage import files, reading
