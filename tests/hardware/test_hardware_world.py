@@ -14,9 +14,8 @@ from bns.errors import BnsError
 from bns.hardware.driving import homing
 from bns.hardware.emulators import virtual
 from bns.hardware.faults import SafetyStop
-from bns.hardware.worlds.light import HardwareLight
 from bns.hardware.worlds.real_robot import TRIES
-from bns.hardware.worlds.wheeled import HardwareWorld
+from bns.hardware.worlds.wheeled import HardwareLight, HardwareWorld
 from bns.worlds.light import sensors as light_sensors
 from bns.worlds.light.field import Lamp
 from bns.worlds.trial import Commands
