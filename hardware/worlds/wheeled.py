@@ -1,4 +1,4 @@
-"""The real Khepera III as a world, in real time; with a lamp it steers by its sensors."""
+"""The real Khepera III as a world; with a lamp it steers by what its sensors read."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, asdict, dataclass
