@@ -48,6 +48,24 @@ def text(legs: Iterable[int]) -> str:
     return ",".join(str(leg) for leg in sorted(set(legs)))
 
 
+def mirrored(legs: Iterable[int]) -> tuple[int, ...]:
+    """The same legs on the other side."""
+    return tuple(sorted(leg + 1 if leg % 2 else leg - 1 for leg in legs))
+
+
+def subsets(fewest: int = 1, most: int = 4) -> tuple[tuple[int, ...], ...]:
+    """Sets of legs that no left-right mirror image repeats, smallest first.
+
+    One to four legs give the thirty-one classes of a robot that walks in a direction.
+    """
+    found: list[tuple[int, ...]] = []
+    for count in range(fewest, most + 1):
+        for legs in combinations(range(1, 7), count):
+            if mirrored(legs) not in found:
+                found.append(legs)
+    return tuple(found)
+
+
 def name(legs: Iterable[int]) -> str:
     """A set of legs by name, ``left_front+left_middle``."""
     return "+".join(LEGS[leg - 1] for leg in sorted(set(legs)))
