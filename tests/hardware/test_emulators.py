@@ -70,16 +70,7 @@ def tell(port, word):
         pipe.write(word + "\n")
 
 
-def waited(good):
-    until = time.monotonic() + SLOW
-    while time.monotonic() < until:
-        if found := good():
-            return found
-        time.sleep(0.01)
-    return None
-
-
-def test_what_a_camera_may_do(port):
+def test_what_a_camera_may_do(port, waited):
     camera = EmulatedCamera(port, painter("khepera3", Camera.overhead((320, 240))))
 
     def pair():
@@ -100,7 +91,7 @@ def test_what_a_camera_may_do(port):
     camera.close()
 
 
-def test_what_a_line_may_do(port):
+def test_what_a_line_may_do(port, waited):
     line = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
 
     def heard():

@@ -120,21 +120,14 @@ def test_a_walk_that_was_ended_early_has_no_poses_where_it_did_not_come_to():
         made(carried_out(2, late=0.4), goals({}, {}))
 
 
-def test_zeros_are_where_the_servos_stand_and_end_stops_move_along(tmp_path):
+def test_zeros_are_where_the_servos_stand_and_end_stops_move_along(tmp_path, serving):
     bank = ServoBank(at=RealClock().now())
     bank.place[5] = 525.0
-    host, done = PtyHost(bank, tmp_path / "bus"), threading.Event()
-    thread = threading.Thread(target=host.serve, args=(done.is_set,))
-    thread.start()
-    try:
+    with serving(PtyHost(bank, tmp_path / "bus")):
         list(rig.calibrate(str(tmp_path / "bus"), "", tmp_path / "own.toml"))
         bank.place[5] = 640.0
         with pytest.raises(BnsError, match="left_front_tibia reads 640"):
             list(rig.calibrate(str(tmp_path / "bus"), "", tmp_path / "b.toml"))
-    finally:
-        done.set()
-        thread.join()
-        host.unplug()
     before = {joint.id: joint for joint in joints.read()}
     after = {joint.id: joint for joint in joints.read(tmp_path / "own.toml")}
     assert after[5] == before[5]._replace(zero=525, low=292, high=870)

@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import termios
-import time
 import tty
 from types import SimpleNamespace
 
@@ -37,16 +36,7 @@ def port():
             os.close(number)
 
 
-def waited(good):
-    until = time.monotonic() + SLOW
-    while time.monotonic() < until:
-        if good():
-            return True
-        time.sleep(0.01)
-    return False
-
-
-def test_who_holds_the_port_is_named_until_it_lets_go(port):
+def test_who_holds_the_port_is_named_until_it_lets_go(port, waited):
     name = os.ttyname(port[1])
     openers = Openers(name)
     assert not openers.intruder() and openers.others() == []

@@ -6,8 +6,8 @@ is silent, gone, or unplugged.
 
 import os
 import signal
-import threading
 import time
+from functools import partial
 
 import numpy as np
 import pytest
@@ -23,18 +23,6 @@ from bns.hardware.safety.stop_order import AGAIN, insist, khepera3, phantomx
 from bns.hardware.safety.watchdog_client import WatchdogClient
 
 GARBAGE = np.random.default_rng(3).bytes(4000)
-
-
-class Guard:
-    """Remembers its food; raises an error from a moment on."""
-
-    def __init__(self):
-        self.fed, self.error = [], None
-
-    def feed(self, *, moving):
-        self.fed.append(moving)
-        if self.error:
-            raise self.error
 
 
 class Line:
@@ -67,9 +55,9 @@ class Fickle:
 
 
 @pytest.fixture
-def driven():
+def driven(guard):
     """A robot that drives, its device and its guard."""
-    clock, guard = VirtualClock(), Guard()
+    clock = VirtualClock()
     device = Fickle(KheperaDevice(KheperaBody()))
     robot = Khepera3(VirtualLine(device, clock), clock, guard=guard)
     robot.identify()
@@ -161,10 +149,10 @@ SLOW = 20.0  # s; a busy machine
 
 
 @pytest.fixture
-def robot(tmp_path):
+def robot(tmp_path, serving):
     device = KheperaDevice(KheperaBody(at=time.monotonic()), latency=0.002)
     host = PtyHost(device, tmp_path / "port")
-    done, state = threading.Event(), {"plugged": True}
+    state = {"plugged": True}
 
     def plug(now):
         if state["plugged"]:
@@ -172,12 +160,8 @@ def robot(tmp_path):
         elif host._master >= 0:
             host.unplug()
 
-    thread = threading.Thread(target=host.serve, args=(done.is_set, plug))
-    thread.start()
-    yield str(tmp_path / "port"), device, state
-    done.set()
-    thread.join()
-    host.unplug()
+    with serving(host, plug):
+        yield str(tmp_path / "port"), device, state
 
 
 def moving(port):
@@ -186,19 +170,26 @@ def moving(port):
     return fd
 
 
-def told_to_stand(device):
-    until = time.monotonic() + SLOW
-    while time.monotonic() < until:
-        if device.log and device.log[-1][1:] == (0, 0):
-            return True
-        time.sleep(0.01)
-    return False
+@pytest.fixture
+def told_to_stand(waited):
+    """Waits until a device is told to stand; whether it was."""
+    return lambda device: waited(lambda: device.log and device.log[-1][1:] == (0, 0))
 
 
-def test_silence_stops_a_moving_robot_and_feeding_is_refused_then(robot):
-    port, device, _ = robot
+@pytest.fixture
+def guarded(robot):
+    """Starts the watchdog of a robot that moves."""
+    port, *_ = robot
     fd = moving(port)
-    watchdog = WatchdogClient(fd, port, 115200, "khepera3", silence=0.2)
+    yield partial(WatchdogClient, fd, port, 115200, "khepera3")
+    os.close(fd)
+
+
+def test_silence_stops_a_moving_robot_and_feeding_is_refused_then(
+    robot, guarded, told_to_stand
+):
+    _, device, _ = robot
+    watchdog = guarded(silence=0.2)
     watchdog.feed(moving=True)
     assert told_to_stand(device)
     time.sleep(0.3)
@@ -206,24 +197,20 @@ def test_silence_stops_a_moving_robot_and_feeding_is_refused_then(robot):
         watchdog.feed(moving=True)
     watchdog.feed(moving=False)
     watchdog.release()
-    os.close(fd)
 
 
-def test_the_end_of_the_driver_stops_it(robot):
-    port, device, _ = robot
-    fd = moving(port)
-    watchdog = WatchdogClient(fd, port, 115200, "khepera3")
+def test_the_end_of_the_driver_stops_it(robot, guarded, told_to_stand):
+    _, device, _ = robot
+    watchdog = guarded()
     watchdog.feed(moving=False)
     os.close(watchdog._writer)  # as when the driving process is killed
     assert told_to_stand(device)
     assert watchdog._process.wait(SLOW) == 0
-    os.close(fd)
 
 
-def test_a_cable_that_comes_back_is_used_to_stop(robot):
+def test_a_cable_that_comes_back_is_used_to_stop(robot, guarded, told_to_stand):
     port, device, state = robot
-    fd = moving(port)
-    watchdog = WatchdogClient(fd, port, 115200, "khepera3")
+    watchdog = guarded()
     state["plugged"] = False
     while os.path.exists(port):
         time.sleep(0.01)
@@ -233,26 +220,20 @@ def test_a_cable_that_comes_back_is_used_to_stop(robot):
     state["plugged"] = True
     assert told_to_stand(device)
     watchdog._process.wait(SLOW)
-    os.close(fd)
 
 
-def test_a_watchdog_that_is_killed_is_missed_at_once(robot):
-    port, _, _ = robot
-    fd = moving(port)
-    watchdog = WatchdogClient(fd, port, 115200, "khepera3")
+def test_a_watchdog_that_is_killed_is_missed_at_once(guarded):
+    watchdog = guarded()
     watchdog.feed(moving=True)
     os.kill(watchdog.pid, signal.SIGKILL)
     watchdog._process.wait(SLOW)
     with pytest.raises(SafetyStop, match="watchdog is gone"):
         watchdog.feed(moving=True)
     watchdog.release()
-    os.close(fd)
 
 
-def test_a_watchdog_that_hangs_is_noticed_and_nothing_moves_with_it(robot):
-    port, _, _ = robot
-    fd = moving(port)
-    watchdog = WatchdogClient(fd, port, 115200, "khepera3", silence=SLOW)
+def test_a_watchdog_that_hangs_is_noticed_and_nothing_moves_with_it(guarded):
+    watchdog = guarded(silence=SLOW)
     watchdog.feed(moving=True)
     os.kill(watchdog.pid, signal.SIGSTOP)
     begin = time.monotonic()
@@ -267,16 +248,12 @@ def test_a_watchdog_that_hangs_is_noticed_and_nothing_moves_with_it(robot):
     os.kill(watchdog.pid, signal.SIGKILL)
     watchdog.release()
     assert watchdog._process.poll() is not None
-    os.close(fd)
 
 
-def test_a_line_that_goes_on_talking_holds_up_no_stop(tmp_path):
+def test_a_line_that_goes_on_talking_holds_up_no_stop(tmp_path, serving, told_to_stand):
     device = KheperaDevice(KheperaBody(at=time.monotonic()), latency=0.002)
-    host, done = PtyHost(device, tmp_path / "port", baud=115200), threading.Event()
-    thread = threading.Thread(target=host.serve, args=(done.is_set,))
-    thread.start()
-    port = str(tmp_path / "port")
-    try:
+    host, port = PtyHost(device, tmp_path / "port", baud=115200), str(tmp_path / "port")
+    with serving(host):
         fd = moving(port)
         words = {"silence": 0.2, "patience": 3.0}
         watchdog = WatchdogClient(fd, port, 115200, "khepera3", **words)
@@ -287,32 +264,25 @@ def test_a_line_that_goes_on_talking_holds_up_no_stop(tmp_path):
         watchdog.release()
         watchdog._process.wait(SLOW)
         os.close(fd)
-    finally:
-        done.set()
-        thread.join()
-        host.unplug()
 
 
-def test_a_robot_whose_stop_was_not_confirmed_is_stopped_after_the_session(robot):
-    port, device, _ = robot
-    fd = moving(port)
-    watchdog = WatchdogClient(fd, port, 115200, "khepera3", silence=SLOW)
+def test_a_stop_that_was_not_confirmed_is_made_after_the_session(
+    robot, guarded, told_to_stand
+):
+    _, device, _ = robot
+    watchdog = guarded(silence=SLOW)
     watchdog.feed(moving=True)
     watchdog.release()
     assert told_to_stand(device)
     assert watchdog._process.wait(SLOW) == 0
-    os.close(fd)
 
 
-def test_servos_without_torque_acknowledge_the_stop(tmp_path):
+def test_servos_without_torque_acknowledge_the_stop(tmp_path, serving):
     bank = ServoBank(at=time.monotonic())
     for table in bank.tables.values():
         table[24] = 1
-    host, done = PtyHost(bank, tmp_path / "bus"), threading.Event()
-    thread = threading.Thread(target=host.serve, args=(done.is_set,))
-    thread.start()
-    port = str(tmp_path / "bus")
-    try:
+    host, port = PtyHost(bank, tmp_path / "bus"), str(tmp_path / "bus")
+    with serving(host):
         fd = os.open(port, os.O_RDWR | os.O_NOCTTY)
         watchdog = WatchdogClient(fd, port, 1000000, "phantomx", servo=5)
         watchdog.feed(moving=True)
@@ -320,7 +290,3 @@ def test_servos_without_torque_acknowledge_the_stop(tmp_path):
         assert watchdog._process.wait(SLOW) == 0  # 1 where nothing acknowledges
         assert not any(table[24] for table in bank.tables.values())
         os.close(fd)
-    finally:
-        done.set()
-        thread.join()
-        host.unplug()

@@ -194,23 +194,6 @@ def test_its_task_is_learned(run_python, site, tmp_path, learner):
     assert "near the upper edge" in (tmp_path / "run" / "report.html").read_text()
 
 
-@pytest.mark.parametrize(
-    ("value", "message"),
-    [
-        ("bns_example.nothing", "cannot be had from 'bns_example.nothing'"),
-        ("bns_example", "the package bns_example holds no other.toml"),
-    ],
-)
-def test_a_task_that_is_not_there_is_said(run_python, site, tmp_path, value, message):
-    broken = tmp_path / "broken"
-    shutil.copytree(site, broken)
-    (info,) = broken.glob("*.dist-info")
-    (info / "entry_points.txt").write_text(f"[bns.tasks]\nother = {value}\n")
-    told = ["-m", "bns", "run", "demo", "--task.name", "other", "--out", tmp_path / "r"]
-    said = run_python(*told, code=2, PYTHONPATH=str(broken))
-    assert message in said and said.count("\n") == 1
-
-
 def test_the_command_line_knows_it(run_python, site):
     shown = run_python("-m", "bns", "effects", "loose_wheel", PYTHONPATH=str(site))
     assert "time constant of the slip" in shown
@@ -218,18 +201,26 @@ def test_the_command_line_knows_it(run_python, site):
     assert run_python(*words, PYTHONPATH=str(site)).split() == ["tug"]
 
 
+RUN = ("run", "demo", "--task.name", "other", "--out", "run")
+
+
 @pytest.mark.parametrize(
-    ("value", "message"),
+    ("group", "value", "words", "message"),
     [
-        ("bns_example.worlds:ice", "is not a subclass of"),
-        ("bns_example.nothing:LooseWheel", "cannot be imported from"),
-        ("bns_example.effects:LooseWheel", "it has to be 'other'"),
+        ("effects", "bns_example.worlds:ice", (), "is not a subclass of"),
+        ("effects", "bns_example.nothing:LooseWheel", (), "cannot be imported from"),
+        ("effects", "bns_example.effects:LooseWheel", (), "it has to be 'other'"),
+        ("tasks", "bns_example.nothing", RUN, "be had from 'bns_example.nothing'"),
+        ("tasks", "bns_example", RUN, "the package bns_example holds no other.toml"),
     ],
 )
-def test_a_wrong_entry_is_said_in_one_line(run_python, site, tmp_path, value, message):
+def test_a_wrong_entry_is_said_in_one_line(
+    run_python, site, tmp_path, group, value, words, message
+):
     broken = tmp_path / "broken"
     shutil.copytree(site, broken)
     (info,) = broken.glob("*.dist-info")
-    (info / "entry_points.txt").write_text(f"[bns.effects]\nother = {value}\n")
-    said = run_python("-m", "bns", "effects", code=2, PYTHONPATH=str(broken))
+    (info / "entry_points.txt").write_text(f"[bns.{group}]\nother = {value}\n")
+    told = ("-m", "bns", *(words or ("effects",)))
+    said = run_python(*told, code=2, PYTHONPATH=str(broken))
     assert message in said and said.count("\n") == 1
