@@ -74,27 +74,21 @@ def _python() -> list[Finding]:
 
 
 def _packages() -> list[Finding]:
-    found = []
-    for name in REQUIRED:
-        version = versions.package(name)
-        if version:
-            found.append(Finding(name, "ok", version))
-        else:
-            remedy = f"pip install {name}"
-            found.append(Finding(name, "bad", "not installed", remedy))
-    return found
+    return [_installed(name, "bad", f"pip install {name}") for name in REQUIRED]
 
 
 def _optional() -> list[Finding]:
-    found = []
-    for name, extra, needed_by in OPTIONAL:
-        version = versions.package(name)
-        if version:
-            found.append(Finding(name, "ok", version))
-        else:
-            remedy = f"for {needed_by}: pip install 'bns-testbed[{extra}]'"
-            found.append(Finding(name, "note", "not installed", remedy))
-    return found
+    return [
+        _installed(name, "note", f"for {use}: pip install 'bns-testbed[{extra}]'")
+        for name, extra, use in OPTIONAL
+    ]
+
+
+def _installed(name: str, lacking: State, remedy: str) -> Finding:
+    version = versions.package(name)
+    if version:
+        return Finding(name, "ok", version)
+    return Finding(name, lacking, "not installed", remedy)
 
 
 def pins(package: Callable[[str], str] = versions.package) -> list[Finding]:

@@ -209,8 +209,7 @@ def _source(
     port: str, name: str, known: str, found: calibrate.Lens | None, robot: str
 ) -> tuple[Source, Camera | calibrate.Lens]:
     if name == rigs.EMULATED:
-        from bns.hardware.emulators.camera import EmulatedCamera
-        from bns.hardware.emulators.frames import painter
+        from bns.hardware.emulators.camera import EmulatedCamera, painter
 
         ideal = replace(Camera.overhead(rigs.SIZE))
         return EmulatedCamera(port, painter(robot, ideal)), ideal

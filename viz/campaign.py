@@ -12,7 +12,7 @@ from bns.errors import BnsError
 from bns.stats import resampling
 from bns.stats.compare import MEASURES, values
 from bns.storage import files
-from bns.viz import fitting, style
+from bns.viz import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,7 +42,7 @@ def write(found: Results, folder: Path, measure: str) -> list[Path]:
     ):
         if figure is not None:
             with style.plotting():
-                fitting.fit(figure)
+                style.fit(figure)
                 files.replace(folder / name, figure.savefig)
             made.append(folder / name)
     if not made:

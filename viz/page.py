@@ -5,7 +5,7 @@ import io
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from bns.viz import fitting, style
+from bns.viz import style
 
 
 def render(template: str, content: Mapping[str, Any]) -> bytes:
@@ -42,9 +42,9 @@ class Picture(NamedTuple):
 def picture(figure: Any) -> Picture:
     """A figure in two layouts, the same bytes every time; the figure is used up."""
     with style.plotting():
-        fitting.fit(figure)
+        style.fit(figure)
         wide = _address(figure)
-        fitting.stack(figure)
+        style.stack(figure)
         return Picture(wide, _address(figure))
 
 

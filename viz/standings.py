@@ -10,7 +10,7 @@ from bns.standings import figures
 from bns.standings.design import PRIORS
 from bns.standings.figures import Cell
 from bns.storage import files
-from bns.viz import fitting, style
+from bns.viz import style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,7 +33,7 @@ def write(cells: Sequence[Cell], folder: Path) -> list[Path]:
         some = [cell for cell in cells if cell.entry.task == task]
         figure = curves(some)
         with style.plotting():
-            fitting.fit(figure)
+            style.fit(figure)
             files.replace(path, figure.savefig)
         made.append(path)
     return made

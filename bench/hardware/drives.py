@@ -21,7 +21,7 @@ import numpy as np
 
 from bns.hardware.clock import urgent
 from bns.hardware.dynamixel.walker import Walked
-from bns.hardware.safety.monitor import SafetyMonitor
+from bns.hardware.safety.limits import SafetyMonitor
 from bns.hardware.worlds.hexapod import HardwareHexapod
 from bns.hardware.worlds.wheeled import HardwareWorld
 from bns.worlds.trial import Channel, Commands

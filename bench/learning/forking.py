@@ -13,20 +13,10 @@ from pathlib import Path
 from shutil import copytree, rmtree
 
 from bench.learning import experiments
+from bns.campaign.trunk import ON_DAMAGE
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
 from bns.learners.bns.config import AdaptationConfig
-
-ON_DAMAGE = (
-    "population_reset",
-    "simulator_reset",
-    "simulator_reset_untrained",
-    "data_reset",
-    "restart",
-    "mutation_rate_after",
-    "mutation_magnitude_after",
-)
-"""fields of `AdaptationConfig` that do nothing until a damage is known"""
 
 
 def trunk(config: RunConfig) -> RunConfig:

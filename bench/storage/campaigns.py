@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+import tomli_w
+
 from bns.campaign.file import Campaign, from_content
 
 DAMAGE = "wheel_gain:wheel=left,factor=0.8@2"
@@ -31,21 +33,8 @@ def content(members: int, *, trials: int = 4, replicates: int = 2) -> dict[str, 
 
 def text(members: int, *, trials: int, replicates: int) -> str:
     """The same as a campaign file."""
-    windows = list(range(1, members + 1))
-    return f"""
-name = "tiny"
-replicates = {replicates}
-batch_runs = {replicates}
-[settings]
-trials = {trials}
-compiled = "no"
-evolution.population = 10
-evolution.generations = 2
-snn.epochs = 3
-world.damage = ["{DAMAGE}"]
-[grid]
-adaptation.window = {windows}
-"""
+    made = content(members, trials=trials, replicates=replicates)
+    return tomli_w.dumps({"name": "tiny", **made})
 
 
 def held(directory: Path) -> Mapping[str, bytes]:

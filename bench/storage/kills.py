@@ -1,5 +1,6 @@
-"""Campaigns whose processes are killed, and engines that agree."""
+"""Runs and campaigns whose processes are killed, and engines that agree."""
 
+import json
 import os
 import signal
 import subprocess
@@ -20,12 +21,98 @@ from bench.storage.campaigns import held, text, tiny
 from bns import seeding
 from bns.campaign import drive
 from bns.campaign.engines import registry
-from bns.campaign.engines.base import Beat, Outcome
 from bns.campaign.engines.ray_engine import RayEngine
-from bns.campaign.engines.registry import InlineEngine
+from bns.campaign.engines.registry import Beat, InlineEngine, Outcome
 from bns.campaign.plan import Job
 from bns.campaign.store import CampaignStore
 from bns.errors import MissingDependencyError
+
+MAY_DIFFER = ("timing.jsonl",)
+SETTINGS = (
+    "--trials", "12", "--replicates", "3", "--record-replicates", "2",
+    "--evolution.population", "20", "--evolution.generations", "5",
+    "--snn.epochs", "20", "--compiled", "no", "--rerun", "off", "--no-report",
+    "--world.damage", "wheel_gain:wheel=left,factor=0.8@6",
+)  # fmt: skip
+
+
+@bench(
+    "runs killed (SIGKILL) at random moments that resume to the same bytes",
+    bar="10 of 10",
+)
+def resume(quick: bool) -> Result:
+    """Kill and resume; a moment is a random share of an undisturbed run's time."""
+    count = 2 if quick else 10
+    rng = seeding.generator(0, "bench", "resume")
+    with tempfile.TemporaryDirectory() as name:
+        home = Path(name)
+        whole, first_step = _undisturbed(home / "clean")
+        expected = _contents(home / "clean")
+        kills = []
+        for index in range(count):
+            moment = float(rng.uniform(0.5 * first_step, whole))
+            trials = _killed(home / f"{index}", moment)
+            _finish(_demo(home / f"{index}"))
+            kills.append(
+                {
+                    "seconds": round(moment, 2),
+                    "trials_done": trials,
+                    "differing": _differing(_contents(home / f"{index}"), expected),
+                }
+            )
+    same = sum(not kill["differing"] for kill in kills)
+    return Result(
+        figure=same,
+        unit=f"of {count}",
+        holds=same == count,
+        n=count,
+        details={"kills": kills, "undisturbed_seconds": round(whole, 2)},
+    )
+
+
+def _demo(out: Path) -> subprocess.Popen:
+    return _start("run", "demo", "--out", out, *SETTINGS, "--resume")
+
+
+def _undisturbed(out: Path) -> tuple[float, float]:
+    """Seconds that a whole run takes, and seconds to its first stored trial."""
+    began, first = time.monotonic(), np.inf
+    process = _demo(out)
+    while process.poll() is None:
+        if np.isinf(first) and (out / "steps" / "00000.npz").exists():
+            first = time.monotonic() - began
+        time.sleep(0.01)
+    if process.returncode != 0:
+        raise RuntimeError(f"the undisturbed run exited with {process.returncode}")
+    return time.monotonic() - began, first
+
+
+def _killed(out: Path, moment: float) -> int:
+    """Kill a run after so many seconds; gives the trials it had stored."""
+    process = _demo(out)
+    try:
+        process.wait(timeout=moment)
+    except subprocess.TimeoutExpired:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    return len(list((out / "steps").glob("[0-9]*.npz")))
+
+
+def _contents(directory: Path) -> dict[str, bytes]:
+    """Bytes of every file, the commit's name left out: it may change meanwhile."""
+    head = json.loads((directory / "run.json").read_bytes())
+    commit = head["versions"]["commit"].encode()
+    return {
+        str(path.relative_to(directory)): path.read_bytes().replace(commit, b"commit")
+        for path in sorted(directory.rglob("*"))
+        if path.is_file() and path.name not in MAY_DIFFER
+    }
+
+
+def _differing(one: dict[str, bytes], other: dict[str, bytes]) -> list[str]:
+    names = sorted({*one, *other})
+    return [name for name in names if one.get(name) != other.get(name)]
+
 
 WORKERS = 2
 
@@ -42,9 +129,9 @@ def campaign_kill(quick: bool) -> Result:
         home = Path(name)
         file = home / "tiny.toml"
         file.write_text(text(batches, trials=2, replicates=2))
-        clean = _finish(_start(file, home / "clean"))
+        clean = _finish(_driver(file, home / "clean"))
         moments = np.sort(rng.integers(1, int(0.75 * batches), kills))
-        driver = _start(file, home / "out")
+        driver = _driver(file, home / "out")
         struck = _strike(driver, home / "out", moments, rng)
         kept = _end_driver(driver, home / "out", int(0.8 * batches))
         changed, last = _resume(file, home / "out", kept)
@@ -74,20 +161,26 @@ def campaign_kill(quick: bool) -> Result:
     )
 
 
-def _start(file: Path, out: Path) -> subprocess.Popen:
-    words = ["campaign", "run", str(file), "--out", str(out), "--resume"]
+def _driver(file: Path, out: Path) -> subprocess.Popen:
+    words = ("campaign", "run", file, "--out", out, "--resume")
+    return _start(*words, "--workers", WORKERS)
+
+
+def _start(*words: object) -> subprocess.Popen:
+    """`bns` in a process of its own."""
     return subprocess.Popen(
-        [sys.executable, "-m", "bns", *words, "--workers", str(WORKERS)],
+        [sys.executable, "-m", "bns", *map(str, words)],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         env={**os.environ, "OMP_NUM_THREADS": "1"},
     )
 
 
-def _finish(driver: subprocess.Popen) -> float:
+def _finish(process: subprocess.Popen) -> float:
+    """Seconds until it ends."""
     began = time.monotonic()
-    if driver.wait() != 0:
-        raise RuntimeError(f"the campaign exited with {driver.returncode}")
+    if process.wait() != 0:
+        raise RuntimeError(f"it exited with {process.returncode}")
     return time.monotonic() - began
 
 
@@ -132,7 +225,7 @@ def _end_driver(driver: subprocess.Popen, out: Path, after: int) -> dict[str, by
 
 def _resume(file: Path, out: Path, kept: dict[str, bytes]) -> tuple[int, float]:
     """Go on; gives how many stored batches changed meanwhile, and the time it took."""
-    driver = _start(file, out)
+    driver = _driver(file, out)
     began, changed = time.monotonic(), set()
     while driver.poll() is None:
         time.sleep(0.2)

@@ -8,5 +8,4 @@ engines/      where batches run: in this process, on a local pool, on Ray
 store.py      a file per batch, compacted to Parquet, readable while it grows
 drive.py      the loop around all of them
 table.py      what the campaign says: medians, pairs, power
-curves.py     recovery curves and sensitivity, as numbers
 """

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bns.campaign.engines.base import Engine, Outcome
+from bns.campaign.engines.registry import Engine, Outcome
 from bns.campaign.file import Campaign
 from bns.campaign.identity import changed_default
 from bns.campaign.plan import Job, plan
@@ -140,15 +140,12 @@ def run(
         check_device(member.config.device)
         check_world(member.config)
     with Lock(out) as lock:
-        store = opened(campaign, Path(out), resume=resume, lock=lock)
-        if not mix:
-            store.check_versions()
-        store.tidy()
+        store = opened(
+            campaign, Path(out), resume=resume, lock=lock, mix=mix, retry=retry
+        )
         if campaign.text:
             text = seal.sealed_text(campaign.text)
             files.write_text(store.directory / FILE, text)
-        if retry:
-            store.forgive()
         done = replicates_done(store, campaign)
         jobs = plan(campaign, done)
         known = store.failures()
@@ -158,7 +155,15 @@ def run(
     return Session(**session, waiting=len(jobs) - len(todo))
 
 
-def opened(campaign: Campaign, out: Path, *, resume: bool, lock: Lock) -> CampaignStore:
+def opened(
+    campaign: Campaign,
+    out: Path,
+    *,
+    resume: bool,
+    lock: Lock,
+    mix: bool = False,
+    retry: bool = False,
+) -> CampaignStore:
     """The store to go on with, or a new one, in a directory that is locked.
 
     Args:
@@ -166,19 +171,28 @@ def opened(campaign: Campaign, out: Path, *, resume: bool, lock: Lock) -> Campai
         out: directory of the store.
         resume: whether to go on with a store that is there.
         lock: held on that directory; the store keeps it.
+        mix: allow results of several package versions in it.
+        retry: forget which batches failed before.
 
     Raises:
-        BnsError: the directory is not free, or holds a campaign of another seed.
+        BnsError: the directory is not free, or holds a campaign of another seed or
+            version.
     """
     if not (resume and (out / "campaign.json").exists()):
-        return CampaignStore.create(out, campaign.name, campaign.seed, lock)
-    store = CampaignStore.open(out)
-    store.lock = lock
+        store = CampaignStore.create(out, campaign.name, campaign.seed, lock)
+    else:
+        store = CampaignStore.open(out)
+        store.lock = lock
     if store.seed != campaign.seed:
         raise BnsError(
             f"{out} was made with seed = {store.seed}, the file says {campaign.seed}: "
             "give the file that seed, or another --out."
         )
+    if not mix:
+        store.check_versions()
+    store.tidy()
+    if retry:
+        store.forgive()
     return store
 
 

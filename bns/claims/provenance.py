@@ -13,7 +13,7 @@ from typing import Any
 
 from bns.campaign.identity import NO_PART, digest
 from bns.experiment.config import RunConfig
-from bns.experiment.loading import to_mapping
+from bns.experiment.loading import flat, to_mapping
 from bns.experiment.versions import REVISION
 
 LENGTH = 16  # hexadecimal digits of a digest
@@ -51,14 +51,14 @@ def resolved(config: RunConfig, ignored: Collection[str] = ()) -> dict[str, Any]
         config: the configuration.
         ignored: sections that are no part of it.
     """
-    flat = _flat(
+    flattened = flat(
         {
             key: value
             for key, value in to_mapping(config).items()
             if key not in ignored and key not in NO_PART
         }
     )
-    return dict(sorted(flat.items()))
+    return dict(sorted(flattened.items()))
 
 
 def of(settings: Settings) -> str:
@@ -76,16 +76,6 @@ def difference(now: Settings, then: Settings) -> str:
         if now[key] != then[key]:
             return f"{key} was {then[key]!r}, is {now[key]!r}"
     return ""
-
-
-def _flat(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for key, value in content.items():
-        if isinstance(value, dict):
-            found |= _flat(value, f"{prefix}{key}.")
-        else:
-            found[prefix + key] = value
-    return found
 
 
 def current(made: Made, sides: tuple[str, ...]) -> bool:

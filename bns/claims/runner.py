@@ -7,11 +7,10 @@ from pathlib import Path
 
 from bns.campaign import drive
 from bns.campaign.drive import Progress
-from bns.campaign.engines.base import Engine
+from bns.campaign.engines.registry import Engine
 from bns.campaign.file import Campaign, Member
-from bns.campaign.merge import adopt
 from bns.campaign.plan import Job
-from bns.campaign.store import CampaignStore
+from bns.campaign.store import CampaignStore, adopt
 from bns.claims import held, price, report, schedule, sides
 from bns.claims.claim import Claim
 from bns.claims.report import Judged
@@ -104,12 +103,9 @@ def run(
     check_device("cpu")
     session = Session()
     with Lock(out) as lock:
-        store = drive.opened(_campaign((), world), out, resume=True, lock=lock)
-        if not mix:
-            store.check_versions()
-        store.tidy()
-        if retry:
-            store.forgive()
+        store = drive.opened(
+            _campaign((), world), out, resume=True, lock=lock, mix=mix, retry=retry
+        )
         while not session.stopped:
             rows = report.judged(
                 claims, out, world=world, quick=quick, own=own, runs=last
@@ -231,8 +227,6 @@ def take(
     out = directory(world, quick=False, root=root)
     with Lock(out) as lock:
         store = drive.opened(campaign, out, resume=True, lock=lock)
-        store.check_versions()
-        store.tidy()
         taken = []
         for folder in folders:
             have = held.read(out, report.identities(members.values()))

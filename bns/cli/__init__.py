@@ -8,10 +8,10 @@ from bns.errors import UnknownNameError
 
 VERBS = {
     "run": ("run", "train a preset or a TOML file"),
-    "report": ("report", "write one self-contained HTML report on runs"),
-    "compare": ("compare", "medians, intervals, p values and effect sizes of runs"),
+    "report": ("results", "write one self-contained HTML report on runs"),
+    "compare": ("results", "medians, intervals, p values and effect sizes of runs"),
     "view": ("view", "open a run's recording, or make a picture of it"),
-    "export": ("export", "write trials as a LeRobotDataset or a Parquet table"),
+    "export": ("results", "write trials as a LeRobotDataset or a Parquet table"),
     "campaign": ("campaign", "many configurations: run them, tables, pictures"),
     "claims": ("claims", "the dissertation's claims: list, run, judge"),
     "standings": ("standings", "all learners on the same damages: who recovers"),
@@ -23,7 +23,7 @@ VERBS = {
     "robots": ("lists", "list the robot models"),
     "models": ("models", "make, check, open or draw a robot model"),
     "effects": ("lists", "list the effects with parameters, units and ranges"),
-    "examples": ("examples", "list, print or copy the examples"),
+    "examples": ("lists", "list, print or copy the examples"),
     "schema": ("schema", "JSON Schema of the TOML files, for editors"),
     "gap": ("gap", "diagnose the gap between recordings and a model (experimental)"),
     "hardware": ("hardware", "real robots: rehearse, check, calibrate, record"),

@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from bns.cli.fields import Positional
 from bns.cli.parse import Verbs, dispatch
 from bns.cli.tables import show
 from bns.errors import BnsError
+
+if TYPE_CHECKING:
+    from bns.campaign.engines.registry import Engine
 
 MANUAL = """usage: bns campaign {run,merge,status,table,plot} ... [...]
 
@@ -27,7 +30,31 @@ Measure = Literal["observation", "solve", "recover"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class Batches:
+    """Where batches run, and which: options that several verbs have."""
+
+    engine: Literal["local", "inline", "ray"] = "local"
+    """local: processes of one thread each; inline: this process; ray: a Ray cluster"""
+    workers: int = 0
+    """processes (local) or CPUs (ray, where it is started here); 0 = one a core"""
+    ray_address: str = ""
+    """HOST:PORT of a Ray cluster; without it one is started here"""
+    retry: bool = False
+    """try batches again that failed before"""
+    mix: bool = False
+    """allow results of several package versions in one directory"""
+
+    def made(self) -> "Engine":
+        """The engine, see `bns.campaign.engines.registry.make`."""
+        from bns.campaign.engines import registry
+
+        return registry.make(
+            self.engine, workers=self.workers, ray_address=self.ray_address
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run(Batches):
     """Run what is missing of a campaign. Ctrl-C stops it after the next batch that is
     done, twice at once; --resume goes on and loses nothing that was done.
     """
@@ -36,18 +63,8 @@ class Run:
     """the campaign file (TOML), or a campaign's directory to go on with"""
     out: str = ""
     """directory for the results (default: runs/NAME)"""
-    engine: Literal["local", "inline", "ray"] = "local"
-    """local: processes of one thread each; inline: this process; ray: a Ray cluster"""
-    workers: int = 0
-    """processes (local) or CPUs (ray, where it is started here); 0 = one a core"""
-    ray_address: str = ""
-    """HOST:PORT of a Ray cluster; without it one is started here"""
     resume: bool = False
     """go on with what is in the directory"""
-    retry: bool = False
-    """try batches again that failed before"""
-    mix: bool = False
-    """allow results of several package versions in one directory"""
     yes: bool = False
     """take a very large campaign"""
 
@@ -115,7 +132,6 @@ def main(verb: str, argv: list[str]) -> int:
 
 def _run(given: Run) -> int:
     from bns.campaign import drive, file
-    from bns.campaign.engines import registry
     from bns.campaign.store import FILE
     from bns.cli.run import STOPPED, until_interrupted
 
@@ -127,14 +143,11 @@ def _run(given: Run) -> int:
     if not path.exists():
         raise BnsError(f"There is no campaign file {path}: see docs/campaigns.md.")
     campaign = file.read(path, sure=given.yes)
-    engine = registry.make(
-        given.engine, workers=given.workers, ray_address=given.ray_address
-    )
     with until_interrupted() as stop:
         session = drive.run(
             campaign,
             out,
-            engine,
+            given.made(),
             resume=given.resume,
             retry=given.retry,
             mix=given.mix,
@@ -144,11 +157,22 @@ def _run(given: Run) -> int:
     return _say(session, out, STOPPED)
 
 
-def _say(session: Any, out: Path, stopped: int) -> int:
+def say(session: Any, out: Path | str) -> int:
+    """Print what a session did; gives how many batches failed.
+
+    Args:
+        session: that `run` of campaigns, claims or standings gave.
+        out: directory of its results.
+    """
     bad = len(session.failed) + session.waiting
     print(f"{session.done} batches done, {bad} failed. Results: {out}")
     for key, reason in list(session.failed.items())[:5]:
         print(f"  {key}: {reason}")
+    return bad
+
+
+def _say(session: Any, out: Path, stopped: int) -> int:
+    bad = say(session, out)
     if session.missing:
         print(f"{session.missing} are left: bns campaign run {out} --resume")
         return stopped
@@ -159,7 +183,7 @@ def _say(session: Any, out: Path, stopped: int) -> int:
 
 
 def _merge(given: Merge) -> int:
-    from bns.campaign.merge import merge
+    from bns.campaign.store import merge
 
     if not given.others:
         raise BnsError("No directory was given to take from: name one or more.")
@@ -193,7 +217,7 @@ def _status(given: Status) -> int:
 def _table(given: TableOf) -> int:
     from bns.campaign import results
     from bns.campaign.table import table
-    from bns.cli.compare import span, text
+    from bns.cli.results import span, text
     from bns.stats.compare import MEASURES
 
     found = table(results.read(given.directory), given.measure)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from bns.claims.price import Price
+from bns.cli.campaign import Batches
 from bns.cli.fields import Positional
 from bns.cli.parse import Verbs, dispatch
 from bns.cli.tables import show
@@ -53,7 +54,7 @@ class Plan:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class Run(Batches):
     """Run what claims need and is missing, look by look, then judge them. Runs are kept
     in runs/claims/WORLD and never done twice; it goes on wherever it was stopped. What
     is published of today's settings is not run again, unless --own.
@@ -74,16 +75,6 @@ class Run:
     findings: str = ""
     """file that all findings are written to as they come; by default
     ROOT/findings.json"""
-    engine: Literal["local", "inline", "ray"] = "local"
-    """local: processes of one thread each; inline: this process; ray: a Ray cluster"""
-    workers: int = 0
-    """processes or CPUs; 0 = one a core"""
-    ray_address: str = ""
-    """HOST:PORT of a Ray cluster; without it one is started here"""
-    retry: bool = False
-    """try batches again that failed before"""
-    mix: bool = False
-    """allow results of several package versions in one directory"""
     root: str = "runs/claims"
     """where runs are kept"""
 
@@ -187,7 +178,6 @@ def _some(names: Collection[str]) -> str:
 
 
 def _run(given: Run) -> int:
-    from bns.campaign.engines import registry
     from bns.claims import runner
     from bns.claims.claim import chosen
     from bns.cli.run import STOPPED, until_interrupted
@@ -202,14 +192,11 @@ def _run(given: Run) -> int:
     lacking = runner.impossible(wanted, world=given.world)
     for name, why in list(lacking.items())[: None if given.ids else 3]:
         print(f"{name} cannot run: {why}.")
-    engine = registry.make(
-        given.engine, workers=given.workers, ray_address=given.ray_address
-    )
     keeper = Keeper(given)
     with until_interrupted() as stop:
         session = runner.run(
             wanted,
-            engine,
+            given.made(),
             world=given.world,
             quick=given.quick,
             runs=given.runs,

@@ -1,14 +1,19 @@
-"""`bns presets`, `learners`, `tasks`, `worlds`, `robots`, `effects`: what exists."""
+"""`bns presets`, `learners`, `tasks`, `worlds`, `robots`, `effects`, `examples`."""
 
+import ast
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.cli.tables import show
-from bns.errors import UnknownNameError
+from bns.errors import BnsError, UnknownNameError
 
+PLACE = Path(__file__).parents[1] / "examples"
+LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.pyc", ".*")
 FEW = 4  # commands of a robot that a list shows
 Stage = Literal["", "command", "actuator", "body", "optics", "sensor", "tracking"]
 Rows = tuple[list[str], list[list[str]]]
@@ -30,18 +35,32 @@ class Effects:
 
     filter: Positional[str] = ""
     """part of a name or of a meaning, such as wheel or friction"""
-    stage: Literal[
-        "", "command", "actuator", "body", "optics", "sensor", "tracking"
-    ] = ""
+    stage: Stage = ""
     """only effects that act there"""
     json: bool = False
     """print JSON instead of a table, parameters included"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Examples:
+    """List the examples, print one, or copy them all: scripts of less than 100 lines,
+    notebooks, robots, and a package that adds to the testbed.
+    """
+
+    name: Positional[str] = ""
+    """script to print, such as 01_drive_a_robot"""
+    copy: str = ""
+    """directory to copy all examples to; must not be there yet"""
+    json: bool = False
+    """print JSON instead of a table"""
 
 
 def main(verb: str, argv: list[str]) -> int:
     """Print the list that `verb` names."""
     if verb == "effects":
         return _effects(parse(Effects, argv, prog="bns effects"))
+    if verb == "examples":
+        return _examples(parse(Examples, argv, prog="bns examples"))
     given = parse(Arguments, argv, prog=f"bns {verb}")
     head, rows = LISTS[verb]()
     show(head, rows, json=given.json)
@@ -161,6 +180,40 @@ def _parameters(found: list[Any]) -> Rows:
         for c in effect.choices:
             rows.append(["", "", c.name, "", f"{c.shown} (default {c.default})", c.doc])
     return ["effect", "stage", "parameter", "unit", "range", "meaning"], rows
+
+
+def _examples(given: Examples) -> int:
+    if given.copy:
+        return _copy(Path(given.copy))
+    scripts = {path.stem: path for path in sorted(PLACE.glob("*.py"))}
+    if not given.name:
+        rows = [[name, says(path)] for name, path in scripts.items()]
+        show(["example", "what it shows"], rows, json=given.json)
+        if not given.json:
+            print("Read one: bns examples NAME. Take all: bns examples --copy DIR.")
+        return 0
+    name = given.name.removesuffix(".py")
+    if name not in scripts:
+        raise UnknownNameError("example", given.name, scripts)
+    print(scripts[name].read_text(encoding="utf-8"), end="")
+    return 0
+
+
+def says(path: Path) -> str:
+    """The first line of a script's docstring."""
+    text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+    return text.split("\n", 1)[0]
+
+
+def _copy(to: Path) -> int:
+    if to.exists():
+        raise BnsError(f"{to} exists and is not overwritten; give another directory.")
+    try:
+        shutil.copytree(PLACE, to, ignore=LEFT_OUT)
+    except OSError as error:
+        raise BnsError(f"{to} cannot be written: {error}.") from error
+    print(f"examples:  {to}")
+    return 0
 
 
 LISTS: dict[str, Callable[[], Rows]] = {

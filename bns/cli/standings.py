@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
+from bns.cli.campaign import FAILED, Batches, say
 from bns.cli.fields import Positional
 from bns.cli.parse import Verbs, dispatch
 from bns.cli.tables import show
@@ -17,9 +17,6 @@ MANUAL = """usage: bns standings {plan,run,table,plot} [RIVAL ...] [...]
 
 RIVAL is an entry of the standings or any learner, one of your own as well;
 none means all entries. `bns standings VERB --help` is the manual of a verb."""
-
-FAILED = 1
-"""exit code where batches failed"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,23 +40,13 @@ class Plan:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run(Plan):
+class Run(Batches, Plan):
     """Run what is missing. Runs are kept and never done twice; learners that are the
     same until the damage train those trials once. Ctrl-C stops after the next batch.
     """
 
     root: str = "runs/standings"
     """where runs are kept"""
-    engine: Literal["local", "inline", "ray"] = "local"
-    """local: processes of one thread each; inline: this process; ray: a Ray cluster"""
-    workers: int = 0
-    """processes or CPUs; 0 = one a core"""
-    ray_address: str = ""
-    """HOST:PORT of a Ray cluster; without it one is started here"""
-    retry: bool = False
-    """try batches again that failed before"""
-    mix: bool = False
-    """allow results of several package versions in one directory"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +107,6 @@ def _plan(given: Plan) -> int:
 
 
 def _run(given: Run) -> int:
-    from bns.campaign.engines import registry
     from bns.cli.run import STOPPED, until_interrupted
     from bns.standings.run import hours, run
 
@@ -128,23 +114,17 @@ def _run(given: Run) -> int:
     print(
         f"{sum(hours(entries, given.runs).values()):.1f} processor hours from nothing."
     )
-    engine = registry.make(
-        given.engine, workers=given.workers, ray_address=given.ray_address
-    )
     with until_interrupted() as stop:
         session = run(
             entries,
-            engine,
+            given.made(),
             runs=given.runs,
             root=Path(given.root),
             retry=given.retry,
             mix=given.mix,
             stop=stop,
         )
-    bad = len(session.failed) + session.waiting
-    print(f"{session.done} batches done, {bad} failed. Results: {given.root}")
-    for key, reason in list(session.failed.items())[:5]:
-        print(f"  {key}: {reason}")
+    bad = say(session, given.root)
     if session.stopped:
         return STOPPED
     return FAILED if bad else 0

@@ -36,10 +36,6 @@ class Arguments:
 def main(verb: str, argv: list[str]) -> int:
     """Run the verb; gives the exit code.
 
-    Args:
-        verb: "view".
-        argv: words after it.
-
     Raises:
         BnsError: more than one of ``--png``, ``--gif``, ``--mp4`` and ``--web``, or
             nothing there to show.

@@ -80,6 +80,17 @@ def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
     return tree
 
 
+def flat(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """A tree of mappings as values by dotted name, the inverse of `nested`."""
+    found: dict[str, Any] = {}
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            found |= flat(value, f"{prefix}{key}.")
+        else:
+            found[prefix + key] = value
+    return found
+
+
 OLD_LEARNERS = {"navigation": "", "light": "light", "walk": "walk"}
 """what `learner` was called up to version 0.1, when it said what is learned: task"""
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from bns.campaign import drive
-from bns.campaign.engines.base import Engine
+from bns.campaign.engines.registry import Engine
 from bns.campaign.file import Campaign, Member
 from bns.campaign.plan import Job
 from bns.claims import schedule
@@ -108,12 +108,9 @@ def run(
     campaign = Campaign("standings", tuple(members.values()), runs, schedule.SEED)
     session = Session()
     with Lock(root) as lock:
-        store = drive.opened(campaign, root, resume=True, lock=lock)
-        if not mix:
-            store.check_versions()
-        store.tidy()
-        if retry:
-            store.forgive()
+        store = drive.opened(
+            campaign, root, resume=True, lock=lock, mix=mix, retry=retry
+        )
         done = drive.replicates_done(store, campaign)
         todo = jobs(entries, runs, done, root)
         known = store.failures()

@@ -130,22 +130,21 @@ def _remove(path: Path) -> None:
 
 def _sync(path: Path) -> None:
     """Bring a file, or all files of a directory, to the disk."""
-    if path.is_dir():
-        for below in path.iterdir():
-            _sync(below)
-        _sync_directory(path)
+    if not path.is_dir():
+        _flush(path, os.O_RDWR)
         return
-    handle = os.open(path, os.O_RDWR)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+    for below in path.iterdir():
+        _sync(below)
+    _sync_directory(path)
 
 
 def _sync_directory(path: Path) -> None:
-    if os.name != "posix":  # elsewhere a directory cannot be opened
-        return
-    handle = os.open(path, os.O_RDONLY)
+    if os.name == "posix":  # elsewhere a directory cannot be opened
+        _flush(path, os.O_RDONLY)
+
+
+def _flush(path: Path, flags: int) -> None:
+    handle = os.open(path, flags)
     try:
         os.fsync(handle)
     finally:

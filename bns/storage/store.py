@@ -18,6 +18,7 @@ arrays and dataset hold all that was in it. Every file that is read again carrie
 checksum (`seal`, `parquet`; NPZ has its own); what an older version wrote has none.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,7 +33,7 @@ from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
 from bns.experiment.step import ARRAYS, Step, assemble
 from bns.storage import arrays as npz
-from bns.storage import files, journal, reading
+from bns.storage import files, journal, parquet, reading
 from bns.storage.directory import FORMAT, SCHEMA, check_free, read_head
 from bns.storage.lock import Lock
 
@@ -195,8 +196,6 @@ class RunStore:
 
     def finish(self) -> RunRecord:
         """Turn the steps into the record, its arrays and the dataset."""
-        from bns.storage.table import write_table
-
         steps = self.steps()
         record = self._assemble(steps)
         arrays = {name: getattr(record, name) for name in ARRAYS}
@@ -263,8 +262,6 @@ def _form(step: Step) -> dict[str, tuple]:
 
 
 def _finished_record(store: RunStore) -> RunRecord:
-    from bns.storage.table import read_table
-
     path, config = store.directory / "arrays.npz", store.config
     arrays = npz.read_npz(path)
     missing = {*ARRAYS, "damage_onset"} - set(arrays)
@@ -300,3 +297,40 @@ def _finished_record(store: RunStore) -> RunRecord:
         },
         **{name: arrays[name] for name in ARRAYS},
     )
+
+
+KEYS = ("replicate", "trial")
+
+
+def write_table(path: Path, columns: Mapping[str, np.ndarray]) -> None:
+    """Write columns of shape ``(R, T)``; the same columns give the same bytes.
+
+    Raises:
+        StorageError: no space, or no permission.
+    """
+    runs, trials = np.indices(next(iter(columns.values())).shape)
+    table = {"replicate": runs, "trial": trials} | dict(columns)
+    parquet.write(path, {name: array.ravel() for name, array in table.items()})
+
+
+def read_table(path: Path) -> dict[str, np.ndarray]:
+    """Read what `write_table` wrote, each column ``(R, T)``.
+
+    Raises:
+        FormatError: absent, torn, damaged, or not such a table.
+    """
+    table = parquet.read(path)
+    kinds = dict.fromkeys(table.column_names, "double") | dict.fromkeys(KEYS, "int64")
+    columns = parquet.numbers(table, kinds, path)
+    shape = tuple(int(columns[key].max(initial=-1)) + 1 for key in KEYS)
+    if math.prod(shape) != table.num_rows:  # nothing is made for numbers so large
+        raise FormatError(
+            f"{path}: {' x '.join(map(str, shape))} replicates and trials in "
+            f"{table.num_rows} rows."
+        )
+    for key, index in zip(KEYS, np.indices(shape), strict=True):
+        if not np.array_equal(columns.pop(key), index.ravel()):
+            raise FormatError(
+                f"{path}: {key} does not count up over the {table.num_rows} rows."
+            )
+    return {name: array.reshape(shape) for name, array in columns.items()}

@@ -13,7 +13,6 @@ TURNED = np.deg2rad(1.0)  # off the start's heading that will do
 FACED = np.deg2rad(5.0)  # off a heading at the edge that will do; assumed
 SLOW = 0.025  # m/s; below it the robot's speed control does not regulate well
 TIME = 60.0  # s to get there
-PULSE = 0.12  # s of lag of the wheels: what a short turn loses at each end
 AXLE = 0.0874  # m, nominal
 
 

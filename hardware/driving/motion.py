@@ -8,8 +8,7 @@ from bns.hardware.clock import Clock
 from bns.hardware.driving.wheels import Following, Wheels
 from bns.hardware.faults import FaultLog, LinkError, Void
 from bns.hardware.khepera.driver import Drive, Khepera3
-from bns.hardware.safety.limits import Limits, Operator
-from bns.hardware.safety.monitor import SafetyMonitor
+from bns.hardware.safety.limits import Limits, Operator, SafetyMonitor
 from bns.hardware.safety.motion_check import MotionCheck
 from bns.hardware.tracking.eyes import Eyes
 from bns.hardware.tracking.tracker import Sighting

@@ -18,8 +18,7 @@ from bns.hardware.dynamixel import packets
 from bns.hardware.dynamixel.joints import Joint
 from bns.hardware.faults import FaultLog, LinkError, SafetyStop, Void
 from bns.hardware.khepera.driver import Guard
-from bns.hardware.line import INSTALL, check_port, claim
-from bns.hardware.openers import Openers
+from bns.hardware.line import INSTALL, Openers, check_port, claim
 from bns.hardware.safety.stop_order import insist, phantomx
 from bns.hardware.safety.watchdog import receive, send
 from bns.worlds.physics.legged_flags import OVERLOAD_TIME, SATURATED, STALLED

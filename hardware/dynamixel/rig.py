@@ -1,13 +1,22 @@
-"""A hexapod, a camera and a watchdog, connected and checked; nothing moves for that."""
+"""A hexapod, a camera and a watchdog, connected and checked; nothing moves for that.
+
+Zeros of its servos are positions read while its legs are half-way: the torque stays
+off, a person or a jig holds the legs where every joint of the model is at 0
+(`models/phantomx`: coxae straight, femora and tibiae half-way).
+"""
 
 import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from bns.errors import BnsError
 from bns.hardware.clock import Clock, RealClock, urgent
 from bns.hardware.dynamixel import joints, packets
 from bns.hardware.dynamixel.bus import EMPTY, Bus
+from bns.hardware.dynamixel.joints import Joint
 from bns.hardware.dynamixel.walker import Walker
 from bns.hardware.faults import FaultLog, LinkError
 from bns.hardware.line import check_port
@@ -143,3 +152,89 @@ def charged(bus: Bus) -> float:
             f"The bus has {volts:.1f} V, less than {EMPTY:g} V: charge the battery."
         )
     return volts
+
+
+READS = 9  # of each servo
+SCATTER = 3  # units between them; more = the leg was moved
+FAR = 60  # units (18 deg) from half-way; farther = the leg is somewhere else
+
+
+def calibrate(port: str, known: str, out: Path) -> Iterator[str]:
+    """Read every servo and write the robot's file; says what was found.
+
+    Args:
+        port: of the robot.
+        known: file with numbers and signs; empty = the one that comes with the driver.
+        out: file to write.
+
+    Raises:
+        BnsError: a servo is missing, holds, moves, or is far from half-way.
+    """
+    bus = Bus(port, joints.read(known or joints.FILE), RealClock())
+    try:
+        bus.identify()
+        holding = [j.name for j in bus.joints if bus.holds(j.id)]
+        if holding:
+            raise BnsError(
+                f"{', '.join(holding[:3])}{' ...' * (len(holding) > 3)} hold their "
+                "place: switch the robot off and on, put its legs half-way by hand."
+            )
+        made = [found(bus, joint) for joint in bus.joints]
+    finally:
+        bus.release()
+    joints.write(out, tuple(made), said="Zeros by `bns hardware calibrate`.")
+    off = [m.zero - 512 for m in made]
+    yield f"zeros   {min(off):+d} to {max(off):+d} units from half-way, 18 servos"
+
+
+def found(bus: Bus, joint: Joint) -> Joint:
+    """A joint with its zero where it stands now; its end stops move along.
+
+    Raises:
+        BnsError: it moves, or is far from half-way.
+    """
+    seen = [bus.read(joint.id).position for _ in range(READS)]
+    zero = round(float(np.median(seen)))
+    if max(seen) - min(seen) > SCATTER:
+        raise BnsError(f"{joint.name} moves while it is read: hold the leg still.")
+    if abs(zero - 512) > FAR:
+        raise BnsError(
+            f"{joint.name} reads {zero}, {abs(zero - 512)} units from half-way: put "
+            "the leg half-way, or mount the horn anew."
+        )
+    moved = zero - joint.zero
+    low, high = (min(max(stop + moved, 0), 1023) for stop in (joint.low, joint.high))
+    return joint._replace(zero=zero, low=low, high=high)
+
+
+def report(port: str, servos: str = "") -> Iterator[str]:
+    """Look at every servo; nothing moves.
+
+    Args:
+        port: of the robot.
+        servos: its file; empty = the one that comes with the driver.
+
+    Raises:
+        BnsError: the port, a servo or the battery is not as it should be.
+    """
+    clock = RealClock()
+    bus = Bus(port, joints.read(servos or joints.FILE), clock)
+    try:
+        bus.identify()
+        if not servos:
+            yield "zeros      assumed; see `bns hardware calibrate --what servos`"
+        yield f"servos     {len(bus.joints)} AX-12A at {packets.BAUD} baud"
+        begin = clock.now()
+        for joint in bus.joints:
+            state = bus.read(joint.id)
+            yield (
+                f"{joint.name:<9} id {joint.id:>2}  {joint.angle(state.position):+.3f} "
+                f"rad, load {state.load:+.2f}, {state.voltage:.1f} V, "
+                f"{state.temperature} C"
+            )
+        took = clock.now() - begin
+        yield f"sweep      {took * 1e3:.1f} ms for all, {len(bus.faults)} faults"
+        if min(state.voltage for state in bus.states.values()) < EMPTY:
+            raise BnsError(f"The bus has less than {EMPTY} V: charge the battery.")
+    finally:
+        bus.release()

@@ -15,8 +15,7 @@ from bns.errors import BnsError
 from bns.hardware.clock import Clock
 from bns.hardware.dynamixel.bus import Bus, Overload
 from bns.hardware.faults import FaultLog
-from bns.hardware.safety.limits import Limits, Operator
-from bns.hardware.safety.monitor import SafetyMonitor
+from bns.hardware.safety.limits import Limits, Operator, SafetyMonitor
 from bns.hardware.tracking.eyes import Eyes
 from bns.hardware.tracking.tracker import Sighting
 from bns.models.ax12a import SPEED_UNIT

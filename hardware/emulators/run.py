@@ -11,12 +11,10 @@ from bns.hardware.clock import urgent
 from bns.hardware.dynamixel import joints, packets
 from bns.hardware.emulators.camera import PoseServer
 from bns.hardware.emulators.device import Noise
-from bns.hardware.emulators.hexapod_body import HexapodBody
-from bns.hardware.emulators.khepera_body import KheperaBody
-from bns.hardware.emulators.khepera_device import KheperaDevice
+from bns.hardware.emulators.hexapod import HexapodBody, ServoBank
+from bns.hardware.emulators.khepera import KheperaBody, KheperaDevice
 from bns.hardware.emulators.mishaps import Mishaps, Restarts
 from bns.hardware.emulators.pty_host import PtyHost
-from bns.hardware.emulators.servo_bank import ServoBank
 from bns.hardware.khepera import protocol
 from bns.worlds.light.field import Lamp
 

@@ -5,11 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from bns.hardware.clock import VirtualClock
-from bns.hardware.emulators.camera import BodyPainter
+from bns.hardware.emulators.camera import BodyPainter, Painter
 from bns.hardware.emulators.device import Noise, VirtualLine
-from bns.hardware.emulators.frames import Painter
-from bns.hardware.emulators.khepera_body import KheperaBody
-from bns.hardware.emulators.khepera_device import KheperaDevice
+from bns.hardware.emulators.khepera import KheperaBody, KheperaDevice
 from bns.hardware.faults import FaultLog
 from bns.hardware.khepera.driver import Khepera3
 from bns.hardware.rig import SIZE, Rig

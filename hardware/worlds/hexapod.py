@@ -13,7 +13,7 @@ from bns.hardware.dynamixel.rig import HexapodRig
 from bns.hardware.dynamixel.walker import SPEED
 from bns.hardware.faults import Void
 from bns.hardware.safety.limits import Limits
-from bns.hardware.worlds import walked
+from bns.hardware.worlds import records
 from bns.hardware.worlds.real_robot import RealRobot
 from bns.worlds import active
 from bns.worlds.active import Stages
@@ -104,7 +104,7 @@ class HardwareHexapod(RealRobot[HexapodRig]):
             "missed": done.missed,
             "late": round(done.late, 4),
         }
-        return walked.trial(
+        return records.walked_trial(
             done,
             given,
             sample_dt=self.sample_dt,

@@ -5,7 +5,7 @@ import warnings
 
 import pytest
 
-from bench.storage import reading
+from bench.storage import fuzz
 from bench.storage.readers import Reader, readers
 from bench.storage.sample_files import make
 
@@ -24,11 +24,11 @@ def home(tmp_path_factory):
 @pytest.mark.parametrize("reader", readers(), ids=lambda reader: reader.name)
 def test_wrong_files_are_refused_by_one_line(reader, home):
     assert reader.sane(reader.read(home)) == ""
-    found = reading.Found()
+    found = fuzz.Found()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for seed in range(INPUTS):
-            reading.attempt(reader, home, seed, found)
+            fuzz.attempt(reader, home, seed, found)
     assert found.cases == []
     assert found.counts["inputs"] == INPUTS
     skips = reader.name == "timing.jsonl"  # lines that are torn are left out
@@ -48,8 +48,8 @@ def busy(home):
 def test_what_hangs_is_ended_and_a_busy_machine_is_no_hang(
     read, hangs, monkeypatch, tmp_path
 ):
-    monkeypatch.setattr(reading, "SLOW", 0.05)
-    monkeypatch.setattr(reading, "ASLEEP", 1.0)
-    found = reading.Found()
-    reading.judge(Reader("one", "file", read), tmp_path, 0, found)
+    monkeypatch.setattr(fuzz, "SLOW", 0.05)
+    monkeypatch.setattr(fuzz, "ASLEEP", 1.0)
+    found = fuzz.Found()
+    fuzz.judge(Reader("one", "file", read), tmp_path, 0, found)
     assert found.counts["hangs"] == hangs and len(found.cases) == hangs

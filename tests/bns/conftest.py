@@ -2,6 +2,8 @@
 
 import pytest
 
+from bns.__main__ import WRONG_INPUT, main
+
 
 @pytest.fixture(autouse=True)
 def one_commit(monkeypatch):
@@ -15,3 +17,19 @@ def fakes():
     from tests.bns import fakes
 
     return fakes
+
+
+@pytest.fixture
+def said(capsys):
+    """What a command prints, its exit code being `code`; an error is one line."""
+
+    def run(*argv, code=0):
+        assert main([str(word) for word in argv]) == code
+        captured = capsys.readouterr()
+        if code != WRONG_INPUT:
+            return captured.out
+        lines = captured.err.splitlines()
+        assert "Traceback" not in captured.err and len(lines) == 1
+        return captured.err
+
+    return run

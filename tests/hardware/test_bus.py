@@ -1,8 +1,8 @@
 """The hexapod's bus: ROBOTIS's SDK against emulated servos on a pseudo terminal."""
 
 import os
-import threading
 import time
+from contextlib import ExitStack
 
 import numpy as np
 import pytest
@@ -10,43 +10,26 @@ import pytest
 from bns.errors import BnsError, FormatError
 from bns.hardware.clock import RealClock
 from bns.hardware.dynamixel import joints, packets
+from bns.hardware.emulators.hexapod import ServoBank
 from bns.hardware.emulators.pty_host import PtyHost
-from bns.hardware.emulators.servo_bank import ServoBank
 from bns.hardware.faults import LinkError, SafetyStop, Void
 
 pytest.importorskip("dynamixel_sdk")
 pytest.importorskip("serial")
 
 
-class Watching:
-    def __init__(self):
-        self.fed = []
-
-    def feed(self, *, moving):
-        self.fed.append(moving)
-
-
 @pytest.fixture
-def served(tmp_path):
+def served(tmp_path, serving):
     """Serves servos on a port; gives port and servos."""
-    ends = []
+    with ExitStack() as ends:
 
-    def serve(**settings):
-        clock = RealClock()
-        bank = ServoBank(at=clock.now(), **settings)
-        host = PtyHost(bank, tmp_path / "bus")
-        done = threading.Event()
-        thread = threading.Thread(target=host.serve, args=(done.is_set,))
-        thread.start()
-        ends.append((done, thread, host))
-        bank.host = host
-        return str(tmp_path / "bus"), bank
+        def serve(**settings):
+            bank = ServoBank(at=RealClock().now(), **settings)
+            bank.host = PtyHost(bank, tmp_path / "bus")
+            ends.enter_context(serving(bank.host))
+            return str(tmp_path / "bus"), bank
 
-    yield serve
-    for done, thread, host in ends:
-        done.set()
-        thread.join()
-        host.unplug()
+        yield serve
 
 
 def opened(port, **settings):
@@ -55,9 +38,9 @@ def opened(port, **settings):
     return Bus(port, joints.read(), RealClock(), latency=0.3, **settings)
 
 
-def test_goals_reach_all_servos_and_states_come_back(served):
+def test_goals_reach_all_servos_and_states_come_back(served, guard):
     port, bank = served()
-    bus = opened(port, guard=Watching())
+    bus = opened(port, guard=guard)
     bus.identify()
     bus.power()
     bus.write({joint.name: 0.2 for joint in bus.joints})
@@ -129,18 +112,19 @@ def test_a_full_turn_of_the_law_takes_the_motors_time():
     assert np.isclose(packets.UNITS, 1023 / np.deg2rad(300), rtol=1e-5)
 
 
-def standing(served):
+@pytest.fixture
+def standing(served, guard):
     """A bus whose servos hold, and the servos."""
     port, bank = served()
-    bus = opened(port, guard=Watching())
+    bus = opened(port, guard=guard)
     bus.write({joint.name: 0.0 for joint in bus.joints})
     bus.power()
     bus.read(1)
     return bus, bank
 
 
-def test_a_bus_that_goes_on_talking_is_left_and_the_stop_gets_through(served):
-    bus, bank = standing(served)
+def test_a_bus_that_goes_on_talking_is_left_and_the_stop_gets_through(standing):
+    bus, bank = standing
     bank.host.baud, bank.host.flooded = packets.BAUD, True
     with pytest.raises((Void, LinkError)):
         for _ in range(200):
@@ -152,8 +136,8 @@ def test_a_bus_that_goes_on_talking_is_left_and_the_stop_gets_through(served):
     bus.release()
 
 
-def test_servos_that_were_reset_are_noticed(served):
-    bus, bank = standing(served)
+def test_servos_that_were_reset_are_noticed(standing):
+    bus, bank = standing
     bus.powered()
     bank.restart(RealClock().now(), power=True)
     with pytest.raises(Void, match="has lost its torque"):
@@ -161,8 +145,8 @@ def test_servos_that_were_reset_are_noticed(served):
     bus.close()
 
 
-def test_a_stop_that_no_servo_confirms_is_said_so(served):
-    bus, bank = standing(served)
+def test_a_stop_that_no_servo_confirms_is_said_so(standing):
+    bus, bank = standing
     bank.host.deaf_until = float("inf")
     with pytest.raises(LinkError, match="do not confirm"):
         bus.stop()
@@ -170,8 +154,8 @@ def test_a_stop_that_no_servo_confirms_is_said_so(served):
     bus.release()
 
 
-def test_somebody_who_opens_the_port_stops_the_robot(served):
-    bus, bank = standing(served)
+def test_somebody_who_opens_the_port_stops_the_robot(standing):
+    bus, bank = standing
     other = os.open(bank.host.link, os.O_RDWR | os.O_NOCTTY)
     os.close(other)
     with pytest.raises(Void, match="another program"):
@@ -179,8 +163,8 @@ def test_somebody_who_opens_the_port_stops_the_robot(served):
     bus.close()
 
 
-def test_a_wall_clock_that_is_set_does_not_matter(served, monkeypatch):
-    bus, _ = standing(served)
+def test_a_wall_clock_that_is_set_does_not_matter(standing, monkeypatch):
+    bus, _ = standing
     jumps = iter(range(10**6))
     real = time.time
     monkeypatch.setattr(time, "time", lambda: real() + 3600 * (next(jumps) % 3 - 1))
@@ -190,8 +174,8 @@ def test_a_wall_clock_that_is_set_does_not_matter(served, monkeypatch):
     bus.close()
 
 
-def test_a_servo_that_falls_silent_makes_the_trial_void_where_torque_is_on(served):
-    bus, bank = standing(served)
+def test_a_servo_that_falls_silent_makes_the_trial_void_where_torque_is_on(standing):
+    bus, bank = standing
     bank.numbers.remove(7)
     with pytest.raises(Void, match="servo 7 gave no proper answer"):
         bus.read(7)
@@ -201,8 +185,8 @@ def test_a_servo_that_falls_silent_makes_the_trial_void_where_torque_is_on(serve
     bus.close()
 
 
-def test_an_answer_is_not_waited_for_without_end_on_a_line_that_never_rests(served):
-    bus, _ = standing(served)
+def test_an_answer_is_not_waited_for_without_end_on_a_line_that_never_rests(standing):
+    bus, _ = standing
     bus.stop()
     begin = time.monotonic()
     with open("/dev/zero", "rb", buffering=0) as garbage:

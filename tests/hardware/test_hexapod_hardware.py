@@ -1,4 +1,7 @@
-"""The hexapod as a hardware world, over emulated servos with a body behind them."""
+"""The hexapod as a hardware world, over emulated servos with a body behind them.
+
+It gets up from rest, and from nothing else.
+"""
 
 import threading
 
@@ -6,17 +9,17 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.hardware.clock import RealClock
+from bns.hardware.clock import RealClock, VirtualClock
 from bns.hardware.driving import excitation
-from bns.hardware.dynamixel import joints, zeros
-from bns.hardware.dynamixel.walker import SPEED, Walked
-from bns.hardware.emulators.hexapod_body import HexapodBody
+from bns.hardware.dynamixel import joints, packets, rig
+from bns.hardware.dynamixel.walker import LIES, SPEED, STILL, Walked, Walker
+from bns.hardware.emulators.hexapod import HexapodBody, ServoBank
 from bns.hardware.emulators.pty_host import PtyHost
 from bns.hardware.emulators.run import phantomx
-from bns.hardware.emulators.servo_bank import ServoBank
-from bns.hardware.faults import Void
+from bns.hardware.faults import FaultLog, Void
+from bns.hardware.safety.limits import Limits, Operator
 from bns.hardware.tracking.tracker import Sighting
-from bns.hardware.worlds import hexapod, walked
+from bns.hardware.worlds import hexapod, records
 from bns.hardware.worlds.hexapod import HardwareHexapod
 from bns.models import robot
 from bns.models.legs import JOINTS
@@ -94,7 +97,7 @@ def carried_out(count, late=0.001):
 
 def made(done, given):
     channels = (*POSE_CHANNELS, Channel("left_front_coxa_position", "rad"))
-    return walked.trial(
+    return records.walked_trial(
         done,
         given,
         sample_dt=0.1,
@@ -117,21 +120,14 @@ def test_a_walk_that_was_ended_early_has_no_poses_where_it_did_not_come_to():
         made(carried_out(2, late=0.4), goals({}, {}))
 
 
-def test_zeros_are_where_the_servos_stand_and_end_stops_move_along(tmp_path):
+def test_zeros_are_where_the_servos_stand_and_end_stops_move_along(tmp_path, serving):
     bank = ServoBank(at=RealClock().now())
     bank.place[5] = 525.0
-    host, done = PtyHost(bank, tmp_path / "bus"), threading.Event()
-    thread = threading.Thread(target=host.serve, args=(done.is_set,))
-    thread.start()
-    try:
-        list(zeros.calibrate(str(tmp_path / "bus"), "", tmp_path / "own.toml"))
+    with serving(PtyHost(bank, tmp_path / "bus")):
+        list(rig.calibrate(str(tmp_path / "bus"), "", tmp_path / "own.toml"))
         bank.place[5] = 640.0
         with pytest.raises(BnsError, match="left_front_tibia reads 640"):
-            list(zeros.calibrate(str(tmp_path / "bus"), "", tmp_path / "b.toml"))
-    finally:
-        done.set()
-        thread.join()
-        host.unplug()
+            list(rig.calibrate(str(tmp_path / "bus"), "", tmp_path / "b.toml"))
     before = {joint.id: joint for joint in joints.read()}
     after = {joint.id: joint for joint in joints.read(tmp_path / "own.toml")}
     assert after[5] == before[5]._replace(zero=525, low=292, high=870)
@@ -188,3 +184,70 @@ def test_a_trial_in_real_time(tmp_path):
     assert np.hypot(*trial.poses_world[-1, :2]) < 0.06
     lines = (tmp_path / "log").read_text().splitlines()
     assert '"powered": 0' in [line for line in lines if "powered" in line][-1]
+
+
+class Servos:
+    """A bus whose servos sink until a moment; notes when torque goes on."""
+
+    def __init__(self, clock, sinks):
+        self.clock, self.sinks, self.guard = clock, sinks, None
+        self.joints, self.on, self.goals = joints.read(), [], None
+
+    def read(self, servo):
+        self.clock.sleep(0.0015)
+        moved = round(100 * min(self.clock.now(), self.sinks))
+        return packets.State(512 + moved, 0, 0.0, 11.1, 35)
+
+    def look(self, count):
+        return [(joint, self.read(joint.id)) for joint in self.joints[:count]]
+
+    def write(self, goals):
+        self.goals = self.goals or goals
+
+    def power(self):
+        self.on.append(self.clock.now())
+
+    def powered(self):
+        pass
+
+    def pace(self, speed):
+        pass
+
+    def stop(self):
+        pass
+
+
+class Eyes:
+    """See the robot where it is, at every look."""
+
+    def __init__(self, clock, tag=lambda now: 0.0):
+        self.clock, self.tag = clock, tag
+
+    def poll(self):
+        now = self.clock.now()
+        return [Sighting(now, np.array([self.tag(now), 0.0, 0.0]), 0.1)]
+
+
+def walker(sinks, **words):
+    clock = VirtualClock()
+    bus, names = Servos(clock, sinks), tuple(joint.name for joint in joints.read())
+    rest = {"limits": Limits(), "operator": Operator(), "faults": FaultLog(clock)}
+    return Walker(bus, Eyes(clock, **words), clock, names=names, **rest), bus
+
+
+def test_torque_comes_on_once_the_robot_that_was_stopped_has_come_to_rest():
+    made, bus = walker(sinks=0.8)
+    made.rise()
+    assert 0.8 + STILL <= bus.on[0] < 0.8 + STILL + 0.2
+    joint = bus.joints[0]
+    assert bus.goals[joint.name] == joint.angle(592)  # it begins where it lies
+    made, bus = walker(sinks=0.0, tag=lambda now: 0.1 * min(now, 1.5))
+    made.rise()
+    assert 1.5 + STILL - 0.02 <= bus.on[0] < 1.5 + STILL + 0.2
+
+
+def test_a_robot_that_is_carried_is_not_switched_on():
+    made, bus = walker(sinks=1e9)
+    with pytest.raises(BnsError, match="let go of it"):
+        made.rise()
+    assert not bus.on and made.clock.now() > LIES

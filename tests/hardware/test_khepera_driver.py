@@ -6,21 +6,10 @@ import pytest
 from bns.errors import BnsError
 from bns.hardware.clock import VirtualClock
 from bns.hardware.emulators.device import Noise, Reply, VirtualLine
-from bns.hardware.emulators.khepera_body import KheperaBody
-from bns.hardware.emulators.khepera_device import KheperaDevice
+from bns.hardware.emulators.khepera import KheperaBody, KheperaDevice
 from bns.hardware.faults import LinkError
 from bns.hardware.khepera import protocol
 from bns.hardware.khepera.driver import Khepera3
-
-
-class Watching:
-    """A guard that remembers what it was fed."""
-
-    def __init__(self):
-        self.fed = []
-
-    def feed(self, *, moving):
-        self.fed.append(moving)
 
 
 class Talker:
@@ -46,9 +35,11 @@ def clock():
 
 
 @pytest.mark.parametrize("version,units", [((2, 5), 17281), ((3, 1), 26246)])
-def test_both_generations_of_firmware_drive_at_the_speed_told(clock, version, units):
+def test_both_generations_of_firmware_drive_at_the_speed_told(
+    clock, version, units, guard
+):
     device = KheperaDevice(KheperaBody(), version=version)
-    robot = connected(device, clock, guard=Watching())
+    robot = connected(device, clock, guard=guard)
     assert robot.identify() == version
     robot.drive(0.12, 0.12)
     assert device.log[-1][1:] == (units, units)
@@ -88,7 +79,7 @@ def test_the_emulator_has_the_quirks_of_the_server(clock):
     assert device.receive(b"\r\n\r\n", 6.0) == []
 
 
-def test_nothing_moves_unguarded_unidentified_or_too_fast(clock):
+def test_nothing_moves_unguarded_unidentified_or_too_fast(clock, guard):
     device = KheperaDevice(KheperaBody())
     robot = connected(device, clock)
     with pytest.raises(BnsError, match="firmware is not known"):
@@ -96,7 +87,7 @@ def test_nothing_moves_unguarded_unidentified_or_too_fast(clock):
     robot.identify()
     with pytest.raises(BnsError, match="Nobody guards"):
         robot.drive(0.1, 0.1)
-    robot.guard = guard = Watching()
+    robot.guard = guard
     with pytest.raises(BnsError, match=r"above the limit of 0\.15 m/s"):
         robot.drive(0.2, 0.0)
     assert not device.log
@@ -120,10 +111,10 @@ def test_a_stranger_on_the_port_is_named(clock, name):
         connected(Talker(says), clock).identify()
 
 
-def test_a_bad_line_is_survived_and_every_fault_is_noted(clock):
+def test_a_bad_line_is_survived_and_every_fault_is_noted(clock, guard):
     device = KheperaDevice(KheperaBody())
     noise = Noise(device, lost=0.01, corrupted=0.01, rng=np.random.default_rng(1))
-    robot = connected(noise, clock, guard=Watching())
+    robot = connected(noise, clock, guard=guard)
     robot.identify()
     for _ in range(100):
         robot.drive(0.1, 0.1, times=2)

@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import termios
-import time
 import tty
 from types import SimpleNamespace
 
@@ -16,7 +15,7 @@ import pytest
 
 from bns.errors import BnsError
 from bns.hardware.clock import VirtualClock
-from bns.hardware.openers import Openers
+from bns.hardware.line import Openers
 from bns.hardware.safety import watchdog
 from bns.hardware.worlds import real_robot
 
@@ -37,16 +36,7 @@ def port():
             os.close(number)
 
 
-def waited(good):
-    until = time.monotonic() + SLOW
-    while time.monotonic() < until:
-        if good():
-            return True
-        time.sleep(0.01)
-    return False
-
-
-def test_who_holds_the_port_is_named_until_it_lets_go(port):
+def test_who_holds_the_port_is_named_until_it_lets_go(port, waited):
     name = os.ttyname(port[1])
     openers = Openers(name)
     assert not openers.intruder() and openers.others() == []

@@ -1,7 +1,6 @@
 """Setting a robot up: which port it is, the file, and a rehearsal of all of it."""
 
 import io
-import threading
 import time
 from contextlib import contextmanager
 
@@ -15,8 +14,7 @@ from bns.worlds.data import dataset
 pytest.importorskip("serial")
 
 from bns.hardware import line
-from bns.hardware.emulators.khepera_body import KheperaBody
-from bns.hardware.emulators.khepera_device import KheperaDevice
+from bns.hardware.emulators.khepera import KheperaBody, KheperaDevice
 from bns.hardware.emulators.pty_host import PtyHost
 
 
@@ -116,19 +114,12 @@ def test_the_port_of_the_robot_is_the_one_that_went(asked, capsys, monkeypatch):
     assert "no serial port" in capsys.readouterr().err
 
 
-def test_a_port_is_asked_who_it_is(tmp_path):
+def test_a_port_is_asked_who_it_is(tmp_path, serving):
     port = tmp_path / "robot"
     body = KheperaBody(at=time.monotonic())
     host = PtyHost(KheperaDevice(body, version=(2, 5), latency=0.0), port)
-    over = threading.Event()
-    thread = threading.Thread(target=host.serve, args=(over.is_set, lambda at: None))
-    thread.start()
-    try:
+    with serving(host):
         assert line.answers(str(port)) == "khepera3, firmware 2.5"
-    finally:
-        over.set()
-        thread.join()
-        host.unplug()
     assert line.answers(str(tmp_path / "none")).startswith("There is no port")
 
 

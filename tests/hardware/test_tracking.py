@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("cv2")
 
 from bns.errors import BnsError, FormatError
-from bns.hardware.emulators.frames import Painter
+from bns.hardware.emulators.camera import Painter
 from bns.hardware.tracking import calibrate
 from bns.hardware.tracking.camera import Camera
 from bns.hardware.tracking.marker import Floor, Marker

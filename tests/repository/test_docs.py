@@ -1,4 +1,7 @@
-"""The documentation is true: its links lead somewhere and its Python runs."""
+"""The documentation is true: its links lead somewhere, its Python runs.
+
+So do the examples, and the notebooks, which are the pages of the tutorials.
+"""
 
 import re
 from pathlib import Path
@@ -101,3 +104,69 @@ def test_the_site_has_its_styles():
     if (ROOT / ".git").exists():
         asked = ["git", "check-ignore", str(path)]
         assert subprocess.run(asked, cwd=ROOT, check=False).returncode == 1
+
+
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+
+
+def test_there_are_examples():
+    assert len(EXAMPLES) >= 6
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_is_short_and_runs(path, run_python):
+    assert len(path.read_text().splitlines()) < 100
+    output = run_python(path, "--quick")
+    assert output.strip(), "an example says what it found"
+
+
+def test_examples_come_with_the_package(run_python, tmp_path):
+    listed = run_python("-m", "bns", "examples")
+    assert all(path.stem in listed for path in EXAMPLES)
+    shown = run_python("-m", "bns", "examples", "01_drive_a_robot")
+    assert shown == (ROOT / "examples" / "01_drive_a_robot.py").read_text()
+    wrong = run_python("-m", "bns", "examples", "01_drive_robot", code=2)
+    assert "Did you mean '01_drive_a_robot'?" in wrong
+    run_python("-m", "bns", "examples", "--copy", tmp_path / "mine")
+    assert (tmp_path / "mine" / "burger" / "robot.toml").is_file()
+    again = run_python("-m", "bns", "examples", "--copy", tmp_path / "mine", code=2)
+    assert "is not overwritten" in again
+
+
+TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
+NOTEBOOKS = ROOT / "examples" / "notebooks"
+
+
+@pytest.fixture
+def jupytext():
+    return pytest.importorskip("jupytext")
+
+
+def cells(notebook):
+    return [(cell.cell_type, cell.source) for cell in notebook.cells]
+
+
+@pytest.mark.parametrize("page", TUTORIALS, ids=lambda page: page.stem)
+def test_a_notebook_is_the_page(page, jupytext):
+    made = jupytext.read(NOTEBOOKS / f"{page.stem}.ipynb")
+    kept = f"examples/notebooks/{page.stem}.ipynb"
+    again = f"jupytext --to ipynb --output {kept} {page}"
+    assert cells(made) == cells(jupytext.read(page)), f"make it again: {again}"
+
+
+@pytest.mark.parametrize("page", TUTORIALS, ids=lambda page: page.stem)
+def test_a_notebook_runs(page, jupytext, tmp_path, monkeypatch):
+    nbclient = pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    monkeypatch.chdir(tmp_path)
+    notebook = jupytext.read(page)
+    client = nbclient.NotebookClient(notebook, timeout=240, kernel_name="python3")
+    done = client.execute(cwd=str(tmp_path))
+    outputs = [out for cell in done.cells for out in cell.get("outputs", ())]
+    assert len(outputs) >= 3
+    assert all(out.output_type != "error" for out in outputs)
+    if page.stem == "diagnose":
+        said = "".join(out.get("text", "") for out in outputs)
+        assert "joint_damping[elbow]" in said
+    if page.stem == "recover":
+        assert any("image/png" in out.get("data", {}) for out in outputs), "no figure"

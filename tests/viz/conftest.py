@@ -1,9 +1,11 @@
 """A made-up batch of runs: it solves the simple task, is damaged, and recovers."""
 
 import os
+from itertools import combinations
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 from bns.experiment.config import RunConfig, WorldConfig
 from bns.experiment.record import RunRecord
@@ -11,7 +13,6 @@ from bns.experiment.task_settings import TaskConfig
 from bns.seeding import generator
 from bns.viz import page
 from bns.worlds.trial import Commands, Trial
-from tests.viz.legible import flaws
 
 os.environ["RERUN_ANALYTICS"] = "0"
 
@@ -205,8 +206,60 @@ def illegible(monkeypatch):
     found, drawn = [], page._address
 
     def looked_at(figure):
-        found.extend(flaws(figure))
+        found.extend(_flaws(figure))
         return drawn(figure)
 
     monkeypatch.setattr(page, "_address", looked_at)
     return found
+
+
+SLACK = 1.5  # [px] that boxes may touch: they are larger than the letters
+
+
+def _flaws(figure):
+    """A line for each text beyond the edge, and each two texts that overlap."""
+    drawn = _texts(figure)
+    width, height = figure.canvas.get_width_height()
+    beyond = [
+        f"beyond the edge: {said!r}"
+        for said, box in drawn
+        if min(box.x0, box.y0, width - box.x1, height - box.y1) < -SLACK
+    ]
+    crossed = [
+        f"on one another: {one!r} and {other!r}"
+        for (one, first), (other, second) in combinations(drawn, 2)
+        if _overlap(first, second)
+    ]
+    return beyond + crossed
+
+
+def _texts(figure):
+    """What is written, and the box around it, of each text that is drawn."""
+    found = []
+    draw = Text.draw
+
+    def noted(text, renderer, *args, **kwargs):
+        draw(text, renderer, *args, **kwargs)
+        if text.get_visible() and text.get_text().strip():
+            found.append((text.get_text(), text.get_window_extent(renderer)))
+
+    figure.draw_without_rendering()  # the layout, once
+    Text.draw = noted
+    try:
+        figure.draw_without_rendering()
+    finally:
+        Text.draw = draw
+    return found
+
+
+def _overlap(one, other):
+    """Whether two boxes lie on one another."""
+    wide = min(one.x1, other.x1) - max(one.x0, other.x0)
+    high = min(one.y1, other.y1) - max(one.y0, other.y0)
+    return min(wide, high) > SLACK
+
+
+@pytest.fixture
+def flaws():
+    """Says what of a figure cannot be read: texts beyond its edge, on one another."""
+    return _flaws

@@ -11,7 +11,7 @@ from bns.learners.bns.learner import DIVERSITY, SNN_ERROR
 from bns.viz import facts, figures
 from bns.viz.choices import choose, typical
 from bns.viz.figures import trials
-from bns.viz.figures.displacement import SHOWN, groups
+from bns.viz.figures.motion import SHOWN, groups
 from bns.viz.paths import arcs, dashes, listed
 
 OVER_TRIALS = ("fitness", "solved", "waits")

@@ -1,14 +1,23 @@
-"""Recordings: verified by Rerun's own tool, read back, and drawn."""
+"""Recordings: verified by Rerun's own tool, read back, and drawn; seen live.
 
+A live view that fails is said once and does not stop the run. Legs of a walking robot
+are drawn as its servos reported them.
+"""
+
+import logging
 import socket
 import subprocess
+import time
 
 import numpy as np
 import pytest
 
+from bns import models
 from bns.errors import FormatError, MissingDependencyError
-from bns.viz import moments, picture, recording, scene
+from bns.experiment.step import ARRAYS, Step
+from bns.viz import live, moments, picture, recording, scene
 from bns.viz.choices import choose, typical
+from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Trial
 
 pytest.importorskip("rerun")
 
@@ -139,3 +148,140 @@ def test_broken_vulkan_says_what_to_install(rrd, tmp_path, monkeypatch):
     monkeypatch.setenv("WGPU_BACKEND", "vulkan")
     with pytest.raises(MissingDependencyError, match="mesa-vulkan-drivers"):
         picture.save(rrd, tmp_path / "run.png")
+
+
+def step(record, trial):
+    return Step(
+        {name: values[:, trial] for name, values in record.columns.items()},
+        {name: getattr(record, name)[:, trial] for name in ARRAYS},
+    )
+
+
+def test_without_a_display_it_warns_once_and_goes_on(record, monkeypatch, caplog):
+    monkeypatch.setattr(live, "_no_display", lambda: True)
+    with (
+        caplog.at_level(logging.WARNING),
+        live.stream(record.config) as on_trial,
+    ):
+        for trial in range(3):
+            on_trial(trial, step(record, trial), [])
+    assert len(caplog.records) == 1
+    assert "no display" in caplog.text
+
+
+def test_unexpected_data_do_not_stop_the_run(record, monkeypatch, caplog):
+    monkeypatch.setattr(live.Stream, "_open", lambda self, url: None)
+    shown = live.Stream(record.config)
+    shown.on_trial(0, Step({}, {"poses": np.zeros((1, 1, 3))}))
+    assert shown.failed
+
+
+def test_the_live_view_listens_on_this_machine_alone(monkeypatch):
+    begun = []
+    monkeypatch.setattr(live, "_no_display", lambda: False)
+    monkeypatch.setattr(live, "executable", lambda: "viewer")
+    monkeypatch.setattr(live, "wait", lambda process, port: None)
+    monkeypatch.setattr(
+        live.subprocess, "Popen", lambda words, **_: begun.append(words)
+    )
+    assert live._spawn().startswith("rerun+http://127.0.0.1:")
+    ((_, flag, address, *_),) = begun
+    assert (flag, address) == ("--bind", "127.0.0.1")
+
+
+def test_trials_reach_a_viewer(record):
+    problem = picture.missing()
+    if problem:
+        pytest.skip(str(problem))
+    with (
+        picture.viewer() as viewer,
+        live.stream(record.config, url=viewer.url) as on_trial,
+    ):
+        for trial in range(3):
+            on_trial(trial, step(record, trial), [])
+        names, tries = set(), 0
+        while not names and (tries := tries + 1) < 40:
+            time.sleep(0.25)
+            names = {view.name for view in viewer.get_state().views}
+    assert names >= {"World", "Fitness"}
+
+
+@pytest.fixture(scope="module")
+def model():
+    return models.scene_spec("phantomx").compile()
+
+
+def trial(positions):
+    """Two samples at (0.3, -0.2); servos at `positions` [rad], else half-way."""
+    robot = models.robot("phantomx")
+    names = [channel.name for channel in robot.channels]
+    row = [0.3, -0.2, 1.0, *(positions.get(name, 0.0) for name in names)]
+    channels = tuple(Channel(f"{name}_position", "rad") for name in names)
+    told = Commands(
+        np.zeros((1, 18)), [1.0], tuple(Channel(*c) for c in robot.channels)
+    )
+    return Trial(
+        told, [0.0, 1.0], [row, row], [0, 1], channels=(*POSE_CHANNELS, *channels)
+    )
+
+
+def feet(model, qpos):
+    """Heights of the feet by leg [m]."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    names = [model.site(i).name for i in range(model.nsite)]
+    return {
+        name.removesuffix("_foot"): data.site(name).xpos[2]
+        for name in names
+        if name.endswith("_foot")
+    }
+
+
+def test_it_stands_on_all_feet_half_way(model):
+    seen = trial({})
+    qpos = moments.walking_qpos(model, seen.poses_world, seen, np.arange(2))
+    heights = feet(model, qpos[0])
+    assert len(heights) == 6
+    np.testing.assert_allclose(list(heights.values()), 0.0, atol=1e-3)
+    np.testing.assert_allclose(qpos[0, :2], [0.3, -0.2])
+
+
+def test_a_raised_leg_is_in_the_air_and_the_others_are_not(model):
+    seen = trial({"left_middle_femur": 1.0})
+    qpos = moments.walking_qpos(model, seen.poses_world, seen, np.arange(2))
+    heights = feet(model, qpos[0])
+    assert heights.pop("left_middle") > 0.05
+    np.testing.assert_allclose(list(heights.values()), 0.0, atol=1e-3)
+
+
+def test_only_walking_robots_report_servos():
+    bare = Trial(Commands([[0.1, 0.1]], [1.0]), [0, 1], np.zeros((2, 3)), [0, 1])
+    assert moments.reports_servos(trial({})) and not moments.reports_servos(bare)
+
+
+@pytest.mark.parametrize("walks", [False, True])
+def test_a_recording_of_walking_shows_distances_and_no_wheels(walks):
+    from bns import presets
+    from bns.viz import blueprint, charts, scene
+
+    config = presets.load("hexapod-walk" if walks else "khepera-simple")
+    shown_task = scene.picture(config)
+    titles = charts.chart_titles({}, shown_task)
+    layout = blueprint.blueprint(shown_task, charts=titles)
+    shown = dict(_views(layout.root_container))
+    assert ("/wheels" in shown) != walks
+    title = shown["charts/fitness"]
+    assert title.startswith(
+        "Distance walked" if walks else "Fitness over trials (log10"
+    )
+
+
+def _views(part):
+    """(origin, name) of all views in a part of a blueprint."""
+    for inner in getattr(part, "contents", ()):
+        if hasattr(inner, "origin"):
+            yield inner.origin, inner.name
+        yield from _views(inner)

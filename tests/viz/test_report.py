@@ -10,9 +10,8 @@ import pytest
 
 from bns.errors import BnsError, FormatError
 from bns.stats import Interval
-from bns.viz import comparison, facts, figures, recording, report, style
+from bns.viz import facts, figures, recording, report, style
 from bns.viz.page import Picture
-from tests.viz.legible import flaws
 
 
 @pytest.fixture(scope="module")
@@ -144,7 +143,7 @@ def test_intervals_in_words(value, text):
 def test_an_undamaged_run_is_compared_on_trials_to_solve(record):
     never = np.full(record.replicates, -1)
     healthy = replace(record, damage_onset=never)
-    rows = comparison.table({"a": healthy, "b": healthy})["rows"]
+    rows = report.comparison({"a": healthy, "b": healthy})["rows"]
     assert rows[1][4:8] == ["-", "-", "1.0000", "1.0000"]
 
 
@@ -198,12 +197,7 @@ def test_it_is_drawn_without_a_warning(case, record, tmp_path):
     assert "Key figures" in text and path.stat().st_size > 10_000
 
 
-def test_none_recovered_is_said(record, tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        report,
-        "picture",
-        lambda figure: Picture("data:image/svg+xml,", "data:image/svg+xml,"),
-    )
+def test_none_recovered_is_said(record, tmp_path, unpictured):
     text = report.write(never(record), tmp_path / "a.html").read_text("utf-8")
     assert "None solved the task before the damage." in text
     assert "None recovered within the 20 trials that were left." in text
@@ -216,7 +210,7 @@ def test_all_that_is_written_in_figures_can_be_read(record, tmp_path, illegible)
     assert illegible == [], "\n".join(illegible)
 
 
-def test_what_cannot_be_read_is_found():
+def test_what_cannot_be_read_is_found(flaws):
     with style.plotting() as figure_class:
         figure = figure_class(figsize=(2.0, 2.0))
         figure.text(0.9, 0.5, "beyond the edge")

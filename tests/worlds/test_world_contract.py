@@ -1,13 +1,110 @@
-"""Every registered world keeps the contract of `bns.worlds.world.World`."""
+"""Every registered world keeps the contract of `bns.worlds.world.World`.
+
+A model world counts what is executed in it, and ends where its budget does.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
+from bns import models
 from bns.errors import BnsError, OutOfBoundsError, UnknownNameError
 from bns.worlds import registry
-from bns.worlds.trial import Channel, Commands, Trial
-from bns.worlds.world import World
-from tests.worlds import kinds
+from bns.worlds.trial import WHEEL_CHANNELS, Channel, Commands, Trial
+from bns.worlds.world import BudgetSpentError, CountedWorld, World
+
+STRIDE = np.tile([1.0, 0.0, 0.0], 6)  # all coxae forward [1]
+LIFTED = np.array([0, 0.5, 0.2] * 6)  # femur up, tibia out [rad]
+ONE_SET = np.repeat([1, 0, 1, 0, 0, 1], 3).astype(float)  # legs 1, 3, 6
+
+
+class Kind(NamedTuple):
+    """Commands and damages that suit a kind of robot.
+
+    Attributes:
+        channels: what it is told.
+        lists: so many random lists of commands, of different lengths, from a seed.
+        ahead: commands that move it ahead (1) or back (-1).
+        damage: an effect as text that ahead shows.
+        sides: two effects that mirror each other.
+        shows: whether a trial of `ahead` is one with `damage`.
+        beyond: commands of which the second one cannot be told, and what says so.
+    """
+
+    channels: tuple[Channel, ...]
+    lists: Callable[[int, int], list[Commands]]
+    ahead: Callable[[int], Commands]
+    damage: str
+    sides: tuple[str, str]
+    shows: Callable[[Trial], bool]
+    beyond: tuple[Commands, str]
+
+
+def of(world: str) -> Kind:
+    """The kind of robot of a registered world."""
+    return KINDS[models.robot(registry.make(world).robot).kind]
+
+
+def _wheel_lists(count: int, seed: int = 0) -> list[Commands]:
+    rng = np.random.default_rng(seed)
+    lengths = rng.integers(1, 7, count)
+    return [
+        Commands(rng.uniform(-0.12, 0.12, (k, 2)), rng.uniform(0.2, 1.5, k))
+        for k in lengths
+    ]
+
+
+def _leg_lists(count: int, seed: int = 0) -> list[Commands]:
+    rng = np.random.default_rng(seed)
+    lengths = rng.integers(1, 5, count)
+    return [
+        Commands(rng.uniform(-0.4, 0.4, (k, 18)), rng.uniform(0.2, 1.5, k), LEGS)
+        for k in lengths
+    ]
+
+
+def _steps(way: int) -> Commands:
+    """Four steps of a simple tripod gait."""
+    goals = []
+    for swing in (ONE_SET, 1 - ONE_SET) * 2:
+        placed = 0.3 * way * STRIDE * (2 * swing - 1)
+        goals += [placed + LIFTED * swing, placed]
+    return Commands(np.array(goals), np.full(len(goals), 1.0), LEGS)
+
+
+LEGS = tuple(Channel(*item) for item in models.robot("phantomx").channels)
+KINDS = {
+    "wheeled": Kind(
+        channels=WHEEL_CHANNELS,
+        lists=_wheel_lists,
+        ahead=lambda way: Commands([[0.1 * way, 0.1 * way]], [1.5]),
+        damage="wheel_gain:wheel=left,factor=0.8",
+        sides=(
+            "wheel_gain:wheel=left,factor=0.8",
+            "wheel_gain:wheel=right,factor=0.8",
+        ),
+        shows=lambda trial: trial.poses_world[-1, 2] > 0.1,  # it turns left
+        beyond=(
+            Commands([[0, 0], [0.1, 0.5]], [1, 1]),
+            r"command 1: right_speed = 0\.5",
+        ),
+    ),
+    "legged": Kind(
+        channels=LEGS,
+        lists=_leg_lists,
+        ahead=_steps,
+        damage="leg_raised:legs=5,blend=1",
+        sides=("leg_raised:legs=5,blend=1", "leg_raised:legs=6,blend=1"),
+        shows=lambda trial: trial.channel("left_middle_femur_position")[-1] > 1.0,
+        beyond=(
+            Commands([[0.0] * 18, [0.0] * 17 + [1.5]], [1, 1], LEGS),
+            r"command 1: right_middle_tibia = 1\.5 rad .* from -1\.8",
+        ),
+    ),
+}
+
 
 REAL = {"hardware"}  # one robot, in real time: tests/hardware
 NAMES = [name for name in registry.names() if name not in REAL]
@@ -34,7 +131,7 @@ def name(request):
 @pytest.fixture
 def kind(name):
     """What the world's robot can be told."""
-    return kinds.of(name)
+    return of(name)
 
 
 def test_it_has_one_line_of_description(name):
@@ -57,7 +154,7 @@ def test_it_is_a_world_and_gives_whole_trials(name, kind):
         ends = trial.times[trial.boundaries[1:]]
         late = ends - np.cumsum(sent.durations)
         assert late.max() <= 0.005 * len(sent)
-        if kind is not kinds.KINDS["legged"]:  # whose commands end when it rests
+        if kind is not KINDS["legged"]:  # whose commands end when it rests
             assert late.min() >= -0.005 * len(sent)
         assert np.isfinite(trial.observed).all()
         assert trial.poses_world[0] == pytest.approx([0, 0, 0], abs=1e-9)
@@ -200,3 +297,41 @@ def test_a_script_can_add_a_world(monkeypatch):
     assert registry.make("still", a=1) == {"a": 1}
     with pytest.raises(BnsError, match="exists already"):
         registry.register("mujoco", still)
+
+
+COMMANDS = [Commands([[0.1, 0.05]], [0.5]), Commands([[0.05, 0.1]], [0.5])]
+
+
+@pytest.fixture
+def inner():
+    return registry.make("static-snn", robot="khepera3")
+
+
+def test_it_is_a_world_and_gives_what_the_world_gives(inner):
+    model = CountedWorld(inner, 5)
+    assert isinstance(model, World)
+    wanted, found = (w.run(COMMANDS, seeds=[1, 2]) for w in (inner, model))
+    for one, other in zip(wanted, found, strict=True):
+        np.testing.assert_array_equal(one.observed, other.observed)
+    assert (model.spent, model.left) == (2, 3)
+
+
+def test_more_than_what_is_left_is_refused_and_not_charged(inner):
+    model = CountedWorld(inner, 3)
+    model.run(COMMANDS)
+    with pytest.raises(BudgetSpentError, match=r"2 evaluations .* 1 of 3 left"):
+        model.run(COMMANDS)
+    assert model.left == 1
+    model.run(COMMANDS[:1])
+    assert model.left == 0
+
+
+def test_runs_that_share_a_world_count_for_themselves(inner):
+    one, other = CountedWorld(inner, 4), CountedWorld(inner, 4)
+    one.run(COMMANDS)
+    assert (one.spent, other.spent) == (2, 0)
+
+
+def test_a_world_without_closed_loops_says_so(inner):
+    with pytest.raises(BnsError, match="no closed loops"):
+        CountedWorld(inner, 4).drive(object())

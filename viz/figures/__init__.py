@@ -4,9 +4,8 @@ Figures over trials take a mapping from label to `RunRecord`, so that runs can b
 laid over one another; figures of one run take its record.
 """
 
-from bns.viz.figures.displacement import displacement
 from bns.viz.figures.light import light_responses, readings, starts
-from bns.viz.figures.path import path
+from bns.viz.figures.motion import displacement, path
 from bns.viz.figures.trials import curves, fitness, solved, waits
 
 __all__ = [

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 def scene(world: Any) -> Any:
     """The world's arena with its robot, as a `mujoco.MjSpec` to look at."""
     if hasattr(world, "field"):
-        pass
-
         return spec(world)
     return models.scene_spec(world.robot)
 

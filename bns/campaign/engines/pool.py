@@ -18,8 +18,8 @@ from collections.abc import Generator, Iterator, Sequence
 from dataclasses import replace
 from typing import IO, cast
 
-from bns.campaign.engines import frames
-from bns.campaign.engines.base import PATIENCE, Beat, Outcome
+from bns.campaign.engines.registry import PATIENCE, Beat, Outcome
+from bns.campaign.engines.worker import BEAT, DONE, JOB, SECONDS, Inbox, pack
 from bns.campaign.plan import Job
 
 ATTEMPTS = 5
@@ -98,7 +98,7 @@ class PoolEngine:
         worker.heard = time.monotonic()
         for kind, content in worker.inbox.feed(piece):
             key = worker.busy.key
-            if kind == frames.BEAT:
+            if kind == BEAT:
                 beat(key, int(content))
             else:
                 yield worker.end(_ended(key, kind, content)), None
@@ -118,9 +118,9 @@ class PoolEngine:
 
 def _ended(key: str, kind: bytes, content: bytes) -> Outcome:
     """The outcome in a worker's last message on a batch."""
-    size = frames.SECONDS.size
-    (computed,) = frames.SECONDS.unpack(content[:size])
-    if kind == frames.DONE:
+    size = SECONDS.size
+    (computed,) = SECONDS.unpack(content[:size])
+    if kind == DONE:
         return Outcome(key, content[size:], computed=computed)
     return Outcome(key, None, content[size:].decode(), computed=computed)
 
@@ -141,7 +141,7 @@ class Worker:
         )
         self.input = cast(IO[bytes], self.process.stdin)
         self.output = cast(IO[bytes], self.process.stdout)
-        self.inbox = frames.Inbox()
+        self.inbox = Inbox()
         self.job: Job | None = None
         self.attempts = 0
         self.started = self.heard = time.monotonic()
@@ -162,7 +162,7 @@ class Worker:
         self.job, self.attempts = job, attempts
         self.started = self.heard = time.monotonic()
         content = json.dumps(job.to_mapping()).encode()
-        message = memoryview(frames.pack(frames.JOB, content))
+        message = memoryview(pack(JOB, content))
         try:
             while message:
                 message = message[self.input.write(message) :]

@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Any
 
 from bns.campaign import work
-from bns.campaign.engines.base import PATIENCE, Beat, Outcome, outcome
+from bns.campaign.engines.registry import PATIENCE, Beat, Outcome, outcome
 from bns.campaign.plan import Job
 from bns.errors import BnsError, MissingDependencyError
 

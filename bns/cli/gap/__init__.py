@@ -20,10 +20,6 @@ VERBS = {
 def main(verb: str, argv: list[str]) -> int:
     """Run a verb of the gap diagnosis; gives the exit code.
 
-    Args:
-        verb: "gap".
-        argv: words after it.
-
     Raises:
         UnknownNameError: no such verb of the gap diagnosis.
         SystemExit: help was asked for, or nothing was given; with code 0.

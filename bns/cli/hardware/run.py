@@ -84,7 +84,7 @@ def _world(given: Any, config: Any) -> Any:
 
         return HardwareHexapod(servos=given.servos, **settings)
     if task.closed_loop:
-        from bns.hardware.worlds.light import HardwareLight
+        from bns.hardware.worlds.wheeled import HardwareLight
 
         return HardwareLight(config.world.robot, wheels=given.wheels, **settings)
     from bns.hardware.worlds.wheeled import HardwareWorld

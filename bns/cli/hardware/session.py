@@ -17,13 +17,13 @@ AT_REST = 60.0  # s between samples: none but those at which commands begin and 
 def check(given: Any) -> int:
     """`bns hardware check`."""
     if given.robot == "phantomx":
-        from bns.hardware.dynamixel.zeros import report
+        from bns.hardware.dynamixel.rig import report
 
         for line in report(given.port, given.servos):
             print(line, flush=True)
         print("Nothing has moved.")
         return 0
-    from bns.hardware.checklist import report as khepera
+    from bns.hardware.rig import report as khepera
 
     with _rig(given) as rig:
         for line in khepera(rig, move=given.move):
@@ -66,11 +66,11 @@ def _camera(given: Any, out: Path) -> Iterator[str]:
 
 
 def _servos(given: Any, out: Path) -> Iterator[str]:
-    from bns.hardware.dynamixel import zeros
+    from bns.hardware.dynamixel import rig
 
     if given.robot != "phantomx":
         raise BnsError("A Khepera III has no servos: give --robot phantomx.")
-    yield from zeros.calibrate(given.port, given.servos, out)
+    yield from rig.calibrate(given.port, given.servos, out)
 
 
 def _wheels(given: Any, out: Path) -> Iterator[str]:

@@ -11,13 +11,11 @@ import numpy as np
 import pytest
 
 from bns.campaign import drive, results
-from bns.campaign.engines import frames, registry
-from bns.campaign.engines.base import Outcome
+from bns.campaign.engines import registry, worker
 from bns.campaign.engines.pool import PoolEngine
-from bns.campaign.engines.registry import InlineEngine
-from bns.campaign.merge import merge
+from bns.campaign.engines.registry import InlineEngine, Outcome
 from bns.campaign.plan import plan
-from bns.campaign.store import CampaignStore
+from bns.campaign.store import CampaignStore, merge
 from bns.campaign.table import table
 from bns.errors import BnsError, FormatError
 from bns.storage import files, reading
@@ -288,10 +286,10 @@ def test_progress_counts_what_runs_and_estimates_the_rest():
 
 
 def test_messages_arrive_in_pieces():
-    inbox = frames.Inbox()
-    data = frames.pack(frames.BEAT, b"12") + frames.pack(frames.DONE, b"x" * 300)
+    inbox = worker.Inbox()
+    data = worker.pack(worker.BEAT, b"12") + worker.pack(worker.DONE, b"x" * 300)
     found = [m for i in range(len(data)) for m in inbox.feed(data[i : i + 1])]
-    assert found == [(frames.BEAT, b"12"), (frames.DONE, b"x" * 300)]
+    assert found == [(worker.BEAT, b"12"), (worker.DONE, b"x" * 300)]
 
 
 def test_a_worker_goes_when_its_driver_goes():

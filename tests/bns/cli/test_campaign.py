@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from bns.__main__ import WRONG_INPUT, main
+from bns.__main__ import WRONG_INPUT
 from bns.cli.campaign import FAILED
 
 TINY = """
@@ -21,13 +21,6 @@ adaptation.window = [0, 20]
 """
 
 
-def said(capsys, *argv, code=0):
-    """What a command prints, its exit code being `code`."""
-    assert main([str(word) for word in argv]) == code
-    captured = capsys.readouterr()
-    return captured.err if code == WRONG_INPUT else captured.out
-
-
 @pytest.fixture
 def tiny(tmp_path, monkeypatch):
     """A campaign file; the present directory is empty but for it."""
@@ -37,23 +30,23 @@ def tiny(tmp_path, monkeypatch):
     return path
 
 
-def test_a_campaign_from_file_to_pictures(capsys, tiny, tmp_path):
+def test_a_campaign_from_file_to_pictures(said, tiny, tmp_path):
     out = tmp_path / "out"
     run = ("campaign", "run", tiny, "--out", out, "--engine", "inline")
-    assert "1 batches done, 0 failed" in said(capsys, *run)
-    assert "4 of 4 runs are done" in said(capsys, "campaign", "status", out)
-    status = json.loads(said(capsys, "campaign", "status", out, "--json"))
+    assert "1 batches done, 0 failed" in said(*run)
+    assert "4 of 4 runs are done" in said("campaign", "status", out)
+    status = json.loads(said("campaign", "status", out, "--json"))
     assert [row["runs"] for row in status["members"]] == [2, 2]
-    table = said(capsys, "campaign", "table", out)
+    table = said("campaign", "table", out)
     assert "window=20" in table and "A12" in table and "power" in table
-    both = json.loads(said(capsys, "campaign", "table", out, "--json"))
+    both = json.loads(said("campaign", "table", out, "--json"))
     assert len(both["members"]) == 2 and len(both["pairs"]) == 1
-    drawn = said(capsys, "campaign", "plot", out)
+    drawn = said("campaign", "plot", out)
     for name in ("curves.png", "sensitivity.png"):
         assert name in drawn
         assert (out / name).read_bytes().startswith(b"\x89PNG")
-    assert "add --resume" in said(capsys, *run, code=WRONG_INPUT)
-    again = said(capsys, "campaign", "run", out, "--resume", "--engine", "inline")
+    assert "add --resume" in said(*run, code=WRONG_INPUT)
+    again = said("campaign", "run", out, "--resume", "--engine", "inline")
     assert "0 batches done" in again
 
 
@@ -69,9 +62,9 @@ def test_a_campaign_from_file_to_pictures(capsys, tiny, tmp_path):
         ("replicates = [", "cannot be read as TOML"),
     ],
 )
-def test_a_wrong_file_is_one_line(capsys, tiny, text, words):
+def test_a_wrong_file_is_one_line(said, tiny, text, words):
     tiny.write_text(text)
-    message = said(capsys, "campaign", "run", tiny, "--out", "x", code=WRONG_INPUT)
+    message = said("campaign", "run", tiny, "--out", "x", code=WRONG_INPUT)
     assert words in message and message.count("\n") == 1
     assert not (tiny.parent / "x").exists()
 
@@ -101,24 +94,24 @@ def test_a_wrong_file_is_one_line(capsys, tiny, text, words):
         (["claims", "tabel"], "Did you mean 'table'"),
     ],
 )
-def test_wrong_words_are_one_line(capsys, tiny, argv, words):
-    message = said(capsys, *argv, code=WRONG_INPUT)
+def test_wrong_words_are_one_line(said, tiny, argv, words):
+    message = said(*argv, code=WRONG_INPUT)
     assert words in message and message.count("\n") == 1
 
 
-def test_ray_that_cannot_be_used_leaves_nothing_behind(capsys, tiny, monkeypatch):
+def test_ray_that_cannot_be_used_leaves_nothing_behind(said, tiny, monkeypatch):
     import sys
 
     go = ("campaign", "run", tiny, "--out", "out", "--engine", "ray")
-    nobody = said(capsys, *go, "--ray-address", "127.0.0.1:9", code=WRONG_INPUT)
+    nobody = said(*go, "--ray-address", "127.0.0.1:9", code=WRONG_INPUT)
     assert "Nobody answers at 127.0.0.1:9" in nobody
     monkeypatch.setitem(sys.modules, "ray", None)
-    missing = said(capsys, *go, code=WRONG_INPUT)
+    missing = said(*go, code=WRONG_INPUT)
     assert "pip install 'bns-testbed[ray]'" in missing
     assert not (tiny.parent / "out").exists()
 
 
-def test_what_failed_is_said_and_tried_again(capsys, tiny, monkeypatch):
+def test_what_failed_is_said_and_tried_again(said, tiny, monkeypatch):
     from bns.campaign import work
 
     whole = work.run
@@ -128,26 +121,26 @@ def test_what_failed_is_said_and_tried_again(capsys, tiny, monkeypatch):
 
     monkeypatch.setattr(work, "run", run)
     go = ("campaign", "run", tiny, "--out", "out", "--engine", "inline")
-    text = said(capsys, *go, code=FAILED)
+    text = said(*go, code=FAILED)
     assert "RuntimeError: no such luck" in text and "--retry" in text
-    assert "no such luck" in said(capsys, "campaign", "status", "out")
-    empty = said(capsys, "campaign", "table", "out", code=WRONG_INPUT)
+    assert "no such luck" in said("campaign", "status", "out")
+    empty = said("campaign", "table", "out", code=WRONG_INPUT)
     assert "nothing on 'observation' yet" in empty
     monkeypatch.setattr(work, "run", whole)
-    said(capsys, *go, "--resume", code=FAILED)
-    assert "1 batches done" in said(capsys, *go, "--resume", "--retry")
+    said(*go, "--resume", code=FAILED)
+    assert "1 batches done" in said(*go, "--resume", "--retry")
 
 
-def test_claims_are_listed_and_judged_without_runs(capsys, tiny):
-    rows = json.loads(said(capsys, "claims", "list", "--json"))
+def test_claims_are_listed_and_judged_without_runs(said, tiny):
+    rows = json.loads(said("claims", "list", "--json"))
     assert len(rows) == 157
-    assert "p 0.05543" in " ".join(said(capsys, "claims", "list", "a15").split())
-    text = said(capsys, "claims", "table", "A15", "B6")
+    assert "p 0.05543" in " ".join(said("claims", "list", "a15").split())
+    text = said("claims", "table", "A15", "B6")
     assert "stale" in text and "not tested" in text
-    rows = json.loads(said(capsys, "claims", "list", "--json", "A3", "c", "A3"))
+    rows = json.loads(said("claims", "list", "--json", "A3", "c", "A3"))
     assert [row["id"] for row in rows] == ["A3"] + [f"C{n}" for n in range(1, 42)]
-    assert "not run" in said(capsys, "claims", "table", "A15", "--own")
-    said(capsys, "claims", "table", "--write", "claims.md", "--publish", "all.json")
+    assert "not run" in said("claims", "table", "A15", "--own")
+    said("claims", "table", "--write", "claims.md", "--publish", "all.json")
     assert (tiny.parent / "claims.md").read_text().startswith("# Claims")
     kept = json.loads((tiny.parent / "all.json").read_text())
     assert len(kept["findings"]) > 100

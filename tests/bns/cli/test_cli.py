@@ -28,13 +28,6 @@ TINY = [
 ]  # fmt: skip
 
 
-def said(capsys, *argv, code=0):
-    """What a command prints, its exit code being `code`."""
-    assert main([str(word) for word in argv]) == code
-    captured = capsys.readouterr()
-    return captured.err if code == WRONG_INPUT else captured.out
-
-
 @pytest.fixture
 def run(fakes, tmp_path):
     """A finished run of the fake learner."""
@@ -51,22 +44,22 @@ def test_every_help_is_a_manual(capsys, verb):
 
 
 @pytest.mark.parametrize("argv", [[], ["--help"], ["-h"]])
-def test_help_lists_every_verb(capsys, argv):
-    text = said(capsys, *argv)
+def test_help_lists_every_verb(said, argv):
+    text = said(*argv)
     assert all(f"  {verb} " in text for verb in VERBS)
 
 
-def test_version(capsys):
-    assert said(capsys, "--version") == "bns 0.2.0\n"
+def test_version(said):
+    assert said("--version") == "bns 0.2.0\n"
 
 
 @pytest.mark.parametrize("name", EXTRAS)
-def test_a_package_that_is_missing_is_named_with_its_extra(capsys, monkeypatch, name):
+def test_a_package_that_is_missing_is_named_with_its_extra(said, monkeypatch, name):
     def missing(argv):
         raise ModuleNotFoundError(f"No module named {name!r}", name=f"{name}.part")
 
     monkeypatch.setattr("bns.__main__.dispatch", missing)
-    text = said(capsys, "doctor", code=WRONG_INPUT)
+    text = said("doctor", code=WRONG_INPUT)
     assert text.count("\n") == 1
     assert f"pip install 'bns-testbed[{EXTRAS[name]}]'" in text
 
@@ -86,12 +79,12 @@ def test_a_module_of_ours_that_is_missing_is_a_fault_of_ours(monkeypatch):
         main(["doctor"])
 
 
-def test_threads_that_wait_leave_the_cores_to_others(capsys, monkeypatch):
+def test_threads_that_wait_leave_the_cores_to_others(said, monkeypatch):
     monkeypatch.delenv("GOMP_SPINCOUNT", raising=False)
-    said(capsys, "--version")
+    said("--version")
     assert os.environ["GOMP_SPINCOUNT"] == SPINS
     monkeypatch.setenv("GOMP_SPINCOUNT", "7")  # a user's own stays
-    said(capsys, "--version")
+    said("--version")
     assert os.environ["GOMP_SPINCOUNT"] == "7"
 
 
@@ -159,7 +152,7 @@ LISTS = ["presets", "learners", "tasks", "worlds", "robots", "effects"]
 
 
 @pytest.mark.parametrize("verb", LISTS)
-def test_lists_name_what_exists(capsys, verb):
+def test_lists_name_what_exists(said, verb):
     known = {
         "presets": "khepera-simple",
         "learners": "cma",
@@ -168,28 +161,28 @@ def test_lists_name_what_exists(capsys, verb):
         "robots": "khepera3",
         "effects": "wheel_gain",
     }
-    assert known[verb] in said(capsys, verb)
-    rows = json.loads(said(capsys, verb, "--json"))
+    assert known[verb] in said(verb)
+    rows = json.loads(said(verb, "--json"))
     assert known[verb] in [next(iter(row.values())) for row in rows]
     assert all(list(row.values())[-1] for row in rows), "a line without a meaning"
 
 
-def test_effects_have_units_and_ranges(capsys):
-    rows = json.loads(said(capsys, "effects", "--json"))
+def test_effects_have_units_and_ranges(said):
+    rows = json.loads(said("effects", "--json"))
     names = [row["parameter"] for row in rows]
     row = rows[names.index("factor", [r["effect"] for r in rows].index("wheel_gain"))]
     assert row["unit"] == "1" and "nominal 1" in row["range"]
 
 
-def test_effects_are_found_by_a_part_of_their_name_and_by_stage(capsys, monkeypatch):
+def test_effects_are_found_by_a_part_of_their_name_and_by_stage(said, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
-    brief = said(capsys, "effects", "--stage", "tracking")
+    brief = said("effects", "--stage", "tracking")
     assert "tracker_noise" in brief and "wheel_gain" not in brief
     assert "nominal" not in brief
-    full = said(capsys, "effects", "wheel_gain")
+    full = said("effects", "wheel_gain")
     assert "0 to " in full and "nominal 1" in full and "wheel_diameter" not in full
     assert max(map(len, full.splitlines())) <= 80
-    rows = json.loads(said(capsys, "effects", "friction", "--json"))
+    rows = json.loads(said("effects", "friction", "--json"))
     assert {"floor_friction", "servo_load_friction"} <= {row["effect"] for row in rows}
 
 
@@ -260,12 +253,12 @@ WRONG = {
 
 @pytest.mark.parametrize("case", WRONG)
 def test_wrong_input_is_one_line_and_changes_nothing(
-    capsys, run, monkeypatch, tmp_path, case
+    said, run, monkeypatch, tmp_path, case
 ):
     argv, message = WRONG[case]
     monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.rglob("*"))
-    text = said(capsys, *argv, code=WRONG_INPUT)
+    text = said(*argv, code=WRONG_INPUT)
     assert message in text
     assert text.startswith("bns: ") and text.count("\n") == 1
     assert sorted(tmp_path.rglob("*")) == before
@@ -281,21 +274,21 @@ def test_a_bad_option_is_one_line_on_any_terminal(run_python, encoding):
     )
 
 
-def test_view_without_a_display_says_what_to_do(capsys, tmp_path, monkeypatch):
+def test_view_without_a_display_says_what_to_do(said, tmp_path, monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(sys, "platform", "linux")
     (tmp_path / "x.rrd").write_bytes(b"")
-    text = said(capsys, "view", tmp_path / "x.rrd", code=WRONG_INPUT)
+    text = said("view", tmp_path / "x.rrd", code=WRONG_INPUT)
     assert "No display" in text and "--png FILE" in text
 
 
-def test_view_of_a_diagnosis(capsys, tmp_path):
+def test_view_of_a_diagnosis(said, tmp_path):
     from bns.cli import view
     from bns.gap.store import FILE
 
     (tmp_path / FILE).write_text("{}")
-    text = said(capsys, "view", tmp_path, code=WRONG_INPUT)
+    text = said("view", tmp_path, code=WRONG_INPUT)
     assert "diagnosis without a recording" in text
     (tmp_path / "recording.rrd").write_bytes(b"")
     assert view.find(tmp_path) == tmp_path / "recording.rrd"
@@ -338,33 +331,31 @@ def test_a_report_replaces_reports_alone_unless_forced(capsys, run, tmp_path):
     )
 
 
-def test_run_to_the_end_and_once_more(capsys, tmp_path):
+def test_run_to_the_end_and_once_more(said, tmp_path):
     out = tmp_path / "out"
     quiet = ["--rerun", "off", "--no-report"]
-    text = said(capsys, "run", "demo", "--out", out, *quiet, *TINY)
+    text = said("run", "demo", "--out", out, *quiet, *TINY)
     assert f"data:      {out}" in text
     assert "3 trials of 2 runs" in text and "was not met" in text
     assert load(out).config.preset == "demo"
-    again = said(capsys, "run", "demo", "--out", out, *quiet, *TINY, code=WRONG_INPUT)
+    again = said("run", "demo", "--out", out, *quiet, *TINY, code=WRONG_INPUT)
     assert "holds a run already: add --resume" in again
-    assert "3 trials of 2 runs" in said(capsys, "run", out, "--resume", *quiet)
-    other = said(
-        capsys, "run", out, "--resume", "--seed", "5", *quiet, code=WRONG_INPUT
-    )
+    assert "3 trials of 2 runs" in said("run", out, "--resume", *quiet)
+    other = said("run", out, "--resume", "--seed", "5", *quiet, code=WRONG_INPUT)
     assert "seed = 0, not 5" in other
 
 
-def test_compare_prints_tables_and_json(capsys, fakes, run, tmp_path):
+def test_compare_prints_tables_and_json(said, fakes, run, tmp_path):
     fakes.train(tmp_path / "other", config=fakes.longer(5))
-    text = said(capsys, "compare", run, tmp_path / "other")
+    text = said("compare", run, tmp_path / "other")
     assert "p (Holm)" in text and "A12" in text and "recover" in text
-    found = json.loads(said(capsys, "compare", run, tmp_path / "other", "--json"))
+    found = json.loads(said("compare", run, tmp_path / "other", "--json"))
     assert {pair["measure"] for pair in found["pairs"]} == {
         "observation", "solve", "recover",
     }  # fmt: skip
 
 
-def test_interrupted_run_says_how_to_go_on(capsys, fakes, tmp_path, monkeypatch):
+def test_interrupted_run_says_how_to_go_on(said, fakes, tmp_path, monkeypatch):
     out = tmp_path / "run"
     begun = fakes.train(out, stop=lambda: True)
 
@@ -374,7 +365,7 @@ def test_interrupted_run_says_how_to_go_on(capsys, fakes, tmp_path, monkeypatch)
         return begun
 
     monkeypatch.setattr("bns.experiment.run.train", interrupted)
-    text = said(capsys, "run", "demo", "--out", out, code=STOPPED)
+    text = said("run", "demo", "--out", out, code=STOPPED)
     assert f"bns run {out} --resume" in text
 
 
@@ -392,12 +383,12 @@ def test_second_interrupt_stops_at_once(monkeypatch):
     assert main(["presets"]) == INTERRUPTED
 
 
-def test_doctor_looks_at_everything(capsys):
-    rows = json.loads(said(capsys, "doctor", "--json"))
+def test_doctor_looks_at_everything(said):
+    rows = json.loads(said("doctor", "--json"))
     looked_at = {row["what"] for row in rows}
     assert {"mujoco", "Vulkan", "C++ compiler", "cores", "serial ports"} <= looked_at
     assert all(row["what to do"] for row in rows if row["state"] in ("bad", "missing"))
-    assert "Ready to run." in said(capsys, "doctor")
+    assert "Ready to run." in said("doctor")
 
 
 @pytest.mark.parametrize(

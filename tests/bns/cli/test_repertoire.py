@@ -6,25 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bns.__main__ import main
 from bns.campaign.engines import registry as engines
 from bns.campaign.file import Member
 from bns.prior import repertoire
 from bns.standings import design, figures, run
 from bns.worlds import registry as worlds
 from tests.bns.walkers import Slider
-
-
-def said(capsys, *words) -> str:
-    assert main(list(words)) == 0, capsys.readouterr().err
-    return capsys.readouterr().out
-
-
-def refused(capsys, *words) -> str:
-    assert main(list(words)) == 2
-    error = capsys.readouterr().err
-    assert "Traceback" not in error and len(error.splitlines()) == 1
-    return error
 
 
 @pytest.fixture
@@ -40,24 +27,21 @@ def _slider(**settings):
     return Slider()
 
 
-def test_made_shown_and_made_larger(slider, capsys):
+def test_made_shown_and_made_larger(slider, said):
     told = ["--preset", "walk.toml", "--behaviour", "told", "--step", "0"]
     (slider / "walk.toml").write_text(
         'preset = "hexapod-walk"\n[world]\nname = "slider"\n'
     )
-    said(capsys, "repertoire", "make", "mine", "--evaluations", "100", *told)
+    said("repertoire", "make", "mine", "--evaluations", "100", *told)
     found = repertoire.read("mine.npz")
     assert found.head.evaluations == 128  # whole generations
     assert "--evaluations 100" in found.head.command
-    text = said(capsys, "repertoire", "show", "mine.npz")
+    text = said("repertoire", "show", "mine.npz")
     assert "walk of phantomx in the world slider" in text and "as here" in text
-    assert "already" in refused(
-        capsys, "repertoire", "make", "mine", "--evaluations", "100", *told
-    )
-    said(
-        capsys, "repertoire", "make", "mine", "--evaluations", "1100", *told, "--resume"
-    )
-    head = json.loads(said(capsys, "repertoire", "show", "mine.npz", "--json"))
+    words = ("repertoire", "make", "mine", "--evaluations", "100", *told)
+    assert "already" in said(*words, code=2)
+    said("repertoire", "make", "mine", "--evaluations", "1100", *told, "--resume")
+    head = json.loads(said("repertoire", "show", "mine.npz", "--json"))
     assert [row[0] for row in head["growth"]] == [1024, 1152]
 
 
@@ -71,21 +55,21 @@ def test_made_shown_and_made_larger(slider, capsys):
         (["shwo"], "Did you mean 'show'"),
     ],
 )
-def test_repertoires_refused(slider, capsys, words, wrong):
-    assert wrong in refused(capsys, "repertoire", *words)
+def test_repertoires_refused(slider, said, words, wrong):
+    assert wrong in said("repertoire", *words, code=2)
 
 
-def test_a_damaged_repertoire(slider, capsys):
+def test_a_damaged_repertoire(slider, said):
     (slider / "x.npz").write_bytes(b"no archive")
-    assert "cannot be read" in refused(capsys, "repertoire", "show", "x.npz")
+    assert "cannot be read" in said("repertoire", "show", "x.npz", code=2)
 
 
-def test_plan_prints_hours_and_runs_nothing(slider, capsys):
+def test_plan_prints_hours_and_runs_nothing(slider, said):
     words = ["--tasks", "walk", "--kinds", "inside", "--runs", "3"]
-    text = said(capsys, "standings", "plan", "ite", "random", *words)
+    text = said("standings", "plan", "ite", "random", *words)
     assert "processor hours in all" in text and "P2" in text
     assert not list(slider.iterdir())
-    assert "no standings yet" in refused(capsys, "standings", "table", *words)
+    assert "no standings yet" in said("standings", "table", *words, code=2)
 
 
 def small(entries):

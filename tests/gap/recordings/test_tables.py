@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.storage.foreign_logs import (
+from bench.storage.sample_files import (
     GOALS,
     JOINTS,
     SEEN,

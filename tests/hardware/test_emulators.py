@@ -1,4 +1,4 @@
-"""Emulated robots have the mishaps that they are told to have."""
+"""Emulated robots: looked at at any moment; mishaps that they are told to have."""
 
 import os
 import threading
@@ -7,13 +7,46 @@ import time
 import numpy as np
 import pytest
 
-pytest.importorskip("cv2")
-
-from bns.hardware.emulators.camera import EmulatedCamera
-from bns.hardware.emulators.frames import painter
+from bns.hardware.emulators.camera import EmulatedCamera, painter
+from bns.hardware.emulators.khepera import KheperaBody
 from bns.hardware.emulators.mishaps import WORDS
 from bns.hardware.emulators.run import khepera3
 from bns.hardware.tracking.camera import Camera
+
+pytest.importorskip("cv2")
+
+SPEED = 0.1  # m/s
+
+
+def test_a_picture_shows_the_moment_and_not_the_nearest_physics_step():
+    body = KheperaBody()
+    body.tell(0.0, -SPEED, SPEED)
+    body.advance(1.5)
+    moments = 1.0 + np.arange(40) * body.dt / 8
+    yaws = np.array([body.pose(at)[2] for at in moments])
+    rate = np.diff(yaws) / np.diff(moments)
+    assert rate == pytest.approx(np.full(39, rate.mean()), rel=0.05)
+    assert rate.mean() > 1.5  # it turns
+
+
+def test_a_moment_ahead_of_the_physics_is_reached_by_going_straight_on():
+    body = KheperaBody()
+    body.tell(0.0, SPEED, SPEED)
+    body.advance(1.0 + 1e-6)
+    ahead = 1.0 + 0.6 * body.dt
+    seen = body.pose(ahead)
+    body.advance(1.5)
+    assert seen[0] == pytest.approx(body.pose(ahead)[0], abs=1e-6)
+    assert body.pose(0.0)[0] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_the_attitude_stays_a_rotation_between_steps():
+    body = KheperaBody()
+    body.tell(0.0, -SPEED, SPEED)
+    body.advance(1.0)
+    for at in (0.5001, 0.5023):
+        assert np.linalg.norm(body.attitude(at)[1:]) == pytest.approx(1.0, abs=1e-4)
+
 
 SLOW = 20.0  # s; a busy machine
 
@@ -37,16 +70,7 @@ def tell(port, word):
         pipe.write(word + "\n")
 
 
-def waited(good):
-    until = time.monotonic() + SLOW
-    while time.monotonic() < until:
-        if found := good():
-            return found
-        time.sleep(0.01)
-    return None
-
-
-def test_what_a_camera_may_do(port):
+def test_what_a_camera_may_do(port, waited):
     camera = EmulatedCamera(port, painter("khepera3", Camera.overhead((320, 240))))
 
     def pair():
@@ -67,7 +91,7 @@ def test_what_a_camera_may_do(port):
     camera.close()
 
 
-def test_what_a_line_may_do(port):
+def test_what_a_line_may_do(port, waited):
     line = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
 
     def heard():

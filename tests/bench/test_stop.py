@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from bench.hardware import ramps
-from bns.hardware.emulators.hexapod_body import HexapodBody
+from bench.hardware import stop
+from bns.hardware.emulators.hexapod import HexapodBody
 
 
 @pytest.mark.parametrize(
@@ -21,12 +21,12 @@ from bns.hardware.emulators.hexapod_body import HexapodBody
     ],
 )
 def test_rest_is_what_lasts_and_a_robot_on_its_legs_sinks_first(rows, sinks, rest):
-    assert ramps.came_to_rest(rows, 1.0, sinks=sinks) == rest
+    assert stop.came_to_rest(rows, 1.0, sinks=sinks) == rest
 
 
 def test_wheels_stand_after_what_their_lag_and_their_speed_make():
-    slowest = 0.136 * np.log(ramps.SPEEDS[1] / ramps.SLOW)  # models/khepera3/README.md
-    assert 0.8 * slowest < ramps.khepera3() < 1.1 * slowest
+    slowest = 0.136 * np.log(stop.SPEEDS[1] / stop.SLOW)  # models/khepera3/README.md
+    assert 0.8 * slowest < stop.khepera3_ramp() < 1.1 * slowest
 
 
 def test_a_hexapod_without_torque_falls_as_its_body_does_and_one_that_lies_rests():
@@ -35,17 +35,17 @@ def test_a_hexapod_without_torque_falls_as_its_body_does_and_one_that_lies_rests
         body.tell(number, 512)
         body.power(number, True)
     body.advance(1.5)
-    falls = ramps.phantomx(body.state)
+    falls = stop.phantomx_ramp(body.state)
     assert 0.1 < falls < 0.6
     for number in body.joints:
         body.power(number, False)
     begin, rested = body.now, []
     while body.now < begin + 1.0:
-        body.advance(body.now + ramps.ROUND)
+        body.advance(body.now + stop.ROUND)
         rested.append((body.now, body.rests()))
-    found = ramps.came_to_rest(changes(rested), begin, sinks=True)
+    found = stop.came_to_rest(changes(rested), begin, sinks=True)
     assert found - begin == pytest.approx(falls, abs=0.02)
-    assert ramps.phantomx(body.state) == 0.0
+    assert stop.phantomx_ramp(body.state) == 0.0
 
 
 def changes(rows):

@@ -1,1 +1,0 @@
-"""Learners beside each other: faithfulness, priors, and what is deployed."""
