@@ -278,37 +278,25 @@ def drawn(
     rows = [row for row in pool if _stem(row.term) == effect]
     row = rows[int(rng.integers(len(rows)))]
     up = row.high > row.nominal and (row.low >= row.nominal or rng.random() < 0.5)
-    edge = (row.high if up else row.low) - row.nominal
     others = [item for item in rows if item.term == row.term and item is not row]
     turn = float(rng.uniform(-np.pi, np.pi))
     plane = others and row.name.rpartition(".")[2] in PLANE
 
     def values(size: float) -> dict[str, float]:
+        """Of the rows of the effect; in a plane they are a size and a direction."""
         if not plane:
             return {row.name: row.nominal + size}
-        return {
-            item.name: abs(size) * way
-            for item, way in zip(
-                (row, others[0]), (np.cos(turn), np.sin(turn)), strict=True
-            )
-        }
+        ways = zip((row, others[0]), (np.cos(turn), np.sin(turn)), strict=True)
+        return {item.name: abs(size) * way for item, way in ways}
 
-    steps = [v - row.nominal for v in row.levels if (v > row.nominal) == up]
-    tried = sorted({abs(v) for v in steps} if row.stepped else
-                   {abs(edge) * share for share in SHARES})  # fmt: skip
-    if not tried:
+    sizes = _sizes(row, up)
+    if not len(sizes):
         return None
-    sizes = np.sign(edge) * np.array(tried)
     made = [_effect(problem, row.term, values(float(s))) for s in sizes]
     lengths = np.nan_to_num(_lengths(problem, point, made), posinf=0.0, neginf=0.0)
     if lengths.max() < 0.7 * length:
         return None
-    if row.stepped:
-        size = float(sizes[np.abs(np.log(np.maximum(lengths, 1e-9) / length)).argmin()])
-    else:
-        grown = np.append(0.0, np.maximum.accumulate(lengths))
-        size = float(np.interp(length, grown, np.append(0.0, np.abs(sizes))))
-        size *= np.sign(edge)
+    size = _of_length(sizes, lengths, length, stepped=row.stepped)
     chosen = values(size)
     hidden = _effect(problem, row.term, chosen)
     (reached,) = _lengths(problem, point, [hidden])
@@ -317,6 +305,32 @@ def drawn(
         return None
     magnitude = abs(size) if plane else row.nominal + size
     return Hidden(row.term, chosen, hidden, float(magnitude))
+
+
+def _sizes(row: Row, up: bool) -> np.ndarray:
+    """Departures of a row that are tried, the smallest first."""
+    edge = (row.high if up else row.low) - row.nominal
+    steps = [v - row.nominal for v in row.levels if (v > row.nominal) == up]
+    found = {abs(v) for v in steps} if row.stepped else {abs(edge) * s for s in SHARES}
+    return np.sign(edge) * np.array(sorted(found))
+
+
+def _of_length(
+    sizes: np.ndarray, lengths: np.ndarray, wanted: float, *, stepped: bool
+) -> float:
+    """The departure whose effect is about so long.
+
+    Args:
+        sizes: departures that were tried, of one sign, ``(S,)``.
+        lengths: of what they do, in deviations, ``(S,)``.
+        wanted: length.
+        stepped: whether only those that were tried can be.
+    """
+    if stepped:
+        return float(sizes[np.abs(np.log(np.maximum(lengths, 1e-9) / wanted)).argmin()])
+    grown = np.append(0.0, np.maximum.accumulate(lengths))
+    size = float(np.interp(wanted, grown, np.append(0.0, np.abs(sizes))))
+    return size * float(np.sign(sizes[0]))
 
 
 def _effect(problem: Problem, term: str, values: Mapping[str, float]) -> Effect:

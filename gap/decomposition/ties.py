@@ -42,8 +42,10 @@ def _refitted(
     problem: Problem, point: Point, tried: Singles
 ) -> list[tuple[float, Support]]:
     """Explanations in place of a single one, each fitted from where it was by itself: a
-    tangent at the one tells little of another that is far from nominal."""
-    if len(point.support) > 1 or problem.onset:
+    tangent at the one tells little of another that is far from nominal, where large
+    departures are no longer in proportion."""
+    bent = problem.model.singly or problem.model.many
+    if len(point.support) > 1 or problem.onset or not bent:
         return []
     least = min(one.height for one in tried.fitted)
     near = [one for one in tried.fitted if one.height < least + 2 * (TIED + MARGIN)]
