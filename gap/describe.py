@@ -12,8 +12,15 @@ import numpy as np
 from bns.errors import BnsError, FormatError
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column
-from bns.gap.models.mjcf import guesses, matching, rehearsal
-from bns.gap.models.mjcf.channels import Work, commands, compiled, factor, observed
+from bns.gap.models.mjcf import guesses, matching
+from bns.gap.models.mjcf.channels import (
+    Work,
+    commands,
+    compiled,
+    factor,
+    observed,
+    replayed,
+)
 from bns.gap.models.mjcf.log import split
 from bns.gap.models.mjcf.toml_text import toml
 from bns.worlds.data.column_map import FACTORS
@@ -177,13 +184,9 @@ def _settled(work: Work, rows: np.ndarray, pose: str) -> bool:
     """Whether a trial begins as a robot does that has come to rest, not as one that was
     let go: by which of the two predicts its first samples better."""
     rows = rows[work.times[rows] <= work.times[rows[0]] + guesses.SETTLE]
-    told = np.stack([c.values[rows] * factor(unit) for c, _, unit in work.told], axis=1)
-    actuators = [work.model.actuator(name).id for _, name, _ in work.told]
-    times = work.times[rows] - work.times[rows[0]]
     errors = []
     for lasting in (guesses.SETTLE, 0.0):
-        data = guesses.posed(work.model, pose, lasting)
-        made = rehearsal.motions(work.model, data, actuators, times, told)
+        made = replayed(work, rows, guesses.posed(work.model, pose, lasting))
         rest = [
             np.nanmean((column.values[rows] * factor(unit) - made[part]) ** 2)
             / np.nanvar(column.values * factor(unit))

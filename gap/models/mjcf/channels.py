@@ -355,7 +355,23 @@ def _moved(
             span = np.abs(values[np.isfinite(values)]).max(initial=0.0)
             if len(first) and span <= 2 * np.pi:
                 data.joint(part.name).qpos[0] = first[0]
+    return replayed(work, rows, data)
+
+
+def replayed(
+    work: Work, rows: np.ndarray, data: mujoco.MjData
+) -> dict[Part, np.ndarray]:
+    """What the model does of itself under the commands of some samples.
+
+    Args:
+        work: what is known of the log.
+        rows: numbers of the samples, ``(T,)``.
+        data: the model's state at the first of them; is changed.
+
+    Returns:
+        positions of all joints, named sites and bodies, each ``(T,)``.
+    """
     told = np.stack([c.values[rows] * factor(unit) for c, _, unit in work.told], axis=1)
-    actuators = [model.actuator(actuator).id for _, actuator, _ in work.told]
+    actuators = [work.model.actuator(name).id for _, name, _ in work.told]
     times = work.times[rows] - work.times[rows[0]]
-    return rehearsal.motions(model, data, actuators, times, np.nan_to_num(told))
+    return rehearsal.motions(work.model, data, actuators, times, np.nan_to_num(told))
