@@ -114,9 +114,16 @@ class Decomposition:
         return self.after > max(LARGE, SCATTER * self.scatter)
 
     @property
+    def failing(self) -> bool:
+        """Whether most of a large gap stays on motion that was not fitted: what was
+        found describes the recording, not the robot."""
+        large = bool(self.point.support) and self.before > LARGE
+        return large and self.closed < 1 - MOST
+
+    @property
     def kind(self) -> str:
         """Kind of the verdict, one of `records.KINDS`."""
-        if self.lasting and self.unexplained > MOST:
+        if (self.lasting and self.unexplained > MOST) or self.failing:
             return "none of the library"
         if not self.point.support:
             return "no gap"

@@ -149,7 +149,12 @@ def statements(made: Decomposition) -> list[str]:
     return [
         words.size(before, beyond, features, _over(problem)),
         words.explained(listed, made.closed, date, swapped),
-        words.left(made.left, made.lasting, made.recurring, words.sized(left, features))
+        words.left(
+            made.left,
+            made.lasting or made.failing,
+            made.recurring,
+            words.sized(left, features),
+        )
         + apart,
     ]
 

@@ -1,10 +1,13 @@
 """The joint fit on recordings: shares, statements, dates, and what is left out."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from bns.gap.bench.wheeled_cases import commands
 from bns.gap.decomposition import diagnosis, rest
+from bns.gap.decomposition.decomposition import Decomposition
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
 from bns.gap.diagnose import diagnose
@@ -96,3 +99,24 @@ def test_a_row_without_room_is_refused():
 
     with pytest.raises(BnsError, match="between low and high"):
         Row("x", 0.0, 1.0, 1.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("before", "closed", "kind"),
+    [
+        (50.0, 0.9, "effect"),
+        (50.0, 0.3, "none of the library"),
+        (1.0, 0.3, "effect"),  # so small a gap is closed by chance
+    ],
+)
+def test_what_holds_for_the_fitted_motion_alone_is_no_answer(before, closed, kind):
+    made = SimpleNamespace(
+        point=SimpleNamespace(support=frozenset({"dead_zone[both]"})),
+        tied=(frozenset({"dead_zone[both]"}),),
+        before=before,
+        closed=closed,
+        lasting=False,
+        unexplained=0.1,
+    )
+    made.failing = Decomposition.failing.fget(made)
+    assert Decomposition.kind.fget(made) == kind
