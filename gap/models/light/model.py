@@ -75,6 +75,7 @@ class SightModel(LibraryModel):
 
     starts = 6
     singly = True
+    spread = (0.3, 1.0)
     odds = 5.0  # against each of some two hundred
 
     def __init__(
