@@ -8,6 +8,7 @@ from bench.walking import ceiling, runs
 from bench.walking.runs import spread
 from bns.experiment.record import RunRecord
 
+BARS = (0.5, 0.75, 0.9)  # of the damage's ceiling, whatever the robot did before
 MILD, LIMIT_MILD, LIMIT = ("type0", "type1", "type3"), 30, 46
 
 
@@ -58,7 +59,6 @@ def _forgot(record: RunRecord) -> np.ndarray:
 def _recovery(legs: str, record: RunRecord, hand: runs.Hand) -> dict[str, object]:
     onset, ways = int(record.damage_onset[0]), record["distance"]
     late = np.median(ways[:, -runs.BEFORE :], axis=1)
-    share = ceiling.share(late, legs)
     enough = runs.SHARE * runs.before(record)
     adequate = runs.adequate(record, hand)
     return {
@@ -70,6 +70,23 @@ def _recovery(legs: str, record: RunRecord, hand: runs.Hand) -> dict[str, object
         "before [m]": spread(runs.before(record)),
         "first damaged trial [m]": spread(ways[:, onset]),
         "last ten trials [m]": spread(late),
-        "ceiling [m]": ceiling.known(legs),
-        "share of the ceiling": None if share is None else spread(share),
+        "ceiling [m]": ceiling.ceilings(legs),
+        "share of the ceiling": ceiling.shares(late, legs),
+        "until a share of the ceiling": until(ways[:, onset:], legs),
+    }
+
+
+def until(ways: np.ndarray, legs: str) -> dict[str, dict[str, object]]:
+    """Trials until robots got to `BARS` of each ceiling of a damage that is known.
+
+    Args:
+        ways: of the trials with the damage, ``(R, T)`` [m].
+        legs: the damage.
+    """
+    return {
+        name: {
+            f"{bar:.0%}": solving.waits(solving.first(ways >= bar * most))
+            for bar in BARS
+        }
+        for name, most in ceiling.ceilings(legs).items()
     }
