@@ -38,8 +38,10 @@ NEWER = (
     ("evolution", "cells"),
     ("light", "readings"),
     ("light", "renewed"),
+    ("walk", "nominal"),
     ("walk", "repeat"),
     ("walk", "repeat_after"),
+    ("walk", "swing"),
     ("watch", "forget_floor"),
 )
 """settings newer than some stored runs of their sections"""

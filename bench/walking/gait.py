@@ -91,8 +91,17 @@ def hexapod_gait(quick: bool) -> Result:
             "within the stretch": int((timed <= STRETCH).sum()),
             "trials to its distance in as many commands": solving.waits(told),
             "at the end": at_the_end(record),
+            runs.OWN: _of(runs.walking("nominal", quick=quick), hand),
         },
     )
+
+
+def _of(record: RunRecord, hand: runs.Hand) -> dict[str, object]:
+    timed = solving.first(runs.adequate(record, hand))
+    return {
+        "trials to its distance in its time": solving.waits(timed),
+        "at the end": at_the_end(record),
+    }
 
 
 def at_the_end(record: RunRecord) -> dict[str, object]:

@@ -1,5 +1,7 @@
 """Recovery from raised legs with a sliding window of 300 patterns."""
 
+from typing import get_args
+
 import numpy as np
 
 from bench.learning import solving
@@ -21,11 +23,12 @@ def recover_hexapod(quick: bool) -> Result:
 
     The runs of all types are those of `hexapod-gait` up to the damage. The figure is
     that of the window, ten runs a type; beside it, from the same undamaged runs on,
-    what forgetting by evidence comes to (`watch.forget`), and, thirty runs a type, the
-    preset `hexapod-recover`.
+    what forgetting by evidence comes to (`watch.forget`), and the presets
+    `hexapod-recover`, thirty runs a type, and `hexapod-nominal`, from runs of its own.
     """
-    kinds = runs.recovering(quick=quick)
-    records, others, ours = (kinds[kind] for kind in ("window", "forget", "own"))
+    records, others, *ours = (
+        runs.recovering(kind, quick=quick) for kind in get_args(runs.Kind)
+    )
     hand = runs.by_hand()
     found: dict[str, object] = {}
     medians, holds = [], True
@@ -35,7 +38,8 @@ def recover_hexapod(quick: bool) -> Result:
             **_recovery(legs, others[legs], hand),
             "trials until it forgot": solving.waits(_forgot(others[legs])),
         }
-        row["hexapod-recover"] = _recovery(legs, ours[legs], hand)
+        for preset, found_by in zip(("hexapod-recover", runs.OWN), ours, strict=True):
+            row[preset] = _recovery(legs, found_by[legs], hand)
         median = row["median"]
         limit = LIMIT_MILD if legs in MILD else LIMIT
         holds = holds and median is not None and median <= limit

@@ -27,7 +27,7 @@ from bns.evolution.generation import Rates
 from bns.evolution.goals import TICK, GoalBreeder, Goals
 from bns.experiment.config import RunConfig
 from bns.experiment.task_settings import WalkConfig
-from bns.learners.bns import change_detection
+from bns.learners.bns import change_detection, nominal
 from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.memory import Memory
 from bns.learners.bns.navigation import OpenLoopProblem
@@ -53,10 +53,13 @@ class WalkEvaluator:
     Attributes:
         shape: of the ensemble.
         config: which fitness.
+        nominal: weights of a network that says what the ensemble adds to, see
+            `bns.learners.bns.nominal`; None = nothing does.
     """
 
     shape: Shape
     config: WalkConfig
+    nominal: Tensor | None = None
 
     def inputs(self, population: Population) -> Tensor:
         """Network inputs, ``(R, 2 C, K * P)``, the individual varying fastest."""
@@ -66,15 +69,21 @@ class WalkEvaluator:
     def members(self, theta: Tensor, seen: Tensor) -> Tensor:
         """Scaled outputs of every member, ``(R, G, 3, N)``, piece by piece."""
         if seen.device.type != "cpu":
-            return forward(self.shape, theta, seen)
+            return self._said(theta, seen)
         return torch.cat(
             [
-                torch.cat([forward(self.shape, row, part) for part in parts], dim=3)
+                torch.cat([self._said(row, part) for part in parts], dim=3)
                 for row, parts in zip(
                     theta.split(1), map(_pieces, seen.split(1)), strict=True
                 )
             ]
         )
+
+    def _said(self, theta: Tensor, seen: Tensor) -> Tensor:
+        found = forward(self.shape, theta, seen)
+        if self.nominal is None:
+            return found
+        return found + nominal.said(self.nominal, seen)[:, None]
 
     def judge(
         self, theta: Tensor, seen: Tensor, lengths: Tensor, *, fused: bool = False
@@ -232,7 +241,8 @@ class WalkProblem(OpenLoopProblem):
         self.output = torch.tensor(MOVED)
         names = [channel.name for channel in self.encoding.channels]
         self._femurs = [i for i, name in enumerate(names) if name.endswith("_femur")]
-        self.evaluator = WalkEvaluator(self.shape, config.walk)
+        known = nominal.weights(config) if config.walk.nominal else None
+        self.evaluator = WalkEvaluator(self.shape, config.walk, known)
         self.breeder = GoalBreeder(config.evolution, self.encoding, True)
         self._compile()
 
@@ -290,6 +300,12 @@ class WalkProblem(OpenLoopProblem):
         """See `OpenLoopProblem.inputs_and_motion`."""
         return of_trial(trial)
 
+    def foreseen(self, memory: Memory, run: int, inputs: np.ndarray) -> np.ndarray:
+        """See `OpenLoopProblem.foreseen`; with what the ensemble adds to."""
+        found = super().foreseen(memory, run, inputs)
+        model = self.evaluator.nominal
+        return found if model is None else found + nominal.predict(model, inputs)
+
     def forget(self, run: int, memories: Sequence[Memory]) -> int:
         """See `Problem.forget`; by `change_detection`."""
         memory, size = memories[0], self.config.walk.commands
@@ -304,6 +320,9 @@ class WalkProblem(OpenLoopProblem):
         self, shape: Shape, theta: Tensor, patterns: fitting.Patterns
     ) -> tuple[Tensor, Tensor]:
         """See `Problem.train`; by Adam on parts of the patterns (walk.batch > 0)."""
+        if self.evaluator.nominal is not None:
+            told = nominal.said(self.evaluator.nominal, patterns.inputs)
+            patterns = patterns._replace(targets=patterns.targets - told)
         if self.config.walk.batch == 0:
             return super().train(shape, theta, patterns)
         return adam.fit(shape, self.config, theta, patterns, self.draws)
