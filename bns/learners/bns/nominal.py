@@ -22,6 +22,7 @@ from bns.draws import Draws, whole_below
 from bns.experiment import robots
 from bns.experiment.config import RunConfig
 from bns.snn.adam import AdamState, adam
+from bns.snn.fitting import Patterns
 from bns.snn.network import Shape, forward
 from bns.snn.training import gradient
 
@@ -133,15 +134,39 @@ def drawn(
 SHAPE = Shape(groups=1, hidden=HIDDEN, outputs=3, inputs=36, activation="relu")
 
 
-def weights(config: RunConfig) -> Tensor:
-    """The network of a configuration's robot, see `network`.
+class Nominal:
+    """The model as R runs use it, each as far as its patterns bear it out.
+
+    Args:
+        config: of the runs.
+        runs: R.
+
+    Attributes:
+        theta: weights of `network`.
+        trust: what the model's forward, left and turn are multiplied by, ``(R, 3, 1)``.
 
     Raises:
         BnsError: a robot whose legs are not known.
     """
-    walk, robot = config.walk, config.world.robot
-    reach = walk.swing or walk.reach, walk.reach, walk.reach
-    return network(robot, reach).to(config.device)
+
+    def __init__(self, config: RunConfig, runs: int):
+        walk = config.walk
+        reach = walk.swing or walk.reach, walk.reach, walk.reach
+        self.theta = network(config.world.robot, reach).to(config.device)
+        self.trust = torch.ones(runs, 3, 1, device=config.device)
+
+    def weigh(self, patterns: Patterns) -> Tensor:
+        """Trust the model by its least squares share in patterns, from 0 to 1.
+
+        Returns:
+            what it says of them then, ``(R, 3, N)``.
+        """
+        told = said(self.theta, patterns.inputs)
+        weighed = told * patterns.weight[:, 0]
+        square = (weighed * told).sum(2, keepdim=True)
+        share = (weighed * patterns.targets).sum(2, keepdim=True) / square
+        self.trust = torch.where(square > 0, share.clamp(0, 1), 1.0)
+        return self.trust * told
 
 
 @cache
@@ -177,12 +202,6 @@ def network(robot: str, reach: Reach) -> Tensor:
 
 def _tensor(rows: np.ndarray) -> Tensor:
     return torch.from_numpy(rows.T.astype(np.float32).copy())[None]
-
-
-def predict(theta: Tensor, inputs: np.ndarray) -> np.ndarray:
-    """What such a network says of scaled inputs ``(N, 36)``, scaled, ``(N, 3)``."""
-    found: np.ndarray = said(theta, _tensor(inputs).to(theta.device))[0].cpu().numpy().T
-    return found
 
 
 def said(theta: Tensor, seen: Tensor) -> Tensor:

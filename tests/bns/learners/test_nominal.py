@@ -10,6 +10,7 @@ from bns.learners.bns import nominal
 from bns.learners.bns.learner import Bns
 from bns.learners.bns.walking import GOAL, MOVED
 from bns.models.phantomx import gait, kinematics
+from bns.snn.fitting import Patterns
 from tests.bns.walkers import Slider, small
 
 STANDING = np.zeros((1, 18))
@@ -55,7 +56,7 @@ def test_the_network_says_what_the_model_says_and_is_the_same_each_time():
     theta = nominal.network("phantomx", reach)
     before, after = nominal.drawn(np.random.default_rng(1), 500, reach)
     seen = np.concatenate([before, after], axis=1) / GOAL
-    said = nominal.predict(theta, seen) * np.array(MOVED)
+    said = nominal.said(theta, nominal._tensor(seen))[0].numpy().T * np.array(MOVED)
     told = nominal.moved(before, after, kinematics.feet)
     rest = ((said - told) ** 2).sum(0) / ((told - told.mean(0)) ** 2).sum(0)
     assert (rest < 0.4).all()
@@ -78,7 +79,9 @@ def test_a_fresh_learner_foresees_what_the_model_says_and_learns_the_rest():
     goals = tried[0].values
     before = np.concatenate([STANDING, goals[:-1]])
     seen = np.concatenate([before, goals], axis=1) / GOAL
-    own = nominal.predict(problem.evaluator.nominal, seen) * np.array(MOVED)
+    model = problem.evaluator.nominal
+    own = nominal.said(model.theta, nominal._tensor(seen))[0].numpy().T
+    own = own * np.array(MOVED)
     _, moved = problem.inputs_and_motion(trials[0])
     (patterns,) = problem.patterns(0, trials[0])
     error = problem.error(0, trials[0], one.memories, patterns)
@@ -87,6 +90,23 @@ def test_a_fresh_learner_foresees_what_the_model_says_and_learns_the_rest():
     for _ in range(20):
         one.observe(0, trials, None)
     assert problem.error(0, trials[0], one.memories, patterns)[0] < error[0] / 2
+
+
+@pytest.mark.parametrize("share,trust", [(0.4, 0.4), (-1.0, 0.0), (3.0, 1.0)])
+def test_the_model_is_trusted_as_far_as_patterns_bear_it_out(share, trust):
+    model = learner(nominal=True).problem.evaluator.nominal
+    before, after = nominal.drawn(np.random.default_rng(1), 50, (0.6, 0.6, 0.6))
+    seen = nominal._tensor(np.concatenate([before, after], axis=1) / GOAL)
+    told = nominal.said(model.theta, seen)
+    weight = torch.ones(1, 1, 1, 50)
+    weight[..., 40:] = 0.0  # padding
+    targets = told * share
+    targets[..., 40:] = 99.0
+    found = model.weigh(Patterns(seen, targets, weight))
+    assert model.trust.flatten().tolist() == pytest.approx([trust] * 3, abs=1e-5)
+    torch.testing.assert_close(found, told * trust)
+    model.weigh(Patterns(seen, targets, torch.zeros_like(weight)))
+    assert model.trust.flatten().tolist() == [1.0] * 3, "nothing speaks against it"
 
 
 def test_robots_whose_legs_are_not_known_are_refused():
