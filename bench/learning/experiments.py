@@ -41,7 +41,6 @@ NEWER = (
     ("walk", "nominal"),
     ("walk", "repeat"),
     ("walk", "repeat_after"),
-    ("walk", "swing"),
     ("watch", "forget_floor"),
 )
 """settings newer than some stored runs of their sections"""

@@ -55,12 +55,9 @@ class Goals:
                 "world.robot = 'phantomx', or learner = 'navigation'."
             )
         bounds = torch.tensor(robot.ranges, dtype=torch.float32, device=config.device)
-        swing = walk.swing or walk.reach
-        coxae = [channel.name.endswith("_coxa") for channel in robot.channels]
-        reach = bounds.new_tensor([swing if coxa else walk.reach for coxa in coxae])
         return cls(
-            low=torch.maximum(bounds[:, 0], -reach),
-            high=torch.minimum(bounds[:, 1], reach),
+            low=bounds[:, 0].clamp(min=-walk.reach),
+            high=bounds[:, 1].clamp(max=walk.reach),
             initial=walk.initial,
             max_commands=walk.commands,
             limit=walk.limit,

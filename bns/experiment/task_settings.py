@@ -152,9 +152,6 @@ class WalkConfig:
     reach: float = 3.0
     """no goal is farther than this from half-way [rad]; the servos' own limits hold
     besides"""
-    swing: float = 0.0
-    """no goal of a coxa is farther than this from half-way instead [rad] (own); 0 = as
-    `reach`"""
     nominal: bool = False
     """the networks learn what is missing from a model of feet that stay where they
     stand (own; bns/learners/bns/nominal.py)"""

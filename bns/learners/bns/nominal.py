@@ -32,7 +32,6 @@ SLIPS = 3  # turns of reweighting: the sum of slips for that of their squares
 LEAST = 0.001  # [m] of slip, so that weights stay finite
 SAMPLES, STEPS, BATCH, RATE, HIDDEN = 20_000, 3_000, 256, 0.002, 300
 Feet = Callable[[np.ndarray], np.ndarray]
-Reach = tuple[float, float, float]  # [rad] of goals of coxae, femurs and tibiae
 TRIPLES = np.array(list(combinations(range(6), 3)))
 
 
@@ -106,14 +105,14 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def drawn(
-    rng: np.random.Generator, count: int, reach: Reach
+    rng: np.random.Generator, count: int, reach: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of goals as walks have them: near, far and at the bounds; some stay.
 
     Args:
         rng: the only source of randomness.
         count: N.
-        reach: see `Reach`.
+        reach: farthest that goals are from half-way [rad].
 
     Returns:
         goals in force and the next ones, each ``(N, 18)`` [rad].
@@ -123,7 +122,7 @@ def drawn(
         goals = rng.uniform(-1, 1, (count, 18))
         share = rng.choice([0.0, 0.3, 0.6], (count, 1))
         ends = np.where(rng.random(goals.shape) < share, np.sign(goals), goals)
-        return ends * rng.uniform(0.2, 1, (count, 1)) * np.tile(reach, 6)
+        return ends * rng.uniform(0.2, 1, (count, 1)) * reach
 
     before, after = pose(), pose()
     before[rng.random(count) < 0.1] = 0.0
@@ -150,9 +149,8 @@ class Nominal:
     """
 
     def __init__(self, config: RunConfig, runs: int):
-        walk = config.walk
-        reach = walk.swing or walk.reach, walk.reach, walk.reach
-        self.theta = network(config.world.robot, reach).to(config.device)
+        made = network(config.world.robot, config.walk.reach)
+        self.theta = made.to(config.device)
         self.trust = torch.ones(runs, 3, 1, device=config.device)
 
     def weigh(self, patterns: Patterns) -> Tensor:
@@ -170,14 +168,14 @@ class Nominal:
 
 
 @cache
-def network(robot: str, reach: Reach) -> Tensor:
+def network(robot: str, reach: float) -> Tensor:
     """Weights of a network of `SHAPE` that says what `moved` says, ``(1, D)``.
 
     The same each time, so no run has to keep them.
 
     Args:
         robot: its name.
-        reach: see `Reach`.
+        reach: farthest that goals are from half-way [rad].
 
     Raises:
         BnsError: a robot whose legs are not known.
@@ -201,7 +199,7 @@ def network(robot: str, reach: Reach) -> Tensor:
 
 
 def _tensor(rows: np.ndarray) -> Tensor:
-    return torch.from_numpy(rows.T.astype(np.float32).copy())[None]
+    return torch.from_numpy(rows.T.astype(np.float32))[None]
 
 
 def said(theta: Tensor, seen: Tensor) -> Tensor:

@@ -52,7 +52,7 @@ def test_a_tripod_gait_goes_a_stride_every_other_command():
 
 
 def test_the_network_says_what_the_model_says_and_is_the_same_each_time():
-    reach = (0.6, 0.6, 0.6)
+    reach = 0.6
     theta = nominal.network("phantomx", reach)
     before, after = nominal.drawn(np.random.default_rng(1), 500, reach)
     seen = np.concatenate([before, after], axis=1) / GOAL
@@ -95,7 +95,7 @@ def test_a_fresh_learner_foresees_what_the_model_says_and_learns_the_rest():
 @pytest.mark.parametrize("share,trust", [(0.4, 0.4), (-1.0, 0.0), (3.0, 1.0)])
 def test_the_model_is_trusted_as_far_as_patterns_bear_it_out(share, trust):
     model = learner(nominal=True).problem.evaluator.nominal
-    before, after = nominal.drawn(np.random.default_rng(1), 50, (0.6, 0.6, 0.6))
+    before, after = nominal.drawn(np.random.default_rng(1), 50, 0.6)
     seen = nominal._tensor(np.concatenate([before, after], axis=1) / GOAL)
     told = nominal.said(model.theta, seen)
     weight = torch.ones(1, 1, 1, 50)
@@ -112,13 +112,6 @@ def test_the_model_is_trusted_as_far_as_patterns_bear_it_out(share, trust):
 def test_robots_whose_legs_are_not_known_are_refused():
     with pytest.raises(BnsError, match="not those of 'other'"):
         robots.feet("other")
-
-
-def test_coxae_swing_as_far_as_they_are_told_and_the_rest_as_before():
-    goals = learner(swing=0.9).problem.encoding
-    assert goals.high[:6].tolist() == pytest.approx([0.9, 0.6, 0.6] * 2)
-    assert goals.low[:6].tolist() == pytest.approx([-0.9, -0.6, -0.6] * 2)
-    assert learner().problem.encoding.high.tolist() == pytest.approx([0.6] * 18)
 
 
 def test_resumed_with_the_model_it_gives_the_same_bytes():
