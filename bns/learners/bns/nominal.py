@@ -26,6 +26,7 @@ from bns.snn.fitting import Patterns
 from bns.snn.network import Shape, forward
 from bns.snn.training import gradient
 
+GIVEN = 55.0  # patterns: five trials
 PIECES = 8  # of a command
 SOFT = 0.004  # [m] triples that are so much higher bear a third as much
 SLIPS = 3  # turns of reweighting: the sum of slips for that of their squares
@@ -156,14 +157,19 @@ class Nominal:
     def weigh(self, patterns: Patterns) -> Tensor:
         """Trust the model by its least squares share in patterns, from 0 to 1.
 
+        `GIVEN` further patterns, in which it is right, keep few from speaking too loud.
+
         Returns:
             what it says of them then, ``(R, 3, N)``.
         """
         told = said(self.theta, patterns.inputs)
         weighed = told * patterns.weight[:, 0]
+        count = patterns.weight.sum((2, 3))[..., None].clamp(min=1.0)
         square = (weighed * told).sum(2, keepdim=True)
-        share = (weighed * patterns.targets).sum(2, keepdim=True) / square
-        self.trust = torch.where(square > 0, share.clamp(0, 1), 1.0)
+        right = GIVEN * square / count
+        share = (weighed * patterns.targets).sum(2, keepdim=True) + right
+        share = (share / (square + right)).clamp(0, 1)
+        self.trust = torch.where(square > 0, share, 1.0)
         return self.trust * told
 
 
