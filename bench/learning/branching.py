@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from bench.learning import experiments
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig
@@ -41,6 +43,8 @@ def begin(trunk: RunConfig, branch: RunConfig, *, idle: tuple[str, ...] = ()) ->
     arrays |= record.extra
     for trial in range(done):
         columns = {name: column[:, trial] for name, column in record.columns.items()}
+        if branch.watch.forget:  # a trunk that was not asked to forgot nothing
+            columns.setdefault("forgotten", np.zeros(trunk.replicates))
         rows = {name: array[:, trial] for name, array in arrays.items()}
         begun.write_step(trial, Step(columns, rows))
     begun.write_state(done, state)

@@ -38,6 +38,7 @@ NEWER = (
     ("evolution", "cells"),
     ("light", "readings"),
     ("light", "renewed"),
+    ("walk", "nominal"),
     ("walk", "repeat"),
     ("walk", "repeat_after"),
     ("watch", "forget_floor"),

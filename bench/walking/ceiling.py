@@ -2,11 +2,14 @@
 
 It starts from the farthest walk that BNS found on that damage or undamaged, and goes on
 for `BUDGET` trials, a thousand times cheaper to have than a robot's. What is learned in
-the world with a hundred trials is then a share of what is possible.
+the world with a hundred trials is then a share of what is possible. The preset's goals
+stay near half-way (`walk.reach`), which the servos do not ask for; so there are two
+ceilings, within its reach and in full.
 """
 
 import json
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -14,7 +17,7 @@ from bench.learning import experiments
 from bench.result import Result, bench
 from bench.runner import write
 from bench.walking import runs
-from bns import seeding
+from bns import presets, seeding
 from bns.experiment.record import RunRecord
 
 NONE = "none"  # no damage
@@ -23,55 +26,79 @@ OTHERS = tuple(f"type{n}" for n in range(16) if f"type{n}" not in WANTED)
 POPULATION, STAGE = 20, 10  # generations of a stage
 BUDGET = 50 * POPULATION  # trials
 STEP = 0.1  # [rad] first standard deviation of a goal
+REACH = presets.load("hexapod-walk").walk.reach  # [rad] of the preset
+BOTH = {"in full": None, "within the preset's reach": REACH}
 
 
 @bench(
     "farthest walk that CMA-ES finds in the world itself, undamaged, and "
-    "by damage type",
+    "by damage type, in full and within the preset's reach",
     bar="none: printed beside hexapod-gait and recover-hexapod",
 )
 def hexapod_ceiling(quick: bool) -> Result:
-    """One search a damage; quick: those known already, and none anew."""
+    """Two searches a damage; quick: those known already, and none anew."""
+    find = known if quick else reached
+    wanted = {None: (*WANTED, *OTHERS), REACH: WANTED}
     found = {
-        legs: known(legs) if quick else reached(legs) for legs in (*WANTED, *OTHERS)
+        name: {legs: find(legs, reach) for legs in wanted[reach]}
+        for name, reach in BOTH.items()
     }
-    ways = {legs: way for legs, way in found.items() if way is not None}
+    ways = {
+        name: {legs: way for legs, way in each.items() if way is not None}
+        for name, each in found.items()
+    }
     return Result(
-        figure=ways.get(NONE, 0.0),
+        figure=ways["in full"].get(NONE, 0.0),
         unit="m",
         holds=None,
-        n=len(ways),
-        details={"farthest [m]": ways, "trials of a search": BUDGET},
+        n=sum(map(len, ways.values())),
+        details={
+            "farthest [m]": ways["in full"],
+            f"farthest within {REACH:g} rad [m]": ways["within the preset's reach"],
+            "trials of a search": BUDGET,
+        },
     )
 
 
-def known(legs: str) -> float | None:
-    """The farthest walk found on one damage [m], if it has been searched."""
-    place = _place(legs)
+def known(legs: str, reach: float | None = None) -> float | None:
+    """The farthest walk found on one damage [m], if it has been searched.
+
+    Args:
+        legs: as for `reached`.
+        reach: likewise.
+    """
+    place = _place(legs, reach)
     row = json.loads(place.read_text()) if place.exists() else {"trials": 0}
     return float(row["farthest [m]"]) if row["trials"] >= BUDGET else None
 
 
-def share(ways: np.ndarray, legs: str) -> np.ndarray | None:
-    """Distances [m] as shares of the ceiling, where that is known."""
-    ceiling = known(legs)
-    return None if ceiling is None else ways / ceiling
+def shares(ways: np.ndarray, legs: str) -> dict[str, dict[str, float]]:
+    """Distances [m] as shares of the ceilings that are known."""
+    return {name: runs.spread(ways / most) for name, most in ceilings(legs).items()}
 
 
-def reached(legs: str) -> float:
+def ceilings(legs: str) -> dict[str, float]:
+    """Of one damage those of `BOTH` that are known [m]."""
+    found = {name: known(legs, reach) for name, reach in BOTH.items()}
+    return {name: most for name, most in found.items() if most is not None}
+
+
+def reached(legs: str, reach: float | None = None) -> float:
     """The farthest walk found on one damage [m]; kept stage by stage, as it is dear.
 
     Args:
         legs: as the effect `leg_raised` takes them, or `NONE`.
+        reach: farthest that a goal may be from half-way [rad]; None = the end stops.
     """
-    place = _place(legs)
-    row = json.loads(place.read_text()) if place.exists() else _begun(legs)
+    place = _place(legs, reach)
+    row = json.loads(place.read_text()) if place.exists() else _begun(legs, reach)
     while row["trials"] < BUDGET:
         goals, farthest, step = search(
             np.array(row["goals [rad]"]),
             legs,
             step=row["step [rad]"],
             seed=seeding.integer(row["trials"], "hexapod-ceiling", legs),
+            reach=reach,
         )
         if farthest > row["farthest [m]"]:
             row |= {"farthest [m]": round(farthest, 4), "goals [rad]": goals.tolist()}
@@ -81,8 +108,8 @@ def reached(legs: str) -> float:
     return float(row["farthest [m]"])
 
 
-def _begun(legs: str) -> dict:
-    start, begun = _start(legs)
+def _begun(legs: str, reach: float | None) -> dict:
+    start, begun = _start(legs, reach)
     return {
         "farthest [m]": begun,
         "started from [m]": round(begun, 4),
@@ -93,7 +120,13 @@ def _begun(legs: str) -> dict:
 
 
 def search(
-    start: np.ndarray, legs: str, *, step: float, seed: int, generations: int = STAGE
+    start: np.ndarray,
+    legs: str,
+    *,
+    step: float,
+    seed: int,
+    generations: int = STAGE,
+    reach: float | None = None,
 ) -> tuple[np.ndarray, float, float]:
     """CMA-ES, its covariance diagonal, on goals within the servos' end stops.
 
@@ -103,6 +136,7 @@ def search(
         step: first standard deviation [rad].
         seed: of the search.
         generations: of `POPULATION` trials.
+        reach: as for `reached`.
 
     Returns:
         the goals that got farthest, how far [m], and the last step [rad].
@@ -111,9 +145,8 @@ def search(
 
     from bns import models
 
-    low, high = (
-        np.tile(side, len(start)) for side in models.robot("phantomx").ranges.T
-    )
+    stops = models.robot("phantomx").ranges.T
+    low, high = (np.tile(side, len(start)) for side in _within(stops, reach))
     options = {
         "popsize": POPULATION,
         "bounds": [low.tolist(), high.tolist()],
@@ -139,17 +172,18 @@ def distances(lists: Sequence[np.ndarray], legs: str) -> np.ndarray:
     return runs.ways(runs.walked(lists, damage=damage))
 
 
-def _start(legs: str) -> tuple[np.ndarray, float]:
+def _start(legs: str, reach: float | None) -> tuple[np.ndarray, float]:
     """The farthest of what is known to walk: by hand, or found by BNS."""
     from bns.models.phantomx import gait
 
-    lists = [
-        gait.tripod(),
-        *_found(runs.kept(legs)),
-        *_found(runs.kept(NONE)),
-    ]
+    every = [gait.tripod(), *_found(runs.kept(legs)), *_found(runs.kept(NONE))]
+    lists = [_within(goals, reach) for goals in every]
     ways = distances(lists, legs)
     return lists[int(ways.argmax())], float(ways.max())
+
+
+def _within(goals: np.ndarray, reach: float | None) -> np.ndarray:
+    return goals if reach is None else goals.clip(-reach, reach)
 
 
 def _found(records: Sequence[RunRecord]) -> list[np.ndarray]:
@@ -162,5 +196,6 @@ def _found(records: Sequence[RunRecord]) -> list[np.ndarray]:
     return lists
 
 
-def _place(legs: str):
-    return experiments.RUNS / f"hexapod-ceiling-{legs}.json"
+def _place(legs: str, reach: float | None) -> Path:
+    name = legs if reach is None else f"{legs}-{reach:g}"
+    return experiments.RUNS / f"hexapod-ceiling-{name}.json"

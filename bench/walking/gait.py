@@ -91,15 +91,23 @@ def hexapod_gait(quick: bool) -> Result:
             "within the stretch": int((timed <= STRETCH).sum()),
             "trials to its distance in as many commands": solving.waits(told),
             "at the end": at_the_end(record),
+            runs.OWN: _of(runs.walking("nominal", quick=quick), hand),
         },
     )
+
+
+def _of(record: RunRecord, hand: runs.Hand) -> dict[str, object]:
+    timed = solving.first(runs.adequate(record, hand))
+    return {
+        "trials to its distance in its time": solving.waits(timed),
+        "at the end": at_the_end(record),
+    }
 
 
 def at_the_end(record: RunRecord) -> dict[str, object]:
     """How far, how fast and on what the robot walks in the last ten trials."""
     ways, late = record["distance"], slice(-LATE, None)
     far = np.median(ways[:, late], axis=1)
-    share = ceiling.share(far, "none")
     speed = (ways / record["seconds"])[:, late].mean(1)
     loads = shares([run[-1] for run in record.sent]).mean(0)
     return {
@@ -107,8 +115,8 @@ def at_the_end(record: RunRecord) -> dict[str, object]:
         "farthest of a run [m]": spread(ways.max(1)),
         "last ten trials [m]": spread(far),
         "last ten trials [m/s]": spread(speed),
-        "ceiling [m]": ceiling.known("none"),
-        "share of the ceiling": None if share is None else spread(share),
+        "ceiling [m]": ceiling.ceilings("none"),
+        "share of the ceiling": ceiling.shares(far, "none"),
         "share of the last ten trials with belly or hip on the floor": round(
             float(record["fell"][:, late].mean()), 3
         ),

@@ -1,5 +1,7 @@
 """Recovery from raised legs with a sliding window of 300 patterns."""
 
+from typing import get_args
+
 import numpy as np
 
 from bench.learning import solving
@@ -8,6 +10,7 @@ from bench.walking import ceiling, runs
 from bench.walking.runs import spread
 from bns.experiment.record import RunRecord
 
+BARS = (0.5, 0.75, 0.9)  # of the damage's ceiling, whatever the robot did before
 MILD, LIMIT_MILD, LIMIT = ("type0", "type1", "type3"), 30, 46
 
 
@@ -20,11 +23,12 @@ def recover_hexapod(quick: bool) -> Result:
 
     The runs of all types are those of `hexapod-gait` up to the damage. The figure is
     that of the window, ten runs a type; beside it, from the same undamaged runs on,
-    what forgetting by evidence comes to (`watch.forget`), and, thirty runs a type, the
-    preset `hexapod-recover`.
+    what forgetting by evidence comes to (`watch.forget`), and the presets
+    `hexapod-recover`, thirty runs a type, and `hexapod-nominal`, from runs of its own.
     """
-    kinds = runs.recovering(quick=quick)
-    records, others, ours = (kinds[kind] for kind in ("window", "forget", "own"))
+    records, others, *ours = (
+        runs.recovering(kind, quick=quick) for kind in get_args(runs.Kind)
+    )
     hand = runs.by_hand()
     found: dict[str, object] = {}
     medians, holds = [], True
@@ -34,7 +38,8 @@ def recover_hexapod(quick: bool) -> Result:
             **_recovery(legs, others[legs], hand),
             "trials until it forgot": solving.waits(_forgot(others[legs])),
         }
-        row["hexapod-recover"] = _recovery(legs, ours[legs], hand)
+        for preset, found_by in zip(("hexapod-recover", runs.OWN), ours, strict=True):
+            row[preset] = _recovery(legs, found_by[legs], hand)
         median = row["median"]
         limit = LIMIT_MILD if legs in MILD else LIMIT
         holds = holds and median is not None and median <= limit
@@ -58,7 +63,6 @@ def _forgot(record: RunRecord) -> np.ndarray:
 def _recovery(legs: str, record: RunRecord, hand: runs.Hand) -> dict[str, object]:
     onset, ways = int(record.damage_onset[0]), record["distance"]
     late = np.median(ways[:, -runs.BEFORE :], axis=1)
-    share = ceiling.share(late, legs)
     enough = runs.SHARE * runs.before(record)
     adequate = runs.adequate(record, hand)
     return {
@@ -70,6 +74,23 @@ def _recovery(legs: str, record: RunRecord, hand: runs.Hand) -> dict[str, object
         "before [m]": spread(runs.before(record)),
         "first damaged trial [m]": spread(ways[:, onset]),
         "last ten trials [m]": spread(late),
-        "ceiling [m]": ceiling.known(legs),
-        "share of the ceiling": None if share is None else spread(share),
+        "ceiling [m]": ceiling.ceilings(legs),
+        "share of the ceiling": ceiling.shares(late, legs),
+        "until a share of the ceiling": until(ways[:, onset:], legs),
+    }
+
+
+def until(ways: np.ndarray, legs: str) -> dict[str, dict[str, object]]:
+    """Trials until robots got to `BARS` of each ceiling of a damage that is known.
+
+    Args:
+        ways: of the trials with the damage, ``(R, T)`` [m].
+        legs: the damage.
+    """
+    return {
+        name: {
+            f"{bar:.0%}": solving.waits(solving.first(ways >= bar * most))
+            for bar in BARS
+        }
+        for name, most in ceiling.ceilings(legs).items()
     }

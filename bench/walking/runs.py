@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from bns.experiment.record import RunRecord
 from bns.storage.store import RunStore
 from bns.worlds.trial import Trial
 
-Kind = Literal["window", "forget", "own"]  # of recovering, see `damaged`
+Kind = Literal["window", "forget", "own", "nominal"]  # of recovering, see `damaged`
 ONSET = 100  # trial of the damage (dissertation, table 7.4)
 AFTER = 50  # trials from the damage on: more than the latest bar
 GROUPS = ("a", "b", "c")
@@ -30,8 +30,10 @@ RECOVERING: Mapping[Kind, Sequence[str]] = {
     "window": GROUPS[:1],
     "forget": GROUPS[:1],
     "own": GROUPS,
+    "nominal": GROUPS[:1],
 }
 """groups that are damaged"""
+OWN = "hexapod-nominal"  # the preset of the kind `nominal`, with trunks of its own
 WINDOW = 300
 TYPES = ("type0", "type1", "type3", "type2", "type5")
 BEFORE = 10  # trials whose median distance is what the robot did before the damage
@@ -51,15 +53,22 @@ class Hand(NamedTuple):
     seconds: float
 
 
-def undamaged(group: str = "", *, trials: int = ONSET, **walk: object) -> RunConfig:
-    """A batch of the preset without damage.
+def undamaged(
+    group: str = "",
+    *,
+    trials: int = ONSET,
+    preset: str = "hexapod-walk",
+    **walk: object,
+) -> RunConfig:
+    """A batch of a preset without damage.
 
     Args:
         group: one of `GROUPS`, or another name for other seeds.
         trials: of each run.
+        preset: which.
         walk: settings of the section `walk` that differ.
     """
-    config = presets.load("hexapod-walk")
+    config = presets.load(preset)
     config = replace(
         config,
         trials=trials,
@@ -68,7 +77,9 @@ def undamaged(group: str = "", *, trials: int = ONSET, **walk: object) -> RunCon
         world=replace(config.world, damage=()),
     )
     words = [f"{key}={value}" for key, value in sorted(walk.items())]
-    named = experiments.named(config, "-".join(["walk", group, *words]))
+    named = experiments.named(
+        config, "-".join([preset.removeprefix("hexapod-"), group, *words])
+    )
     return replace(named, replicates=GROUP)
 
 
@@ -78,10 +89,10 @@ def damaged(legs: str, group: str = "a", *, kind: Kind = "window") -> RunConfig:
     Args:
         legs: as the effect `leg_raised` takes them.
         group: of which undamaged batch it is the continuation.
-        kind: with the window alone, forgetting by evidence besides, or as the preset
-            `hexapod-recover` does (which forgets as well).
+        kind: with the window alone, forgetting by evidence besides, or as the presets
+            `hexapod-recover` and `OWN` do (which forget as well).
     """
-    trunk = undamaged(group)
+    trunk = _trunk(kind, group)
     damage = (f"leg_raised:legs={legs},blend=1@{ONSET}",)
     config = replace(
         trunk,
@@ -95,6 +106,10 @@ def damaged(legs: str, group: str = "a", *, kind: Kind = "window") -> RunConfig:
     return config
 
 
+def _trunk(kind: Kind, group: str) -> RunConfig:
+    return undamaged(group, preset=OWN if kind == "nominal" else "hexapod-walk")
+
+
 def records(
     configs: Iterable[RunConfig], *, quick: bool = False
 ) -> Mapping[str, RunRecord]:
@@ -102,10 +117,15 @@ def records(
     return experiments.records([small(c) if quick else c for c in configs])
 
 
-def walking(*, quick: bool = False) -> RunRecord:
-    """All undamaged runs, trained where they are missing; quick: one small run."""
-    groups = GROUPS[:1] if quick else GROUPS
-    found = records(map(undamaged, groups), quick=quick)
+def walking(kind: Kind = "window", *, quick: bool = False) -> RunRecord:
+    """All undamaged runs, trained where they are missing; quick: one small run.
+
+    Args:
+        kind: of which recovering they are the beginning.
+        quick: see above.
+    """
+    groups = RECOVERING["own" if kind == "window" else kind][: 1 if quick else None]
+    found = records((_trunk(kind, group) for group in groups), quick=quick)
     return joined(list(found.values()))
 
 
@@ -114,32 +134,29 @@ def adequate(record: RunRecord, hand: Hand) -> np.ndarray:
     return in_time(record, hand.seconds) >= hand.distance
 
 
-def recovering(*, quick: bool = False) -> Mapping[Kind, Mapping[str, RunRecord]]:
-    """The runs of each kind and each damage of `TYPES`; quick: one small run of each.
+def recovering(kind: Kind, *, quick: bool = False) -> Mapping[str, RunRecord]:
+    """The runs of a kind and each damage of `TYPES`; quick: one small run of each.
 
     Raises:
         BnsError: to forget by evidence would have changed the undamaged runs.
     """
-    kinds: tuple[Kind, ...] = get_args(Kind)
+    groups = RECOVERING[kind]
     configs = {
-        (kind, legs, group): damaged(legs, group, kind=kind)
-        for kind, legs in product(kinds, TYPES)
-        for group in RECOVERING[kind]
+        (legs, group): damaged(legs, group, kind=kind)
+        for legs, group in product(TYPES, groups)
     }
     if not quick:
-        trunks = records(map(undamaged, GROUPS))
-        if any(evidence.forgets(trunk).any() for trunk in trunks.values()):
+        trunks = records(_trunk(kind, group) for group in groups)
+        told = kind in ("forget", "own")  # the trunks were run without
+        if told and any(evidence.forgets(trunk).any() for trunk in trunks.values()):
             raise BnsError("Run the undamaged runs with watch.forget, too.")
-        for (_, _, group), config in configs.items():
-            branching.begin(undamaged(group), config, idle=("watch", "walk"))
+        for (_, group), config in configs.items():
+            branching.begin(_trunk(kind, group), config, idle=("watch", "walk"))
     found = records(configs.values(), quick=quick)
-
-    def of(kind: Kind, legs: str) -> RunRecord:
-        """All groups of a kind and a damage."""
-        names = [configs[kind, legs, group].preset for group in RECOVERING[kind]]
-        return joined([found[name] for name in names])
-
-    return {kind: {legs: of(kind, legs) for legs in TYPES} for kind in kinds}
+    return {
+        legs: joined([found[configs[legs, group].preset] for group in groups])
+        for legs in TYPES
+    }
 
 
 def kept(legs: str) -> list[RunRecord]:

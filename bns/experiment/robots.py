@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -36,6 +37,22 @@ def told(name: str) -> Told:
     robot = models.robot(name)
     channels = tuple(Channel(*channel) for channel in robot.channels)
     return Told(robot.kind, channels, robot.ranges)
+
+
+def feet(name: str) -> Callable[[np.ndarray], np.ndarray]:
+    """Where the feet of a robot are: goals ``(..., 18)`` to ``(..., 6, 3)``.
+
+    Raises:
+        BnsError: that is known of the PhantomX alone.
+    """
+    if name != "phantomx":
+        raise BnsError(
+            f"walk.nominal knows the legs of 'phantomx', not those of {name!r}; leave "
+            "it out."
+        )
+    from bns.models.phantomx import kinematics
+
+    return kinematics.feet
 
 
 def digest(name: str) -> str:

@@ -152,6 +152,9 @@ class WalkConfig:
     reach: float = 3.0
     """no goal is farther than this from half-way [rad]; the servos' own limits hold
     besides"""
+    nominal: bool = False
+    """the networks learn what is missing from a model of feet that stay where they
+    stand (own; bns/learners/bns/nominal.py)"""
     mutation_magnitude: float = 20.0
     """standard deviation of a goal's mutation [ticks of 300/1023 deg] (table 7.2,
     unit silent)"""

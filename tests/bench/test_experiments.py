@@ -64,6 +64,8 @@ def test_a_section_that_did_nothing_in_the_trunk_may_differ(trunk):
     place = experiments.directory(branch)
     assert len(list((place / "steps").iterdir())) == ONSET
     assert RunStore.open(place).config.watch.forget
+    record = train(branch, place, resume=True)
+    assert not record["forgotten"][:, :ONSET].any()
 
 
 def side(damage="wheel_gain:wheel=left,factor=0.5@2", **settings):

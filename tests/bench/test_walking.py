@@ -74,6 +74,16 @@ def test_runs_that_forget_differ_in_that_alone():
     assert (own.walk, own.watch) == (recover.walk, recover.watch)
 
 
+def test_runs_with_a_model_continue_undamaged_ones_with_it():
+    trunk = hexapod_runs.undamaged("a", preset=hexapod_runs.OWN)
+    branch = hexapod_runs.damaged("type2", kind="nominal")
+    assert trunk.walk.nominal and trunk.evolve_from == 1
+    assert not hexapod_runs.undamaged("a").walk.nominal
+    world = replace(branch.world, damage=())
+    alike = replace(branch, preset=trunk.preset, trials=trunk.trials, world=world)
+    assert alike == trunk
+
+
 def test_the_first_trial_with_fewer_patterns_is_when_it_forgot():
     runs = record(np.zeros((3, 5)), onset=2)
     counts = [[11, 22, 33, 22, 33], [30, 30, 30, 30, 30], [22, 33, 33, 33, 22]]
@@ -91,7 +101,21 @@ def test_what_a_learner_would_have_forgotten_is_told_from_its_record():
     assert evidence.forgets(runs)[1].argmax() == 10  # one trial says nothing
 
 
-def test_the_search_climbs_and_stays_within_the_stops(monkeypatch):
+def test_until_counts_trials_to_shares_of_the_ceilings_that_are_known(monkeypatch):
+    known = {("type2", None): 2.0, ("type2", ceiling.REACH): 1.0}
+    monkeypatch.setattr(ceiling, "known", lambda *key: known.get(key))
+    ways = np.array([[0.4, 0.6, 1.0], [0.2, 1.2, 1.6]])
+    found = recover_hexapod.until(ways, "type2")
+    full, within = found["in full"], found["within the preset's reach"]
+    assert (full["50%"]["median"], full["75%"]["came"]) == (2.5, 1)
+    assert full["90%"]["came"] == 0
+    assert (within["50%"]["median"], within["90%"]["median"]) == (2.0, 2.5)
+    assert ceiling.shares(ways[:, 2], "type2")["in full"]["least"] == 0.5
+    assert recover_hexapod.until(ways, "type1") == {}
+
+
+@pytest.mark.parametrize("reach", [None, 0.4])
+def test_the_search_climbs_and_stays_within_the_stops(monkeypatch, reach):
     goal = np.full((2, 18), 0.5)
     goal[0, 0] = 99.0  # beyond the stop
 
@@ -102,7 +126,7 @@ def test_the_search_climbs_and_stays_within_the_stops(monkeypatch):
     monkeypatch.setattr(ceiling, "distances", distances)
     start = np.zeros((2, 18))
     goals, farthest, step = ceiling.search(
-        start, "type0", step=0.1, seed=1, generations=20
+        start, "type0", step=0.1, seed=1, generations=20, reach=reach
     )
     assert 0 < step < 1
     assert farthest > distances([start], "type0")[0] + 0.05
@@ -111,6 +135,7 @@ def test_the_search_climbs_and_stays_within_the_stops(monkeypatch):
 
     low, high = models.robot("phantomx").ranges.T
     assert (goals >= low).all() and (goals <= high).all()
+    assert (np.abs(goals).max() > 0.4) == (reach is None)
 
 
 def test_a_robot_that_stands_stands_on_its_feet():

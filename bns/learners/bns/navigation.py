@@ -151,6 +151,16 @@ class OpenLoopProblem(Problem):
         inputs, moved = self.inputs_and_motion(trial)
         return [(Patterns(inputs, moved / self.output.cpu().numpy()),)]
 
+    def foreseen(self, memory: Memory, run: int, inputs: np.ndarray) -> np.ndarray:
+        """Scaled motions that a run foresees, ``(K, 3)``.
+
+        Args:
+            memory: its networks'.
+            run: its number.
+            inputs: scaled, ``(K, I)``.
+        """
+        return memory.predict(run, inputs)
+
     def error(
         self,
         run: int,
@@ -162,7 +172,7 @@ class OpenLoopProblem(Problem):
         inputs, moved = self.inputs_and_motion(trial)
         if len(inputs) == 0:
             return np.full(OUTPUTS, np.nan)
-        said = memories[0].predict(run, inputs) * self.output.cpu().numpy()
+        said = self.foreseen(memories[0], run, inputs) * self.output.cpu().numpy()
         found: np.ndarray = np.sqrt(np.mean((said - moved) ** 2, axis=0))
         return found
 

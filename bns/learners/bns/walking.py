@@ -31,6 +31,7 @@ from bns.learners.bns import change_detection
 from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.memory import Memory
 from bns.learners.bns.navigation import OpenLoopProblem
+from bns.learners.bns.nominal import Nominal, said
 from bns.path import integrate
 from bns.snn import adam, fitting
 from bns.snn.network import Shape, forward
@@ -53,10 +54,12 @@ class WalkEvaluator:
     Attributes:
         shape: of the ensemble.
         config: which fitness.
+        nominal: the model that the ensemble adds to; None = to nothing.
     """
 
     shape: Shape
     config: WalkConfig
+    nominal: Nominal | None = None
 
     def inputs(self, population: Population) -> Tensor:
         """Network inputs, ``(R, 2 C, K * P)``, the individual varying fastest."""
@@ -66,15 +69,20 @@ class WalkEvaluator:
     def members(self, theta: Tensor, seen: Tensor) -> Tensor:
         """Scaled outputs of every member, ``(R, G, 3, N)``, piece by piece."""
         if seen.device.type != "cpu":
-            return forward(self.shape, theta, seen)
-        return torch.cat(
-            [
-                torch.cat([forward(self.shape, row, part) for part in parts], dim=3)
-                for row, parts in zip(
-                    theta.split(1), map(_pieces, seen.split(1)), strict=True
-                )
-            ]
-        )
+            own = forward(self.shape, theta, seen)
+        else:
+            own = torch.cat(
+                [
+                    torch.cat([forward(self.shape, row, part) for part in parts], dim=3)
+                    for row, parts in zip(
+                        theta.split(1), map(_pieces, seen.split(1)), strict=True
+                    )
+                ]
+            )
+        if self.nominal is None:
+            return own
+        told = [said(self.nominal.theta, part) for part in _pieces(seen)]
+        return own + (self.nominal.trust * torch.cat(told, dim=2))[:, None]
 
     def judge(
         self, theta: Tensor, seen: Tensor, lengths: Tensor, *, fused: bool = False
@@ -232,7 +240,8 @@ class WalkProblem(OpenLoopProblem):
         self.output = torch.tensor(MOVED)
         names = [channel.name for channel in self.encoding.channels]
         self._femurs = [i for i, name in enumerate(names) if name.endswith("_femur")]
-        self.evaluator = WalkEvaluator(self.shape, config.walk)
+        model = Nominal(config, self.runs) if config.walk.nominal else None
+        self.evaluator = WalkEvaluator(self.shape, config.walk, model)
         self.breeder = GoalBreeder(config.evolution, self.encoding, True)
         self._compile()
 
@@ -290,6 +299,16 @@ class WalkProblem(OpenLoopProblem):
         """See `OpenLoopProblem.inputs_and_motion`."""
         return of_trial(trial)
 
+    def foreseen(self, memory: Memory, run: int, inputs: np.ndarray) -> np.ndarray:
+        """See `OpenLoopProblem.foreseen`; with what the ensemble adds to."""
+        found, model = super().foreseen(memory, run, inputs), self.evaluator.nominal
+        if model is None:
+            return found
+        seen = torch.from_numpy(inputs.T.astype(np.float32))[None].to(self.device)
+        told = model.trust[run] * said(model.theta, seen)[0]
+        total: np.ndarray = found + told.cpu().numpy().T
+        return total
+
     def forget(self, run: int, memories: Sequence[Memory]) -> int:
         """See `Problem.forget`; by `change_detection`."""
         memory, size = memories[0], self.config.walk.commands
@@ -304,6 +323,20 @@ class WalkProblem(OpenLoopProblem):
         self, shape: Shape, theta: Tensor, patterns: fitting.Patterns
     ) -> tuple[Tensor, Tensor]:
         """See `Problem.train`; by Adam on parts of the patterns (walk.batch > 0)."""
+        if self.evaluator.nominal is not None:
+            rest = patterns.targets - self.evaluator.nominal.weigh(patterns)
+            patterns = patterns._replace(targets=rest)
         if self.config.walk.batch == 0:
             return super().train(shape, theta, patterns)
         return adam.fit(shape, self.config, theta, patterns, self.draws)
+
+    def state(self) -> dict[str, np.ndarray]:
+        """See `Problem.state`: how far each run trusts the model."""
+        model = self.evaluator.nominal
+        return {} if model is None else {"nominal.trust": model.trust.cpu().numpy()}
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """See `Problem.restore`."""
+        if self.evaluator.nominal is not None:
+            trust = torch.from_numpy(arrays["nominal.trust"].copy())
+            self.evaluator.nominal.trust = trust.to(self.device)

@@ -15,7 +15,7 @@ ASKED = {
     "verb": (["comp"], {"compare", "completion"}),
     "preset": (
         ["run", "hexapod-"],
-        {"hexapod-hybrid", "hexapod-recover", "hexapod-walk"},
+        {"hexapod-hybrid", "hexapod-nominal", "hexapod-recover", "hexapod-walk"},
     ),
     "verb of a verb": (["campaign", "pl"], {"plot"}),
     "verb of a verb of a verb": (["gap", "bench", ""], {"make", "run", "score"}),

@@ -1,0 +1,133 @@
+"""The model of feet that stay where they stand, against motions known in advance."""
+
+import numpy as np
+import pytest
+import torch
+
+from bns.errors import BnsError
+from bns.experiment import robots
+from bns.learners.bns import nominal
+from bns.learners.bns.learner import Bns
+from bns.learners.bns.walking import GOAL, MOVED
+from bns.models.phantomx import gait, kinematics
+from bns.snn.fitting import Patterns
+from tests.bns.walkers import Slider, small
+
+STANDING = np.zeros((1, 18))
+CROUCHED = gait.tripod(gait.Tripod(stride=0.02, height=0.12))[3:4]  # all feet down
+FEET = kinematics.feet(CROUCHED)
+
+
+def moving(feet):
+    return nominal.moved(CROUCHED, kinematics.goals(feet), kinematics.feet)[0]
+
+
+def test_a_body_goes_against_the_feet_that_it_stands_on():
+    ahead, left, turn = moving(FEET + np.array([-0.02, 0.01, 0.0]))
+    assert (ahead, left, turn) == pytest.approx((0.02, -0.01, 0.0), abs=1e-3)
+
+
+def test_a_body_turns_against_the_feet_that_it_stands_on():
+    angle = 0.1
+    around = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    turned = np.concatenate([FEET[..., :2] @ around.T, FEET[..., 2:]], axis=-1)
+    assert moving(turned) == pytest.approx((0.0, 0.0, -angle), abs=2e-3)
+
+
+def test_feet_in_the_air_bear_nothing_and_the_rest_the_weight():
+    feet = FEET.copy()
+    feet[:, ~gait.ONE_SET, 2] += 0.03
+    load = nominal.loads(feet)[0]
+    assert load.sum() == pytest.approx(1.0)
+    assert load[gait.ONE_SET].min() > 0.2
+    assert load[~gait.ONE_SET].max() < 0.05
+
+
+def test_a_tripod_gait_goes_a_stride_every_other_command():
+    goals = gait.tripod()
+    before = np.concatenate([STANDING, goals[:-1]])
+    ahead = nominal.moved(before, goals, kinematics.feet)[2:, 0]
+    assert ahead[0::2] == pytest.approx(gait.BEST.stride, rel=0.25)
+    assert np.abs(ahead[1::2]).max() < 0.2 * gait.BEST.stride
+
+
+def test_the_network_says_what_the_model_says_and_is_the_same_each_time():
+    reach = 0.6
+    theta = nominal.network("phantomx", reach)
+    before, after = nominal.drawn(np.random.default_rng(1), 500, reach)
+    seen = np.concatenate([before, after], axis=1) / GOAL
+    said = nominal.said(theta, nominal._tensor(seen))[0].numpy().T * np.array(MOVED)
+    told = nominal.moved(before, after, kinematics.feet)
+    rest = ((said - told) ** 2).sum(0) / ((told - told.mean(0)) ** 2).sum(0)
+    assert (rest < 0.4).all()
+    again = nominal.network.__wrapped__("phantomx", reach)
+    torch.testing.assert_close(again, theta, rtol=0, atol=0)
+
+
+def learner(**walk):
+    config = small()
+    changed = config.with_({f"walk.{name}": value for name, value in walk.items()})
+    return Bns([changed], replicates=[0], onsets=[-1])
+
+
+def test_a_fresh_learner_foresees_what_the_model_says_and_learns_the_rest():
+    one = learner(nominal=True)
+    tried = one.propose(0).tried
+    trials = Slider().run(tried)
+    memory, problem = one.memories[0], one.problem
+    memory.theta = torch.zeros_like(memory.theta)
+    goals = tried[0].values
+    before = np.concatenate([STANDING, goals[:-1]])
+    seen = np.concatenate([before, goals], axis=1) / GOAL
+    model = problem.evaluator.nominal
+    own = nominal.said(model.theta, nominal._tensor(seen))[0].numpy().T
+    own = own * np.array(MOVED)
+    _, moved = problem.inputs_and_motion(trials[0])
+    (patterns,) = problem.patterns(0, trials[0])
+    error = problem.error(0, trials[0], one.memories, patterns)
+    assert error == pytest.approx(np.sqrt(((own - moved) ** 2).mean(0)), rel=1e-4)
+    memory.theta = memory.fresh()
+    for _ in range(20):
+        one.observe(0, trials, None)
+    assert problem.error(0, trials[0], one.memories, patterns)[0] < error[0] / 2
+
+
+HELD = nominal.GIVEN / (nominal.GIVEN + 40)  # of the model's right in 40 patterns
+
+
+@pytest.mark.parametrize(
+    "share,trust", [(0.4, HELD + (1 - HELD) * 0.4), (-9.0, 0.0), (3.0, 1.0)]
+)
+def test_the_model_is_trusted_as_far_as_patterns_bear_it_out(share, trust):
+    model = learner(nominal=True).problem.evaluator.nominal
+    before, after = nominal.drawn(np.random.default_rng(1), 50, 0.6)
+    seen = nominal._tensor(np.concatenate([before, after], axis=1) / GOAL)
+    told = nominal.said(model.theta, seen)
+    weight = torch.ones(1, 1, 1, 50)
+    weight[..., 40:] = 0.0  # padding
+    targets = told * share
+    targets[..., 40:] = 99.0
+    found = model.weigh(Patterns(seen, targets, weight))
+    assert model.trust.flatten().tolist() == pytest.approx([trust] * 3, abs=1e-5)
+    torch.testing.assert_close(found, told * trust)
+    model.weigh(Patterns(seen, targets, torch.zeros_like(weight)))
+    assert model.trust.flatten().tolist() == [1.0] * 3, "nothing speaks against it"
+
+
+def test_robots_whose_legs_are_not_known_are_refused():
+    with pytest.raises(BnsError, match="not those of 'other'"):
+        robots.feet("other")
+
+
+def test_resumed_with_the_model_it_gives_the_same_bytes():
+    def advance(one, number):
+        seen = Slider().run(one.propose(number).tried)
+        return one.observe(number, seen, None)
+
+    first, second = learner(nominal=True, repeat=0.1), learner(nominal=True, repeat=0.1)
+    for number in range(6):
+        advance(first, number)
+    second.restore(first.state())
+    wanted, found = advance(first, 6), advance(second, 6)
+    for name in wanted:
+        np.testing.assert_array_equal(found[name], wanted[name])
