@@ -12,6 +12,9 @@ from bns.worlds.effects.sensors import FORWARD, SINGLE
 
 SHARE = 0.02  # slack of a number over its plausible departure; assumed
 GROUPS = ("all", "left", "right")
+FRAME = (
+    1 / 30
+)  # [s] between pictures: how well the moment of a reading is known; assumed
 HEADING = 0.005  # [rad] how well the tracker's zero of a heading is known; assumed
 RHYTHMS = np.arange(0.05, 1.26, 0.025)  # [Hz] of a flicker that are tried
 AZIMUTHS, WIDTHS = np.arange(-6, 6) * np.pi / 6, (0.7, 1.5, 3.0)  # [rad] of a shadow
@@ -36,7 +39,7 @@ _SENSORS: tuple[tuple[str, str, float, float, float, float, dict[str, Any]], ...
     ("sensor_saturation", "level", 800, 0, 4095, 0.0,
      {"smooth": False, "levels": (150, 600, 1200, 2000, 3000, 3800)}),
     ("sensor_crosstalk", "share", 0.1, 0, 0.5, 0.0, {"levels": (0.3,)}),
-    ("sensor_response_time", "time_constant", 0.3, 0, 10, 0.0,
+    ("sensor_response_time", "time_constant", 0.3, 0, 10, FRAME,
      {"step": 0.1, "levels": (0.3, 1.0, 3.0)}),
 )  # fmt: skip
 _LIGHT: tuple[tuple[str, str, float, float, float, dict[str, Any]], ...] = (
@@ -87,7 +90,7 @@ def _sensors(names: Iterable[str]) -> Iterable[Row]:
 
 def _slack(effect: str, sensor: str, single: float) -> float:
     """How uncertain the nominal sensors are: each, and the robot's heading for all."""
-    if sensor not in GROUPS or effect == "sensor_noise":
+    if sensor not in GROUPS or effect in ("sensor_noise", "sensor_response_time"):
         return single
     return HEADING if (effect, sensor) == ("sensor_misaligned", "all") else 0.0
 
