@@ -115,7 +115,7 @@ def _flicker() -> Iterable[Row]:
         yield _row(
             "light_flicker", "depth", 0.3, 0, 1, f"light_flicker@{hertz:.4g}",
             group="light_flicker", fixed={"frequency": float(hertz)}, smooth=False,
-            levels=(0.5,),
+            levels=(0.15, 0.5),
         )  # fmt: skip
 
 
@@ -127,7 +127,7 @@ def _shadow() -> Iterable[Row]:
                 "light_shadow", "loss", 0.5, 0, 1,
                 f"light_shadow@{azimuth:.3g},{width:.3g}", group="light_shadow",
                 fixed={"azimuth": float(azimuth), "width": width}, smooth=False,
-                levels=(0.5, 1.0),
+                levels=(0.2, 0.5, 1.0),
             )  # fmt: skip
 
 
