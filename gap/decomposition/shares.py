@@ -13,6 +13,7 @@ from bns.gap.decomposition.problem import Problem
 CHOICE = 4.0  # nats within which the held-out error decides
 CLEARLY = 0.02  # of the held-out error that a further explanation has to lower
 PIECES = 4  # of a stretch, each left out by itself for the share that is closed
+EXACT = 1e-3  # of the smallest deviation that is believed: no fit is more exact
 NINETY = 1.645  # standard deviations of a 90 % interval
 
 
@@ -121,6 +122,7 @@ class HeldOut:
             problem = replace(problem, block=_pieces(problem.block, pieces))
             linear = linear.in_blocks(problem.block)
         sd = np.sqrt(np.nanmean(point.rest**2, axis=0))
+        sd = np.maximum(sd, EXACT * problem.model.least)
         weight = np.where(problem.seen if inside is None else inside, 1 / sd**2, 0.0)
         units = fit.units(problem, point.values)
         whole = fit.target(problem, point.values, point.rest, point.slopes)

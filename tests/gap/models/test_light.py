@@ -11,6 +11,9 @@ from bns.cli.gap import after
 from bns.errors import BnsError
 from bns.gap.bench import light_cases
 from bns.gap.candidates import light
+from bns.gap.decomposition import descent
+from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.shares import HeldOut
 from bns.gap.diagnose import diagnose, single
 from bns.gap.models.light import diagnosis
 from bns.gap.models.light.model import SightModel, sees, unlikely
@@ -79,6 +82,17 @@ def test_a_planted_effect_is_named(find, text, name):
 
 def test_nothing_planted_is_no_gap(find):
     assert find().kind == "no gap"
+
+
+def test_a_fit_that_leaves_nothing_at_all_can_be_held_out():
+    """In full light all readings are the same, to the count."""
+    trials = recorded(singles=False)
+    sight = SightModel(trials)
+    problem = Problem.of(sight.ready(trials)[0], sight)
+    point = descent.nothing(problem)
+    exact = replace(point, rest=np.zeros_like(point.rest))
+    error = HeldOut.of(problem, exact).error(())
+    assert np.isfinite(error).all()
 
 
 def test_the_two_virtual_sensors_are_enough(find):
