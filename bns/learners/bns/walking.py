@@ -240,8 +240,8 @@ class WalkProblem(OpenLoopProblem):
         self.output = torch.tensor(MOVED)
         names = [channel.name for channel in self.encoding.channels]
         self._femurs = [i for i, name in enumerate(names) if name.endswith("_femur")]
-        model = Nominal(config, self.runs) if config.walk.nominal else None
-        self.evaluator = WalkEvaluator(self.shape, config.walk, model)
+        self.nominal = Nominal(config, self.runs) if config.walk.nominal else None
+        self.evaluator = WalkEvaluator(self.shape, config.walk, self.nominal)
         self.breeder = GoalBreeder(config.evolution, self.encoding, True)
         self._compile()
 
@@ -301,7 +301,7 @@ class WalkProblem(OpenLoopProblem):
 
     def foreseen(self, memory: Memory, run: int, inputs: np.ndarray) -> np.ndarray:
         """See `OpenLoopProblem.foreseen`; with what the ensemble adds to."""
-        found, model = super().foreseen(memory, run, inputs), self.evaluator.nominal
+        found, model = super().foreseen(memory, run, inputs), self.nominal
         if model is None:
             return found
         seen = torch.from_numpy(inputs.T.astype(np.float32))[None].to(self.device)
@@ -323,8 +323,8 @@ class WalkProblem(OpenLoopProblem):
         self, shape: Shape, theta: Tensor, patterns: fitting.Patterns
     ) -> tuple[Tensor, Tensor]:
         """See `Problem.train`; by Adam on parts of the patterns (walk.batch > 0)."""
-        if self.evaluator.nominal is not None:
-            rest = patterns.targets - self.evaluator.nominal.weigh(patterns)
+        if self.nominal is not None:
+            rest = patterns.targets - self.nominal.weigh(patterns)
             patterns = patterns._replace(targets=rest)
         if self.config.walk.batch == 0:
             return super().train(shape, theta, patterns)
@@ -332,11 +332,11 @@ class WalkProblem(OpenLoopProblem):
 
     def state(self) -> dict[str, np.ndarray]:
         """See `Problem.state`: how far each run trusts the model."""
-        model = self.evaluator.nominal
+        model = self.nominal
         return {} if model is None else {"nominal.trust": model.trust.cpu().numpy()}
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """See `Problem.restore`."""
-        if self.evaluator.nominal is not None:
+        if self.nominal is not None:
             trust = torch.from_numpy(arrays["nominal.trust"].copy())
-            self.evaluator.nominal.trust = trust.to(self.device)
+            self.nominal.trust = trust.to(self.device)
