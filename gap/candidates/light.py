@@ -12,9 +12,7 @@ from bns.worlds.effects.sensors import FORWARD, SINGLE
 
 SHARE = 0.02  # slack of a number over its plausible departure; assumed
 GROUPS = ("all", "left", "right")
-FRAME = (
-    1 / 30
-)  # [s] between pictures: how well the moment of a reading is known; assumed
+FRAME = 1 / 30  # [s] of a picture: how well a reading's moment is known; assumed
 HEADING = 0.005  # [rad] how well the tracker's zero of a heading is known; assumed
 RHYTHMS = np.arange(0.05, 1.26, 0.025)  # [Hz] of a flicker that are tried
 AZIMUTHS, WIDTHS = np.arange(-6, 6) * np.pi / 6, (0.7, 1.5, 3.0)  # [rad] of a shadow

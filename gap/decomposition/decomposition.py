@@ -146,7 +146,7 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         problem = problem.without(unstable)
         start = descent.nothing(problem)
     tried = Singles(problem, start)
-    point = descent.decompose(problem, tried)
+    point = descent.decompose(tried)
     found = onset.dated(problem, start, point)
     late = None
     if found:

@@ -126,7 +126,7 @@ def relinearised(problem: Problem, point: Point, known: Noise) -> Linear:
     return linear.correlated(known.lam)
 
 
-def decompose(problem: Problem, tried: Singles) -> Point:
+def decompose(tried: Singles) -> Point:
     """The explanations of a recording.
 
     Started from a tangent at the nominal model, from the best single explanation (a
@@ -134,17 +134,16 @@ def decompose(problem: Problem, tried: Singles) -> Point:
     are strong, and from levels of what has no slope at the nominal.
 
     Args:
-        problem: the recording.
-        tried: the nominal model, and single explanations fitted.
+        tried: the recording, the nominal model, and single explanations fitted.
     """
-    start = tried.start
+    problem, start = tried.problem, tried.start
     several = not problem.model.singly
     found = start.linear.search()[1] if several else frozenset()
-    best = start if several else _alone(problem, tried)
+    best = start if several else _alone(tried)
     if len(found) == 1:
         best = _followed(problem, start, found)
     if several and len(found | best.support) > 1:
-        best = _several(problem, tried, found, best)
+        best = _several(tried, found, best)
     for _ in range(ROUNDS):
         level = levels.best(problem, best)
         if level is None or level.cost > best.cost - WORTH:
@@ -253,10 +252,11 @@ def fitted_at(problem: Problem, point: Point, support: Iterable[str]) -> Point:
     return Point(values, support, rest, linear, slopes, known)
 
 
-def _several(problem: Problem, tried: Singles, found: Support, best: Point) -> Point:
+def _several(tried: Singles, found: Support, best: Point) -> Point:
     """The best point where a tangent finds several explanations: from a single one, and
     if that is not enough from those several, and from all where many depart."""
-    points = _simple(problem, tried) + [best] * bool(best.support)
+    problem = tried.problem
+    points = _simple(tried) + [best] * bool(best.support)
     if not any(enough(point) for point in points):
         if not best.support:
             points.append(_followed(problem, tried.start, found))
@@ -278,24 +278,25 @@ def _followed(problem: Problem, start: Point, support: Support) -> Point:
     return descend(problem, values, support, start.noise)
 
 
-def _simple(problem: Problem, tried: Singles) -> list[Point]:
+def _simple(tried: Singles) -> list[Point]:
     """Points from the best single explanation, and from it with a level on top."""
-    start, best = tried.start, tried.fitted[0]
+    problem, start, best = tried.problem, tried.start, tried.fitted[0]
     made = [descend(problem, best.values, {best.name}, start.noise)]
     if not enough(made[0]) and (both := _with_level(problem, best, start)):
         made.append(both)
     return made
 
 
-def _alone(problem: Problem, tried: Singles) -> Point:
+def _alone(tried: Singles) -> Point:
     """From the single explanation that leaves least; nothing, if it is no better than
     the best of so many fits is by chance."""
+    problem, start = tried.problem, tried.start
     if not tried.fitted:
-        return tried.start
+        return start
     best = tried.fitted[0]
-    found = descend(problem, best.values, {best.name}, tried.start.noise)
-    nominal, here = costs(problem, [tried.start, found])
-    return found if here + np.log(len(tried.fitted)) < nominal else tried.start
+    found = descend(problem, best.values, {best.name}, start.noise)
+    nominal, here = costs(problem, [start, found])
+    return found if here + np.log(len(tried.fitted)) < nominal else start
 
 
 def _with_level(problem: Problem, best: Single, start: Point) -> Point | None:

@@ -330,8 +330,8 @@ def _step(
         prior = float((far**2).sum()) + 2 * tail(far[free])
         return known.loss(left) / known.lam + prior
 
-    far = np.where(free, np.maximum(np.abs(departure(values)), 1.0), 1.0)
-    held = (flat / far) ** 2  # by their priors, see `tail`
+    wider = np.where(free, np.maximum(np.abs(departure(values)), 1.0), 1.0)
+    held = (flat / wider) ** 2  # by their priors, see `tail`
     heavy = design * weight[:, None]
     curvature = heavy.T @ design / known.lam + np.diag(held)
     pull = heavy.T @ known.innovations(np.nan_to_num(rest)).ravel() / known.lam

@@ -41,7 +41,7 @@ class Corrected(GapModel):
     def of(cls, trials: Sequence[Trial], model: GapModel) -> "Corrected":
         """From checked recordings in which nothing was changed."""
         problem = Problem.of(trials, model)
-        point = descent.decompose(problem, Singles(problem, descent.nothing(problem)))
+        point = descent.decompose(Singles(problem, descent.nothing(problem)))
         support = shares.guarded(problem, point)
         values = fit.placed(problem, point.linear, support, point.values)
         linear = point.linear

@@ -47,9 +47,11 @@ def _refitted(
     bent = problem.model.singly or problem.model.many
     if len(point.support) > 1 or problem.onset or not bent:
         return []
-    least = min(one.height for one in tried.fitted)
-    near = [one for one in tried.fitted if one.height < least + 2 * (TIED + MARGIN)]
+    most = tried.fitted[0].height + 2 * (TIED + MARGIN)
+    near = [one for one in tried.fitted if one.height < most]
     rivals = [one for one in near if one.name not in point.support][:KEPT]
+    if not rivals:
+        return []
     made = [
         descent.fitted_at(problem, replace(point, values=one.values), {one.name})
         for one in rivals

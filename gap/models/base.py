@@ -65,7 +65,8 @@ class GapModel(ABC):
         memory: order of the autoregression that residuals may have; 0 = none.
         many: whether fits are also started from all rows at once: where many depart
             at once a tangent at the nominal misleads.
-        starts: explanations that are fitted singly, where `singly`.
+        starts: explanations that are fitted by themselves, by the tangent at the
+            nominal and as many by levels and departures.
         odds: log odds against each explanation, by how many there are: with 3 about one
             of twenty is expected.
         longest: seconds of a recording that are fitted; of a longer one each trial is
@@ -73,7 +74,8 @@ class GapModel(ABC):
         before: seconds after which a simulation begun at rest moves as the robot.
         singly: whether fits are started from single explanations alone: where there
             are more rows than a tangent at the nominal can tell apart.
-        spread: plausible departures at which each row is then tried, beside its levels.
+        spread: plausible departures at which each row is tried by itself, beside its
+            levels.
     """
 
     name: str

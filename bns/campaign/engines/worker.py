@@ -84,6 +84,7 @@ def _serve(content: dict, out: IO[bytes]) -> None:
     spoke = time.monotonic()
 
     def beat(trials: int) -> None:
+        """Say that the run goes on, once in a while."""
         nonlocal spoke
         now = time.monotonic()
         if now - spoke >= BEAT_SECONDS:
