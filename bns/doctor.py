@@ -8,6 +8,7 @@ from ctypes.util import find_library
 from glob import glob
 from typing import Literal, NamedTuple
 
+from bns.errors import install
 from bns.experiment import versions
 
 State = Literal["ok", "missing", "bad", "note"]
@@ -79,7 +80,7 @@ def _packages() -> list[Finding]:
 
 def _optional() -> list[Finding]:
     return [
-        _installed(name, "note", f"for {use}: pip install 'bns-testbed[{extra}]'")
+        _installed(name, "note", f"for {use}: {install(extra)}")
         for name, extra, use in OPTIONAL
     ]
 

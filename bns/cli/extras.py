@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from bns.errors import BnsError
+from bns.errors import BnsError, install
 
 EXTRAS = {
     "torch": "learn",
@@ -31,7 +31,7 @@ def missing(error: ModuleNotFoundError) -> str:
     name = (error.name or "").partition(".")[0]
     if name not in EXTRAS:
         return ""
-    return f"This needs {name}: pip install 'bns-testbed[{EXTRAS[name]}]'"
+    return f"This needs {name}: {install(EXTRAS[name])}"
 
 
 def attempt(name: str, make: Callable[[], Path]) -> dict[str, Path]:
