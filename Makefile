@@ -52,7 +52,7 @@ $(SMALL): pyproject.toml constraints.txt
 	@sh .ci/venv $(VENV) $(PYTHON)
 	@test -f $(STAMP) || echo "Installing into $(VENV) (some minutes, once) ..."
 	@test -f $(STAMP) || $(BIN)/python -m pip install --quiet --no-compile \
-		-c constraints.txt -e '.[learn]'
+		-c constraints.txt -e '.[demo]'
 	@touch $@
 
 clean:

@@ -13,7 +13,7 @@ from bns.experiment import versions
 
 State = Literal["ok", "missing", "bad", "note"]
 
-REQUIRED = ("mujoco", "numpy", "scipy", "pyarrow", "rich", "jinja2")
+REQUIRED = ("mujoco", "numpy", "scipy", "rich", "jinja2")
 
 
 class Optional(NamedTuple):
@@ -33,6 +33,7 @@ class Optional(NamedTuple):
 OPTIONAL = (
     Optional("torch", "learn", "learners"),
     Optional("matplotlib", "report", "figures and reports"),
+    Optional("pyarrow", "tables", "Parquet, CSV and campaigns"),
     Optional("rerun-sdk", "view", "recordings in 3D"),
     Optional("imageio-ffmpeg", "video", "videos as MP4"),
     Optional("gymnasium", "gym", "Gymnasium worlds"),

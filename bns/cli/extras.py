@@ -9,6 +9,7 @@ from bns.errors import BnsError, install
 EXTRAS = {
     "torch": "learn",
     "matplotlib": "report",
+    "pyarrow": "tables",
     "rerun": "view",
     "gymnasium": "gym",
     "dm_env": "dm",
