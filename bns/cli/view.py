@@ -9,6 +9,7 @@ from pathlib import Path
 from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.errors import BnsError, MissingDependencyError, OutOfBoundsError, install
+from bns.progress import working
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +56,9 @@ def main(verb: str, argv: list[str]) -> int:
     if given.png:
         from bns.viz import picture
 
-        for report in picture.save(recording, given.png):
+        with working("drawing"):
+            reports = picture.save(recording, given.png)
+        for report in reports:
             print(f"bns: the viewer says: {report}", file=sys.stderr)
         print(given.png)
         return 0
@@ -128,7 +131,8 @@ def find(path: Path) -> Path:
         return recording
     if record.trials == 0:
         raise BnsError(f"{path} has no trial yet: let it run for a while.")
-    return write_recording(record, recording)
+    with working("writing the recording"):
+        return write_recording(record, recording)
 
 
 def show(recording: Path, bind: str, *, web: bool = False) -> int:

@@ -322,6 +322,14 @@ def test_an_extra_is_installed_into_the_python_that_runs(monkeypatch, tmp_path):
     assert install("gym").startswith(f"{tmp_path / 'mine' / 'python'} -m pip ")
 
 
+def test_no_value_is_not_offered_as_one(said, capsys):
+    text = said("effects", "--stage", "foo", code=WRONG_INPUT)
+    assert "Available: actuator, body," in text
+    with pytest.raises(SystemExit):
+        main(["effects", "--help"])
+    assert "{command,actuator," in capsys.readouterr().out
+
+
 def test_view_of_a_diagnosis(said, tmp_path):
     from bns.cli import view
     from bns.gap.store import FILE
