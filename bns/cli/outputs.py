@@ -114,7 +114,13 @@ def summary(record: RunRecord) -> str:
 
 
 def sentence(word: str, values: np.ndarray, phrase: str) -> str:
-    """How many runs got somewhere, and when; `phrase` holds the number's place."""
+    """How many runs got somewhere, and when.
+
+    Args:
+        word: what they did, as in "Solved".
+        values: trials that each run needed, ``(R,)``; infinity = it did not.
+        phrase: with the place of the number, as in "after {} trials".
+    """
     reached = np.isfinite(values)
     text = f"{word} by {reached.sum()} of {len(values)}"
     if not reached.any():
