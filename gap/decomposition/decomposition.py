@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bns.gap.decomposition import descent, fit, onset, rest, shares, ties
+from bns.gap.decomposition import descent, fit, flexible, onset, rest, shares, ties
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.onset import Onset
@@ -40,6 +40,8 @@ class Decomposition:
         inside: which residuals count, ``(N, C)``: no wild points, no strayed trial.
         unstable: numbers of trials that may go anywhere, and are not fitted.
         strayed: numbers of trials that went another way than their repeats.
+        goes: with what the gap goes where its explanations only imitate its cause, in
+            words; "" = they do not (`flexible.imitated`).
     """
 
     problem: Problem
@@ -57,6 +59,7 @@ class Decomposition:
     inside: np.ndarray
     unstable: tuple[int, ...] = ()
     strayed: tuple[int, ...] = ()
+    goes: str = ""
 
     @cached_property
     def closed(self) -> float:
@@ -121,9 +124,15 @@ class Decomposition:
         return large and self.closed < 1 - MOST
 
     @property
+    def foreign(self) -> bool:
+        """Whether the library lacks what most of the gap comes from."""
+        most = self.lasting and self.unexplained > MOST
+        return most or self.failing or bool(self.goes)
+
+    @property
     def kind(self) -> str:
         """Kind of the verdict, one of `records.KINDS`."""
-        if (self.lasting and self.unexplained > MOST) or self.failing:
+        if self.foreign:
             return "none of the library"
         if not self.point.support:
             return "no gap"
@@ -185,6 +194,9 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         inside=inside,
         unstable=_numbers(problem, unstable),
         strayed=_numbers(problem, strayed),
+        goes=flexible.imitated(problem, start.rest, plain, known, inside)
+        if point.support
+        else "",
     )
 
 

@@ -90,7 +90,7 @@ def explained(
     return text
 
 
-def left(share: float, lasting: bool, recurs: bool, sizes: str) -> str:
+def left(share: float, lasting: bool, recurs: bool, sizes: str, goes: str) -> str:
     """Third statement: how large the rest is, and whether it recurs.
 
     Args:
@@ -98,7 +98,13 @@ def left(share: float, lasting: bool, recurs: bool, sizes: str) -> str:
         lasting: whether it is more than a sound robot and its camera scatter.
         recurs: whether it is the same whenever the motion is.
         sizes: how large it is, in words.
+        goes: with what the gap goes that these explanations imitate; "" = nothing.
     """
+    if goes:
+        return (
+            f"They imitate what the library lacks: a regression on {goes}, which knows "
+            "no effect, predicts trials that it has not seen better."
+        )
     if not lasting:
         return "What is left does not recur: the robot scatters it, or the camera."
     how = "recurs" if recurs else "is more than a sound robot scatters"
