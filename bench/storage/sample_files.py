@@ -128,13 +128,13 @@ def make(home: Path) -> None:
 
 def _plain(run: Path, copy: Path) -> None:
     """A run as it is stored where pyarrow is missing."""
-    from bns.storage import arrays, parquet
+    from bns.storage import parquet, tables
 
     shutil.copytree(run, copy)
     for path in list(copy.rglob("*.parquet")):
         table = parquet.read(path)
         columns = {name: table[name].to_numpy() for name in table.column_names}
-        arrays.write_npz(path.with_suffix(".npz"), columns, compressed=True)
+        tables.write_plain(path, columns)
         path.unlink()
 
 

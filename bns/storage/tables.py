@@ -5,6 +5,7 @@ has one name, that of its Parquet file; the NPZ beside it has the same columns, 
 both are read wherever they come from.
 """
 
+import hashlib
 from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,10 +14,12 @@ from typing import Any
 import numpy as np
 
 from bns.errors import FormatError
-from bns.storage import arrays, parquet
+from bns.storage import arrays, parquet, seal
 
 KINDS = {"double": np.dtype(np.float64), "int64": np.dtype(np.int64)}
 """Arrow's name of a type -> NumPy's"""
+KEY = "sha256"
+"""array of an NPZ that holds the digest of the others"""
 
 
 def write(path: Path, columns: Mapping[str, np.ndarray], **options: Any) -> None:
@@ -33,7 +36,21 @@ def write(path: Path, columns: Mapping[str, np.ndarray], **options: Any) -> None
     if find_spec("pyarrow"):
         parquet.write(path, columns, **options)
     else:
-        arrays.write_npz(_npz(path), columns, compressed=True)
+        write_plain(path, columns)
+
+
+def write_plain(path: Path, columns: Mapping[str, np.ndarray]) -> None:
+    """Write columns as NPZ, with a digest: the archive's checksums miss a lost member.
+
+    Args:
+        path: of the Parquet file in whose place it is.
+        columns: name -> ``(N,)``.
+
+    Raises:
+        StorageError: no space, or no permission.
+    """
+    held = {**columns, KEY: np.array(_digest(columns))}
+    arrays.write_npz(_npz(path), held, compressed=True)
 
 
 def exists(path: Path) -> bool:
@@ -64,6 +81,9 @@ def read(
         return parquet.numbers(table, wanted, path)
     path = _npz(path)
     found = arrays.read_npz(path)
+    said = found.pop(KEY, None)
+    if said is None or str(said) != _digest(found):
+        raise seal.damaged(path)
     others = dict.fromkeys(found, "double")
     wanted = {**(others if channels is None else channels), **keys}
     _check(found, wanted, path)
@@ -72,6 +92,15 @@ def read(
 
 def _npz(path: Path) -> Path:
     return path.with_suffix(".npz")
+
+
+def _digest(columns: Mapping[str, np.ndarray]) -> str:
+    """SHA-256 of names, types, shapes and values of all columns."""
+    made = hashlib.sha256()
+    for name, column in columns.items():
+        made.update(repr((name, column.dtype.str, column.shape)).encode())
+        made.update(np.ascontiguousarray(column).tobytes())
+    return made.hexdigest()
 
 
 def _check(

@@ -50,13 +50,23 @@ def test_a_table_comes_back_as_it_was(tmp_path, no_pyarrow):
     ],
 )
 def test_arrays_that_are_no_such_table_are_refused(tmp_path, changed, match):
-    arrays.write_npz(tmp_path / "a.npz", COLUMNS | changed)
+    tables.write_plain(tmp_path / "a.parquet", COLUMNS | changed)
     with pytest.raises(FormatError, match=match):
         tables.read(tmp_path / "a.parquet", KEYS)
 
 
+def test_a_column_that_was_lost_is_noticed(tmp_path):
+    tables.write_plain(tmp_path / "a.parquet", COLUMNS)
+    held = arrays.read_npz(tmp_path / "a.npz")
+    for name in ("fitness", tables.KEY):
+        left = {key: array for key, array in held.items() if key != name}
+        arrays.write_npz(tmp_path / "a.npz", left)
+        with pytest.raises(FormatError, match=r"a\.npz is damaged"):
+            tables.read(tmp_path / "a.parquet", KEYS)
+
+
 def test_a_column_that_is_missing_is_named(tmp_path):
-    arrays.write_npz(tmp_path / "a.npz", COLUMNS)
+    tables.write_plain(tmp_path / "a.parquet", COLUMNS)
     with pytest.raises(FormatError, match="lacks the columns yaw; it has trial, fitn"):
         tables.read(tmp_path / "a.parquet", KEYS, {"yaw": "double"})
 
