@@ -15,7 +15,7 @@ from typing import Any
 from bns.campaign import work
 from bns.campaign.engines.registry import PATIENCE, Beat, Outcome, outcome
 from bns.campaign.plan import Job
-from bns.errors import BnsError, MissingDependencyError
+from bns.errors import BnsError, MissingDependencyError, install
 
 RETRIES = 4
 """times a batch is started again when its worker or node dies"""
@@ -177,9 +177,7 @@ def _ray() -> Any:
     try:
         import ray
     except ImportError:
-        raise MissingDependencyError(
-            "--engine ray", "Ray", "pip install 'bns-testbed[ray]'"
-        ) from None
+        raise MissingDependencyError("--engine ray", "Ray", install("ray")) from None
     return ray
 
 
