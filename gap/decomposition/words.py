@@ -12,8 +12,8 @@ LISTED = 4  # alternatives, or channels, in a sentence
 
 
 def sized(sizes: Sequence[float] | np.ndarray, channels: Sequence[Channel]) -> str:
-    """Sizes of features in units that are read, "1.2 mm forward"; of many the
-    largest."""
+    """Sizes of features, ``(C,)``, in units that are read, "1.2 mm forward"; of many
+    the largest."""
     order = sorted(range(len(channels)), key=lambda n: -sizes[n])
     kept = sorted(order[: LISTED if len(order) > LISTED + 1 else None])
     found = [_one(sizes[n], channels[n]) for n in kept]
@@ -39,8 +39,8 @@ def size(
     """First statement: how large the gap is beyond what measuring scatters.
 
     Args:
-        before: size of the gap by feature, in its unit.
-        beyond: the same without what measuring scatters.
+        before: size of the gap by feature, in its unit, ``(C,)``.
+        beyond: the same, ``(C,)``, without what measuring scatters.
         channels: the features.
         over: in what time it has grown, in words.
     """
