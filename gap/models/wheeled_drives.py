@@ -21,6 +21,7 @@ from bns.worlds.trial import Commands, Trial
 FINE, COARSE = 0.002, 0.005  # [s] physics steps: of residuals, of differences
 KEPT = 0.01  # [s] between two poses that are kept
 DRIVES = 8_000  # kept, about 24 kB each
+SCENES = 200  # that are kept, some 3 MB each
 AFTER = 0.05  # [s] that are simulated beyond the last command
 RESTING = 0.2  # [s] over which the pose at the start is the median of what was seen
 PLANES = ("floor_slope", "wheel_eccentricity")
@@ -199,7 +200,7 @@ def base_mass(robot: str) -> float:
     return bodies.Inertial.of(spec, bodies.base(spec)).mass
 
 
-@lru_cache(maxsize=4000)
+@lru_cache(maxsize=2 * SCENES)
 def begun(robot: str, body: tuple[ModelEdit, ...], dt: float, yaw: float) -> np.ndarray:
     """Full physics state at rest at the origin with a heading. On a level floor a robot
     comes to rest alike at every heading.
@@ -220,7 +221,7 @@ def begun(robot: str, body: tuple[ModelEdit, ...], dt: float, yaw: float) -> np.
     return state
 
 
-@lru_cache(maxsize=2000)
+@lru_cache(maxsize=SCENES)
 def scene(robot: str, body: tuple[ModelEdit, ...], dt: float) -> Compiled:
     """The robot's scene with edits, at a step [s].
 
