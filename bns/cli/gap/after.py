@@ -7,7 +7,7 @@ from typing import Any
 from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.errors import BnsError, UnknownNameError
-from bns.progress import working
+from bns.progress import counting
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,8 +98,10 @@ def _plan(given: Planned) -> int:
     else:
         model = _model(found)
         _plannable(found, model)
-        with working("planning"):
-            made = plan.plan(found, model, arena=given.arena, seed=given.seed)
+        with counting("planning") as each:
+            made = plan.plan(
+                found, model, arena=given.arena, seed=given.seed, each=each
+            )
     print(made.sentence)
     if not made.options or not made.repeats:
         return 0
@@ -143,8 +145,10 @@ def _edit(given: Edit) -> int:
     model = _model(found)
     trials = load_recordings.trials(given.predict, model, columns=given.columns)
     load_recordings.tellable(trials, model)
-    with working("predicting"):
-        made = edit.edit(found, trials, model, remove=given.remove, effect=given.effect)
+    with counting("predicting") as each:
+        made = edit.edit(
+            found, trials, model, remove=given.remove, effect=given.effect, each=each
+        )
     print(made.sentence)
     for name, loss in made.losses.items():
         errors = ", ".join(

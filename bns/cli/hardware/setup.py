@@ -13,6 +13,8 @@ from typing import Any
 
 from bns.errors import BnsError
 
+NONE = "none"
+"""answer that leaves something out"""
 START = 60.0
 """s for an emulated robot to appear"""
 DAMAGE = {
@@ -79,13 +81,13 @@ def _answer(question: Question, usual: str) -> str:
     print(f"\n{question.why}")
     while True:
         try:
-            typed = input(f"{question.ask} [{usual or 'none'}] ").strip()
+            typed = input(f"{question.ask} [{usual or NONE}] ").strip()
         except EOFError:
             raise BnsError(
                 f"The answers ended at {question.ask!r}: give one a line; nothing was "
                 "written."
             ) from None
-        answer = typed or usual
+        answer = "" if typed.lower() == NONE else typed or usual
         wrong = question.check(answer)
         if not sys.stdin.isatty():  # answers from a pipe are not to be seen
             print(answer)
