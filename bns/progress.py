@@ -227,8 +227,14 @@ def duration(seconds: float) -> str:
 def _spinner(estimate: Estimate) -> Any:
     """A line whose last column is the estimate, as long as that is shown."""
     from rich.console import Console
-    from rich.progress import Progress, ProgressColumn, SpinnerColumn, TextColumn
-    from rich.progress import Task, TimeElapsedColumn
+    from rich.progress import (
+        Progress,
+        ProgressColumn,
+        SpinnerColumn,
+        Task,
+        TextColumn,
+        TimeElapsedColumn,
+    )
     from rich.table import Column
     from rich.text import Text
 

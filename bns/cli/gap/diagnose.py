@@ -201,9 +201,7 @@ def _general(
             return _servo(given, model, usable)
         warnings.reproducible(usable, model)
         unchanged = recorded(replace(given, data=given.reference, trials=""), model)
-        found = diagnose(
-            trials, model, seed=given.seed, reference=unchanged, tell=tell
-        )
+        found = diagnose(trials, model, seed=given.seed, reference=unchanged, tell=tell)
         more = warnings.warnings(found, model.rows(usable))
         return replace(found, warnings=(*found.warnings, *more))
     except BnsError as error:
@@ -325,9 +323,7 @@ def _drawn(
     def report() -> Path:
         from bns.viz.gap import report as gap_report
 
-        return gap_report.write(
-            found, trials, model, out / "report.html", each=each
-        )
+        return gap_report.write(found, trials, model, out / "report.html", each=each)
 
     def recording() -> Path:
         from bns.viz.gap import recording as gap_recording

@@ -66,11 +66,13 @@ def setup(given: Any) -> int:
     made = setup.Setup(**found)  # type: ignore[arg-type]
     setup.write(out, made, said)
     print(f"\n{out} is written. Next:")
+    if not Path(made.port).exists():
+        print(f"  there is no {made.port} now: connect the robot, or start an emulated")
     if found.get("calibration") == "" and found["camera"] != "emulated":
         print(
             f"  bns hardware calibrate --setup {out} --views PICTURES --out camera.json"
-            "    and name camera.json in the file"
         )
+        print(f'  and add this line to {out}: calibration = "camera.json"')
     print(f"  bns hardware check --setup {out}")
     print(f"  bns hardware record --setup {out} --out recording --move")
     return 0
