@@ -17,6 +17,8 @@ Tell = Callable[[str], None]
 
 QUIET_SECONDS = 30.0
 """time between two lines where there is no terminal [s]"""
+LEFT = len("about 10 h 10 min left")
+"""width of an estimate [characters]"""
 NAME, TEXT = 16, 26
 """widest name and widest text of a bar on 80 columns [characters]"""
 
@@ -44,20 +46,27 @@ class Bar:
         total: how much there is, in any unit.
         done: how much lies behind already.
         counted: show done and total as numbers.
+        transient: leave nothing on the terminal once it is over.
     """
 
     def __init__(
-        self, name: str, total: float, *, done: float = 0, counted: bool = True
+        self,
+        name: str,
+        total: float,
+        *,
+        done: float = 0,
+        counted: bool = True,
+        transient: bool = False,
     ):
         self.name, self.total, self.done = name, total, done
         self.began = self.spoke = time.monotonic()
         self.before = done
         self.bar: Any = None
         if sys.stderr.isatty():
-            self.bar = _bar(counted)
+            self.bar = _bar(counted, transient)
             shown = name if len(name) <= NAME else f"{name[: NAME - 1]}…"
             self.task = self.bar.add_task(
-                "", total=total, completed=done, name=shown, text=""
+                "", total=total or None, completed=done, name=shown, text=""
             )
             self.bar.start()
 
@@ -133,7 +142,7 @@ def counting(name: str) -> Iterator[Each]:
     if not sys.stderr.isatty():
         yield uncounted
         return
-    with Bar(name, 0) as bar:
+    with Bar(name, 0, transient=True) as bar:
 
         def each(items: Sequence[Item]) -> Iterator[Item]:
             bar.extend(len(items))
@@ -242,18 +251,20 @@ def _spinner(estimate: Estimate) -> Any:
         def render(self, task: Task) -> Text:
             return Text(str(estimate))
 
-    one_line = Column(no_wrap=True, overflow="ellipsis")
+    console = Console(stderr=True)
+    room = max(console.width - LEFT - len("- 10:00:00 "), NAME)
+    one_line = Column(no_wrap=True, overflow="ellipsis", max_width=room)
     return Progress(
         SpinnerColumn(),
         TextColumn("{task.description}", markup=False, table_column=one_line),
         TimeElapsedColumn(),
         Left(Column(no_wrap=True)),
-        console=Console(stderr=True),
+        console=console,
         transient=True,
     )
 
 
-def _bar(counted: bool) -> Any:
+def _bar(counted: bool, transient: bool) -> Any:
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -277,4 +288,5 @@ def _bar(counted: bool) -> Any:
         TextColumn("{task.fields[text]}", markup=False, table_column=one_line),
         console=Console(stderr=True),
         expand=True,
+        transient=transient,
     )

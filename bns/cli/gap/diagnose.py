@@ -152,15 +152,14 @@ def _asked(given: Diagnose) -> dict[str, Any]:
 
 def _diagnosed(given: Diagnose, out: Path | None) -> int:
     """Diagnose, or go on where the same command was killed after it had."""
-    from bns.gap import store
-    from bns.gap.stages import shares_of
+    from bns.gap import stages, store
 
     if given.importer == "khepera3_odometry" and not given.model:
         found, model, trials = _odometry(given), None, []
     else:
         model = nominal(given, given.threads)
         trials = _some(recorded(given, model))
-        shares = shares_of(model)
+        shares = stages.shares(model, trials)
         with working(f"diagnosing {len(trials)} trials", shares) as tell:
             found = _before(out) or _general(given, model, trials, out, tell)
     found = replace(
