@@ -10,6 +10,7 @@ from bns.gap.models.light import diagnosis as light
 from bns.gap.models.light import model as light_model
 from bns.gap.recordings import check
 from bns.gap.records import Diagnosis
+from bns.progress import Tell, unheard
 from bns.worlds.trial import Trial
 
 LEAST = 2  # trials
@@ -23,6 +24,7 @@ def diagnose(
     rows: Sequence[str] | None = None,
     full: bool = True,
     reference: Sequence[Trial] = (),
+    tell: Tell = unheard,
 ) -> Diagnosis:
     """Where a recording and a nominal model part, why, and how far it can be closed.
 
@@ -34,6 +36,7 @@ def diagnose(
         full: with localisation; False = the verdict alone.
         reference: recordings of the same robot in which nothing was changed; they tell
             how far the nominal model is off anyway.
+        tell: is told when a stage begins (`bns.gap.stages`).
 
     Raises:
         BnsError: too few trials, faults that cannot be repaired, channels that do not
@@ -41,9 +44,24 @@ def diagnose(
     """
     if light_model.told_by(model, (*trials, *reference)):
         return light.diagnose(
-            trials, model, single, seed=seed, rows=rows, full=full, reference=reference
+            trials,
+            model,
+            single,
+            seed=seed,
+            rows=rows,
+            full=full,
+            reference=reference,
+            tell=tell,
         )
-    return single(trials, model, seed=seed, rows=rows, full=full, reference=reference)
+    return single(
+        trials,
+        model,
+        seed=seed,
+        rows=rows,
+        full=full,
+        reference=reference,
+        tell=tell,
+    )
 
 
 def single(
@@ -55,6 +73,7 @@ def single(
     full: bool = True,
     reference: Sequence[Trial] = (),
     checked: bool = False,
+    tell: Tell = unheard,
 ) -> Diagnosis:
     """A diagnosis by one model; arguments as `diagnose`.
 
@@ -66,14 +85,16 @@ def single(
         full: with localisation.
         reference: recordings in which nothing was changed.
         checked: whether recordings are as the model compares them.
+        tell: is told when a stage begins.
     """
+    tell("nominal model")
     usable, faults = (tuple(trials), ()) if checked else check.check(trials, model)
     _enough(usable)
     if reference:
         unchanged = reference if checked else check.check(reference, model)[0]
         model = Corrected.of(unchanged, model)
     return diagnosis.diagnose(
-        usable, model, seed=seed, faults=faults, full=full, rows=rows
+        usable, model, seed=seed, faults=faults, full=full, rows=rows, tell=tell
     )
 
 

@@ -216,12 +216,15 @@ def _errors() -> tuple[type[BaseException], ...]:
     return (OSError, termios.error, TypeError, ValueError)  # the last: closed
 
 
+BUILT_IN = ("/dev/ttyS", "/dev/ttyAMA")
+"""how ports are called that machines have whether or not something is wired to them"""
 MISHAPS = ".mishaps"
 """what the name of the pipe beside an emulated robot's port ends with"""
 
 
 def ports(place: Path | str = ".") -> dict[str, str]:
-    """Ports by device, each with what is known of it.
+    """Ports by device, each with what is known of it: emulated robots, then what was
+    plugged in or bound, then those that machines have built in.
 
     Args:
         place: directory in which emulated robots are looked for.
@@ -232,12 +235,23 @@ def ports(place: Path | str = ".") -> dict[str, str]:
     pyserial()
     from serial.tools import list_ports
 
-    found = {item.device: item.description for item in sorted(list_ports.comports())}
+    found = {}
     for pipe in sorted(Path(place).glob(f"*{MISHAPS}")):
         link = pipe.with_name(pipe.name.removesuffix(MISHAPS))
         if link.exists():
             found[str(link)] = "an emulated robot"
+    there = sorted(list_ports.comports())
+    for item in sorted(there, key=lambda item: item.device.startswith(BUILT_IN)):
+        known = item.description not in (None, "n/a")
+        found[item.device] = item.description if known else _kind(item.device)
     return found
+
+
+def _kind(device: str) -> str:
+    """What a port is by its name, where the system says nothing of it."""
+    if device.startswith(BUILT_IN):
+        return "built into this machine"
+    return "Bluetooth" if "rfcomm" in device else "an unknown adapter"
 
 
 def answers(port: str) -> str:

@@ -104,10 +104,20 @@ def executable() -> str | None:
     return str(path) if path.is_file() else None
 
 
-def free_port() -> int:
-    """A TCP port that nothing listens on at this moment."""
+def free_port(wanted: int = 0) -> int:
+    """A TCP port that nothing listens on at this moment.
+
+    Args:
+        wanted: the port to give where it is free; 0 = any.
+    """
     with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", wanted))
+        except OSError:
+            if not wanted:
+                raise
+            return free_port()
         return probe.getsockname()[1]
 
 

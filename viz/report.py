@@ -12,6 +12,7 @@ from bns.experiment import loading
 from bns.experiment.record import RunRecord
 from bns.learners import registry as learners
 from bns.learners.base import Curves
+from bns.progress import Each, uncounted
 from bns.storage import files
 from bns.tasks import registry as tasks
 from bns.viz import facts, figures, scene
@@ -73,6 +74,8 @@ SHARED = ("fitness", "solved", "waits")
 def write(
     sources: Sequence[str | Path | RunRecord] | Mapping[str, RunRecord] | str | Path,
     out_html: str | Path,
+    *,
+    each: Each = uncounted,
 ) -> Path:
     """Write the report of one batch, or the comparison of several.
 
@@ -80,6 +83,7 @@ def write(
         sources: run directories or records, one or more; a mapping gives the labels
             that a comparison shows.
         out_html: file to write; no other file is needed to read it.
+        each: goes through the figures, and may count them.
 
     Returns:
         The path written.
@@ -91,7 +95,7 @@ def write(
     runs = _runs(sources)
     if not runs:
         raise BnsError("A report needs at least one run: give its directory.")
-    files.write_bytes(Path(out_html), render("report.html", _context(runs)))
+    files.write_bytes(Path(out_html), render("report.html", _context(runs, each)))
     return Path(out_html)
 
 
@@ -126,7 +130,7 @@ def _labels(records: Sequence[RunRecord]) -> list[str]:
     ]
 
 
-def _context(runs: Mapping[str, RunRecord]) -> dict:
+def _context(runs: Mapping[str, RunRecord], each: Each = uncounted) -> dict:
     """What the template fills in."""
     batches = [_batch(label, record) for label, record in runs.items()]
     several = len(runs) > 1
@@ -134,13 +138,14 @@ def _context(runs: Mapping[str, RunRecord]) -> dict:
         "several": several,
         "batches": batches,
         "title": _title(list(runs)) if several else batches[0]["name"],
-        "figures": _shared_figures(runs) if several else _own_figures(runs),
+        "figures": _drawn(runs, each),
     }
     if several:
         context["comparison"] = comparison(runs)
         context["differences"] = differences(runs)
         context["paths"] = [
-            (label, picture(figures.path(record))) for label, record in runs.items()
+            (label, picture(figures.path(record)))
+            for label, record in each(list(runs.items()))
         ]
         context["path_caption"] = _caption("path", next(iter(runs.values())))
     return context
@@ -171,11 +176,16 @@ def _batch(label: str, record: RunRecord) -> dict:
     }
 
 
-def _own_figures(runs: Mapping[str, RunRecord]) -> list[dict]:
+def _drawn(runs: Mapping[str, RunRecord], each: Each) -> list[dict]:
+    chosen = _shared_figures(runs) if len(runs) > 1 else _own_figures(runs)
+    return [_entry(figure, runs) for figure in each(chosen)]
+
+
+def _own_figures(runs: Mapping[str, RunRecord]) -> list[Curves | str]:
     record = next(iter(runs.values()))
     shown = scene.picture(record.config)
     ours = [*shown.figures, *SHARED, *_of_learner(record)]
-    return [_entry(figure, runs) for figure in ours if _drawable(figure, record)]
+    return [figure for figure in ours if _drawable(figure, record)]
 
 
 def _of_learner(record: RunRecord) -> list[Curves | str]:
@@ -191,7 +201,7 @@ def _drawable(figure: Curves | str, record: RunRecord) -> bool:
     return figure != "displacement" or bool(np.isfinite(record.predicted).any())
 
 
-def _shared_figures(runs: Mapping[str, RunRecord]) -> list[dict]:
+def _shared_figures(runs: Mapping[str, RunRecord]) -> list[Curves | str]:
     """Figures that all batches have."""
     first = next(iter(runs.values()))
     own = [
@@ -201,8 +211,7 @@ def _shared_figures(runs: Mapping[str, RunRecord]) -> list[dict]:
         and figure.compared
         and all(_drawable(figure, record) for record in runs.values())
     ]
-    shown: list[Curves | str] = [*SHARED, *own]
-    return [_entry(figure, runs) for figure in shown]
+    return [*SHARED, *own]
 
 
 def _entry(figure: Curves | str, runs: Mapping[str, RunRecord]) -> dict:

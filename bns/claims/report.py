@@ -12,6 +12,7 @@ from bns.claims.held import Held
 from bns.claims.published import Library, Stale
 from bns.claims.verdict import Finding
 from bns.errors import BnsError
+from bns.progress import Each, uncounted
 from bns.stats.designs import Design, up_to
 
 NOT_RUN, NOT_TESTED, STALE = "not run", "not tested", "stale"
@@ -75,6 +76,7 @@ def judged(
     own: bool = True,
     runs: int = 0,
     among: Library | None = None,
+    each: Each = uncounted,
 ) -> list[Judged]:
     """Claims, judged by the runs in a store; without a store none has runs.
 
@@ -90,6 +92,7 @@ def judged(
             than there are has the published finding (never a quick one).
         runs: the last look at most, instead of that of the design; 0 = the design's.
         among: published findings; by default those of the package.
+        each: goes through the claims, and may count them.
 
     Raises:
         FormatError: the store is damaged or of a newer version.
@@ -98,7 +101,7 @@ def judged(
     family = [c for c in claims().values() if c.investigation in letters]
     members = {
         member.label: member
-        for claim in family
+        for claim in each(family)
         for cell in claim.cells
         for member in _members(claim, cell, world, quick)
     }
@@ -106,10 +109,12 @@ def judged(
     if (directory / "campaign.json").exists():
         have = held.read(directory, identities(members.values()))
     rows: dict[str, Judged] = {}
+    judging = each if have else uncounted  # without runs it takes no time
     for letter in sorted(letters):
         part = [claim for claim in family if claim.investigation == letter]
         judge = _Judge(have, world, quick, own or quick, runs, among)
-        rows |= {row.claim.id: row for row in _adjusted([judge(c) for c in part])}
+        found = _adjusted([judge(claim) for claim in judging(part)])
+        rows |= {row.claim.id: row for row in found}
     return [rows[claim.id] for claim in wanted]
 
 

@@ -12,7 +12,7 @@ from bns.cli.fields import Positional
 from bns.cli.parse import Verbs, dispatch
 from bns.cli.tables import show
 from bns.errors import BnsError
-from bns.progress import working
+from bns.progress import Each, counting, uncounted
 
 MANUAL = """usage: bns claims {list,plan,run,take,table} [...]
 
@@ -30,6 +30,7 @@ The rule is in docs/claims.md. `bns claims VERB --help` is the manual of a verb.
 WORLDS = ("mujoco", "static-snn")
 PUBLISHED = "published"
 KEEP_EVERY = 300.0  # s
+JUDGING = "judging claims"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -250,7 +251,7 @@ class Keeper:
         self.wrote = time.monotonic()
 
 
-def _both(root: str, *, own: bool = False) -> dict:
+def _both(root: str, *, own: bool = False, each: Each = uncounted) -> dict:
     """World -> all claims, judged."""
     from bns.claims import report, runner
     from bns.claims.claim import chosen
@@ -261,6 +262,7 @@ def _both(root: str, *, own: bool = False) -> dict:
             runner.directory(world, quick=False, root=Path(root)),
             world=world,
             own=own,
+            each=each,
         )
         for world in WORLDS
     }
@@ -289,23 +291,25 @@ def _table(given: Table) -> int:
     from bns.claims.claim import chosen
 
     wanted = chosen(given.ids)
-    root = Path(given.root)
-
-    def judged(world: str) -> list:
-        place = runner.directory(world, quick=given.quick, root=root)
-        return report.judged(
-            wanted, place, world=world, quick=given.quick, own=given.own
-        )
-
     if given.write or given.publish:
         if given.ids or given.quick:
             raise BnsError(
                 "--write and --publish take all claims: leave ids and --quick out."
             )
-        _written(given, _both(given.root, own=given.own))
+        with counting(JUDGING) as each:
+            worlds = _both(given.root, own=given.own, each=each)
+        _written(given, worlds)
         return 0
-    with working("judging the claims"):
-        rows = judged(given.world)
+    place = runner.directory(given.world, quick=given.quick, root=Path(given.root))
+    with counting(JUDGING) as each:
+        rows = report.judged(
+            wanted,
+            place,
+            world=given.world,
+            quick=given.quick,
+            own=given.own,
+            each=each,
+        )
     _show(rows, json=given.json, brief=not given.ids)
     if not given.json:
         said = ", ".join(f"{n} {name}" for name, n in report.counts(rows).items() if n)

@@ -29,9 +29,14 @@ compdef _bns bns
     "fish": """function __bns_complete
     set -l words (commandline -opc)
     set -l current (commandline -ct)
-    $words[1] --complete $words[2..] "$current" 2>/dev/null
+    set -l found ($words[1] --complete $words[2..] "$current" 2>/dev/null)
+    if set -q found[1]
+        printf '%s\\n' $found
+    else
+        __fish_complete_path "$current"
+    end
 end
-complete -c bns -a '(__bns_complete)'
+complete -c bns -f -a '(__bns_complete)'
 """,
 }
 

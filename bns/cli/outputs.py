@@ -14,10 +14,12 @@ from bns.cli.extras import attempt
 from bns.errors import install
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
-from bns.progress import working
+from bns.progress import Each, counting, uncounted, working
 
 RECORDING = "recording.rrd"
 REPORT = "report.html"
+DRAWING = "figures"
+"""name of the progress of a report"""
 
 
 @contextmanager
@@ -47,8 +49,10 @@ def write(
     """
     made: dict[str, Path | str] = {"data": out}
     if report:
-        with working("drawing the report"):
-            made |= attempt("report", lambda: write_report([out], out / REPORT))
+        with counting(DRAWING) as each:
+            made |= attempt(
+                "report", lambda: write_report([out], out / REPORT, each=each)
+            )
     if recording and find_spec("rerun") is None:
         made["in 3D"] = f"{install('view')}, then bns view {out}"
     elif recording:
@@ -61,11 +65,19 @@ def write(
         print(f"{name + ':':<11}{path}")
 
 
-def write_report(directories: list[Path], path: Path) -> Path:
-    """The HTML report on runs."""
+def write_report(
+    directories: list[Path], path: Path, *, each: Each = uncounted
+) -> Path:
+    """The HTML report on runs.
+
+    Args:
+        directories: of the runs.
+        path: file to write.
+        each: goes through the figures, and may count them.
+    """
     from bns.viz import report
 
-    report.write(directories, path)
+    report.write(directories, path, each=each)
     return path
 
 

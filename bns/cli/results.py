@@ -9,7 +9,7 @@ from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.cli.tables import show
 from bns.errors import BnsError
-from bns.progress import working
+from bns.progress import counting
 
 TITLE = b" - BNS report</title>"  # of every page that `bns report` makes
 MARK = 4096  # [bytes] from the beginning, within which a page has its title
@@ -71,7 +71,7 @@ def main(verb: str, argv: list[str]) -> int:
 def _report(given: Report) -> int:
     if not given.directories:
         raise BnsError("No run was given: give one or more run directories.")
-    from bns.cli.outputs import REPORT, write_report
+    from bns.cli.outputs import DRAWING, REPORT, write_report
     from bns.storage.store import load
 
     directories = [Path(directory) for directory in given.directories]
@@ -84,8 +84,8 @@ def _report(given: Report) -> int:
             f"{path} was not made by `bns report`: add --force to replace it, or give "
             "another --out."
         )
-    with working("drawing the report"):
-        write_report(directories, path)
+    with counting(DRAWING) as each:
+        write_report(directories, path, each=each)
     print(path)
     return 0
 
@@ -102,8 +102,8 @@ def _compare(given: Compare) -> int:
     from bns.stats.compare import MEASURES, compare
     from bns.storage.store import load
 
-    with working("comparing"):
-        found = compare([load(directory) for directory in given.directories])
+    with counting("comparing") as each:
+        found = compare([load(path) for path in each(given.directories)], each=each)
     if given.json:
         print(json.dumps(found.to_mapping(), indent=2))
         return 0

@@ -1,15 +1,24 @@
 """`bns view`: open the recording of a run or a diagnosis, or make a picture of it."""
 
 import os
+import socket
 import sys
 from dataclasses import dataclass
 from importlib.util import find_spec
+from ipaddress import IPv4Address, IPv6Address, ip_address
 from pathlib import Path
+from urllib.parse import quote
 
 from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.errors import BnsError, MissingDependencyError, OutOfBoundsError, install
 from bns.progress import working
+
+DATA, PAGE = 9876, 9090
+"""ports of Rerun's data and of its page, where they are free"""
+DRAWING = 11.0
+"""what a picture takes [s]: 12 and 19 s, of a diagnosis and of the demo's run, on two
+cores that others used as well; 6 s of it are a wait"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +65,7 @@ def main(verb: str, argv: list[str]) -> int:
     if given.png:
         from bns.viz import picture
 
-        with working("drawing"):
+        with working("drawing", usual=DRAWING):
             reports = picture.save(recording, given.png)
         for report in reports:
             print(f"bns: the viewer says: {report}", file=sys.stderr)
@@ -144,7 +153,7 @@ def show(recording: Path, bind: str, *, web: bool = False) -> int:
         web: serve it to a browser on this machine, until Ctrl-C.
 
     Raises:
-        BnsError: there is no display.
+        BnsError: there is no display, or no such address.
         MissingDependencyError: there is no viewer.
     """
     import subprocess
@@ -163,5 +172,29 @@ def show(recording: Path, bind: str, *, web: bool = False) -> int:
             f"No display to open {recording} on: make a picture with --png FILE, "
             "serve it to a browser with --web, or copy it to a machine that has one."
         )
-    words = ["--bind", bind, *(["--web-viewer"] if web else [])]
+    words = ["--bind", str(_address(bind)), *(_served(bind) if web else [])]
+    os.environ.setdefault("RUST_LOG", "warn")
     return subprocess.call([viewer, *words, str(recording)])
+
+
+def _address(bind: str) -> IPv4Address | IPv6Address:
+    try:
+        return ip_address(bind)
+    except ValueError:
+        raise BnsError(
+            f"--bind {bind} is no address: give 127.0.0.1 for this machine alone, or "
+            "0.0.0.0 for all that reach it."
+        ) from None
+
+
+def _served(bind: str) -> list[str]:
+    """How the viewer is told to serve a browser; says where it does."""
+    from bns.viz import picture
+
+    data, page = picture.free_port(DATA), picture.free_port(PAGE)
+    everywhere = _address(bind).is_unspecified
+    host = socket.gethostname() if everywhere else bind
+    host = f"[{host}]" if ":" in host else host
+    source = quote(f"rerun+http://{host}:{data}/proxy", safe="")
+    print(f"http://{host}:{page}?url={source}\nCtrl-C ends it.", flush=True)
+    return ["--web-viewer", "--port", str(data), "--web-viewer-port", str(page)]

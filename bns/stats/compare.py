@@ -10,6 +10,7 @@ import numpy as np
 from bns import stats
 from bns.errors import BnsError
 from bns.experiment.record import RunRecord
+from bns.progress import Each, uncounted
 from bns.stats import Interval
 
 MEASURES = {
@@ -77,12 +78,15 @@ class Comparison:
         }
 
 
-def compare(records: Sequence[RunRecord], names: Sequence[str] = ()) -> Comparison:
+def compare(
+    records: Sequence[RunRecord], names: Sequence[str] = (), each: Each = uncounted
+) -> Comparison:
     """Compare two or more runs on every measure that all of them have.
 
     Args:
         records: finished runs.
         names: of the runs; by default those of their directories.
+        each: goes through the measures, and may count them.
 
     Raises:
         BnsError: fewer than two runs, or one that is not finished.
@@ -99,7 +103,7 @@ def compare(records: Sequence[RunRecord], names: Sequence[str] = ()) -> Comparis
             )
     sides: list[Side] = []
     pairs: list[Pair] = []
-    for measure in MEASURES:
+    for measure in each(tuple(MEASURES)):
         samples = [values(record, measure) for record in records]
         if all(len(sample) for sample in samples):
             sides += [side(n, measure, s) for n, s in zip(names, samples, strict=True)]

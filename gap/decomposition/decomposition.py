@@ -13,6 +13,7 @@ from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.shares import Part
 from bns.gap.decomposition.singles import Singles
 from bns.gap.recordings import command_moments
+from bns.progress import Tell, unheard
 
 MOST = 0.5  # share of the gap beyond which what is left is most of it
 FELT = 0.02  # of the floor's variance: a gap below shows in no picture
@@ -141,12 +142,15 @@ class Decomposition:
         return "effect" if len(self.point.support) == 1 else "together"
 
 
-def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
+def decompose(
+    problem: Problem, *, seed: int = 0, tell: Tell = unheard
+) -> Decomposition:
     """Fit, date, guard against what makes held-out errors worse, and weigh the rest.
 
     Args:
         problem: the recording.
         seed: of the noise that measures the floor.
+        tell: is told when a stage begins (`bns.gap.stages`).
     """
     start = descent.nothing(problem)
     known = rest.floor(problem, start.noise.starts, seed=seed)
@@ -154,6 +158,7 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
     if unstable.any() and not unstable.all():
         problem = problem.without(unstable)
         start = descent.nothing(problem)
+    tell("explanations")
     tried = Singles(problem, start)
     point = descent.decompose(tried)
     found = onset.dated(problem, start, point)
@@ -172,6 +177,7 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         size = _Sizes.of(problem, start, point, known)
     if late and late.name not in point.support:
         late = None
+    tell("rivals")
     return Decomposition(
         problem=problem,
         start=start,

@@ -9,6 +9,7 @@ from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.record import recorded
 from bns.gap.models.base import GapModel
 from bns.gap.records import Diagnosis
+from bns.progress import Tell, unheard
 from bns.worlds.trial import Trial
 
 
@@ -20,6 +21,7 @@ def diagnose(
     faults: Sequence[str] = (),
     full: bool = True,
     rows: Sequence[str] | None = None,
+    tell: Tell = unheard,
 ) -> Diagnosis:
     """A diagnosis of a checked recording.
 
@@ -30,12 +32,13 @@ def diagnose(
         faults: what the check found.
         full: with localisation; False = the verdict alone.
         rows: names of the explanations that are considered, None = all.
+        tell: is told when a stage begins.
     """
     began = time.perf_counter()
     problem = Problem.of(trials, model)
     if rows is not None:
         problem = narrowed(problem, rows)
-    made = decompose(problem, seed=seed)
+    made = decompose(problem, seed=seed, tell=tell)
     seconds = {"fit": round(time.perf_counter() - began, 3)}
     return recorded(made, faults=faults, seed=seed, seconds=seconds, full=full)
 

@@ -25,6 +25,7 @@ from bns.gap.planning.plan_runs import repeats, runs
 from bns.gap.recordings import load_recordings
 from bns.gap.records import Diagnosis, Fit
 from bns.gap.where.compared import Compared
+from bns.progress import Each, uncounted
 from bns.worlds.effects.base import Effect, Parameter
 from bns.worlds.trial import Commands, Trial
 
@@ -81,6 +82,7 @@ def plan(
     family: Sequence[Excitation] = (),
     arena: tuple[float, float] = ARENA,
     seed: int = 0,
+    each: Each = uncounted,
 ) -> Plan:
     """The command that best separates what a diagnosis left tied.
 
@@ -90,6 +92,7 @@ def plan(
         family: excitations to choose from; empty = those of the robot's kind.
         arena: size of the board [m] that a wheeled robot may not leave.
         seed: of the random excitations.
+        each: goes through the excitations, and may count them.
     """
     fits = tied(found)
     if len(fits) < 2:
@@ -98,7 +101,7 @@ def plan(
     told = found.provenance.get("told", {})
     family = tuple(family) or _family(model, seed, told)
     family = _safe(family, model, effects, arena)
-    made = [_option(item, found, model, fits, effects) for item in family]
+    made = [_option(item, found, model, fits, effects) for item in each(family)]
     names = tuple(fit.names for fit in fits)
     if not made:
         return Plan(names, (), 0, "No command of the family is safe in this arena.")

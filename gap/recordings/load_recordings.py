@@ -127,7 +127,14 @@ def _read(
     """Trials of a recording with their run, where there are several, and number."""
     from bns.worlds.data import dataset
 
-    own = model.logs and tables.reader(path) is not None
+    known = tables.reader(path) is not None
+    own = model.logs and known
+    if known and Path(path).is_dir() and not importer and not own:
+        raise FormatError(
+            f"{path} is a log of joints: describe its robot with `bns gap describe "
+            f"MJCF {path} --out robot.toml`, then give --model robot.toml. Of a robot "
+            "of `bns robots` give the run or dataset itself."
+        )
     if Path(path).is_dir() and not importer and not own:
         inside = Path(path) / RUN
         found = dataset.read(inside if inside.is_dir() else path)

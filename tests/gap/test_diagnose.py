@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError, FormatError
+from bns.gap import stages
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.reference import Corrected
 from bns.gap.diagnose import diagnose
 from bns.gap.recordings import check
 from bns.gap.records import Diagnosis
+from bns.gap.stages import BY_FITS, BY_TANGENT, WITH_LIGHT
 from bns.worlds.effects.base import CommandEffect, Parameter
 from bns.worlds.physics.wheeled_world import MujocoWorld
 from bns.worlds.trial import Channel, Commands
@@ -61,9 +63,17 @@ def test_one_effect_is_named_with_its_value(find, text, name, value, tolerance):
 
 def test_a_simulated_recording_without_noise_is_named(model, told):
     world = MujocoWorld(reality=["wheel_gain:wheel=left,factor=0.85"], threads=1)
-    found = diagnose(world.run(told), model, rows=KEPT, full=False)
+    trials, heard = world.run(told), []
+    found = diagnose(trials, model, rows=KEPT, full=False, tell=heard.append)
+    assert heard == list(stages.shares(model, trials))
     assert found.verdict.kind == "effect"
     assert found.verdict.named == (("wheel_gain[left]",),)
+
+
+@pytest.mark.parametrize("shares", [BY_TANGENT, BY_FITS, WITH_LIGHT])
+def test_stages_share_the_time_of_a_diagnosis(shares):
+    assert sum(shares.values()) == pytest.approx(1.0)
+    assert min(shares.values()) > 0
 
 
 def test_an_alias_is_never_a_single_name(find):

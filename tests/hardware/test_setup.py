@@ -68,6 +68,34 @@ def test_it_takes_what_it_found_and_asks_again_where_an_answer_cannot_be(
     assert setup.read(tmp_path / "hardware.toml") == found
 
 
+def test_none_leaves_out_what_stands_in_brackets(asked, capsys, tmp_path):
+    (tmp_path / "camera.json").write_text("{}")
+    assert asked(["setup"], "", "/dev/ttyUSB9", "1", "none", "None") == 0
+    found = setup.read(tmp_path / "hardware.toml")
+    assert found.calibration == found.wheels == ""
+    shown = capsys.readouterr().out
+    assert "there is no /dev/ttyUSB9 now" in shown
+    assert 'calibration = "camera.json"' in shown
+
+
+def test_ports_that_machines_have_anyway_come_last(tmp_path, monkeypatch):
+    from serial.tools import list_ports
+    from serial.tools.list_ports_common import ListPortInfo
+
+    devices = ["/dev/ttyS0", "/dev/ttyUSB0", "/dev/rfcomm0"]
+    there = [ListPortInfo(device, skip_link_detection=True) for device in devices]
+    there[1].description = "FT232R"
+    monkeypatch.setattr(list_ports, "comports", lambda: there)
+    (tmp_path / "bns-robot").touch()
+    (tmp_path / "bns-robot.mishaps").touch()
+    assert list(line.ports(tmp_path).values()) == [
+        "an emulated robot",
+        "Bluetooth",
+        "FT232R",
+        "built into this machine",
+    ]
+
+
 def test_verbs_take_a_set_up_and_what_they_are_told_goes_before(
     asked, tmp_path, capsys
 ):

@@ -196,12 +196,11 @@ def _path(series: Any) -> "Figure":
                 values[:, 0], values[:, 1], color=colour, lw=width, ls=line, label=name
             )
         start = series[0][1][0]
-        axes.plot(start[0], start[1], "o", color=RECORDED, ms=6)
-        axes.annotate(" start", (start[0], start[1]), va="bottom")
+        axes.plot(start[0], start[1], "o", color=RECORDED, ms=6, label="start")
         axes.set_aspect("equal", "datalim")
         axes.set_xlabel("x [m]")
         axes.set_ylabel("y [m]")
-        axes.legend(loc="best")
+        figure.legend(loc="outside lower center", ncols=4)
     return figure
 
 

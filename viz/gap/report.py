@@ -1,13 +1,15 @@
 """One self-contained HTML page about one diagnosis, in words and tables."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel
 from bns.gap.records import Diagnosis, Fit
+from bns.progress import Each, uncounted
 from bns.storage import files
 from bns.viz.gap import figures, view
 from bns.viz.page import picture, render
@@ -46,7 +48,12 @@ CAPTIONS = {
 
 
 def write(
-    found: Diagnosis, trials: Sequence[Trial], model: GapModel | None, path: str | Path
+    found: Diagnosis,
+    trials: Sequence[Trial],
+    model: GapModel | None,
+    path: str | Path,
+    *,
+    each: Each = uncounted,
 ) -> Path:
     """Write the report.
 
@@ -56,13 +63,19 @@ def write(
         model: its nominal model; None = none that can be simulated (no figures of
             motion).
         path: file to write; no other is needed to read it.
+        each: goes through the figures, and may count them.
     """
-    page = render("gap_report.html", _context(found, trials, model))
+    page = render("gap_report.html", _context(found, trials, model, each))
     files.write_bytes(Path(path), page)
     return Path(path)
 
 
-def _context(found: Diagnosis, trials: Sequence[Trial], model: GapModel | None) -> dict:
+def _context(
+    found: Diagnosis,
+    trials: Sequence[Trial],
+    model: GapModel | None,
+    each: Each = uncounted,
+) -> dict:
     about = found.provenance
     rows = model.rows(trials) if model is not None else ()
     return {
@@ -72,7 +85,7 @@ def _context(found: Diagnosis, trials: Sequence[Trial], model: GapModel | None) 
         "explanations": explanations(found),
         "detectable": detectable(found, rows),
         "steps": next_steps(found, rows),
-        "figures": _figures(found, trials, model),
+        "figures": _figures(found, trials, model, each),
         "data": about.get("data", ()),
         "command": _command(found),
         "versions": sorted(dict(about.get("versions", {})).items()),
@@ -93,32 +106,37 @@ def _command(found: Diagnosis) -> str:
 
 
 def _figures(
-    found: Diagnosis, trials: Sequence[Trial], model: GapModel | None
+    found: Diagnosis,
+    trials: Sequence[Trial],
+    model: GapModel | None,
+    each: Each,
 ) -> list[dict]:
-    made = {}
+    drawn: dict[str, Callable[[], Any]] = {}
     if found.decomposition.get("parts"):
-        made["shares"] = figures.shares(found)
+        drawn["shares"] = lambda: figures.shares(found)
     if model is not None and found.where:
-        made |= _drawn(found, trials, model)
+        drawn |= _simulated(found, trials, model)
     return [
         {
             "name": name,
             "title": CAPTIONS[name][0],
             "caption": CAPTIONS[name][1],
-            "image": picture(figure),
+            "image": picture(draw()),
         }
-        for name, figure in made.items()
+        for name, draw in each(list(drawn.items()))
     ]
 
 
-def _drawn(found: Diagnosis, trials: Sequence[Trial], model: GapModel) -> dict:
-    """Figures that need the simulation."""
-    seen = view.view(found, trials, model)
+def _simulated(
+    found: Diagnosis, trials: Sequence[Trial], model: GapModel
+) -> dict[str, Callable[[], Any]]:
+    """What draws the figures that need the simulation; the first one simulates."""
+    seen = cache(lambda: view.view(found, trials, model))
     return {
-        "motion": figures.motion(seen),
-        "horizons": figures.horizons(found, seen),
-        "closing": figures.closing(found),
-        "over_time": figures.over_time(seen),
+        "motion": lambda: figures.motion(seen()),
+        "horizons": lambda: figures.horizons(found, seen()),
+        "closing": lambda: figures.closing(found),
+        "over_time": lambda: figures.over_time(seen()),
     }
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.errors import BnsError, UnknownNameError
-from bns.progress import working
+from bns.progress import counting, working
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,8 +98,10 @@ def _plan(given: Planned) -> int:
     else:
         model = _model(found)
         _plannable(found, model)
-        with working("planning"):
-            made = plan.plan(found, model, arena=given.arena, seed=given.seed)
+        with counting("planning") as each:
+            made = plan.plan(
+                found, model, arena=given.arena, seed=given.seed, each=each
+            )
     print(made.sentence)
     if not made.options or not made.repeats:
         return 0
@@ -136,14 +138,14 @@ def _plannable(found: Any, model: Any) -> None:
 
 
 def _edit(given: Edit) -> int:
-    from bns.gap import edit, store
+    from bns.gap import edit, stages, store
     from bns.gap.recordings import load_recordings
 
     found = store.load(given.directory)
     model = _model(found)
     trials = load_recordings.trials(given.predict, model, columns=given.columns)
     load_recordings.tellable(trials, model)
-    with working("predicting"):
+    with working("predicting", usual=stages.nominal(found, len(trials))):
         made = edit.edit(found, trials, model, remove=given.remove, effect=given.effect)
     print(made.sentence)
     for name, loss in made.losses.items():

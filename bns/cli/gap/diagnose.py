@@ -11,7 +11,7 @@ from bns.cli.extras import attempt
 from bns.cli.fields import Positional
 from bns.cli.parse import parse
 from bns.errors import BnsError, FormatError, install
-from bns.progress import working
+from bns.progress import Each, Tell, counting, working
 
 LISTED = 8  # faults that are printed at most
 
@@ -152,15 +152,16 @@ def _asked(given: Diagnose) -> dict[str, Any]:
 
 def _diagnosed(given: Diagnose, out: Path | None) -> int:
     """Diagnose, or go on where the same command was killed after it had."""
-    from bns.gap import store
+    from bns.gap import stages, store
 
     if given.importer == "khepera3_odometry" and not given.model:
         found, model, trials = _odometry(given), None, []
     else:
         model = nominal(given, given.threads)
         trials = _some(recorded(given, model))
-        with working(f"diagnosing {len(trials)} trials"):
-            found = _before(out) or _general(given, model, trials, out)
+        shares = stages.shares(model, trials)
+        with working(f"diagnosing {len(trials)} trials", shares) as tell:
+            found = _before(out) or _general(given, model, trials, out, tell)
     found = replace(
         found, provenance={**found.provenance, **_provenance(given, model, trials)}
     )
@@ -184,7 +185,9 @@ def _before(out: Path | None) -> Any:
         return None
 
 
-def _general(given: Diagnose, model: Any, trials: list[Any], out: Path | None) -> Any:
+def _general(
+    given: Diagnose, model: Any, trials: list[Any], out: Path | None, tell: Tell
+) -> Any:
     from bns.gap.diagnose import diagnose
     from bns.gap.recordings import check, load_recordings
     from bns.gap.report import partial, warnings
@@ -197,7 +200,7 @@ def _general(given: Diagnose, model: Any, trials: list[Any], out: Path | None) -
             return _servo(given, model, usable)
         warnings.reproducible(usable, model)
         unchanged = recorded(replace(given, data=given.reference, trials=""), model)
-        found = diagnose(trials, model, seed=given.seed, reference=unchanged)
+        found = diagnose(trials, model, seed=given.seed, reference=unchanged, tell=tell)
         more = warnings.warnings(found, model.rows(usable))
         return replace(found, warnings=(*found.warnings, *more))
     except BnsError as error:
@@ -307,19 +310,19 @@ def _closed(found: Any) -> Sequence[str]:
 
 
 def _draw(given: Diagnose, found: Any, trials: Any, model: Any, out: Path) -> None:
-    with working("drawing"):
-        made = _drawn(given, found, trials, model, out)
+    with counting("drawing") as each:
+        made = _drawn(given, found, trials, model, out, each)
     for name, path in made.items():
         print(f"{name + ':':<11}{path}")
 
 
 def _drawn(
-    given: Diagnose, found: Any, trials: Any, model: Any, out: Path
+    given: Diagnose, found: Any, trials: Any, model: Any, out: Path, each: Each
 ) -> dict[str, Path | str]:
     def report() -> Path:
         from bns.viz.gap import report as gap_report
 
-        return gap_report.write(found, trials, model, out / "report.html")
+        return gap_report.write(found, trials, model, out / "report.html", each=each)
 
     def recording() -> Path:
         from bns.viz.gap import recording as gap_recording
@@ -332,5 +335,6 @@ def _drawn(
     if given.rerun and model is not None and find_spec("rerun") is None:
         made["in 3D"] = f"{install('view')}, then repeat this command"
     elif given.rerun and model is not None:
-        made |= attempt("recording", recording)
+        for write in each([recording]):
+            made |= attempt("recording", write)
     return made

@@ -13,6 +13,8 @@ from typing import Any
 
 from bns.errors import BnsError
 
+NONE = "none"
+"""answer that leaves something out"""
 START = 60.0
 """s for an emulated robot to appear"""
 DAMAGE = {
@@ -64,11 +66,13 @@ def setup(given: Any) -> int:
     made = setup.Setup(**found)  # type: ignore[arg-type]
     setup.write(out, made, said)
     print(f"\n{out} is written. Next:")
+    if not Path(made.port).exists():
+        print(f"  there is no {made.port} now: connect the robot, or start an emulated")
     if found.get("calibration") == "" and found["camera"] != "emulated":
         print(
             f"  bns hardware calibrate --setup {out} --views PICTURES --out camera.json"
-            "    and name camera.json in the file"
         )
+        print(f'  and add this line to {out}: calibration = "camera.json"')
     print(f"  bns hardware check --setup {out}")
     print(f"  bns hardware record --setup {out} --out recording --move")
     return 0
@@ -79,13 +83,13 @@ def _answer(question: Question, usual: str) -> str:
     print(f"\n{question.why}")
     while True:
         try:
-            typed = input(f"{question.ask} [{usual or 'none'}] ").strip()
+            typed = input(f"{question.ask} [{usual or NONE}] ").strip()
         except EOFError:
             raise BnsError(
                 f"The answers ended at {question.ask!r}: give one a line; nothing was "
                 "written."
             ) from None
-        answer = typed or usual
+        answer = "" if typed.lower() == NONE else typed or usual
         wrong = question.check(answer)
         if not sys.stdin.isatty():  # answers from a pipe are not to be seen
             print(answer)

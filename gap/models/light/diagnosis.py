@@ -17,6 +17,7 @@ from bns.gap.models.base import GapModel
 from bns.gap.models.light.model import SightModel
 from bns.gap.recordings.trial_selection import narrowed
 from bns.gap.records import Diagnosis, Fit, Verdict
+from bns.progress import Tell, unheard
 from bns.worlds.trial import Commands, Trial
 
 LEAST = 5  # commands between two in which the robot was handled, to be of use
@@ -31,6 +32,7 @@ def diagnose(
     single: Single,
     *,
     reference: Sequence[Trial] = (),
+    tell: Tell = unheard,
     **given: Any,
 ) -> Diagnosis:
     """Motion and readings of recordings with light, as one diagnosis.
@@ -40,12 +42,15 @@ def diagnose(
         model: nominal model of the motion.
         single: diagnoses one of the two.
         reference: recordings of the same robot in which nothing was changed.
+        tell: is told when a stage begins.
         **given: further arguments of `single`.
     """
     before = unhandled(reference, model)
-    motion = single(unhandled(trials, model), model, reference=before, **given)
+    moved = unhandled(trials, model)
+    motion = single(moved, model, reference=before, tell=tell, **given)
     deviations = motion.floor["sigma"]
     sight = SightModel(trials, robot=model.name, pose_sd=deviations)
+    tell("light")
     seen = look(trials, sight, single, reference=reference, **given)
     return joined(motion, seen)
 

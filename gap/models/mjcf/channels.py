@@ -53,7 +53,10 @@ def compiled(path: Path, told: Sequence[Told]) -> mujoco.MjModel:
         FormatError: there is no such file, or MuJoCo cannot compile it.
     """
     if not path.is_file():
-        raise FormatError(f"There is no model file {path}.")
+        raise FormatError(
+            f"There is no model file {path}: give an MJCF file; a robot of `bns "
+            "robots` needs no description."
+        )
     try:
         return prepared.spec(OwnConfig(path.stem, path, tuple(told), ())).compile()
     except ValueError as error:

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import tomllib
@@ -359,6 +360,40 @@ def test_a_view_listens_on_this_machine_alone_unless_asked(
     assert main(["view", str(recording), *words]) == 0
     (given,) = called
     assert given[given.index("--bind") + 1] == address and given.count("--bind") == 1
+
+
+def test_a_second_view_in_a_browser_has_ports_of_its_own(said, tmp_path, monkeypatch):
+    from bns.cli import view
+    from bns.viz import picture
+
+    called = []
+    monkeypatch.setattr(picture, "executable", lambda: "viewer")
+    monkeypatch.setattr(subprocess, "call", lambda given: called.append(given) or 0)
+    recording = tmp_path / "a.rrd"
+    recording.write_bytes(b"")
+    free = picture.free_port()
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        monkeypatch.setattr(view, "DATA", taken.getsockname()[1])
+        monkeypatch.setattr(view, "PAGE", free)
+        text = said("view", recording, "--web")
+    (given,) = called
+    data = int(given[given.index("--port") + 1])
+    assert data != view.DATA
+    assert given[given.index("--web-viewer-port") + 1] == str(free)
+    assert f"http://127.0.0.1:{free}?url=rerun" in text and f"{data}%2Fproxy" in text
+
+
+def test_a_view_on_no_address_says_what_is_one(said, tmp_path, monkeypatch):
+    from bns.viz import picture
+
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr(picture, "executable", lambda: "viewer")
+    recording = tmp_path / "a.rrd"
+    recording.write_bytes(b"")
+    text = said("view", recording, "--bind", "localhost:1", code=WRONG_INPUT)
+    assert "give 127.0.0.1" in text
 
 
 def test_a_report_replaces_reports_alone_unless_forced(capsys, run, tmp_path):

@@ -72,6 +72,31 @@ zpty -r shell text '*hexapod-walk*' && print -r -- $text
 }
 
 
+@pytest.mark.skipif(not shutil.which("fish"), reason="fish is not installed")
+def test_fish_offers_files_where_there_is_nothing_else(tmp_path):
+    program = tmp_path / "bns"
+    program.write_text('#!/bin/sh\ntest "$2" = gap && echo diagnose\ntrue\n')
+    program.chmod(0o755)
+    (tmp_path / "log.csv").touch()
+
+    def offered(line: str) -> list[str]:
+        words = f"{SCRIPTS['fish']}\ncomplete -C '{line}'"
+        env = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"}
+        done = subprocess.run(
+            ["fish", "--no-config", "-c", words],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=True,
+            cwd=tmp_path,
+            env={**env, "HOME": str(tmp_path)},
+        )
+        return [line.split("\t")[0] for line in done.stdout.splitlines()]
+
+    assert offered("bns gap ") == ["diagnose"]
+    assert "log.csv" in offered("bns view l")
+
+
 @pytest.mark.parametrize("shell", CALLS)
 def test_a_shell_completes(shell, tmp_path):
     if not shutil.which(shell):

@@ -49,6 +49,71 @@ def test_items_are_gone_through_under_a_bar(monkeypatch, capsys):
     assert capsys.readouterr().err == said
 
 
+def drawn(monkeypatch, columns=80):
+    """A terminal; gives what reads the lines that were written to it."""
+    screen = Terminal()
+    monkeypatch.setattr("sys.stderr", screen)
+    monkeypatch.setenv("COLUMNS", str(columns))
+    monkeypatch.setenv("TERM", "xterm")
+
+    def lines():
+        plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue())
+        return [line for line in re.split(r"[\r\n]", plain) if line.strip()]
+
+    return lines
+
+
+def test_items_of_several_sequences_are_counted_together(monkeypatch):
+    lines = drawn(monkeypatch)
+    with progress.counting("figures") as each:
+        assert list(each("ab")) == ["a", "b"]
+        assert list(each("cde")) == ["c", "d", "e"]
+    assert "5/5" in lines()[-1] and max(map(len, lines())) <= 80
+
+
+def test_counting_is_quiet_where_there_is_no_terminal(capsys, monkeypatch):
+    monkeypatch.setattr(progress, "QUIET_SECONDS", 0.0)
+    with progress.counting("figures") as each:
+        assert list(each([1, 2])) == [1, 2]
+    assert capsys.readouterr() == ("", "")
+
+
+def test_what_is_left_follows_from_what_the_stages_before_took():
+    now = 0.0
+    left = progress.Estimate({"a": 0.1, "b": 0.8, "c": 0.1}, clock=lambda: now)
+    left.enter("a")
+    assert str(left) == ""
+    now = 10.0
+    left.enter("b")
+    assert str(left) == "about 2 min left"
+    now = 60.0
+    left.enter("a trial")  # no stage
+    assert str(left) == "about 40 s left"
+    now = 130.0
+    assert str(left) == "a little longer"
+    now = 180.0
+    left.enter("c")
+    assert str(left) == "about 20 s left"
+
+
+def test_what_is_usual_counts_until_a_stage_tells_more():
+    now = 0.0
+    left = progress.Estimate({"a": 0.5, "b": 0.5}, usual=30.0, clock=lambda: now)
+    now = 10.0
+    assert str(left) == "about 20 s left"
+    left.enter("b")
+    assert str(left) == "about 10 s left"
+
+
+@pytest.mark.parametrize("columns", [60, 80])
+def test_work_without_an_end_fits_the_terminal(monkeypatch, columns):
+    lines = drawn(monkeypatch, columns)
+    with progress.working("diagnosing 12 trials", usual=5000.0) as tell:
+        tell("a stage whose name is far too long for any terminal, and goes on")
+    assert max(map(len, lines())) <= columns
+    assert "about 1 h 23 min left" in lines()[-1]
+
+
 def test_work_without_an_end_is_quiet_where_there_is_no_terminal(capsys):
     with progress.working("diagnosing") as tell:
         tell("trial 3")

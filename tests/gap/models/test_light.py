@@ -9,6 +9,7 @@ import pytest
 
 from bns.cli.gap import after
 from bns.errors import BnsError
+from bns.gap import stages
 from bns.gap.bench import light_cases
 from bns.gap.candidates import light
 from bns.gap.decomposition import descent
@@ -190,7 +191,9 @@ def test_a_recording_with_light_is_diagnosed_whole():
     wanted = ("wheel_gain[left]", "tracker_scale")
     assert sees(trials)
     names = (*wanted, *KEPT, "sensor_gain[right]")
-    found = diagnose(trials, model, rows=names)
+    heard: list[str] = []
+    found = diagnose(trials, model, rows=names, tell=heard.append)
+    assert heard == list(stages.shares(model, trials))
     assert found.verdict.kind == "together"
     assert found.verdict.named == (("wheel_gain[left]", "sensor_gain[right]"),)
     assert found.best.magnitudes == pytest.approx((0.9, 0.9), abs=0.01)

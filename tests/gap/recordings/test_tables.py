@@ -15,6 +15,7 @@ from bench.storage.sample_files import (
 )
 from bns.errors import FormatError
 from bns.gap.importers import tables
+from bns.gap.recordings import load_recordings
 
 
 def columns(table, role):
@@ -84,6 +85,12 @@ def test_a_lerobot_dataset_has_a_trial_an_episode(tmp_path):
     np.testing.assert_array_equal(table["trial"], np.repeat([0, 1], 6))
     assert [c.part for c in columns(table, "seen").values()] == list(JOINTS)
     np.testing.assert_allclose(table["action.knee.pos"][:6], GOALS[:, 1])
+
+
+def test_a_log_of_joints_is_not_of_a_robot_that_drives(tmp_path, model):
+    place = lerobot(tmp_path / "a")
+    with pytest.raises(FormatError, match="bns gap describe MJCF"):
+        load_recordings.trials([str(place)], model)
 
 
 def test_a_csv_keeps_its_numbers_alone(tmp_path):
