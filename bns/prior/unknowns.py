@@ -1,0 +1,106 @@
+"""Numbers of a model that may be wrong, as effects with a range.
+
+"wheel_gain:wheel=left,factor=0.2..1.2" is one number. All of them together are a point
+in a cube, each coordinate from 0 to 1.
+"""
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from bns.errors import BnsError
+from bns.prior.breeding import inside
+from bns.worlds.damage import Damage
+
+_RANGE = re.compile(r"(\w+)=(-?[\d.]+?)\.\.(-?[\d.]+)")
+_FIRST, _PULL, _STEP = 0.6, 0.5, 0.02
+
+
+class Unknowns:
+    """What may be wrong with a robot.
+
+    Args:
+        texts: an effect each, one of its numbers as a range.
+
+    Attributes:
+        nominal: where nothing is wrong, ``(P,)``.
+
+    Raises:
+        BnsError: no range, or an effect that there is not.
+    """
+
+    def __init__(self, texts: Sequence[str]):
+        self._texts, ranges, nominal = [], [], []
+        for text in texts:
+            found = _RANGE.search(text)
+            if found is None or not float(found[2]) < float(found[3]):
+                raise BnsError(
+                    f"{text!r} is no effect with a range: write for example "
+                    "wheel_gain:wheel=left,factor=0.2..1.2."
+                )
+            written = _RANGE.sub(r"\1={:.6g}", text)
+            effect = Damage.parse([written.format(float(found[2]))]).events[0].effect
+            named = {item.name: item.nominal for item in effect.parameters}
+            self._texts.append(written)
+            ranges.append((float(found[2]), float(found[3])))
+            nominal.append(named[found[1]])
+        self.low, self._high = np.array(ranges).reshape(-1, 2).T
+        self.nominal = ((np.array(nominal) - self.low) / self._width).clip(0, 1)
+
+    def __len__(self) -> int:
+        return len(self._texts)
+
+    @property
+    def _width(self) -> np.ndarray:
+        return self._high - self.low
+
+    def values(self, points: np.ndarray) -> np.ndarray:
+        """In the effects' own units, shape as `points`."""
+        found: np.ndarray = self.low + points * self._width
+        return found
+
+    def damages(self, points: np.ndarray) -> list[Damage]:
+        """What is wrong with each of N robots.
+
+        Args:
+            points: ``(N, P)``.
+        """
+        return [
+            Damage.parse(
+                text.format(value) for text, value in zip(self._texts, row, strict=True)
+            )
+            for row in self.values(points)
+        ]
+
+    def random(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """Guesses: the model as it is, and others anywhere, ``(count, P)``."""
+        points = rng.random((count, len(self)))
+        points[0] = self.nominal
+        return points
+
+
+def varied(
+    points: np.ndarray, misses: np.ndarray, rows: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
+    """Children of guesses, by differential evolution (Storn and Price 1997).
+
+    Each is drawn half-way to the best one and moved along the difference of two others
+    ("current to best"), in most coordinates, and a little by chance.
+
+    Args:
+        points: ``(M, P)``.
+        misses: how wrong each was, ``(M,)``.
+        rows: of the parents, ``(N,)``.
+        rng: the only source of randomness.
+
+    Returns:
+        ``(N, P)``.
+    """
+    best = points[misses.argmin()]
+    one, other = rng.integers(len(points), size=(2, len(rows)))
+    parents = points[rows]
+    moved = parents + _PULL * (best - parents) + _FIRST * (points[one] - points[other])
+    moved += _STEP * rng.standard_normal(moved.shape)
+    taken = rng.random(moved.shape) < 0.9
+    return inside(np.where(taken, moved, parents))
