@@ -21,17 +21,17 @@ from bns.worlds.trial import Trial
 class SelfModellingSettings(ModellingSettings):
     """Settings of self-modelling; models and rounds as in Bongard et al. 2006."""
 
-    first: int = 400
+    first: int = 300
     """see ThinkingSettings"""
-    each: int = 60
+    each: int = 70
     """see ThinkingSettings"""
     guesses: int = 15
     """models that are kept"""
-    replayed: int = 4
+    replayed: int = 3
     """tests that models are judged by, the newest; the original: all"""
     rounds: int = 15
     """tests of a robot that are chosen to tell models apart"""
-    candidates: int = 6
+    candidates: int = 4
     """random controllers of which one is such a test"""
     jury: int = 5
     """models, the best ones, whose disagreement counts; the original: all"""

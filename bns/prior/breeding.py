@@ -65,10 +65,10 @@ def fronts(costs: np.ndarray) -> list[np.ndarray]:
         costs: of several goals, all lower is better, ``(N, G)``.
     """
     no_worse = (costs[:, None] <= costs[None]).all(2)
-    better = no_worse & (costs[:, None] < costs[None]).any(2)
+    better = np.asarray(no_worse & (costs[:, None] < costs[None]).any(2))
     left, found = np.ones(len(costs), bool), []
     while left.any():
-        front = np.flatnonzero(left & ~np.logical_or.reduce(better[left], axis=0))
+        front = np.flatnonzero(left & ~better[left].any(0))
         found.append(front)
         left[front] = False
     return found

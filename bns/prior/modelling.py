@@ -190,15 +190,22 @@ class Modeller(Thinker[ModellingMind]):
     def learn(self, mind: ModellingMind, seen: Trial, worth: float) -> dict[str, Any]:
         """See `Thinker.learn`: what was seen is to be explained."""
         del worth
-        miss, best = np.nan, mind.model
-        if len(mind.guesses):
-            miss, best = mind.miss.min(), mind.guesses[mind.miss.argmin()]
+        miss = mind.miss.min() if len(mind.guesses) else np.nan
         clue = self.clues([seen])
         mind.clues = np.vstack([mind.clues.reshape(-1, clue.shape[1]), clue])
         most = self.rule.replayed
         mind.misses = mind.misses[:, max(len(mind.clues) - most, 0) :]
         mind.clues = mind.clues[-most:]
-        return {"model_miss": float(miss), "numbers": self.unknowns.values(best)}
+        return {"model_miss": float(miss), "numbers": self.best_guess(mind)}
+
+    def best_guess(self, mind: ModellingMind) -> np.ndarray:
+        """What is wrong as far as is known, in the effects' units, ``(P,)``.
+
+        Where nothing was fitted yet, nothing is.
+        """
+        if not len(mind.guesses):
+            return self.unknowns.values(mind.model)
+        return self.unknowns.values(mind.guesses[mind.miss.argmin()])
 
 
 def places(trials: Sequence[Trial], most: int = 0) -> np.ndarray:

@@ -167,9 +167,11 @@ class Thinker(Learner, Generic[MindT]):
             mind.tried = self.chosen(mind, desk, trial)
             best.append(self.deployed(mind))
         tried = np.stack([mind.tried for mind in self.minds])
-        return Proposal(
-            controllers(self.space, tried), controllers(self.space, np.stack(best))
-        )
+        return Proposal(self.controllers(tried), self.controllers(np.stack(best)))
+
+    def controllers(self, genes: np.ndarray) -> list[Any]:
+        """Controllers of genes ``(N, D)``, each from 0 to 1."""
+        return controllers(self.space, genes)
 
     def changed(self, mind: MindT) -> None:
         """The newest trial was the first of a robot that is another one."""

@@ -14,7 +14,10 @@ from bns.prior.breeding import inside
 from bns.worlds.damage import Damage
 
 _RANGE = re.compile(r"(\w+)=(-?[\d.]+?)\.\.(-?[\d.]+)")
-_FIRST, _PULL, _STEP = 0.6, 0.5, 0.02
+PULL, APART, STEP, TAKEN = 0.5, 0.6, 0.02, 0.9
+"""share of the way to the best guess, of the difference of two, standard deviation of a
+step, and share of coordinates that move; with a stronger pull all guesses were soon
+alike, and later tests found none that fitted"""
 
 
 class Unknowns:
@@ -100,7 +103,7 @@ def varied(
     best = points[misses.argmin()]
     one, other = rng.integers(len(points), size=(2, len(rows)))
     parents = points[rows]
-    moved = parents + _PULL * (best - parents) + _FIRST * (points[one] - points[other])
-    moved += _STEP * rng.standard_normal(moved.shape)
-    taken = rng.random(moved.shape) < 0.9
+    moved = parents + PULL * (best - parents) + APART * (points[one] - points[other])
+    moved += STEP * rng.standard_normal(moved.shape)
+    taken = rng.random(moved.shape) < TAKEN
     return inside(np.where(taken, moved, parents))
