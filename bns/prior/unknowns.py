@@ -18,6 +18,8 @@ PULL, APART, STEP, TAKEN = 0.5, 0.6, 0.02, 0.9
 """share of the way to the best guess, of the difference of two, standard deviation of a
 step, and share of coordinates that move; with a stronger pull all guesses were soon
 alike, and later tests found none that fitted"""
+SWAPPED, ANEW = 0.25, 0.15
+"""shares of children in which two coordinates are exchanged, or one is drawn anew"""
 
 
 class Unknowns:
@@ -89,7 +91,9 @@ def varied(
     """Children of guesses, by differential evolution (Storn and Price 1997).
 
     Each is drawn half-way to the best one and moved along the difference of two others
-    ("current to best"), in most coordinates, and a little by chance.
+    ("current to best"), in most coordinates, and a little by chance. Some exchange two
+    coordinates instead, or get one anew: what seems wrong with one leg may be wrong
+    with another. (Two numbers alone are found sooner without.)
 
     Args:
         points: ``(M, P)``.
@@ -106,4 +110,13 @@ def varied(
     moved = parents + PULL * (best - parents) + APART * (points[one] - points[other])
     moved += STEP * rng.standard_normal(moved.shape)
     taken = rng.random(moved.shape) < TAKEN
-    return inside(np.where(taken, moved, parents))
+    children = inside(np.where(taken, moved, parents))
+    kinds = rng.random(len(rows)) if points.shape[1] > 2 else np.ones(len(rows))
+    for row in np.flatnonzero(kinds < SWAPPED + ANEW):
+        children[row] = parents[row]
+        first, second = rng.integers(parents.shape[1], size=2)
+        if kinds[row] < SWAPPED:
+            children[row, [first, second]] = parents[row, [second, first]]
+        else:
+            children[row, first] = rng.random()
+    return children
