@@ -110,6 +110,12 @@ class Transferability(Thinker[TransferMind]):
         """See `Thinker.mind`."""
         return TransferMind(self.space.size)
 
+    def changed(self, mind: TransferMind) -> None:
+        """See `Thinker.changed`."""
+        best = int(mind.seen.argmax())
+        mind.does, mind.foreseen = mind.tested[best].copy(), mind.model[[best]]
+        super().changed(mind)
+
     def does(self, trials: Sequence[Trial]) -> np.ndarray:
         """What controllers do: behaviour, and where they are on the way, ``(N, F)``."""
         return np.hstack([self.task.behaviour(trials), ways(trials)])

@@ -56,12 +56,13 @@ class Mind:
         tests: genes tried on the robot since it changed, ``(T, D)``.
         seen: what they achieved there, ``(T,)``.
         tried: genes of this trial, ``(D,)``.
+        waiting: genes to be tried next whatever is thought, ``(W, D)``, W 0 or 1.
     """
 
     def __init__(self, size: int):
         self.genes, self.worth = np.empty((0, size)), np.empty(0)
         self.tests, self.seen = np.empty((0, size)), np.empty(0)
-        self.tried = np.zeros(size)
+        self.tried, self.waiting = np.zeros(size), np.empty((0, size))
 
     def keep(self, rows: np.ndarray) -> None:
         """The population's rows that are kept, in order."""
@@ -164,7 +165,10 @@ class Thinker(Learner, Generic[MindT]):
             rng = seeding.generator(self.config.seed, *names)
             desk = Desk(self.task, self.space, self.models[run], most, rng)
             self.prepare(mind, desk)
-            mind.tried = self.chosen(mind, desk, trial)
+            if len(mind.waiting):
+                mind.tried, mind.waiting = mind.waiting[0], mind.waiting[:0]
+            else:
+                mind.tried = self.chosen(mind, desk, trial)
             best.append(self.deployed(mind))
         tried = np.stack([mind.tried for mind in self.minds])
         return Proposal(self.controllers(tried), self.controllers(np.stack(best)))
@@ -174,7 +178,13 @@ class Thinker(Learner, Generic[MindT]):
         return controllers(self.space, genes)
 
     def changed(self, mind: MindT) -> None:
-        """The newest trial was the first of a robot that is another one."""
+        """The newest trial was the first of a robot that is another one.
+
+        What was deployed is tried first: it may work still.
+        """
+        best = int(mind.seen.argmax())
+        if best < len(mind.seen) - 1:
+            mind.waiting = mind.tests[[best]]
         mind.forget(newest=1)
 
     def prepare(self, mind: MindT, desk: Desk) -> None:

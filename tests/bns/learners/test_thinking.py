@@ -100,9 +100,14 @@ def test_deployed_is_the_best_that_was_seen_since_the_robot_changed(learner):
     for trial in range(8):
         step, _ = made.advance(trial)
         if trial == 3:
-            assert len(made.learner.minds[0].seen) == 4
+            mind = made.learner.minds[0]
+            assert len(mind.seen) == 4
+            before = mind.tests[mind.seen.argmax()]
+            newest = mind.tests[-1]
     mind = made.learner.minds[0]
     assert len(mind.seen) == 5  # the first with the damage is remembered
+    np.testing.assert_array_equal(mind.tests[0], newest)
+    assert (mind.tests[:2] == before).all(1).any()  # what was deployed is tried again
     best = mind.tests[mind.seen.argmax()]
     np.testing.assert_array_equal(made.learner.deployed(mind), best)
     worth = -step.columns["fitness_best"][0]
