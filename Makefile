@@ -4,8 +4,9 @@
 # make docs   build the documentation's site, with the reference, into site/
 # make clean  remove the environment and build leftovers (never runs/)
 #
-# Each first makes .venv with what it needs, once: the demo what trains and draws, the
-# others everything. PYTHON=... chooses the Python.
+# Each first makes .venv with what it needs, once: the demo what trains and reports
+# (`bns view`, for 3D, says how to add Rerun), the others everything. PYTHON=... chooses
+# the Python.
 
 SHELL := /bin/sh
 VENV := .venv
@@ -51,7 +52,7 @@ $(SMALL): pyproject.toml constraints.txt
 	@sh .ci/venv $(VENV) $(PYTHON)
 	@test -f $(STAMP) || echo "Installing into $(VENV) (some minutes, once) ..."
 	@test -f $(STAMP) || $(BIN)/python -m pip install --quiet --no-compile \
-		-c constraints.txt -e '.[learn,view]'
+		-c constraints.txt -e '.[demo]'
 	@touch $@
 
 clean:

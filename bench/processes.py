@@ -5,6 +5,7 @@ import subprocess
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from bench.versions import ROOT
 
@@ -31,13 +32,15 @@ def finish(
     *,
     limit: float,
     environment: Mapping[str, str] | None = None,
+    place: Path = ROOT,
 ) -> Finished:
-    """Run a command in the checkout on `CORES` cores (fewer where there are fewer).
+    """Run a command on `CORES` cores (fewer where there are fewer).
 
     Args:
         words: the command and its arguments.
         limit: time after which it is ended [s].
         environment: variables set beside the present ones.
+        place: directory that it runs in; the checkout.
     """
     cores = sorted(os.sched_getaffinity(0))
     os.sched_setaffinity(0, cores[:CORES])
@@ -45,7 +48,7 @@ def finish(
     try:
         done = subprocess.run(
             words,
-            cwd=ROOT,
+            cwd=place,
             env={**os.environ, **(environment or {})},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,

@@ -8,11 +8,12 @@ from ctypes.util import find_library
 from glob import glob
 from typing import Literal, NamedTuple
 
+from bns.errors import install
 from bns.experiment import versions
 
 State = Literal["ok", "missing", "bad", "note"]
 
-REQUIRED = ("mujoco", "numpy", "scipy", "pyarrow", "rich", "jinja2")
+REQUIRED = ("mujoco", "numpy", "scipy", "rich", "jinja2")
 
 
 class Optional(NamedTuple):
@@ -32,6 +33,7 @@ class Optional(NamedTuple):
 OPTIONAL = (
     Optional("torch", "learn", "learners"),
     Optional("matplotlib", "report", "figures and reports"),
+    Optional("pyarrow", "tables", "Parquet, CSV and campaigns"),
     Optional("rerun-sdk", "view", "recordings in 3D"),
     Optional("imageio-ffmpeg", "video", "videos as MP4"),
     Optional("gymnasium", "gym", "Gymnasium worlds"),
@@ -79,7 +81,7 @@ def _packages() -> list[Finding]:
 
 def _optional() -> list[Finding]:
     return [
-        _installed(name, "note", f"for {use}: pip install 'bns-testbed[{extra}]'")
+        _installed(name, "note", f"for {use}: {install(extra)}")
         for name, extra, use in OPTIONAL
     ]
 

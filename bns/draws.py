@@ -67,7 +67,7 @@ class Draws:
         return np.frombuffer(text.encode(), dtype=np.uint8).copy()
 
     def restore(self, state: np.ndarray) -> None:
-        """Go on from a saved state."""
+        """Go on from what `state` gave, shape ``(n,)``."""
         if self._torch is not None:
             self._torch.set_state(torch.from_numpy(state.copy()))
             return

@@ -4,8 +4,11 @@ Every error a user can cause derives from `BnsError`; the command line prints it
 on one line and exits with code 2, without a traceback.
 """
 
+import shutil
+import sys
 from collections.abc import Iterable
 from difflib import get_close_matches
+from pathlib import Path
 
 LONGEST = 400
 """characters of a message; what is longer loses its middle"""
@@ -77,6 +80,18 @@ class OutOfBoundsError(BnsError):
 
 class FormatError(BnsError):
     """A file or directory that is not what it should be; nothing was changed."""
+
+
+def install(extra: str) -> str:
+    """The command that adds an extra of bns-testbed to the Python that runs.
+
+    `pip` alone where that is this Python's own, else this Python by its path.
+    """
+    here, pip = Path(sys.executable), shutil.which("pip")
+    own = pip is not None and Path(pip).absolute().parent == here.parent
+    if here.is_relative_to(Path.cwd()):
+        here = here.relative_to(Path.cwd())
+    return f"{'pip' if own else f'{here} -m pip'} install 'bns-testbed[{extra}]'"
 
 
 class MissingDependencyError(BnsError):

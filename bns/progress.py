@@ -6,9 +6,11 @@ written every `QUIET_SECONDS`, so that a log stays short.
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
+
+Item = TypeVar("Item")
 
 QUIET_SECONDS = 30.0
 """time between two lines where there is no terminal [s]"""
@@ -75,6 +77,19 @@ class Bar:
             return count
         left = (now - self.began) * (self.total - self.done) / here
         return f"{count}, {duration(left)} left"
+
+
+def each(name: str, items: Sequence[Item]) -> Iterator[Item]:
+    """Go through items under a bar.
+
+    Args:
+        name: of the work.
+        items: all of them, a second of work each or more.
+    """
+    with Bar(name, len(items)) as bar:
+        for number, item in enumerate(items, 1):
+            yield item
+            bar.update(number)
 
 
 @contextmanager

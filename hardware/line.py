@@ -8,12 +8,10 @@ import struct
 from pathlib import Path
 from typing import Any, Protocol
 
-from bns.errors import BnsError, MissingDependencyError
+from bns.errors import BnsError, MissingDependencyError, install
 from bns.hardware.clock import RealClock
 from bns.hardware.faults import FaultLog, LinkError
 from bns.hardware.safety.watchdog import receive, send
-
-INSTALL = 'pip install "bns-testbed[hardware]"'
 
 
 class Line(Protocol):
@@ -207,7 +205,7 @@ def pyserial() -> Any:
         import serial
     except ImportError as error:
         raise MissingDependencyError(
-            "a robot on a port", "pyserial", INSTALL
+            "a robot on a port", "pyserial", install("hardware")
         ) from error
     return serial
 

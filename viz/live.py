@@ -12,6 +12,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from bns.errors import install
 from bns.experiment.config import RunConfig
 from bns.experiment.step import Step
 from bns.viz import charts, moments, scene
@@ -121,7 +122,7 @@ def _spawn() -> str:
         )
     program, port = executable(), free_port()
     if program is None:
-        raise RuntimeError("there is no Rerun viewer (pip install rerun-sdk)")
+        raise RuntimeError(f"there is no Rerun viewer ({install('view')})")
     where = ["--bind", LOOPBACK, "--port", str(port)]
     process = subprocess.Popen(
         [program, *where, "--hide-welcome-screen"],

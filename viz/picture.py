@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
-from bns.errors import BnsError, FormatError, MissingDependencyError
+from bns.errors import BnsError, FormatError, MissingDependencyError, install
 from bns.storage import files
 from bns.viz.blueprint import LIVE_TIMELINE, TRIAL_TIMELINE
 
@@ -81,7 +81,7 @@ def missing() -> MissingDependencyError | None:
     """What keeps `save` from working here, or None."""
     if executable() is None:
         return MissingDependencyError(
-            "A picture of a recording", "the Rerun viewer", "pip install rerun-sdk"
+            "A picture of a recording", "the Rerun viewer", install("view")
         )
     if sys.platform == "linux" and not _vulkan():
         return MissingDependencyError(

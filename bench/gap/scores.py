@@ -2,13 +2,9 @@
 
 from statistics import median
 
-from bench.gap.kept_cases import Stopwatch
 from bench.gap.wheeled_cases import ensure
 from bench.result import Result, bench
-from bns.gap.bench import cases, scoring
-from bns.gap.bench.wheeled_cases import WheeledStand
-from bns.gap.diagnose import diagnose
-from bns.gap.models.wheeled import WheeledModel
+from bns.gap.bench import scoring
 
 
 @bench(
@@ -187,44 +183,3 @@ def gap_edit(quick: bool) -> Result:
         n=len(ratios),
         details={"ratios": [round(ratio, 3) for ratio in ratios]},
     )
-
-
-@bench("wall time of one wheeled case in a fresh process", bar="<= 30 s")
-def gap_time(quick: bool) -> Result:
-    """Score the cases; the missing ones are made and diagnosed first."""
-
-    rows = ensure(quick)
-    wall = sorted(row["seconds"] for row in rows)
-    busy = sorted(row["cpu"] for row in rows)
-    cold, cold_busy = _cold()
-    return Result(
-        figure=round(cold, 2),
-        unit="s",
-        holds=cold <= 30,
-        n=1,
-        details={
-            "its processor time": round(cold_busy, 2),
-            "median wall time of the cases, scoring included": _median(wall),
-            "median processor time of the cases": _median(busy),
-            "longest processor time": busy[-1] if busy else None,
-        },
-    )
-
-
-def _median(ordered: list[float]) -> float | None:
-    return round(ordered[len(ordered) // 2], 2) if ordered else None
-
-
-def _cold() -> tuple[float, float]:
-    from bench.gap.strange_effects import other_solver
-
-    case = cases.build(
-        3,
-        "single",
-        WheeledStand(WheeledModel(), other_solver()),
-        wanted="wheel_gain[left]",
-    )
-    watch = Stopwatch()
-    diagnose(case.trials, WheeledModel(threads=1))
-    took = watch.read()
-    return took["seconds"], took["cpu"]

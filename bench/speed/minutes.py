@@ -1,6 +1,8 @@
 """How long the demonstration and the test suite take."""
 
+import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -38,6 +40,60 @@ def demo_time(quick: bool) -> Result:
             "last_lines": done.output.strip().splitlines()[-8:],
         },
     )
+
+
+DEMO_SIZE = 1.2  # GB = 10^9 bytes
+DEMO_TIME = 2.5  # min, with the installation
+
+
+@bench(
+    "size of .venv after `make demo` in a fresh clone, and its time on 2 cores",
+    bar="<= 1.2 GB, <= 2.5 min",
+)
+def demo_bare(quick: bool) -> Result:
+    """Run `make demo` on what is committed; quick: its installation alone.
+
+    Packages come from pip's index or from its cache: the time depends on the line.
+    """
+    with TemporaryDirectory() as scratch:
+        clone = Path(scratch) / "clone"
+        cloned = ["git", "clone", "--quiet", str(ROOT), str(clone)]
+        subprocess.run(cloned, check=True)
+        done = finish(
+            ["make", ".venv/.demo" if quick else "demo", f"PYTHON={sys.executable}"],
+            limit=4 * DEMO_TIME * 60.0,
+            environment={"PYTHONDONTWRITEBYTECODE": ""},
+            place=clone,
+        )
+        report = (clone / "runs" / "demo" / "report.html").is_file()
+        packages = _packages(clone / ".venv")
+    size, minutes = sum(packages.values()) / 1e9, done.seconds / 60.0
+    whole = done.code == 0 and report
+    largest = sorted(packages, key=packages.__getitem__, reverse=True)[:12]
+    return Result(
+        figure=round(size, 3),
+        unit="GB",
+        holds=None if quick else whole and size <= DEMO_SIZE and minutes <= DEMO_TIME,
+        n=1,
+        details={
+            "exit_code": done.code,
+            "report": report,
+            "minutes": round(minutes, 2),
+            "megabytes": {name: round(packages[name] / 1e6, 1) for name in largest},
+            "last_lines": done.output.strip().splitlines()[-8:],
+        },
+    )
+
+
+def _packages(environment: Path) -> dict[str, int]:
+    """Bytes of the files of an environment, by what lies in its site-packages."""
+    found: Counter[str] = Counter()
+    for path in environment.rglob("*"):
+        if path.is_file() and not path.is_symlink():
+            parts = path.relative_to(environment).parts
+            at = parts.index("site-packages") + 1 if "site-packages" in parts else 0
+            found[parts[at]] += path.stat().st_size
+    return found
 
 
 SUITE_LIMIT = 8.0  # min

@@ -56,6 +56,13 @@ def _stored() -> Iterator[Reader]:
         yield Reader(
             name, file, lambda h: dataset.read(h / "run" / "dataset"), trials, True
         )
+    for name in ("trials.npz", "commands.npz"):
+        file = f"plain/dataset/{name}"
+        yield Reader(
+            name, file, lambda h: dataset.read(h / "plain" / "dataset"), trials, True
+        )
+    record = "plain/record.npz"
+    yield Reader("record.npz", record, lambda h: load(h / "plain"), run, True)
     stores = {
         "campaign.json": lambda h: CampaignStore.open(h / "store"),
         "campaign.toml": lambda h: results.wanted(CampaignStore.open(h / "store")),

@@ -104,6 +104,7 @@ def make(home: Path) -> None:
 
     config = replace(config, replicates=2, record_replicates=1, trials=3, threads=1)
     train(config, home / "run")
+    _plain(home / "run", home / "plain")
     asked = iter([False, False, True])
     train(config, home / "begun", stop=lambda: next(asked))
     file = home / "campaign.toml"
@@ -123,6 +124,18 @@ def make(home: Path) -> None:
     _logs(home)
     _recordings(home)
     _tables(home)
+
+
+def _plain(run: Path, copy: Path) -> None:
+    """A run as it is stored where pyarrow is missing."""
+    from bns.storage import parquet, tables
+
+    shutil.copytree(run, copy)
+    for path in list(copy.rglob("*.parquet")):
+        table = parquet.read(path)
+        columns = {name: table[name].to_numpy() for name in table.column_names}
+        tables.write_plain(path, columns)
+        path.unlink()
 
 
 def _tables(home: Path) -> None:

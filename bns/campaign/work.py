@@ -1,7 +1,9 @@
 """One batch, from its job to its bytes: what every engine runs."""
 
+import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -155,13 +157,51 @@ FAILURES: tuple[type[Exception], ...] = (
 """what a batch may raise without taking the campaign with it"""
 
 
+PULSE = 20.0  # [s]
+BUSY = 0.05  # of that time: a process that computes less waits for something
+
+
 def timed(
     content: dict[str, Any], beat: Beat = lambda trials: None
 ) -> tuple[bytes | str, float]:
     """What `attempt` gives, and the time it took [s]."""
     started = time.perf_counter()
-    given = attempt(content, beat)
+    with pulsing(beat) as told:
+        given = attempt(content, told)
     return given, time.perf_counter() - started
+
+
+@contextmanager
+def pulsing(beat: Beat, *, every: float = PULSE) -> Iterator[Beat]:
+    """A beat that is repeated while this process computes: a learner may think in its
+    model for longer than an engine waits for a trial.
+
+    Args:
+        beat: called with the number of trials done.
+        every: time between two looks at how much was computed [s].
+    """
+    done, over = 0, threading.Event()
+
+    def told(trials: int) -> None:
+        nonlocal done
+        done = trials
+        beat(trials)
+
+    def look() -> None:
+        before = time.process_time()
+        while not over.wait(every):
+            now = time.process_time()
+            if now - before > BUSY * every:
+                beat(done)
+            before = now
+
+    looking = threading.Thread(target=look, daemon=True)
+    looking.start()
+    try:
+        yield told
+    finally:
+        over.set()
+        looking.join()
 
 
 def attempt(content: dict[str, Any], beat: Beat = lambda trials: None) -> bytes | str:

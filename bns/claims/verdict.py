@@ -147,8 +147,8 @@ def examine(cell: Cell, mine: np.ndarray, other: np.ndarray, looks: Design) -> F
 
     Args:
         cell: what is claimed.
-        mine: values of its first side, in the order of runs.
-        other: of its second.
+        mine: values of its first side, in the order of runs, ``(N,)``.
+        other: of its second, ``(M,)``.
         looks: at how many runs.
     """
     found: list[float] = []

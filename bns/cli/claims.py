@@ -12,6 +12,7 @@ from bns.cli.fields import Positional
 from bns.cli.parse import Verbs, dispatch
 from bns.cli.tables import show
 from bns.errors import BnsError
+from bns.progress import working
 
 MANUAL = """usage: bns claims {list,plan,run,take,table} [...]
 
@@ -303,7 +304,8 @@ def _table(given: Table) -> int:
             )
         _written(given, _both(given.root, own=given.own))
         return 0
-    rows = judged(given.world)
+    with working("judging the claims"):
+        rows = judged(given.world)
     _show(rows, json=given.json, brief=not given.ids)
     if not given.json:
         said = ", ".join(f"{n} {name}" for name, n in report.counts(rows).items() if n)

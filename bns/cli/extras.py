@@ -4,11 +4,12 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from bns.errors import BnsError
+from bns.errors import BnsError, install
 
 EXTRAS = {
     "torch": "learn",
     "matplotlib": "report",
+    "pyarrow": "tables",
     "rerun": "view",
     "gymnasium": "gym",
     "dm_env": "dm",
@@ -31,7 +32,7 @@ def missing(error: ModuleNotFoundError) -> str:
     name = (error.name or "").partition(".")[0]
     if name not in EXTRAS:
         return ""
-    return f"This needs {name}: pip install 'bns-testbed[{EXTRAS[name]}]'"
+    return f"This needs {name}: {install(EXTRAS[name])}"
 
 
 def attempt(name: str, make: Callable[[], Path]) -> dict[str, Path]:

@@ -80,7 +80,8 @@ class Setting:
     def choices(self) -> tuple[str, ...]:
         """The values that it can have, where they are few."""
         kind = get_args(self.kind)[0] if self.several else self.kind
-        return get_args(kind) if get_origin(kind) is Literal else ()
+        words = get_args(kind) if get_origin(kind) is Literal else ()
+        return tuple(word for word in words if word)  # "" is that none is given
 
 
 def settings(kind: type, default: Any = MISSING) -> list[Setting]:
@@ -210,7 +211,8 @@ def _value(kind: Any, word: str, flag: str) -> Any:
     """One word as a value of a type."""
     if get_origin(kind) is Literal:
         if word not in get_args(kind):
-            raise UnknownNameError(f"value of {flag}", word, get_args(kind))
+            known = filter(None, get_args(kind))
+            raise UnknownNameError(f"value of {flag}", word, known)
         return word
     if get_origin(kind) in (Union, types.UnionType):
         if word.lower() == "none":

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from bns import stats
 from bns.cli.extras import attempt
+from bns.errors import install
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
 from bns.progress import working
@@ -35,17 +37,21 @@ def write(
 ) -> None:
     """Write recording and report, then say where everything is.
 
+    Without Rerun there is no recording, and a line says how to get one.
+
     Args:
         record: of a run.
         out: its directory.
         recording: whether to write the recording.
         report: whether to write the report.
     """
-    made = {"data": out}
+    made: dict[str, Path | str] = {"data": out}
     if report:
         with working("drawing the report"):
             made |= attempt("report", lambda: write_report([out], out / REPORT))
-    if recording:
+    if recording and find_spec("rerun") is None:
+        made["in 3D"] = f"{install('view')}, then bns view {out}"
+    elif recording:
         with working("writing the recording"):
             made |= attempt(
                 "recording", lambda: write_recording(record, out / RECORDING)
@@ -108,7 +114,13 @@ def summary(record: RunRecord) -> str:
 
 
 def sentence(word: str, values: np.ndarray, phrase: str) -> str:
-    """How many runs got somewhere, and when; `phrase` holds the number's place."""
+    """How many runs got somewhere, and when.
+
+    Args:
+        word: what they did, as in "Solved".
+        values: trials that each run needed, ``(R,)``; infinity = it did not.
+        phrase: with the place of the number, as in "after {} trials".
+    """
     reached = np.isfinite(values)
     text = f"{word} by {reached.sum()} of {len(values)}"
     if not reached.any():

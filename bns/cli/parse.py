@@ -144,7 +144,7 @@ def _parser(
     parser = _Parser(
         prog=prog,
         usage=f"{prog} [options] {shown}".strip(),
-        description=_escaped(" ".join((kind.__doc__ or "").split())),
+        description=" ".join((kind.__doc__ or "").split()),
         add_help=False,
         allow_abbrev=False,
         argument_default=argparse.SUPPRESS,
@@ -156,8 +156,9 @@ def _parser(
         groups[""].add_argument(*HELP, action="store_true", help=said)
     for setting in known:
         if setting.group not in groups:
-            said = _escaped(setting.title)
-            groups[setting.group] = parser.add_argument_group(setting.group, said)
+            groups[setting.group] = parser.add_argument_group(
+                setting.group, setting.title
+            )
         _add(parser if setting.positional else groups[setting.group], setting)
     return parser
 
@@ -240,6 +241,7 @@ def _clause(text: str, ends: Sequence[str] = (". ", "; ")) -> str:
 
 
 def _escaped(text: str) -> str:
+    """As argparse wants an option's help; descriptions it prints as they are."""
     return text.replace("%", "%%")
 
 

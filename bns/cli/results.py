@@ -102,7 +102,8 @@ def _compare(given: Compare) -> int:
     from bns.stats.compare import MEASURES, compare
     from bns.storage.store import load
 
-    found = compare([load(directory) for directory in given.directories])
+    with working("comparing"):
+        found = compare([load(directory) for directory in given.directories])
     if given.json:
         print(json.dumps(found.to_mapping(), indent=2))
         return 0

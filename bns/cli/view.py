@@ -3,11 +3,13 @@
 import os
 import sys
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 from bns.cli.fields import Positional
 from bns.cli.parse import parse
-from bns.errors import BnsError, MissingDependencyError, OutOfBoundsError
+from bns.errors import BnsError, MissingDependencyError, OutOfBoundsError, install
+from bns.progress import working
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +41,7 @@ def main(verb: str, argv: list[str]) -> int:
     Raises:
         BnsError: more than one of ``--png``, ``--gif``, ``--mp4`` and ``--web``, or
             nothing there to show.
+        MissingDependencyError: Rerun is not installed, and no film was asked for.
     """
     given = parse(Arguments, argv, prog="bns view")
     os.environ.setdefault("RERUN_ANALYTICS", "0")
@@ -47,11 +50,15 @@ def main(verb: str, argv: list[str]) -> int:
     if given.gif or given.mp4:
         print(film(given))
         return 0
+    if find_spec("rerun") is None:
+        raise MissingDependencyError("bns view", "Rerun", install("view"))
     recording = find(Path(given.directory))
     if given.png:
         from bns.viz import picture
 
-        for report in picture.save(recording, given.png):
+        with working("drawing"):
+            reports = picture.save(recording, given.png)
+        for report in reports:
             print(f"bns: the viewer says: {report}", file=sys.stderr)
         print(given.png)
         return 0
@@ -124,7 +131,8 @@ def find(path: Path) -> Path:
         return recording
     if record.trials == 0:
         raise BnsError(f"{path} has no trial yet: let it run for a while.")
-    return write_recording(record, recording)
+    with working("writing the recording"):
+        return write_recording(record, recording)
 
 
 def show(recording: Path, bind: str, *, web: bool = False) -> int:
@@ -143,6 +151,9 @@ def show(recording: Path, bind: str, *, web: bool = False) -> int:
 
     from bns.viz import picture
 
+    viewer = picture.executable()
+    if viewer is None:
+        raise MissingDependencyError("bns view", "the Rerun viewer", install("view"))
     if (
         not web
         and sys.platform == "linux"
@@ -151,11 +162,6 @@ def show(recording: Path, bind: str, *, web: bool = False) -> int:
         raise BnsError(
             f"No display to open {recording} on: make a picture with --png FILE, "
             "serve it to a browser with --web, or copy it to a machine that has one."
-        )
-    viewer = picture.executable()
-    if viewer is None:
-        raise MissingDependencyError(
-            "bns view", "rerun-sdk", "pip install 'bns-testbed[view]'"
         )
     words = ["--bind", bind, *(["--web-viewer"] if web else [])]
     return subprocess.call([viewer, *words, str(recording)])

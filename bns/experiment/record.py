@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bns.errors import MissingDependencyError
+from bns.errors import MissingDependencyError, install
 from bns.experiment.config import RunConfig
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ class RunRecord:
             import pandas
         except ImportError:
             raise MissingDependencyError(
-                "RunRecord.to_pandas", "pandas", "pip install pandas"
+                "RunRecord.to_pandas", "pandas", install("pandas")
             ) from None
         runs, trials = np.indices((self.replicates, self.trials))
         keys = {"replicate": runs.ravel(), "trial": trials.ravel()}

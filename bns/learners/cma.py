@@ -13,7 +13,7 @@ from typing import Any, ClassVar, cast
 import numpy as np
 
 from bns import seeding
-from bns.errors import MissingDependencyError
+from bns.errors import MissingDependencyError, install
 from bns.experiment.config import LearnerSettings
 from bns.learners.base import Learner, Proposal
 from bns.learners.random import BEST_SEEN
@@ -51,7 +51,7 @@ class Search:
             import cma
         except ImportError:
             raise MissingDependencyError(
-                "learner = 'cma'", "cma", "pip install 'bns-testbed[cma]'"
+                "learner = 'cma'", "cma", install("cma")
             ) from None
         options = {
             "bounds": [0, 1],

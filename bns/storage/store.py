@@ -9,6 +9,7 @@
     dataset/        all samples of the first `record_replicates` replicates
     arrays.npz      commands sent, poses seen, poses foreseen, damage onsets
     record.parquet  a row per replicate and trial; there when the run is finished
+                    (NPZ where pyarrow is missing, see `tables`; so in dataset/)
 
 Every file is written beside, synchronised and renamed, so it is whole or absent; a
 step is written before the state that follows it. So a run killed at any moment and
@@ -33,7 +34,7 @@ from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
 from bns.experiment.step import ARRAYS, Step, assemble
 from bns.storage import arrays as npz
-from bns.storage import files, journal, parquet, reading
+from bns.storage import files, journal, reading, tables
 from bns.storage.directory import FORMAT, SCHEMA, check_free, read_head
 from bns.storage.lock import Lock
 
@@ -131,7 +132,7 @@ class RunStore:
     @property
     def finished(self) -> bool:
         """Whether all trials are done and stored."""
-        return (self.directory / "record.parquet").exists()
+        return tables.exists(self.directory / "record.parquet")
 
     def write_step(self, trial: int, step: Step) -> None:
         """Store trial number `trial`."""
@@ -310,7 +311,7 @@ def write_table(path: Path, columns: Mapping[str, np.ndarray]) -> None:
     """
     runs, trials = np.indices(next(iter(columns.values())).shape)
     table = {"replicate": runs, "trial": trials} | dict(columns)
-    parquet.write(path, {name: array.ravel() for name, array in table.items()})
+    tables.write(path, {name: array.ravel() for name, array in table.items()})
 
 
 def read_table(path: Path) -> dict[str, np.ndarray]:
@@ -319,18 +320,15 @@ def read_table(path: Path) -> dict[str, np.ndarray]:
     Raises:
         FormatError: absent, torn, damaged, or not such a table.
     """
-    table = parquet.read(path)
-    kinds = dict.fromkeys(table.column_names, "double") | dict.fromkeys(KEYS, "int64")
-    columns = parquet.numbers(table, kinds, path)
+    columns = tables.read(path, dict.fromkeys(KEYS, "int64"))
     shape = tuple(int(columns[key].max(initial=-1)) + 1 for key in KEYS)
-    if math.prod(shape) != table.num_rows:  # nothing is made for numbers so large
+    rows = len(columns[KEYS[0]])
+    if math.prod(shape) != rows:  # nothing is made for numbers so large
         raise FormatError(
             f"{path}: {' x '.join(map(str, shape))} replicates and trials in "
-            f"{table.num_rows} rows."
+            f"{rows} rows."
         )
     for key, index in zip(KEYS, np.indices(shape), strict=True):
         if not np.array_equal(columns.pop(key), index.ravel()):
-            raise FormatError(
-                f"{path}: {key} does not count up over the {table.num_rows} rows."
-            )
+            raise FormatError(f"{path}: {key} does not count up over the {rows} rows.")
     return {name: array.reshape(shape) for name, array in columns.items()}

@@ -9,7 +9,7 @@ diagnosis.
 """
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +58,14 @@ def make(directory: Path, answers: Path, cases: Iterable[tuple[str, Case]]) -> i
     return len(known)
 
 
-def run(directory: Path, model: GapModel, said: Path, *, seed: int = 0) -> int:
+def run(
+    directory: Path,
+    model: GapModel,
+    said: Path,
+    *,
+    seed: int = 0,
+    through: Callable[[Sequence[Path]], Iterable[Path]] = iter,
+) -> int:
     """Diagnose the cases that are missing in `said`, appending as they come.
 
     Args:
@@ -66,6 +73,7 @@ def run(directory: Path, model: GapModel, said: Path, *, seed: int = 0) -> int:
         model: nominal model.
         said: JSON Lines file of diagnoses; cases named in it are skipped.
         seed: of what each diagnosis draws.
+        through: goes through the cases and shows how far it is.
 
     Returns:
         How many were run.
@@ -75,15 +83,15 @@ def run(directory: Path, model: GapModel, said: Path, *, seed: int = 0) -> int:
     """
     said = Path(said)
     with Lock(said.parent):
-        return _run(Path(directory), model, said, seed)
+        done = {row["name"] for row in _lines(said)}
+        places = sorted(p for p in Path(directory).iterdir() if p.is_dir())
+        left = [place for place in places if place.name not in done]
+        return _run(through(left), model, said, seed)
 
 
-def _run(directory: Path, model: GapModel, said: Path, seed: int) -> int:
-    done = {row["name"] for row in _lines(said)}
+def _run(places: Iterable[Path], model: GapModel, said: Path, seed: int) -> int:
     count = 0
-    for place in sorted(p for p in directory.iterdir() if p.is_dir()):
-        if place.name in done:
-            continue
+    for place in places:
         trials = dataset.read(place).trials
         try:
             found = json.loads(diagnose(trials, model, seed=seed).to_json())

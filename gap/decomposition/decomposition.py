@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bns.gap.decomposition import descent, fit, onset, rest, shares, ties
+from bns.gap.decomposition import descent, fit, flexible, onset, rest, shares, ties
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.onset import Onset
@@ -40,6 +40,8 @@ class Decomposition:
         inside: which residuals count, ``(N, C)``: no wild points, no strayed trial.
         unstable: numbers of trials that may go anywhere, and are not fitted.
         strayed: numbers of trials that went another way than their repeats.
+        goes: with what the gap goes where its explanations only imitate its cause, in
+            words; "" = they do not (`flexible.imitated`).
     """
 
     problem: Problem
@@ -57,6 +59,7 @@ class Decomposition:
     inside: np.ndarray
     unstable: tuple[int, ...] = ()
     strayed: tuple[int, ...] = ()
+    goes: str = ""
 
     @cached_property
     def closed(self) -> float:
@@ -121,9 +124,15 @@ class Decomposition:
         return large and self.closed < 1 - MOST
 
     @property
+    def foreign(self) -> bool:
+        """Whether the library lacks what most of the gap comes from."""
+        most = self.lasting and self.unexplained > MOST
+        return most or self.failing or bool(self.goes)
+
+    @property
     def kind(self) -> str:
         """Kind of the verdict, one of `records.KINDS`."""
-        if (self.lasting and self.unexplained > MOST) or self.failing:
+        if self.foreign:
             return "none of the library"
         if not self.point.support:
             return "no gap"
@@ -156,14 +165,13 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         point = descent.refitted(problem, point, support)
     if _worse(problem, start, point, known):
         point = descent.refitted(problem, point, frozenset())
+    size = _Sizes.of(problem, start, point, known)
+    support = shares.weighty(point, size.unexplained)
+    if support != point.support:
+        point = descent.refitted(problem, point, support)
+        size = _Sizes.of(problem, start, point, known)
     if late and late.name not in point.support:
         late = None
-    full = point.linear.rest(point.linear.solve(point.linear.free))
-    inside = rest.kept(problem, full, point.noise.sd)
-    strayed = rest.strayed(problem, point.rest, known)
-    inside &= ~strayed[:, None]
-    left = point.linear.rest(point.linear.solve(point.support))
-    plain = left if not point.noise.memory.factors.size else point.rest
     return Decomposition(
         problem=problem,
         start=start,
@@ -172,20 +180,66 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         tied=tuple(ties.tied(problem, point, tried)),
         onset=late,
         floor=known,
-        before=rest.excess(start.rest, known, inside),
-        after=rest.excess(plain, known, inside),
+        before=size.before,
+        after=size.after,
         recurs=rest.recurrence(
             problem,
-            left,
+            point.linear.rest(point.linear.solve(point.support)),
             point.noise.sd,
             piece=rest.SHORT if point.noise.order else rest.PIECE,
         ),
-        scatter=rest.scattered(problem, plain, known, inside),
-        moved=max(rest.excess(problem.recorded, known, inside), 1.0),
-        inside=inside,
+        scatter=size.scatter,
+        moved=max(rest.excess(problem.recorded, known, size.inside), 1.0),
+        inside=size.inside,
         unstable=_numbers(problem, unstable),
-        strayed=_numbers(problem, strayed),
+        strayed=_numbers(problem, size.strayed),
+        goes=flexible.imitated(problem, start.rest, size.plain, known, size.inside)
+        if point.support
+        else "",
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Sizes:
+    """How large a gap is, and what a point leaves of it; see `Decomposition`.
+
+    Attributes:
+        plain: what the point leaves, ``(N, C)``.
+        strayed: windows of trials that went another way than their repeats, ``(N,)``.
+    """
+
+    inside: np.ndarray
+    strayed: np.ndarray
+    plain: np.ndarray
+    before: float
+    after: float
+    scatter: float
+
+    @classmethod
+    def of(
+        cls, problem: Problem, start: Point, point: Point, known: rest.Floor
+    ) -> "_Sizes":
+        linear = point.linear
+        full = linear.rest(linear.solve(linear.free))
+        inside = rest.kept(problem, full, point.noise.sd)
+        strayed = rest.strayed(problem, point.rest, known)
+        inside &= ~strayed[:, None]
+        plain = point.rest
+        if not point.noise.memory.factors.size:
+            plain = linear.rest(linear.solve(point.support))
+        return cls(
+            inside,
+            strayed,
+            plain,
+            before=rest.excess(start.rest, known, inside),
+            after=rest.excess(plain, known, inside),
+            scatter=rest.scattered(problem, plain, known, inside),
+        )
+
+    @property
+    def unexplained(self) -> float:
+        """Share of the gap that is left and is not what differs between repeats."""
+        return max(self.after - self.scatter, 0.0) / max(self.before, self.after, 1e-9)
 
 
 def _numbers(problem: Problem, windows: np.ndarray) -> tuple[int, ...]:

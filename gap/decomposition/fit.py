@@ -47,7 +47,7 @@ class Noise:
         return self.memory.factors.shape[1]
 
     def loss(self, rest: np.ndarray) -> float:
-        """Pseudo-Huber loss of residuals."""
+        """Pseudo-Huber loss of residuals ``(N, C)``."""
         return noise.loss(self.innovations(np.nan_to_num(rest)), self.sd)
 
     def weights(self, rest: np.ndarray, seen: np.ndarray) -> np.ndarray:
@@ -82,7 +82,8 @@ class Point:
 
 
 def smooth(problem: Problem, values: np.ndarray) -> list[int]:
-    """Rows that have a column: those with a slope, and those set to a level."""
+    """Rows that have a column at values ``(R,)``: those with a slope, those set to a
+    level."""
     return [
         number
         for number, row in enumerate(problem.rows)

@@ -65,7 +65,8 @@ def _variance(error: np.ndarray, parts: np.ndarray) -> np.ndarray:
 
 
 def loss(rest: np.ndarray, sd: np.ndarray) -> float:
-    """Pseudo-Huber loss of residuals: their weighted square where they are small."""
+    """Pseudo-Huber loss of residuals ``(N, C)`` with standard deviations ``(N, C)``:
+    their weighted square where they are small."""
     units = np.nan_to_num(rest) / sd / HUBER
     return float((2 * HUBER**2 * (np.sqrt(1 + units**2) - 1)).sum())
 
@@ -124,7 +125,7 @@ class Memory:
 
     @classmethod
     def none(cls, trial: np.ndarray, channels: int) -> "Memory":
-        """One that changes nothing."""
+        """One that changes nothing of residuals of trials ``(N,)``."""
         return cls(np.zeros((channels, 0)), np.ones(channels), trial)
 
     @classmethod

@@ -131,8 +131,8 @@ class Problem:
         return self.model.features
 
     def changed(self, values: np.ndarray, trial: int) -> dict[str, float]:
-        """Rows that are not nominal in a trial, by name; what grows with the number of
-        the trial comes as what it has grown to."""
+        """Rows of values ``(R,)`` that are not nominal in a trial, by name; what grows
+        with the number of the trial comes as what it has grown to."""
         number = self.numbers[trial]
         return {
             row.name: float(value) * (number if row.per_trial else 1)

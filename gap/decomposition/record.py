@@ -154,6 +154,7 @@ def statements(made: Decomposition) -> list[str]:
             made.lasting or made.failing,
             made.recurring,
             words.sized(left, features),
+            made.goes,
         )
         + apart,
     ]

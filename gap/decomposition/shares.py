@@ -13,6 +13,8 @@ from bns.gap.decomposition.problem import Problem
 CHOICE = 4.0  # nats within which the held-out error decides
 CLEARLY = 0.02  # of the held-out error that a further explanation has to lower
 PIECES = 4  # of a stretch, each left out by itself for the share that is closed
+SLIGHT = 0.15  # of what is left: less may as well come from that,
+TRIFLE = 1e-3  # of the gap, if it is less than this too: a thirtieth of its size
 EXACT = 1e-3  # of the smallest deviation that is believed: no fit is more exact
 NINETY = 1.645  # standard deviations of a 90 % interval
 
@@ -193,6 +195,27 @@ def guarded(problem: Problem, point: Point) -> Support:
             break
         best = best - {name}
     return best
+
+
+def weighty(point: Point, left: float) -> Support:
+    """The set of a point without trifles: what closes, added last, hardly any of the
+    gap, and less than a part of what no explanation closes: that may look like it.
+
+    Args:
+        point: the fit.
+        left: share of the gap that is left and is not scatter.
+    """
+    linear, support = point.linear, point.support
+    least = min(SLIGHT * left, TRIFLE)
+    least *= linear.squares(()) - linear.squares(linear.free)
+    while len(support) > 1:
+        here = linear.squares(support)
+        without = {n: linear.squares(support - {n}) - here for n in sorted(support)}
+        name = min(without, key=without.__getitem__)
+        if without[name] >= least:
+            break
+        support = support - {name}
+    return support
 
 
 def _grown(linear: Linear, held: HeldOut, support: Support) -> Support:

@@ -12,8 +12,8 @@ LISTED = 4  # alternatives, or channels, in a sentence
 
 
 def sized(sizes: Sequence[float] | np.ndarray, channels: Sequence[Channel]) -> str:
-    """Sizes of features in units that are read, "1.2 mm forward"; of many the
-    largest."""
+    """Sizes of features, ``(C,)``, in units that are read, "1.2 mm forward"; of many
+    the largest."""
     order = sorted(range(len(channels)), key=lambda n: -sizes[n])
     kept = sorted(order[: LISTED if len(order) > LISTED + 1 else None])
     found = [_one(sizes[n], channels[n]) for n in kept]
@@ -39,8 +39,8 @@ def size(
     """First statement: how large the gap is beyond what measuring scatters.
 
     Args:
-        before: size of the gap by feature, in its unit.
-        beyond: the same without what measuring scatters.
+        before: size of the gap by feature, in its unit, ``(C,)``.
+        beyond: the same, ``(C,)``, without what measuring scatters.
         channels: the features.
         over: in what time it has grown, in words.
     """
@@ -90,7 +90,7 @@ def explained(
     return text
 
 
-def left(share: float, lasting: bool, recurs: bool, sizes: str) -> str:
+def left(share: float, lasting: bool, recurs: bool, sizes: str, goes: str) -> str:
     """Third statement: how large the rest is, and whether it recurs.
 
     Args:
@@ -98,7 +98,13 @@ def left(share: float, lasting: bool, recurs: bool, sizes: str) -> str:
         lasting: whether it is more than a sound robot and its camera scatter.
         recurs: whether it is the same whenever the motion is.
         sizes: how large it is, in words.
+        goes: with what the gap goes that these explanations imitate; "" = nothing.
     """
+    if goes:
+        return (
+            f"They imitate what the library lacks: a regression on {goes}, which knows "
+            "no effect, predicts trials that it has not seen better."
+        )
     if not lasting:
         return "What is left does not recur: the robot scatters it, or the camera."
     how = "recurs" if recurs else "is more than a sound robot scatters"

@@ -187,6 +187,12 @@ class GapModel(ABC):
         del trial, windows
         return {}
 
+    def patterns(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
+        """What an effect that the library lacks may go with, by name in words: numbers
+        of each window, ``(W, K)``. Empty = nothing is known of this."""
+        del trial, windows
+        return {}
+
     def begun(self, trial: Trial) -> Mapping[str, float]:
         """Numbers of the state in which a trial began that are not known, each with its
         standard deviation; `paths` takes them by these names. Empty = it is known."""

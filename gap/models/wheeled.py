@@ -106,6 +106,19 @@ class WheeledModel(GapModel):
         begin, end = observed[..., windows.first, :], observed[..., windows.last, :]
         return body_displacement(begin, end)
 
+    def patterns(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
+        """See `GapModel.patterns`: harmonics of the heading; the place with its pull
+        in the robot's frame."""
+        x, y, yaw = pieces.coarse(trial.poses_world[windows.first]).T
+        ahead, aside = np.cos(yaw), np.sin(yaw)
+        heading = [ahead, aside, np.cos(2 * yaw), np.sin(2 * yaw)]
+        place = [x, y, x**2, y**2, x * y]
+        pull = [ahead * x, ahead * y, aside * x, aside * y]
+        return {
+            "the heading": np.stack(heading, axis=1),
+            "the place": np.stack([*place, *heading, *pull], axis=1),
+        }
+
     def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
         """Commands, their signs, changes, pose and time in each window."""
         index, since, at = pieces.told(trial, windows)

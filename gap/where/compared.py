@@ -49,7 +49,8 @@ class Compared:
         Args:
             trials: checked recording.
             model: nominal model.
-            sigma: what measuring scatters, by observed channel; 0 = as the model says.
+            sigma: what measuring scatters, by observed channel, ``(C,)`` in their
+                units; 0 = as the model says.
         """
         known = np.nan_to_num(np.asarray(sigma, dtype=float))
         trials = tuple(narrowed(trial, model.channels) for trial in trials)

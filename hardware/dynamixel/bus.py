@@ -12,13 +12,13 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from bns.errors import BnsError, MissingDependencyError
+from bns.errors import BnsError, MissingDependencyError, install
 from bns.hardware.clock import Clock
 from bns.hardware.dynamixel import packets
 from bns.hardware.dynamixel.joints import Joint
 from bns.hardware.faults import FaultLog, LinkError, SafetyStop, Void
 from bns.hardware.khepera.driver import Guard
-from bns.hardware.line import INSTALL, Openers, check_port, claim
+from bns.hardware.line import Openers, check_port, claim
 from bns.hardware.safety.stop_order import insist, phantomx
 from bns.hardware.safety.watchdog import receive, send
 from bns.worlds.physics.legged_flags import OVERLOAD_TIME, SATURATED, STALLED
@@ -326,7 +326,7 @@ def _sdk() -> Any:
         import dynamixel_sdk
     except ImportError as error:
         raise MissingDependencyError(
-            "a hexapod on its bus", "dynamixel-sdk", INSTALL
+            "a hexapod on its bus", "dynamixel-sdk", install("hardware")
         ) from error
     return dynamixel_sdk
 

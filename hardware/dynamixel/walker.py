@@ -308,7 +308,7 @@ class Rest:
             self._units[number], self.since = units, now
 
     def pose(self, pose: np.ndarray, now: float) -> None:
-        """The robot was seen."""
+        """The robot was seen: x, y [m] and yaw [rad], at a time [s]."""
         off = np.abs(pose - self._pose)
         if np.hypot(*off[:2]) > MOVED or off[2] > TURNED:
             self._pose, self.since = pose, now

@@ -152,7 +152,7 @@ def height(
         sightings: at rest or moving, the more the better.
         camera: calibrated.
         marker: as the settings describe it.
-        image: a picture with floor tags.
+        image: a picture with floor tags, ``(H, W)`` or ``(H, W, 3)``.
         floor: their places.
     """
     shrunk = _shrunk(image, camera, floor)

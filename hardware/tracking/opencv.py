@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from bns.errors import MissingDependencyError
-from bns.hardware.line import INSTALL
+from bns.errors import MissingDependencyError, install
 
 
 def cv2() -> Any:
@@ -16,10 +15,10 @@ def cv2() -> Any:
         import cv2 as module
     except ImportError as error:
         raise MissingDependencyError(
-            "tracking", "opencv-python-headless", INSTALL
+            "tracking", "opencv-python-headless", install("hardware")
         ) from error
     if not hasattr(module, "aruco"):
-        raise MissingDependencyError("tracking", "ArUco in OpenCV", INSTALL)
+        raise MissingDependencyError("tracking", "ArUco in OpenCV", install("hardware"))
     logging = module if hasattr(module, "setLogLevel") else module.utils.logging
     logging.setLogLevel(0)  # silent; OpenCV 4 has it at the top, 5 below
     module.setNumThreads(1)  # its threads would not share this one's precedence

@@ -117,6 +117,8 @@ def test_what_holds_for_the_fitted_motion_alone_is_no_answer(before, closed, kin
         closed=closed,
         lasting=False,
         unexplained=0.1,
+        goes="",
     )
     made.failing = Decomposition.failing.fget(made)
+    made.foreign = Decomposition.foreign.fget(made)
     assert Decomposition.kind.fget(made) == kind

@@ -19,6 +19,7 @@ BASE = {"bns", "bns.errors", "bns.seeding", "bns.storage"} | {
         "parquet",
         "reading",
         "seal",
+        "tables",
     )
 }
 """what knows no robot and no world; of the storage all that knows no run"""

@@ -1,8 +1,7 @@
 """House rules that a machine can check: docstrings, sizes, formatting.
 
-Public names say what they are, what they raise, and what their arguments are. `LEFT` is
-how many still lack something; it may only fall. `python -m
-tests.repository.test_style` lists them.
+Public names say what they are, what they raise, and what their arguments are.
+`python -m tests.repository.test_style` lists those that lack something.
 """
 
 import ast
@@ -60,8 +59,6 @@ def _docstring_lines(node) -> int:
     return node.body[0].end_lineno - node.body[0].lineno + 1
 
 
-LEFT = 0
-"""of all public functions, classes and methods"""
 MANY = 3
 """arguments from which a docstring has to say what they are"""
 
@@ -106,10 +103,18 @@ def lacks(node) -> list[str]:
     arrays = [
         a for a in (node.returns,) if a is not None and "ndarray" in ast.unparse(a)
     ]
-    if arrays and not any(
-        mark in text for mark in ("(", "shape", "[", "like ", "each")
-    ):
+    takes = [
+        a.arg
+        for a in (*node.args.args, *node.args.kwonlyargs)
+        if a.annotation is not None
+        and "ndarray" in ast.unparse(a.annotation)
+        and not ast.unparse(a.annotation).startswith("Mapping")
+    ]
+    marked = any(mark in text for mark in ("(", "shape", "[", "like ", "each"))
+    if arrays and not marked:
         found.append("the shape or unit of the array")
+    if takes and not marked:
+        found.append(f"the shape or unit of {', '.join(takes)}")
     return found
 
 
@@ -124,14 +129,14 @@ def lacking() -> Iterator[str]:
 
 def test_public_names_say_what_they_are():
     found = list(lacking())
-    assert len(found) <= LEFT, "\n".join(found)
+    assert not found, "\n".join(found)
 
 
 def test_what_a_docstring_lacks_is_found():
-    bare = "def f(a, b, c) -> ndarray:\n    {}\n    raise BnsError('x')\n"
+    bare = "def f(a: ndarray, b, c) -> ndarray:\n    {}\n    raise BnsError('x')\n"
     said = "'''Says. `a`, `b`, `c`, shape ``(N,)``.\n\n    Raises:\n\t    x'''"
     assert lacks(ast.parse(bare.format("pass")).body[0]) == ["a docstring"]
-    assert len(lacks(ast.parse(bare.format("'Says.'")).body[0])) == 3
+    assert len(lacks(ast.parse(bare.format("'Says.'")).body[0])) == 4
     assert lacks(ast.parse(bare.format(said)).body[0]) == []
 
 

@@ -174,7 +174,9 @@ def test_bad_map_files_are_refused(case, log, column_map):
 def test_mcap_without_its_package_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "mcap.reader", None)
     monkeypatch.setitem(__import__("sys").modules, "mcap.exceptions", None)
-    with pytest.raises(MissingDependencyError, match="pip install mcap"):
+    with pytest.raises(
+        MissingDependencyError, match=r"pip install 'bns-testbed\[mcap\]'"
+    ):
         from_mcap(
             tmp_path / "log.mcap", {n: f"/a:{n}" for n in ("time", "x", "y", "yaw")}
         )

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bns.errors import BnsError, FormatError, MissingDependencyError
+from bns.errors import BnsError, FormatError, MissingDependencyError, install
 from bns.storage import reading
 
 STAMPS = ("log_time", "publish_time")  # [ns], of the message itself
@@ -81,7 +81,7 @@ def _messages(path: Path, topics: set[str]) -> dict[str, list]:
         from mcap.reader import make_reader
     except ImportError:
         raise MissingDependencyError(
-            "Reading MCAP logs", "the package mcap", "pip install mcap"
+            "Reading MCAP logs", "the package mcap", install("mcap")
         ) from None
     found: dict[str, list] = {topic: [] for topic in topics}
     decoders: dict[int, Callable[[bytes], Any]] = {}
@@ -141,7 +141,7 @@ def _decoder(schema: Any, channel: Any) -> Callable[[bytes], Any]:
         raise MissingDependencyError(
             f"Decoding {channel.message_encoding!r} messages on {channel.topic}",
             "the package mcap-ros2-support",
-            "pip install mcap-ros2-support",
+            install("mcap"),
         ) from None
     decoder = DecoderFactory().decoder_for(channel.message_encoding, schema)
     if decoder is None:
@@ -185,7 +185,7 @@ def topics(path: Path) -> dict[str, str]:
         from mcap.reader import make_reader
     except ImportError:
         raise MissingDependencyError(
-            "Reading MCAP logs", "the package mcap", "pip install mcap"
+            "Reading MCAP logs", "the package mcap", install("mcap")
         ) from None
     broken: tuple[type[Exception], ...] = (*_broken(), McapError)
     try:

@@ -1,4 +1,4 @@
-"""The two tables of a dataset, to and from Parquet."""
+"""The two tables of a dataset, to and from files."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from bns.errors import BnsError, FormatError
-from bns.storage import parquet
+from bns.storage import tables
 from bns.worlds.trial import Channel, Commands, Trial
 
 Table = dict[str, np.ndarray]
@@ -76,13 +76,13 @@ def of_commands(
 
 
 def write(path: Path, table: Table) -> None:
-    """Write columns to a Parquet file, always the same bytes.
+    """Write columns to a file, always the same bytes; see `bns.storage.tables`.
 
     Raises:
         StorageError: no space, or no permission.
     """
     columns = {name: np.ascontiguousarray(column) for name, column in table.items()}
-    parquet.write(
+    tables.write(
         path,
         columns,
         use_dictionary=False,
@@ -107,10 +107,9 @@ def read(path: Path, keys: dict[str, str], channels: Sequence[Channel]) -> Table
         FormatError: no such file, not Parquet, damaged, a column missing, twice or of
             another type.
     """
-    if not path.exists():
+    if not tables.exists(path):
         raise FormatError(f"{path} is missing; the dataset is half-written.")
-    wanted = keys | {channel.name: "double" for channel in channels}
-    return parquet.numbers(parquet.read(path), wanted, path)
+    return tables.read(path, keys, {channel.name: "double" for channel in channels})
 
 
 def split(

@@ -26,7 +26,7 @@ def columns(effect: Effect, signal: ControlSignal) -> list[int]:
 
 
 def spans(active: np.ndarray) -> Iterator[slice]:
-    """Contiguous stretches where `active` is true, as slices in order."""
+    """Contiguous stretches where `active`, ``(T,)``, is true, as slices in order."""
     edges = np.flatnonzero(np.diff(active.astype(np.int8), prepend=0, append=0))
     for start, stop in edges.reshape(-1, 2):
         yield slice(int(start), int(stop))

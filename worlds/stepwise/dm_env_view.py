@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from bns import seeding
-from bns.errors import BnsError, MissingDependencyError
+from bns.errors import BnsError, MissingDependencyError, install
 from bns.worlds.stepwise import look
 from bns.worlds.stepwise.episode import Episode, Seen
 
@@ -25,7 +25,7 @@ try:
     from dm_env import specs
 except ModuleNotFoundError as error:
     raise MissingDependencyError(
-        "A dm_env environment", "dm-env", "pip install 'bns-testbed[dm]'"
+        "A dm_env environment", "dm-env", install("dm")
     ) from error
 
 
@@ -102,7 +102,7 @@ class RobotEnvironment(dm_env.Environment):
             from dm_control.mujoco import wrapper
         except ModuleNotFoundError as error:
             raise MissingDependencyError(
-                "env.physics", "dm-control", "pip install 'bns-testbed[dm]'"
+                "env.physics", "dm-control", install("dm")
             ) from error
         model = look.scene(self.episode.stepper.world).compile()
         physics = mujoco.Physics.from_model(wrapper.MjModel(model))

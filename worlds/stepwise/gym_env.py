@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from bns.errors import BnsError, MissingDependencyError
+from bns.errors import BnsError, MissingDependencyError, install
 from bns.worlds import registry
 from bns.worlds.checks import bounded
 from bns.worlds.stepwise.core import reset_all, step_all
@@ -32,7 +32,7 @@ try:
     from gymnasium.vector.utils import batch_space
 except ModuleNotFoundError as error:
     raise MissingDependencyError(
-        "A Gymnasium environment", "gymnasium", "pip install 'bns-testbed[gym]'"
+        "A Gymnasium environment", "gymnasium", install("gym")
     ) from error
 
 IDS = {

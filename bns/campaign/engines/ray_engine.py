@@ -15,7 +15,7 @@ from typing import Any
 from bns.campaign import work
 from bns.campaign.engines.registry import PATIENCE, Beat, Outcome, outcome
 from bns.campaign.plan import Job
-from bns.errors import BnsError, MissingDependencyError
+from bns.errors import BnsError, MissingDependencyError, install
 
 RETRIES = 4
 """times a batch is started again when its worker or node dies"""
@@ -126,7 +126,9 @@ class _Session:
                 if attempt <= RETRIES:
                     waiting.appendleft((job, attempt + 1))
                 else:
-                    reason = f"worker lost: no trial in {self.watch.patience:.0f} s"
+                    reason = (
+                        f"worker lost: no sign of life for {self.watch.patience:.0f} s"
+                    )
                     yield Outcome(job.key, None, reason, attempts=attempt)
 
     def _ended(self, reference: Any) -> Outcome:
@@ -177,9 +179,7 @@ def _ray() -> Any:
     try:
         import ray
     except ImportError:
-        raise MissingDependencyError(
-            "--engine ray", "Ray", "pip install 'bns-testbed[ray]'"
-        ) from None
+        raise MissingDependencyError("--engine ray", "Ray", install("ray")) from None
     return ray
 
 
@@ -211,14 +211,15 @@ class Pulse:
     """Where batches say how far they are; lives where all of them reach it."""
 
     def __init__(self) -> None:
-        self._done: dict[str, int] = {}
+        self._done: dict[str, tuple[int, int]] = {}
 
     def beat(self, key: str, trials: int) -> None:
         """A batch is running and has done so many trials."""
-        self._done[key] = trials
+        _, beats = self._done.get(key, (0, 0))
+        self._done[key] = trials, beats + 1
 
-    def all(self) -> dict[str, int]:
-        """Trials done by batch, of those that have started."""
+    def all(self) -> dict[str, tuple[int, int]]:
+        """Trials done, and beats, by batch, of those that have started."""
         return dict(self._done)
 
 
@@ -235,18 +236,18 @@ class Watch:
 
     def __init__(self, patience: float, clock: Callable[[], float] = time.monotonic):
         self.patience, self.clock = patience, clock
-        self._heard: dict[str, tuple[int, float]] = {}
+        self._heard: dict[str, tuple[tuple[int, int], float]] = {}
 
-    def news(self, done: Mapping[str, int]) -> dict[str, int]:
-        """Those of the reports that say something new, noted as heard now."""
+    def news(self, done: Mapping[str, tuple[int, int]]) -> dict[str, int]:
+        """Trials of those reports that are new, noted as heard now."""
         now = self.clock()
         new = {
-            key: trials
-            for key, trials in done.items()
-            if key not in self._heard or self._heard[key][0] != trials
+            key: said
+            for key, said in done.items()
+            if key not in self._heard or self._heard[key][0] != said
         }
-        self._heard.update({key: (trials, now) for key, trials in new.items()})
-        return new
+        self._heard.update({key: (said, now) for key, said in new.items()})
+        return {key: trials for key, (trials, _) in new.items()}
 
     def forget(self, key: str) -> None:
         """The batch is done, or starts anew."""

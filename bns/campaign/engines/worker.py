@@ -100,10 +100,15 @@ def _serve(content: dict, out: IO[bytes]) -> None:
         _send(out, DONE, took + given)
 
 
+_SPEAKING = threading.Lock()
+"""a batch and its pulse speak from threads of their own"""
+
+
 def _send(out: IO[bytes], kind: bytes, content: bytes) -> None:
     try:
-        out.write(pack(kind, content))
-        out.flush()
+        with _SPEAKING:
+            out.write(pack(kind, content))
+            out.flush()
     except BrokenPipeError:  # the driver is gone
         os._exit(0)
 

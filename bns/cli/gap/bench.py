@@ -9,7 +9,7 @@ from typing import Any
 from bns.cli.fields import Positional
 from bns.cli.parse import Verbs, dispatch
 from bns.errors import BnsError, FormatError, UnknownNameError
-from bns.progress import working
+from bns.progress import each
 
 MANUAL = """usage: bns gap bench {make,run,score} [...]
 
@@ -106,10 +106,13 @@ def _stand(model: Any) -> Any:
 def _cases(given: Make, stand: Any) -> Iterator[tuple[str, Any]]:
     from bns.gap.bench import cases
 
-    for place, kind in enumerate(given.kinds):
-        for number in range(given.count):
-            seed = given.seed + 1000 * place + number
-            yield f"case_{seed:06d}", cases.build(seed, kind, stand)
+    wanted = [
+        (given.seed + 1000 * place + number, kind)
+        for place, kind in enumerate(given.kinds)
+        for number in range(given.count)
+    ]
+    for seed, kind in each("making cases", wanted):
+        yield f"case_{seed:06d}", cases.build(seed, kind, stand)
 
 
 def _run(given: Run) -> int:
@@ -119,8 +122,12 @@ def _run(given: Run) -> int:
     if not Path(given.cases).is_dir():
         raise FormatError(f"There is no directory {given.cases} of cases.")
     model = load_recordings.model(given.model, threads=given.threads)
-    with working("diagnosing the cases"):
-        count = benchmark_io.run(Path(given.cases), model, Path(given.said))
+    count = benchmark_io.run(
+        Path(given.cases),
+        model,
+        Path(given.said),
+        through=partial(each, "diagnosing"),
+    )
     print(f"{count} cases diagnosed: {given.said}")
     return 0
 

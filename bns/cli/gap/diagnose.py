@@ -3,13 +3,14 @@
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from bns.cli.extras import attempt
 from bns.cli.fields import Positional
 from bns.cli.parse import parse
-from bns.errors import BnsError, FormatError
+from bns.errors import BnsError, FormatError, install
 from bns.progress import working
 
 LISTED = 8  # faults that are printed at most
@@ -314,7 +315,7 @@ def _draw(given: Diagnose, found: Any, trials: Any, model: Any, out: Path) -> No
 
 def _drawn(
     given: Diagnose, found: Any, trials: Any, model: Any, out: Path
-) -> dict[str, Path]:
+) -> dict[str, Path | str]:
     def report() -> Path:
         from bns.viz.gap import report as gap_report
 
@@ -325,9 +326,11 @@ def _drawn(
 
         return gap_recording.write(found, trials, model, out / "recording.rrd")
 
-    made = {"data": out / "diagnosis.json"}
+    made: dict[str, Path | str] = {"data": out / "diagnosis.json"}
     if given.report:
         made |= attempt("report", report)
-    if given.rerun and model is not None:
+    if given.rerun and model is not None and find_spec("rerun") is None:
+        made["in 3D"] = f"{install('view')}, then repeat this command"
+    elif given.rerun and model is not None:
         made |= attempt("recording", recording)
     return made

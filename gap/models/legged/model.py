@@ -129,7 +129,12 @@ class WalkModel(LibraryModel):
         return made
 
     def signs(self, trials: Sequence[Trial], predicted: Sequence[np.ndarray]) -> Signs:
-        """What the servos say of joints and legs that hold, hang or are gone."""
+        """What the servos say of joints and legs that hold, hang or are gone.
+
+        Args:
+            trials: recorded trials.
+            predicted: observations by the nominal model, ``(T, n_channels)`` each.
+        """
         return walk_signs.signs(trials, predicted, self.joints)
 
     def at_rest(self, trial: Trial, predicted: np.ndarray) -> frozenset[str]:

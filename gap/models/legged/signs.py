@@ -52,7 +52,7 @@ def signs(
 
     Args:
         trials: recordings, the joints' positions after the pose.
-        predicted: by the nominal model, in the same columns.
+        predicted: by the nominal model, in the same columns, ``(T, n_channels)`` each.
         names: of the joints, as the commands have them.
     """
     seen = _ends(names, [(t, t.observed) for t in trials])

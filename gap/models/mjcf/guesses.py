@@ -20,7 +20,7 @@ PAD = 0.02  # of the range of commands, by which limits are wider
 
 
 def time_unit(times: np.ndarray) -> str:
-    """The unit of stamps: the one that makes their rate that of a log."""
+    """The unit of stamps ``(T,)``: the one that makes their rate that of a log."""
     steps = np.diff(times)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else USUAL
     rated = {
@@ -50,7 +50,8 @@ def noise(pieces: Sequence[np.ndarray]) -> float:
 
 
 def limits(told: np.ndarray, allowed: tuple[float, float]) -> tuple[float, float]:
-    """Lowest and highest command: what was told and a little more, within bounds."""
+    """Lowest and highest command: what was told, ``(T,)``, and a little more, within
+    bounds; all in the unit of the command."""
     low, high = float(told.min()), float(told.max())
     pad = PAD * max(high - low, 1e-3 * max(abs(low), abs(high)), 1e-6)
     return max(low - pad, min(allowed[0], low)), min(high + pad, max(allowed[1], high))

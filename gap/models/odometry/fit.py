@@ -127,13 +127,13 @@ class Problem:
     unseen: tuple[str, ...] = ()
 
     def take(self, chosen: np.ndarray) -> "Problem":
-        """Some of the intervals, weighed as before."""
+        """Some of the intervals, by index or mask ``(K,)``, weighed as before."""
         return replace(
             self, motions=self.motions.take(chosen), weight=self.weight[chosen]
         )
 
     def loss(self, values: np.ndarray) -> float:
-        """Weighted sum of squared residuals."""
+        """Weighted sum of squared residuals at changes of `NUMBERS`, ``(8,)``."""
         return float((self.weight * self.motions.rest(values) ** 2).sum())
 
     def normal(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -71,7 +71,7 @@ class Motions:
         return len(self.left)
 
     def take(self, chosen: np.ndarray) -> "Motions":
-        """Some of the intervals."""
+        """Some of the intervals, by index or mask ``(K,)``."""
         return Motions(
             self.left[chosen], self.right[chosen], self.seen[chosen], self.axle
         )

@@ -34,7 +34,8 @@ class Runs:
         return len(self.angles)
 
     def take(self, chosen: np.ndarray) -> "Runs":
-        """Some of the runs, by index or mask; an index may come more than once."""
+        """Some of the runs, by index or mask ``(N,)``; an index may come more than
+        once."""
         index = np.arange(len(self))[chosen]
         on = self.drive.torque_on
         return Runs(

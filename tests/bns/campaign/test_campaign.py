@@ -356,6 +356,22 @@ def test_a_batch_hangs_only_once_it_has_started_and_said_nothing_new():
     assert watch.hanging() == []
 
 
+def test_a_batch_that_computes_for_long_says_so_and_one_that_waits_does_not():
+    from bns.campaign import work
+
+    said = []
+    with work.pulsing(said.append, every=0.05) as told:
+        told(3)
+        before = time.process_time()
+        while time.process_time() - before < 0.5:
+            sum(range(1000))
+    assert said.count(3) > 1 and set(said) == {3}
+    said.clear()
+    with work.pulsing(said.append, every=0.05):
+        time.sleep(0.5)
+    assert len(said) <= 1  # what the thread itself computes is next to nothing
+
+
 def test_engines_are_found_by_name():
     assert registry.make("local", workers=3).workers == 3
     with pytest.raises(BnsError, match="Did you mean 'local'"):

@@ -14,11 +14,12 @@ import pytest
 
 from bns import presets
 from bns.__main__ import INTERRUPTED, SPINS, WRONG_INPUT, main
-from bns.cli import VERBS
+from bns.cli import VERBS, outputs
 from bns.cli.extras import EXTRAS
 from bns.cli.outputs import sentence
 from bns.cli.run import STOPPED, until_interrupted
 from bns.doctor import OPTIONAL, pins
+from bns.errors import install
 from bns.storage.store import load
 
 TINY = [
@@ -118,6 +119,7 @@ def test_a_manual_is_as_wide_as_the_terminal(capsys, monkeypatch, verb, width):
     with pytest.raises(SystemExit):
         main([verb, "--help-all"])
     text = capsys.readouterr().out
+    assert "%%" not in text
     if "[options]" not in text:  # written by hand, for 80 columns or more
         width = 80
     unbroken = re.compile(r"usage:|  -")
@@ -281,6 +283,51 @@ def test_view_without_a_display_says_what_to_do(said, tmp_path, monkeypatch):
     (tmp_path / "x.rrd").write_bytes(b"")
     text = said("view", tmp_path / "x.rrd", code=WRONG_INPUT)
     assert "No display" in text and "--png FILE" in text
+
+
+@pytest.fixture
+def no_rerun(monkeypatch):
+    """As where the extra `view` is not installed; gives the command that adds it."""
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    return "pip install 'bns-testbed[view]'"
+
+
+@pytest.mark.parametrize("words", [[], ["--web"], ["--png", "a.png"]], ids=str)
+def test_view_without_rerun_says_what_to_install(said, run, no_rerun, words):
+    text = said("view", run, *words, code=WRONG_INPUT)
+    assert no_rerun in text and text.count("\n") == 1
+    assert not (run / "recording.rrd").exists()
+
+
+def test_a_run_without_rerun_says_how_to_look_at_it_in_3d(capsys, run, no_rerun):
+    outputs.write(load(run), run, report=False)
+    said = capsys.readouterr()
+    (line,) = (line for line in said.out.splitlines() if line.startswith("in 3D:"))
+    assert line.endswith(f"{no_rerun}, then bns view {run}") and not said.err
+    outputs.write(load(run), run, report=False, recording=False)
+    assert "in 3D" not in capsys.readouterr().out
+
+
+def test_an_extra_is_installed_into_the_python_that_runs(monkeypatch, tmp_path):
+    for place in ("mine", "other"):
+        (tmp_path / place).mkdir()
+        (tmp_path / place / "pip").touch(0o755)
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "mine" / "python"))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", str(tmp_path / "mine"))
+    assert install("gym") == "pip install 'bns-testbed[gym]'"
+    monkeypatch.setenv("PATH", str(tmp_path / "other"))
+    assert install("gym") == "mine/python -m pip install 'bns-testbed[gym]'"
+    monkeypatch.chdir(tmp_path / "other")
+    assert install("gym").startswith(f"{tmp_path / 'mine' / 'python'} -m pip ")
+
+
+def test_no_value_is_not_offered_as_one(said, capsys):
+    text = said("effects", "--stage", "foo", code=WRONG_INPUT)
+    assert "Available: actuator, body," in text
+    with pytest.raises(SystemExit):
+        main(["effects", "--help"])
+    assert "{command,actuator," in capsys.readouterr().out
 
 
 def test_view_of_a_diagnosis(said, tmp_path):

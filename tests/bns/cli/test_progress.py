@@ -40,6 +40,15 @@ def test_without_a_terminal_a_line_says_what_is_left(monkeypatch, capsys):
     assert capsys.readouterr().err == "cases: 1 of 4, about 30 s left, case 1\n"
 
 
+def test_items_are_gone_through_under_a_bar(monkeypatch, capsys):
+    monkeypatch.setattr(progress, "QUIET_SECONDS", 0.0)
+    ticks = iter([0.0, 10.0, 20.0])
+    monkeypatch.setattr(progress.time, "monotonic", lambda: next(ticks))
+    assert list(progress.each("cases", ["a", "b"])) == ["a", "b"]
+    said = "cases: 1 of 2, about 10 s left\ncases: 2 of 2, about 0 s left\n"
+    assert capsys.readouterr().err == said
+
+
 def test_work_without_an_end_is_quiet_where_there_is_no_terminal(capsys):
     with progress.working("diagnosing") as tell:
         tell("trial 3")
