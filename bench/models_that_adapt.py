@@ -50,7 +50,7 @@ def _numbers(batch: Batch, trials: int) -> tuple[np.ndarray, np.ndarray]:
 
 @bench(
     "error of the wheel's gain that anytime learning finds in ten trials, median",
-    bar="<= 0.03; with late commands, which its model does not know, it fits half as "
+    bar="<= 0.03; with a wider axle, which its model does not know, it fits half as "
     "well at best",
 )
 def faithful_anytime(quick: bool) -> Result:
