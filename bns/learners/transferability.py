@@ -200,7 +200,7 @@ class Transferability(Thinker[TransferMind]):
         return int(apart.argmax())
 
     def likeliest(self, mind: TransferMind, rows: np.ndarray) -> int:
-        """Which of some rows achieves most of those that are expected to transfer."""
+        """Which of some rows ``(N,)`` achieves most of those expected to transfer."""
         disparity = self.expected(mind, mind.done[rows])
         limit = self.rule.tolerated * mind.disparity.max(initial=0.0)
         good = disparity <= max(limit, float(disparity.min()))

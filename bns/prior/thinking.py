@@ -65,7 +65,7 @@ class Mind:
         self.tried, self.waiting = np.zeros(size), np.empty((0, size))
 
     def keep(self, rows: np.ndarray) -> None:
-        """The population's rows that are kept, in order."""
+        """The population's rows ``(K,)`` that are kept, in order."""
         self.genes, self.worth = self.genes[rows], self.worth[rows]
 
     def forget(self, newest: int) -> None:
