@@ -193,7 +193,7 @@ def decompose(problem: Problem, *, seed: int = 0) -> Decomposition:
         inside=size.inside,
         unstable=_numbers(problem, unstable),
         strayed=_numbers(problem, size.strayed),
-        goes=flexible.imitated(problem, start.rest, size.plain, known, size.inside)
+        goes=flexible.imitated(problem, start.rest, point.rest, known, size.inside)
         if point.support
         else "",
     )

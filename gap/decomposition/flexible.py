@@ -19,7 +19,6 @@ from bns.gap.decomposition.rest import Floor
 RIDGE = 1.0  # precision of a standardized regressor's weight, in units of the floor
 FEWEST = 4  # trials, each predicted from the others
 BETTER = 0.75  # of what explanations leave: something else explains it better
-SURE = 1.5  # standard errors over trials by which it does
 SMALL = 0.5  # of the floor's variance: less is not worth another explanation
 
 
@@ -46,11 +45,10 @@ def imitated(
     goes, other = tried.best(gap)
     ours = min(tried.squares(rest / known.sd), tried.best(rest)[1], key=tried.total)
     told = tried.count > 0
-    ratio = np.log(ours[told] / other[told])
-    spread = ratio.std(ddof=1) / np.sqrt(len(ratio))
+    mostly = np.log(ours[told] / other[told]).mean() > 0
     large = tried.total(ours) > SMALL
     better = tried.total(other) < BETTER * tried.total(ours)
-    return goes if large and better and ratio.mean() > SURE * spread else ""
+    return goes if large and better and mostly else ""
 
 
 @dataclass(frozen=True, eq=False)
