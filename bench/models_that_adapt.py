@@ -1,4 +1,4 @@
-"""Rivals that think in a model of the robot: whether they do what their originals do.
+"""Rivals that evolve controllers in a model: whether they do what their originals do.
 
 Anytime learning, back to reality and self-modelling are to find what is wrong with the
 robot where it is a number of their model, and to fail where it is not; the
@@ -44,7 +44,7 @@ def _numbers(batch: Batch, trials: int) -> tuple[np.ndarray, np.ndarray]:
     for trial in range(trials):
         step, _ = batch.advance(trial)
         misses.append(step.columns["model_miss"])
-        numbers.append([batch.learner.best_guess(m) for m in batch.learner.minds])
+        numbers.append([batch.learner.best_guess(m) for m in batch.learner.memories])
     return np.array(numbers).swapaxes(0, 1), np.array(misses).T
 
 
@@ -140,13 +140,13 @@ def faithful_transferability(quick: bool) -> Result:
     for trial in range(12):
         batch.advance(trial)
     learner, rows = batch.learner, []
-    for mind in learner.minds:
-        both = [learner.likeliest(mind, np.arange(len(mind.worth)))]
-        both.append(int(mind.worth.argmax()))
-        tried = learner.controllers(mind.genes[both])
+    for memory in learner.memories:
+        both = [learner.likeliest(memory, np.arange(len(memory.worth)))]
+        both.append(int(memory.worth.argmax()))
+        tried = learner.controllers(memory.genes[both])
         seen = batch.task.execute(batch.worlds[0], tried, trial=12, seeds=[0, 1])
         differ = [
-            float(np.linalg.norm(learner.does([trial])[0] - mind.done[row]))
+            float(np.linalg.norm(learner.does([trial])[0] - memory.done[row]))
             for trial, row in zip(seen, both, strict=True)
         ]
         worth = batch.task.worth(seen).round(3).tolist()

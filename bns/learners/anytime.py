@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bns.prior.modelling import Modeller, ModellingMind, places
-from bns.prior.thinking import Desk
+from bns.prior.model_learner import Rollouts
+from bns.prior.modelling import Modeller, ModellingMemory, places
 from bns.worlds.trial import Trial
 
 
@@ -23,11 +23,13 @@ class Anytime(Modeller):
         ends = [places([trial])[0, -1] for trial in trials]
         return np.stack(ends)
 
-    def chosen(self, mind: ModellingMind, desk: Desk, trial: int) -> np.ndarray:
-        """See `Thinker.chosen`: the best, the worst, any one, in turn."""
-        last = len(mind.genes) - 1
-        row = (0, last, int(desk.rng.integers(last + 1)))[trial % 3]
-        return np.array(mind.genes[row])
+    def chosen(
+        self, memory: ModellingMemory, rollouts: Rollouts, trial: int
+    ) -> np.ndarray:
+        """See `ModelLearner.chosen`: the best, the worst, any one, in turn."""
+        last = len(memory.genes) - 1
+        row = (0, last, int(rollouts.rng.integers(last + 1)))[trial % 3]
+        return np.array(memory.genes[row])
 
 
 LEARNER = Anytime

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bns.prior.modelling import Modeller, ModellingMind
-from bns.prior.thinking import Desk
+from bns.prior.model_learner import Rollouts
+from bns.prior.modelling import Modeller, ModellingMemory
 from bns.worlds.trial import Trial
 
 
@@ -21,11 +21,13 @@ class BackToReality(Modeller):
         """See `Modeller.clues`: what each achieved, and nothing else."""
         return self.task.worth(trials)[:, None]
 
-    def chosen(self, mind: ModellingMind, desk: Desk, trial: int) -> np.ndarray:
-        """See `Thinker.chosen`: the best one that was not tried yet."""
-        del desk, trial
-        fresh = np.flatnonzero(mind.untested)
-        return np.array(mind.genes[fresh[0] if len(fresh) else 0])
+    def chosen(
+        self, memory: ModellingMemory, rollouts: Rollouts, trial: int
+    ) -> np.ndarray:
+        """See `ModelLearner.chosen`: the best one that was not tried yet."""
+        del rollouts, trial
+        fresh = np.flatnonzero(memory.untested)
+        return np.array(memory.genes[fresh[0] if len(fresh) else 0])
 
 
 LEARNER = BackToReality

@@ -12,8 +12,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from bns.prior.modelling import Modeller, ModellingMind, ModellingSettings, places
-from bns.prior.thinking import Desk
+from bns.prior.model_learner import Rollouts
+from bns.prior.modelling import Modeller, ModellingMemory, ModellingSettings, places
 from bns.worlds.trial import Trial
 
 
@@ -22,9 +22,9 @@ class SelfModellingSettings(ModellingSettings):
     """Settings of self-modelling; models and rounds as in Bongard et al. 2006."""
 
     first: int = 300
-    """see ThinkingSettings"""
+    """see ModelLearnerSettings"""
     each: int = 70
-    """see ThinkingSettings"""
+    """see ModelLearnerSettings"""
     guesses: int = 15
     """models that are kept"""
     replayed: int = 3
@@ -59,28 +59,30 @@ class SelfModelling(Modeller):
         controller, walk = self.config.controller, self.config.walk
         return max(controller.max_commands, walk.commands)
 
-    def exploring(self, mind: ModellingMind) -> bool:
+    def exploring(self, memory: ModellingMemory) -> bool:
         """Whether the next test is to tell models apart."""
-        return 0 < len(mind.seen) < self.rule.rounds
+        return 0 < len(memory.seen) < self.rule.rounds
 
-    def prepare(self, mind: ModellingMind, desk: Desk) -> None:
-        """See `Thinker.prepare`; while it explores no controllers are evolved."""
-        if not self.exploring(mind):
-            super().prepare(mind, desk)
+    def prepare(self, memory: ModellingMemory, rollouts: Rollouts) -> None:
+        """See `ModelLearner.prepare`; while it explores no controllers are evolved."""
+        if not self.exploring(memory):
+            super().prepare(memory, rollouts)
             return
-        self.fit(mind, desk, self.rule.candidates * self.rule.jury)
+        self.fit(memory, rollouts, self.rule.candidates * self.rule.jury)
 
-    def chosen(self, mind: ModellingMind, desk: Desk, trial: int) -> np.ndarray:
-        """See `Thinker.chosen`: what models dispute, or the best one."""
+    def chosen(
+        self, memory: ModellingMemory, rollouts: Rollouts, trial: int
+    ) -> np.ndarray:
+        """See `ModelLearner.chosen`: what models dispute, or the best one."""
         del trial
         jury = self.rule.jury
-        count = min(self.rule.candidates, desk.room // jury)
-        if not self.exploring(mind) or count < 1 or not len(mind.guesses):
-            return np.array(mind.genes[0])
-        genes = desk.random(count)
-        points = mind.guesses[np.argsort(mind.miss, kind="stable")[:jury]]
+        count = min(self.rule.candidates, rollouts.room // jury)
+        if not self.exploring(memory) or count < 1 or not len(memory.guesses):
+            return np.array(memory.genes[0])
+        genes = rollouts.random(count)
+        points = memory.guesses[np.argsort(memory.miss, kind="stable")[:jury]]
         damages = self.unknowns.damages(np.repeat(points, count, axis=0))
-        made = self.clues(desk.run(np.tile(genes, (len(points), 1)), damages))
+        made = self.clues(rollouts.run(np.tile(genes, (len(points), 1)), damages))
         spread = np.nan_to_num(made).reshape(len(points), count, -1).var(0).mean(1)
         return np.array(genes[spread.argmax()])
 

@@ -12,10 +12,10 @@ import numpy as np
 
 from bns.learners.transferability import (
     Transferability,
-    TransferMind,
+    TransferMemory,
     TransferSettings,
 )
-from bns.prior.thinking import Desk
+from bns.prior.model_learner import Rollouts
 from bns.worlds.trial import Trial
 
 
@@ -32,32 +32,34 @@ class TResilience(Transferability):
 
     Settings = TResilienceSettings
 
-    def differs(self, mind: TransferMind, seen: Trial, worth: float) -> float:
+    def differs(self, memory: TransferMemory, seen: Trial, worth: float) -> float:
         """See `Transferability.differs`: in what was achieved.
 
         Args:
-            mind: with what was foreseen.
+            memory: with what was foreseen.
             seen: the trial.
             worth: of it.
         """
         del seen
-        return abs(float(mind.foreseen[0]) - worth)
+        return abs(float(memory.foreseen[0]) - worth)
 
-    def told_most(self, mind: TransferMind, does: np.ndarray, desk: Desk) -> int:
+    def told_most(
+        self, memory: TransferMemory, does: np.ndarray, rollouts: Rollouts
+    ) -> int:
         """See `Transferability.told_most`: any one.
 
         Args:
-            mind: of the run.
+            memory: of the run.
             does: of those to choose from, ``(N, F)``.
-            desk: to think at.
+            rollouts: which the model may run.
         """
-        del mind
-        return int(desk.rng.integers(len(does)))
+        del memory
+        return int(rollouts.rng.integers(len(does)))
 
-    def hoped(self, mind: TransferMind, row: int) -> float:
+    def hoped(self, memory: TransferMemory, row: int) -> float:
         """What a member of the population may achieve: less than in the model."""
-        less = self.expected(mind, mind.done[[row]])[0]
-        return float(mind.worth[row] - less)
+        less = self.expected(memory, memory.done[[row]])[0]
+        return float(memory.worth[row] - less)
 
 
 LEARNER = TResilience

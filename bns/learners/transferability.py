@@ -17,7 +17,7 @@ import numpy as np
 from bns.learners.base import Curves, Panel
 from bns.prior import gaussian
 from bns.prior.breeding import ranked
-from bns.prior.thinking import Desk, Mind, Thinker, ThinkingSettings
+from bns.prior.model_learner import Memory, ModelLearner, ModelLearnerSettings, Rollouts
 from bns.tasks.base import BOARD, seen_places
 from bns.worlds.trial import Trial
 
@@ -26,11 +26,11 @@ PARTS = 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class TransferSettings(ThinkingSettings):
+class TransferSettings(ModelLearnerSettings):
     """Settings of the transferability approach."""
 
     population: int = 20
-    """see ThinkingSettings"""
+    """see ModelLearnerSettings"""
     tests: int = 10
     """tests on a robot that are chosen to learn what transfers"""
     tolerated: float = 0.3
@@ -42,7 +42,7 @@ class TransferSettings(ThinkingSettings):
     """variance of what is seen about the process"""
 
     bounds: ClassVar[Mapping[str, tuple[float, float, str]]] = {
-        **ThinkingSettings.bounds,
+        **ModelLearnerSettings.bounds,
         "tests": (1, 10_000, "tests"),
         "tolerated": (0, 1, "1"),
         "reach": (1e-3, 1000, "1"),
@@ -50,7 +50,7 @@ class TransferSettings(ThinkingSettings):
     }
 
 
-class TransferMind(Mind):
+class TransferMemory(Memory):
     """What one run knows of what transfers.
 
     Attributes:
@@ -69,19 +69,19 @@ class TransferMind(Mind):
         self.foreseen, self.does = np.zeros(1), np.empty(0)
 
     def keep(self, rows: np.ndarray) -> None:
-        """See `Mind.keep`."""
+        """See `Memory.keep`."""
         super().keep(rows)
         self.done = self.done[rows]
 
     def forget(self, newest: int) -> None:
-        """See `Mind.forget`."""
+        """See `Memory.forget`."""
         super().forget(newest)
         first = max(len(self.disparity) - newest, 0)
         self.tested, self.model = self.tested[first:], self.model[first:]
         self.disparity = self.disparity[first:]
 
 
-class Transferability(Thinker[TransferMind]):
+class Transferability(ModelLearner[TransferMemory]):
     """R runs of the transferability approach; arguments as `Learner`."""
 
     Settings = TransferSettings
@@ -106,116 +106,122 @@ class Transferability(Thinker[TransferMind]):
         ),
     )
 
-    def mind(self) -> TransferMind:
-        """See `Thinker.mind`."""
-        return TransferMind(self.space.size)
+    def memory(self) -> TransferMemory:
+        """See `ModelLearner.memory`."""
+        return TransferMemory(self.space.size)
 
-    def changed(self, mind: TransferMind) -> None:
-        """See `Thinker.changed`."""
-        best = int(mind.seen.argmax())
-        mind.does, mind.foreseen = mind.tested[best].copy(), mind.model[[best]]
-        super().changed(mind)
+    def changed(self, memory: TransferMemory) -> None:
+        """See `ModelLearner.changed`."""
+        best = int(memory.seen.argmax())
+        memory.does, memory.foreseen = memory.tested[best].copy(), memory.model[[best]]
+        super().changed(memory)
 
     def does(self, trials: Sequence[Trial]) -> np.ndarray:
         """What controllers do: behaviour, and where they are on the way, ``(N, F)``."""
         return np.hstack([self.task.behaviour(trials), ways(trials)])
 
-    def differs(self, mind: TransferMind, seen: Trial, worth: float) -> float:
+    def differs(self, memory: TransferMemory, seen: Trial, worth: float) -> float:
         """How much the robot differed from the model: in places on the way.
 
         Args:
-            mind: with what the controller does in the model.
+            memory: with what the controller does in the model.
             seen: the trial.
             worth: what it achieved.
         """
         del worth
-        return float(np.linalg.norm(mind.does - self.does([seen])[0]))
+        return float(np.linalg.norm(memory.does - self.does([seen])[0]))
 
-    def add(self, mind: TransferMind, genes: Any, trials: Sequence[Trial]) -> None:
-        """See `Thinker.add`."""
-        super().add(mind, genes, trials)
+    def add(self, memory: TransferMemory, genes: Any, trials: Sequence[Trial]) -> None:
+        """See `ModelLearner.add`."""
+        super().add(memory, genes, trials)
         does = self.does(trials)
-        mind.done = np.vstack([mind.done.reshape(-1, does.shape[1]), does])
+        memory.done = np.vstack([memory.done.reshape(-1, does.shape[1]), does])
 
-    def expected(self, mind: TransferMind, does: np.ndarray) -> np.ndarray:
+    def expected(self, memory: TransferMemory, does: np.ndarray) -> np.ndarray:
         """Disparities that controllers are expected to have, ``(N,)``.
 
         Args:
-            mind: with the tests.
+            memory: with the tests.
             does: what they do in the model, ``(N, F)``.
         """
-        if not len(mind.disparity):
+        if not len(memory.disparity):
             return np.zeros(len(does))
-        usual, unit = mind.disparity.mean(), max(float(mind.disparity.std()), 1e-9)
+        usual, unit = memory.disparity.mean(), max(float(memory.disparity.std()), 1e-9)
         rise, _ = gaussian.posterior(
-            mind.tested,
-            (mind.disparity - usual) / unit,
+            memory.tested,
+            (memory.disparity - usual) / unit,
             does,
             reach=self.rule.reach,
             noise=self.rule.noise,
         )
         return np.maximum(usual + unit * rise, 0.0)
 
-    def survivors(self, mind: TransferMind) -> np.ndarray:
-        """See `Thinker.survivors`; by three goals."""
-        apart = np.linalg.norm(mind.done[:, None] - mind.done[None], axis=2).mean(1)
-        goals = [-mind.worth, self.expected(mind, mind.done), -apart]
+    def survivors(self, memory: TransferMemory) -> np.ndarray:
+        """See `ModelLearner.survivors`; by three goals."""
+        apart = np.linalg.norm(memory.done[:, None] - memory.done[None], axis=2).mean(1)
+        goals = [-memory.worth, self.expected(memory, memory.done), -apart]
         return ranked(np.stack(goals, axis=1))
 
-    def chosen(self, mind: TransferMind, desk: Desk, trial: int) -> np.ndarray:
-        """See `Thinker.chosen`: a test, or the best that transfers."""
+    def chosen(
+        self, memory: TransferMemory, rollouts: Rollouts, trial: int
+    ) -> np.ndarray:
+        """See `ModelLearner.chosen`: a test, or the best that transfers."""
         del trial
-        untested = np.flatnonzero(mind.untested)
-        if len(untested) and len(mind.seen) < self.rule.tests:
-            row = untested[self.told_most(mind, mind.done[untested], desk)]
-            return self.take(mind, int(row))
+        untested = np.flatnonzero(memory.untested)
+        if len(untested) and len(memory.seen) < self.rule.tests:
+            row = untested[self.told_most(memory, memory.done[untested], rollouts)]
+            return self.take(memory, int(row))
         if len(untested):
-            row = untested[self.likeliest(mind, untested)]
-            if self.hoped(mind, int(row)) > mind.seen.max(initial=-np.inf):
-                return self.take(mind, int(row))
-        best = int(mind.seen.argmax())
-        mind.does, mind.foreseen = mind.tested[best].copy(), mind.model[[best]]
-        return np.array(mind.tests[best])
+            row = untested[self.likeliest(memory, untested)]
+            if self.hoped(memory, int(row)) > memory.seen.max(initial=-np.inf):
+                return self.take(memory, int(row))
+        best = int(memory.seen.argmax())
+        memory.does, memory.foreseen = memory.tested[best].copy(), memory.model[[best]]
+        return np.array(memory.tests[best])
 
-    def take(self, mind: TransferMind, row: int) -> np.ndarray:
+    def take(self, memory: TransferMemory, row: int) -> np.ndarray:
         """Genes of a member of the population, which is tried, ``(D,)``."""
-        mind.does, mind.foreseen = mind.done[row].copy(), mind.worth[[row]]
-        return np.array(mind.genes[row])
+        memory.does, memory.foreseen = memory.done[row].copy(), memory.worth[[row]]
+        return np.array(memory.genes[row])
 
-    def hoped(self, mind: TransferMind, row: int) -> float:
+    def hoped(self, memory: TransferMemory, row: int) -> float:
         """What a member of the population may achieve on the robot."""
-        return float(mind.worth[row])
+        return float(memory.worth[row])
 
-    def told_most(self, mind: TransferMind, does: np.ndarray, desk: Desk) -> int:
+    def told_most(
+        self, memory: TransferMemory, does: np.ndarray, rollouts: Rollouts
+    ) -> int:
         """Which controller is tested: the one most unlike those tested so far.
 
         Args:
-            mind: with the tests.
+            memory: with the tests.
             does: what those to choose from do in the model, ``(N, F)``.
-            desk: to think at.
+            rollouts: which the model may run.
         """
-        if not len(mind.tested):
-            return int(desk.rng.integers(len(does)))
-        apart = np.linalg.norm(does[:, None] - mind.tested[None], axis=2).min(1)
+        if not len(memory.tested):
+            return int(rollouts.rng.integers(len(does)))
+        apart = np.linalg.norm(does[:, None] - memory.tested[None], axis=2).min(1)
         return int(apart.argmax())
 
-    def likeliest(self, mind: TransferMind, rows: np.ndarray) -> int:
+    def likeliest(self, memory: TransferMemory, rows: np.ndarray) -> int:
         """Which of some rows ``(N,)`` achieves most of those expected to transfer."""
-        disparity = self.expected(mind, mind.done[rows])
-        limit = self.rule.tolerated * mind.disparity.max(initial=0.0)
+        disparity = self.expected(memory, memory.done[rows])
+        limit = self.rule.tolerated * memory.disparity.max(initial=0.0)
         good = disparity <= max(limit, float(disparity.min()))
-        return int(np.where(good, mind.worth[rows], -np.inf).argmax())
+        return int(np.where(good, memory.worth[rows], -np.inf).argmax())
 
-    def learn(self, mind: TransferMind, seen: Trial, worth: float) -> dict[str, Any]:
-        """See `Thinker.learn`: how much the robot differed."""
-        disparity = self.differs(mind, seen, worth)
-        expected = self.expected(mind, mind.does[None])[0]
-        width = len(mind.does)
-        mind.tested = np.vstack([mind.tested.reshape(-1, width), mind.does])
-        mind.disparity = np.append(mind.disparity, disparity)
-        mind.model = np.append(mind.model, mind.foreseen)
+    def learn(
+        self, memory: TransferMemory, seen: Trial, worth: float
+    ) -> dict[str, Any]:
+        """See `ModelLearner.learn`: how much the robot differed."""
+        disparity = self.differs(memory, seen, worth)
+        expected = self.expected(memory, memory.does[None])[0]
+        width = len(memory.does)
+        memory.tested = np.vstack([memory.tested.reshape(-1, width), memory.does])
+        memory.disparity = np.append(memory.disparity, disparity)
+        memory.model = np.append(memory.model, memory.foreseen)
         return {
-            "worth_foreseen": float(mind.foreseen[0]),
+            "worth_foreseen": float(memory.foreseen[0]),
             "disparity": disparity,
             "disparity_foreseen": float(expected),
         }

@@ -14,7 +14,7 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.learners.base import Curves, Panel
-from bns.prior.thinking import Desk, Mind, Thinker, ThinkingSettings
+from bns.prior.model_learner import Memory, ModelLearner, ModelLearnerSettings, Rollouts
 from bns.prior.unknowns import Unknowns, varied
 from bns.worlds.trial import Trial
 
@@ -23,7 +23,7 @@ ARM = 0.1
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModellingSettings(ThinkingSettings):
+class ModellingSettings(ModelLearnerSettings):
     """Settings of learners that look for what is wrong with their model."""
 
     guesses: int = 8
@@ -37,14 +37,14 @@ class ModellingSettings(ThinkingSettings):
     empty = what the task says"""
 
     bounds: ClassVar[Mapping[str, tuple[float, float, str]]] = {
-        **ThinkingSettings.bounds,
+        **ModelLearnerSettings.bounds,
         "guesses": (2, 10_000, "models"),
         "replayed": (1, 10_000, "tests"),
         "fitting": (0, 1, "1"),
     }
 
 
-class ModellingMind(Mind):
+class ModellingMemory(Memory):
     """What one run knows, its guesses at the model among it.
 
     Attributes:
@@ -60,7 +60,7 @@ class ModellingMind(Mind):
         self.guesses, self.model = np.empty((0, len(nominal))), nominal.copy()
 
     def forget(self, newest: int) -> None:
-        """See `Mind.forget`."""
+        """See `Memory.forget`."""
         super().forget(newest)
         self.clues = self.clues[max(len(self.clues) - newest, 0) :]
         self.misses = self.misses[:, max(self.misses.shape[1] - newest, 0) :]
@@ -72,7 +72,7 @@ class ModellingMind(Mind):
         return found
 
 
-class Modeller(Thinker[ModellingMind]):
+class Modeller(ModelLearner[ModellingMemory]):
     """R runs that look for what is wrong with their model; arguments as `Learner`."""
 
     Settings = ModellingSettings
@@ -108,104 +108,114 @@ class Modeller(Thinker[ModellingMind]):
             )
         super().begin()
 
-    def mind(self) -> ModellingMind:
-        """See `Thinker.mind`."""
-        return ModellingMind(self.space.size, self.unknowns.nominal)
+    def memory(self) -> ModellingMemory:
+        """See `ModelLearner.memory`."""
+        return ModellingMemory(self.space.size, self.unknowns.nominal)
 
     @abstractmethod
     def clues(self, trials: Sequence[Trial]) -> np.ndarray:
         """What models are judged by in N trials, ``(N, Q)``, NaN where unseen."""
 
-    def changed(self, mind: ModellingMind) -> None:
-        """See `Thinker.changed`; guesses begin anew."""
-        super().changed(mind)
-        mind.guesses = mind.guesses[:0]
-        mind.misses = mind.misses[:0, :0]
+    def changed(self, memory: ModellingMemory) -> None:
+        """See `ModelLearner.changed`; guesses begin anew."""
+        super().changed(memory)
+        memory.guesses = memory.guesses[:0]
+        memory.misses = memory.misses[:0, :0]
 
-    def prepare(self, mind: ModellingMind, desk: Desk) -> None:
+    def prepare(self, memory: ModellingMemory, rollouts: Rollouts) -> None:
         """Fit the models, then evolve in the best one."""
-        if len(mind.clues):
-            self.fit(mind, desk, desk.room - int(self.rule.fitting * desk.room))
-            self.adopt(mind, desk)
-        self.evolve(mind, desk, self.unknowns.damages(mind.model[None]))
+        if len(memory.clues):
+            self.fit(
+                memory, rollouts, rollouts.room - int(self.rule.fitting * rollouts.room)
+            )
+            self.adopt(memory, rollouts)
+        self.evolve(memory, rollouts, self.unknowns.damages(memory.model[None]))
 
-    def fit(self, mind: ModellingMind, desk: Desk, left: int) -> None:
+    def fit(self, memory: ModellingMemory, rollouts: Rollouts, left: int) -> None:
         """Evolve the guesses on what was seen.
 
         Args:
-            mind: whose guesses.
-            desk: to think at.
+            memory: whose guesses.
+            rollouts: which the model may run.
             left: evaluations to leave.
         """
-        tests = len(mind.clues)
-        if not len(mind.guesses):
-            mind.guesses = self.unknowns.random(self.rule.guesses, desk.rng)
-            mind.misses = np.empty((self.rule.guesses, 0))
-        new = np.arange(mind.misses.shape[1], tests)
-        if desk.room < len(mind.guesses) * len(new):
-            mind.guesses = mind.guesses[:0]  # too little is left to judge anything
-            mind.misses = mind.misses[:0, :0]
+        tests = len(memory.clues)
+        if not len(memory.guesses):
+            memory.guesses = self.unknowns.random(self.rule.guesses, rollouts.rng)
+            memory.misses = np.empty((self.rule.guesses, 0))
+        new = np.arange(memory.misses.shape[1], tests)
+        if rollouts.room < len(memory.guesses) * len(new):
+            memory.guesses = memory.guesses[:0]  # too little is left to judge anything
+            memory.misses = memory.misses[:0, :0]
             return
-        judged = self.judge(mind, desk, mind.guesses, new)
-        mind.misses = np.hstack([mind.misses, judged])
-        while (count := min((desk.room - left) // tests, len(mind.guesses))) > 0:
-            rows = desk.rng.permutation(len(mind.guesses))[:count]
-            points = varied(mind.guesses, mind.miss, rows, desk.rng)
-            misses = self.judge(mind, desk, points, np.arange(tests))
-            better = np.sqrt((misses**2).mean(1)) < mind.miss[rows]
-            mind.guesses[rows[better]] = points[better]
-            mind.misses[rows[better]] = misses[better]
+        judged = self.judge(memory, rollouts, memory.guesses, new)
+        memory.misses = np.hstack([memory.misses, judged])
+        while (count := min((rollouts.room - left) // tests, len(memory.guesses))) > 0:
+            rows = rollouts.rng.permutation(len(memory.guesses))[:count]
+            points = varied(memory.guesses, memory.miss, rows, rollouts.rng)
+            misses = self.judge(memory, rollouts, points, np.arange(tests))
+            better = np.sqrt((misses**2).mean(1)) < memory.miss[rows]
+            memory.guesses[rows[better]] = points[better]
+            memory.misses[rows[better]] = misses[better]
 
     def judge(
-        self, mind: ModellingMind, desk: Desk, points: np.ndarray, tests: np.ndarray
+        self,
+        memory: ModellingMemory,
+        rollouts: Rollouts,
+        points: np.ndarray,
+        tests: np.ndarray,
     ) -> np.ndarray:
         """How far models are from what was seen, ``(N, T)``, each replay charged.
 
         Args:
-            mind: with the clues.
-            desk: to think at.
+            memory: with the clues.
+            rollouts: which the model may run.
             points: guesses, ``(N, P)``.
             tests: rows of the clues.
         """
         if not len(tests):
             return np.empty((len(points), 0))
-        done = mind.tests[len(mind.tests) - len(mind.clues) :][tests]
+        done = memory.tests[len(memory.tests) - len(memory.clues) :][tests]
         genes = np.tile(done, (len(points), 1))
         damages = self.unknowns.damages(np.repeat(points, len(tests), axis=0))
-        made = self.clues(desk.run(genes, damages)).reshape(len(points), len(tests), -1)
-        return away(made, mind.clues[tests])
+        made = self.clues(rollouts.run(genes, damages)).reshape(
+            len(points), len(tests), -1
+        )
+        return away(made, memory.clues[tests])
 
-    def adopt(self, mind: ModellingMind, desk: Desk) -> None:
+    def adopt(self, memory: ModellingMemory, rollouts: Rollouts) -> None:
         """Judge the population anew where another guess is the best one now."""
-        if not len(mind.guesses):
+        if not len(memory.guesses):
             return
-        best = mind.guesses[mind.miss.argmin()]
-        if np.array_equal(best, mind.model) or desk.room < len(mind.genes):
+        best = memory.guesses[memory.miss.argmin()]
+        if np.array_equal(best, memory.model) or rollouts.room < len(memory.genes):
             return
-        mind.model = best.copy()
-        damages = self.unknowns.damages(mind.model[None]) * len(mind.genes)
-        mind.worth = self.task.worth(desk.run(mind.genes, damages))
-        mind.keep(self.survivors(mind))
+        memory.model = best.copy()
+        damages = self.unknowns.damages(memory.model[None]) * len(memory.genes)
+        memory.worth = self.task.worth(rollouts.run(memory.genes, damages))
+        memory.keep(self.survivors(memory))
 
-    def learn(self, mind: ModellingMind, seen: Trial, worth: float) -> dict[str, Any]:
-        """See `Thinker.learn`: what was seen is to be explained."""
+    def learn(
+        self, memory: ModellingMemory, seen: Trial, worth: float
+    ) -> dict[str, Any]:
+        """See `ModelLearner.learn`: what was seen is to be explained."""
         del worth
-        miss = mind.miss.min() if len(mind.guesses) else np.nan
+        miss = memory.miss.min() if len(memory.guesses) else np.nan
         clue = self.clues([seen])
-        mind.clues = np.vstack([mind.clues.reshape(-1, clue.shape[1]), clue])
+        memory.clues = np.vstack([memory.clues.reshape(-1, clue.shape[1]), clue])
         most = self.rule.replayed
-        mind.misses = mind.misses[:, max(len(mind.clues) - most, 0) :]
-        mind.clues = mind.clues[-most:]
-        return {"model_miss": float(miss), "numbers": self.best_guess(mind)}
+        memory.misses = memory.misses[:, max(len(memory.clues) - most, 0) :]
+        memory.clues = memory.clues[-most:]
+        return {"model_miss": float(miss), "numbers": self.best_guess(memory)}
 
-    def best_guess(self, mind: ModellingMind) -> np.ndarray:
+    def best_guess(self, memory: ModellingMemory) -> np.ndarray:
         """What is wrong as far as is known, in the effects' units, ``(P,)``.
 
         Where nothing was fitted yet, nothing is.
         """
-        if not len(mind.guesses):
-            return self.unknowns.values(mind.model)
-        return self.unknowns.values(mind.guesses[mind.miss.argmin()])
+        if not len(memory.guesses):
+            return self.unknowns.values(memory.model)
+        return self.unknowns.values(memory.guesses[memory.miss.argmin()])
 
 
 def places(trials: Sequence[Trial], most: int = 0) -> np.ndarray:

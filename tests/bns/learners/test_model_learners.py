@@ -1,4 +1,4 @@
-"""Learners that think in a model, on robots whose damage is planted."""
+"""Learners that evolve controllers in a model, on robots whose damage is planted."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ from tests.bns.walkers import Slider
 SLOW = "wheel_gain:wheel=left,factor=0.8"
 FITTING = ("anytime", "back_to_reality", "self_modelling")
 TRANSFERRING = ("transferability", "t_resilience")
-THINKING = FITTING + TRANSFERRING
+EVOLVING = FITTING + TRANSFERRING
 
 
 def wheels(damage=()):
@@ -50,8 +50,8 @@ def test_the_wheel_that_is_slow_is_found(learner):
     own = {"first": 30, "each": 200, "replayed": 6}
     made, _ = batch(learner, wheels([SLOW]), wheels(), runs=3, **own)
     misses = [made.advance(trial)[0].columns["model_miss"] for trial in range(9)]
-    minds = made.learner.minds
-    found = np.median([made.learner.best_guess(mind) for mind in minds], axis=0)
+    memories = made.learner.memories
+    found = np.median([made.learner.best_guess(memory) for memory in memories], axis=0)
     np.testing.assert_allclose(found, [0.8, 1.0], atol=0.06)
     assert np.median(misses[-1]) < 0.5 * np.median(misses[2]) or learner != "anytime"
 
@@ -76,11 +76,11 @@ def test_a_leg_that_is_held_up_is_named_by_self_modelling():
     for trial in range(9):
         made.advance(trial)
     learner = made.learner
-    named = [learner.best_guess(mind).argmax() for mind in learner.minds]
+    named = [learner.best_guess(memory).argmax() for memory in learner.memories]
     assert named.count(2) >= 2
 
 
-@pytest.mark.parametrize("learner", THINKING)
+@pytest.mark.parametrize("learner", EVOLVING)
 def test_each_spends_what_it_may_and_then_goes_on_without(learner):
     own = {"first": 40, "each": 30}
     made, models = batch(learner, wheels([SLOW]), wheels(), most=100, **own)
@@ -89,10 +89,10 @@ def test_each_spends_what_it_may_and_then_goes_on_without(learner):
         made.advance(trial)
         spent.append(models[0].spent)
     assert 0 < spent[0] <= 40 and spent[1] <= spent[0] + 30
-    assert spent[-1] <= 100 and np.isfinite(made.learner.minds[0].seen).all()
+    assert spent[-1] <= 100 and np.isfinite(made.learner.memories[0].seen).all()
 
 
-@pytest.mark.parametrize("learner", THINKING)
+@pytest.mark.parametrize("learner", EVOLVING)
 def test_deployed_is_the_best_that_was_seen_since_the_robot_changed(learner):
     own = {"first": 60, "each": 40}
     late = [SLOW + "@3"]
@@ -100,18 +100,18 @@ def test_deployed_is_the_best_that_was_seen_since_the_robot_changed(learner):
     for trial in range(8):
         step, _ = made.advance(trial)
         if trial == 3:
-            mind = made.learner.minds[0]
-            assert len(mind.seen) == 4
-            before = mind.tests[mind.seen.argmax()]
-            newest = mind.tests[-1]
-    mind = made.learner.minds[0]
-    assert len(mind.seen) == 5  # the first with the damage is remembered
-    np.testing.assert_array_equal(mind.tests[0], newest)
-    assert (mind.tests[:2] == before).all(1).any()  # what was deployed is tried again
-    best = mind.tests[mind.seen.argmax()]
-    np.testing.assert_array_equal(made.learner.deployed(mind), best)
+            memory = made.learner.memories[0]
+            assert len(memory.seen) == 4
+            before = memory.tests[memory.seen.argmax()]
+            newest = memory.tests[-1]
+    memory = made.learner.memories[0]
+    assert len(memory.seen) == 5  # the first with the damage is remembered
+    np.testing.assert_array_equal(memory.tests[0], newest)
+    assert (memory.tests[:2] == before).all(1).any()  # what was deployed is tried again
+    best = memory.tests[memory.seen.argmax()]
+    np.testing.assert_array_equal(made.learner.deployed(memory), best)
     worth = -step.columns["fitness_best"][0]
-    assert worth == pytest.approx(mind.seen[:-1].max(), rel=1e-5)
+    assert worth == pytest.approx(memory.seen[:-1].max(), rel=1e-5)
 
 
 def test_told_never_nothing_is_forgotten_but_the_oldest():
@@ -120,7 +120,7 @@ def test_told_never_nothing_is_forgotten_but_the_oldest():
     made, _ = batch("t_resilience", wheels(late), wheels(), runs=1, damage=late, **own)
     for trial in range(8):
         made.advance(trial)
-    assert len(made.learner.minds[0].seen) == 6
+    assert len(made.learner.memories[0].seen) == 6
 
 
 class Forked:
@@ -145,11 +145,11 @@ def test_t_resilience_learns_what_transfers_and_chooses_it():
     rows = [made.advance(trial)[0].columns for trial in range(25)]
     learner, deployed = made.learner, np.sqrt(-rows[-1]["fitness_best"]) / 100
     alone = []
-    for mind in learner.minds:
-        best = learner.controllers(mind.genes[[mind.worth.argmax()]])
+    for memory in learner.memories:
+        best = learner.controllers(memory.genes[[memory.worth.argmax()]])
         alone.append(learner.task.worth(Forked().run(best))[0])
     assert np.median(deployed) > 1.3 * np.median(alone)
-    expected = learner.expected(learner.minds[0], learner.minds[0].done)
+    expected = learner.expected(learner.memories[0], learner.memories[0].done)
     assert expected.std() > 0
 
 

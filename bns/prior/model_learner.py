@@ -1,6 +1,6 @@
 """Learners that evolve controllers in a model of the robot: what they share.
 
-Before each trial a learner thinks: it evolves a population of controllers in its model,
+Before each trial a learner evolves a population of controllers in its model,
 of which it may run `each` a trial. One of them is tried on the robot. Deployed is the
 best one that was seen to work since the robot changed; before anything was seen, the
 one that the model likes best.
@@ -24,7 +24,7 @@ from bns.worlds.world import CountedWorld
 
 
 @dataclass(frozen=True, kw_only=True)
-class ThinkingSettings(LearnerSettings):
+class ModelLearnerSettings(LearnerSettings):
     """Settings of learners that evolve controllers in a model."""
 
     population: int = 10
@@ -47,7 +47,7 @@ class ThinkingSettings(LearnerSettings):
     }
 
 
-class Mind:
+class Memory:
     """What one run knows; all attributes are arrays.
 
     Attributes:
@@ -81,11 +81,11 @@ class Mind:
         return found
 
 
-MindT = TypeVar("MindT", bound=Mind)
+MemoryT = TypeVar("MemoryT", bound=Memory)
 
 
-class Desk:
-    """A run's model while it thinks before one trial.
+class Rollouts:
+    """A run's model and what of it may be run before one trial.
 
     Args:
         task: what is learned.
@@ -137,10 +137,10 @@ def controllers(space: Space, genes: np.ndarray) -> list[Any]:
     return space.controllers(space.low + genes * (space.high - space.low))
 
 
-class Thinker(Learner, Generic[MindT]):
+class ModelLearner(Learner, Generic[MemoryT]):
     """R runs that evolve controllers in a model; arguments as `Learner`."""
 
-    Settings: ClassVar[type[LearnerSettings]] = ThinkingSettings
+    Settings: ClassVar[type[LearnerSettings]] = ModelLearnerSettings
     needs_model = True
     deploys = True
 
@@ -148,95 +148,101 @@ class Thinker(Learner, Generic[MindT]):
         """See `Learner.begin`."""
         self.rule: Any = self.config.settings
         self.space = self.task.searched
-        self.minds: list[MindT] = [self.mind() for _ in range(self.runs)]
+        self.memories: list[MemoryT] = [self.memory() for _ in range(self.runs)]
 
     @abstractmethod
-    def mind(self) -> MindT:
+    def memory(self) -> MemoryT:
         """What a run knows at first."""
 
     def propose(self, trial: int) -> Proposal[Any]:
         """See `Learner.propose`."""
         most = self.rule.first if trial == 0 else self.rule.each
         best = []
-        for run, mind in enumerate(self.minds):
+        for run, memory in enumerate(self.memories):
             if self.rule.told == "onset" and trial == self.onsets[run] + 1 > 0:
-                self.changed(mind)
+                self.changed(memory)
             names = (self.config.learner, self.replicates[run], trial)
             rng = seeding.generator(self.config.seed, *names)
-            desk = Desk(self.task, self.space, self.models[run], most, rng)
-            self.prepare(mind, desk)
-            if len(mind.waiting):
-                mind.tried, mind.waiting = mind.waiting[0], mind.waiting[:0]
+            rollouts = Rollouts(self.task, self.space, self.models[run], most, rng)
+            self.prepare(memory, rollouts)
+            if len(memory.waiting):
+                memory.tried, memory.waiting = memory.waiting[0], memory.waiting[:0]
             else:
-                mind.tried = self.chosen(mind, desk, trial)
-            best.append(self.deployed(mind))
-        tried = np.stack([mind.tried for mind in self.minds])
+                memory.tried = self.chosen(memory, rollouts, trial)
+            best.append(self.deployed(memory))
+        tried = np.stack([memory.tried for memory in self.memories])
         return Proposal(self.controllers(tried), self.controllers(np.stack(best)))
 
     def controllers(self, genes: np.ndarray) -> list[Any]:
         """Controllers of genes ``(N, D)``, each from 0 to 1."""
         return controllers(self.space, genes)
 
-    def changed(self, mind: MindT) -> None:
+    def changed(self, memory: MemoryT) -> None:
         """The newest trial was the first of a robot that is another one.
 
         What was deployed is tried first: it may work still.
         """
-        best = int(mind.seen.argmax())
-        if best < len(mind.seen) - 1:
-            mind.waiting = mind.tests[[best]]
-        mind.forget(newest=1)
+        best = int(memory.seen.argmax())
+        if best < len(memory.seen) - 1:
+            memory.waiting = memory.tests[[best]]
+        memory.forget(newest=1)
 
-    def prepare(self, mind: MindT, desk: Desk) -> None:
-        """Evolve, as far as the desk's evaluations go."""
-        self.evolve(mind, desk)
+    def prepare(self, memory: MemoryT, rollouts: Rollouts) -> None:
+        """Evolve, as far as the rollouts go."""
+        self.evolve(memory, rollouts)
 
-    def evolve(self, mind: MindT, desk: Desk, damages: Sequence[Damage] = ()) -> None:
-        """Generations in the model until the desk's evaluations are spent.
+    def evolve(
+        self, memory: MemoryT, rollouts: Rollouts, damages: Sequence[Damage] = ()
+    ) -> None:
+        """Generations in the model until the rollouts are spent.
 
         Args:
-            mind: whose population.
-            desk: to think at.
+            memory: whose population.
+            rollouts: which the model may run.
             damages: the one that the model's robot has, if any.
         """
-        while desk.room:
-            count = min(self.rule.population, desk.room)
-            fresh = not len(mind.genes)
-            genes = desk.random(count) if fresh else bred(mind.genes, count, desk.rng)
-            trials = desk.run(genes, [*damages] * count)
-            self.add(mind, genes, trials)
-            mind.keep(self.survivors(mind)[: self.rule.population])
+        while rollouts.room:
+            count = min(self.rule.population, rollouts.room)
+            fresh = not len(memory.genes)
+            genes = (
+                rollouts.random(count)
+                if fresh
+                else bred(memory.genes, count, rollouts.rng)
+            )
+            trials = rollouts.run(genes, [*damages] * count)
+            self.add(memory, genes, trials)
+            memory.keep(self.survivors(memory)[: self.rule.population])
 
-    def add(self, mind: MindT, genes: np.ndarray, trials: Sequence[Trial]) -> None:
+    def add(self, memory: MemoryT, genes: np.ndarray, trials: Sequence[Trial]) -> None:
         """Put controllers that the model ran into a population.
 
         Args:
-            mind: whose population.
+            memory: whose population.
             genes: theirs, ``(N, D)``.
             trials: in the model, N.
         """
-        mind.genes = np.vstack([mind.genes, genes])
-        mind.worth = np.append(mind.worth, self.task.worth(trials))
+        memory.genes = np.vstack([memory.genes, genes])
+        memory.worth = np.append(memory.worth, self.task.worth(trials))
 
-    def survivors(self, mind: MindT) -> np.ndarray:
+    def survivors(self, memory: MemoryT) -> np.ndarray:
         """Rows of the population, ``(P,)``, the first to survive first."""
-        return np.argsort(-mind.worth, kind="stable")
+        return np.argsort(-memory.worth, kind="stable")
 
     @abstractmethod
-    def chosen(self, mind: MindT, desk: Desk, trial: int) -> np.ndarray:
+    def chosen(self, memory: MemoryT, rollouts: Rollouts, trial: int) -> np.ndarray:
         """Genes to try, ``(D,)``.
 
         Args:
-            mind: of the run.
-            desk: with what is left of the trial's evaluations.
+            memory: of the run.
+            rollouts: with what is left of the trial's evaluations.
             trial: its number.
         """
 
-    def deployed(self, mind: MindT) -> np.ndarray:
+    def deployed(self, memory: MemoryT) -> np.ndarray:
         """Genes of what a user would run now, ``(D,)``."""
-        if len(mind.seen):
-            return cast(np.ndarray, mind.tests[mind.seen.argmax()])
-        return cast(np.ndarray, mind.genes[mind.worth.argmax()])
+        if len(memory.seen):
+            return cast(np.ndarray, memory.tests[memory.seen.argmax()])
+        return cast(np.ndarray, memory.genes[memory.worth.argmax()])
 
     def observe(
         self, trial: int, tried: Sequence[Trial], best: Sequence[Trial] | None
@@ -244,20 +250,20 @@ class Thinker(Learner, Generic[MindT]):
         """See `Learner.observe`."""
         del trial, best
         worth, rows = self.task.worth(tried), []
-        for mind, seen, value in zip(self.minds, tried, worth, strict=True):
-            rows.append(self.learn(mind, seen, float(value)))
-            mind.tests = np.vstack([mind.tests, mind.tried])
-            mind.seen = np.append(mind.seen, value)
-            mind.forget(self.rule.remembered)
+        for memory, seen, value in zip(self.memories, tried, worth, strict=True):
+            rows.append(self.learn(memory, seen, float(value)))
+            memory.tests = np.vstack([memory.tests, memory.tried])
+            memory.seen = np.append(memory.seen, value)
+            memory.forget(self.rule.remembered)
         columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         return {"worth_seen": worth, **columns}
 
     @abstractmethod
-    def learn(self, mind: MindT, seen: Trial, worth: float) -> dict[str, Any]:
+    def learn(self, memory: MemoryT, seen: Trial, worth: float) -> dict[str, Any]:
         """Learn from a trial, before it is remembered as a test.
 
         Args:
-            mind: of the run.
+            memory: of the run.
             seen: the trial.
             worth: what it achieved.
 
@@ -268,14 +274,14 @@ class Thinker(Learner, Generic[MindT]):
     def state(self) -> dict[str, np.ndarray]:
         """See `Learner.state`: all that each run knows, and what models have spent."""
         found = {"spent": np.array([model.spent for model in self.models], np.int64)}
-        for run, mind in enumerate(self.minds):
-            found |= {f"{run}.{name}": array for name, array in vars(mind).items()}
+        for run, memory in enumerate(self.memories):
+            found |= {f"{run}.{name}": array for name, array in vars(memory).items()}
         return found
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """See `Learner.restore`."""
-        for run, mind in enumerate(self.minds):
-            for name in vars(mind):
-                setattr(mind, name, arrays[f"{run}.{name}"].copy())
+        for run, memory in enumerate(self.memories):
+            for name in vars(memory):
+                setattr(memory, name, arrays[f"{run}.{name}"].copy())
         for model, spent in zip(self.models, arrays["spent"], strict=True):
             model.spent = int(spent)
