@@ -1,6 +1,7 @@
 """Which effects hold for one robot in one trial, sorted by stage."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -20,6 +21,7 @@ from bns.worlds.effects.base import (
     TrackingEffect,
 )
 
+WorldT = TypeVar("WorldT", bound=Any)
 EffectT = TypeVar("EffectT", bound=Effect, covariant=True)
 
 
@@ -197,3 +199,27 @@ def refuse(damage: Damage, *, stages: Iterable[str], kind: str, world: str) -> N
             raise BnsError(
                 f"Effect {effect.name!r} is for {able}; this robot is {kind}."
             )
+
+
+def having(
+    world: WorldT, damages: Sequence[Damage], stages: Iterable[str], kind: str
+) -> WorldT:
+    """A world like another, but for its damage.
+
+    Whether the robots can stand is not asked: it is for those who try out what may be
+    wrong with a robot.
+
+    Args:
+        world: whose damage is its attribute `damage`.
+        damages: one for each robot.
+        stages, kind: see `refuse`.
+
+    Raises:
+        BnsError: an effect that the world cannot have.
+    """
+    stages = tuple(stages)
+    for damage in damages:
+        refuse(damage, stages=stages, kind=kind, world=world.name)
+    other = copy(world)
+    other.damage = tuple(damages)
+    return other

@@ -1,10 +1,14 @@
 """The `World` protocol: all that a learner may know of reality; worlds that count."""
 
 from collections.abc import Sequence
-from typing import Any, Protocol, runtime_checkable
+from copy import copy
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from bns.errors import BnsError
 from bns.worlds.trial import Commands, Trial
+
+if TYPE_CHECKING:
+    from bns.worlds.damage import Damage
 
 
 @runtime_checkable
@@ -81,11 +85,33 @@ class CountedWorld:
     def __init__(self, world: World, limit: int):
         self._world, self.limit, self.spent = world, limit, 0
         self.name, self.robot = world.name, world.robot
+        self._payer = self
 
     @property
     def left(self) -> int:
         """Executions that may still be spent."""
         return max(self.limit - self.spent, 0)
+
+    def having(self, damages: "Sequence[Damage]") -> "CountedWorld":
+        """The same model, each of its robots with something else wrong with it.
+
+        What is executed there is charged here.
+
+        Args:
+            damages: one for each robot of the next `run`.
+
+        Raises:
+            BnsError: a model that has no effects, or not these.
+        """
+        able = getattr(self._world, "having", None)
+        if able is None:
+            raise BnsError(
+                f"The model world {self.name!r} cannot be changed by effects: give "
+                "--prior.world mujoco or hexapod."
+            )
+        other = copy(self)
+        other._world = able(damages)
+        return other
 
     def run(
         self, commands: Sequence[Commands], *, trial: int = 0, seeds: Sequence[int] = ()
@@ -95,7 +121,7 @@ class CountedWorld:
         Raises:
             BudgetSpentError: more than what is left; nothing is executed or charged.
         """
-        self._charge(len(commands))
+        self._payer._charge(len(commands))
         return self._world.run(commands, trial=trial, seeds=seeds)
 
     def drive(self, policy: Any, **settings: Any) -> list[Trial]:
@@ -111,7 +137,7 @@ class CountedWorld:
                 f"The model world {self.name!r} has no closed loops: give "
                 "--prior.world light."
             )
-        self._charge(len(policy))
+        self._payer._charge(len(policy))
         driven: list[Trial] = drive(policy, **settings)
         return driven
 

@@ -84,8 +84,8 @@ class Learner(ABC):
             none where `prior.world` is empty.
 
     Raises:
-        BnsError: configurations that cannot share a batch, or a setting that the
-            learner or the task cannot be with.
+        BnsError: configurations that cannot share a batch, a setting that the learner
+            or the task cannot be with, or no model where one is needed.
     """
 
     Settings: ClassVar[type[LearnerSettings]] = LearnerSettings
@@ -96,6 +96,11 @@ class Learner(ABC):
     """per-trial figures that `observe` gives for every task, with their meaning"""
     figures: ClassVar[tuple[Curves | str, ...]] = ()
     """what a report shows of it: own columns, or figures of `bns.viz.figures`"""
+
+    needs_model: ClassVar[bool] = False
+    """whether it is nothing without a model world (`prior.world`)"""
+    open_loop: ClassVar[bool] = False
+    """whether it knows lists of commands alone, and no controllers that steer"""
 
     deploys: bool = False
     """whether `Proposal.best` is what a user would run, and its figures are recorded
@@ -114,7 +119,22 @@ class Learner(ABC):
         self.replicates, self.models = list(replicates), list(models)
         self.onsets = list(onsets)
         self.task: Task = tasks.of(configs[0])
+        self._check_known()
         self.begin()
+
+    def _check_known(self) -> None:
+        """Refuse a task or a prior with which it is nothing."""
+        name = f"The learner {self.config.learner!r}"
+        if self.open_loop and self.task.closed_loop:
+            raise BnsError(
+                f"{name} knows lists of commands; in the task "
+                f"{self.config.task.name!r} robots steer: take another learner."
+            )
+        if self.needs_model and not self.models:
+            raise BnsError(
+                f"{name} thinks in a model of the robot: give --prior.world mujoco, "
+                "light, hexapod or static-snn."
+            )
 
     def begin(self) -> None:  # noqa: B027 (nothing to do is the default)
         """Make what the first trial needs, once configurations and task are known."""

@@ -167,11 +167,6 @@ class Ite(Learner):
         elif not self.models:
             self.maps = [self._blank(replicate) for replicate in self.replicates]
 
-    @property
-    def _searched(self) -> Space:
-        """Where maps are made here: the smallest space of controllers."""
-        return min(self.task.genotypes.values(), key=lambda space: space.size)
-
     def _map(self, space: Space, vectors: Any, behaviours: Any, worth: Any) -> Map:
         if self.task.from_zero:
             return Map(space, vectors, behaviours, worth)
@@ -181,7 +176,7 @@ class Ite(Learner):
 
     def _blank(self, replicate: int) -> Map:
         """Random controllers of which nothing is known, near if their genes are."""
-        space = self._searched
+        space = self.task.searched
         rng = seeding.generator(self.config.seed, "ite", replicate)
         vectors = space.random(self.rule.candidates, rng)
         width = np.maximum(space.high - space.low, 1e-12)
@@ -191,7 +186,7 @@ class Ite(Learner):
 
     def _explore(self, replicate: int, model: CountedWorld) -> Archive:
         """A small map, made with all evaluations of a run's model."""
-        space, archive = self._searched, None
+        space, archive = self.task.searched, None
         width, generation = np.maximum(space.high - space.low, 1e-12), 0
         while model.left:
             count = min(BATCH, model.left)
@@ -220,7 +215,7 @@ class Ite(Learner):
 
     def _take(self, made: Sequence[Sequence[np.ndarray]]) -> None:
         """Use maps made here: genes, behaviours and worth of each run."""
-        space = self._searched
+        space = self.task.searched
         width = space.high - space.low
         self.maps = [
             self._map(space, space.low + genes * width, behaviours, worth[:, 0])

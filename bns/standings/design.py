@@ -147,6 +147,9 @@ class Rival:
 
 _SEEN = {"deploy": "seen"}
 _OWN = {"walk": "hexapod-recover"}
+_MODELS = ("P1", "P2")
+_LISTS = ("walk", "navigate")
+"""tasks in which controllers are lists of commands, to be replayed in a model"""
 RIVALS = {
     "bns": Rival(learner="bns", presets=_OWN, settings=_SEEN),
     "hybrid": Rival(
@@ -159,6 +162,11 @@ RIVALS = {
     "cma": Rival(learner="cma", priors=("P0", "P1", "P2")),
     "ite": Rival(learner="ite", priors=("P0", "P1", "P2"), repertoire=True),
     "safe_ite": Rival(learner="safe_ite", priors=("P1", "P2"), repertoire=True),
+    "t_resilience": Rival(learner="t_resilience", priors=_MODELS),
+    "transferability": Rival(learner="transferability", priors=_MODELS),
+    "anytime": Rival(learner="anytime", priors=_MODELS, tasks=_LISTS),
+    "self_modelling": Rival(learner="self_modelling", priors=_MODELS, tasks=_LISTS),
+    "back_to_reality": Rival(learner="back_to_reality", priors=_MODELS, tasks=_LISTS),
 }
 """those that are there; any other learner takes part by its own name"""
 

@@ -187,6 +187,19 @@ class Task(ABC):
         """Spaces that hold some or all controllers, by name; `space` is "vector"."""
         return {"vector": self.space}
 
+    @property
+    def searched(self) -> Space:
+        """The smallest of `genotypes`: where learners search that have the choice."""
+        return min(self.genotypes.values(), key=lambda space: space.size)
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """What may be wrong with its robots, for learners that fit their model.
+
+        Effects as text with a range, "wheel_gain:wheel=left,factor=0.2..1.2".
+        """
+        return ()
+
     def behaviour(self, trials: Sequence[Trial]) -> np.ndarray:
         """How, not how well, N trials went: ``(N, B)``, each from 0 to 1.
 

@@ -232,6 +232,12 @@ class WheeledTask(Task):
         """Where the robot starts."""
         return {"start": self.path_goal().start}
 
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """The gains of both wheels."""
+        gain = "wheel_gain:wheel={},factor=0.2..1.2"
+        return tuple(gain.format(side) for side in ("left", "right"))
+
     def problem(self) -> "type[Problem]":
         """See `Task.problem`."""
         from bns.learners.bns.navigation import WheeledProblem

@@ -138,6 +138,13 @@ class WalkTask(Task):
         told = np.stack([trial.commands.values for trial in trials])
         return down(told, np.array(femurs))
 
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """How far each leg is held up."""
+        names = [channel.name.rpartition("_")[0] for channel in self.goals.channels]
+        legs = dict.fromkeys(names)
+        return tuple(f"leg_raised:legs={leg},blend=0..1" for leg in legs)
+
     def measured(self, tried: Sequence[Trial]) -> Arrays:
         """See `Task.measured`; sent are goals ``(R, K, C)`` [rad]."""
         ways, walk = of_trials(tried), self.config.walk

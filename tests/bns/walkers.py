@@ -5,25 +5,44 @@ from dataclasses import replace
 import numpy as np
 
 from bns import presets
+from bns.worlds.damage import Damage
 from bns.worlds.trial import Trial
 
 STRIDE = 0.05
 """[m/rad] the body moves forward by so much per radian that the coxae go back"""
 
+SIDES = np.array([3.0, -3.0, 2.0, -2.0, 1.0, -1.0])
+
 
 class Slider:
-    """Each command moves the body ahead by what the six coxae go back on average."""
+    """Each command moves the body ahead by what the six coxae go back on average.
+
+    Legs that are held up do not push, and the body turns to their side.
+    """
 
     name, robot = "slider", "phantomx"
 
-    def run(self, commands, *, trial=0, seeds=()):
-        return [self._one(item) for item in commands]
+    def __init__(self, damages=(), **told):
+        self.damages = damages
 
-    def _one(self, commands):
+    def having(self, damages):
+        return Slider(damages)
+
+    def run(self, commands, *, trial=0, seeds=()):
+        damages = self.damages or [Damage.none()] * len(commands)
+        return [self._one(*both) for both in zip(commands, damages, strict=True)]
+
+    def _one(self, commands, damage):
+        push = np.ones(6)
+        for effect in (event.effect for event in damage.events):
+            for leg in str(effect["legs"]).split(","):
+                push[int(leg) - 1] -= effect["blend"]
         coxae = np.vstack([np.zeros(6), commands.values[:, ::3]])
-        steps = -STRIDE * np.abs(np.diff(coxae, axis=0)).mean(axis=1)
+        ways = np.abs(np.diff(coxae, axis=0)) * push
+        steps = -STRIDE * ways.mean(axis=1)
         poses = np.zeros((len(commands) + 1, 3))
         poses[1:, 0] = np.cumsum(steps)
+        poses[1:, 1] = STRIDE * np.cumsum(ways @ ((1 - push) * SIDES))
         count = len(poses)
         return Trial(
             commands, np.arange(count), poses, np.arange(count), robot="phantomx"

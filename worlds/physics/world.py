@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, ClassVar, Generic, TypedDict, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypedDict, TypeVar
 
 import mujoco
 
@@ -128,6 +128,10 @@ class PhysicsWorld(ABC, Generic[PlanT]):
             self._plan(item, damage, trial, seed)
             for item, damage, seed in zip(commands, damages, seeds, strict=True)
         ]
+
+    def having(self, damages: Sequence[Damage]) -> Self:
+        """The same world with other damage, see `active.having`."""
+        return active.having(self, damages, self.stages, self.model.kind)
 
     @abstractmethod
     def motions(self, plans: Sequence[PlanT]) -> list[Any]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -93,6 +94,10 @@ class StaticSnnWorld:
             self._run(item, damage, trial, seed)
             for item, damage, seed in zip(commands, damages, seeds, strict=True)
         ]
+
+    def having(self, damages: Sequence[Damage]) -> Self:
+        """The same world with other damage, see `active.having`."""
+        return active.having(self, damages, STAGES, self.model.kind)
 
     def _run(self, commands: Commands, damage: Damage, trial: int, seed: int) -> Trial:
         control.check(commands, self.model.channels, self._limits, self.robot)

@@ -11,6 +11,7 @@ from bns.experiment.batch import Batch
 from bns.experiment.config import LearnerSettings
 from bns.experiment.loading import from_mapping, to_mapping, with_learner
 from bns.experiment.run import train
+from bns.experiment.world_factory import make_models
 from bns.learners import registry
 from bns.learners.base import Curves
 from bns.learners.bns.config import AdaptationConfig
@@ -28,7 +29,27 @@ PRESETS = {
     "walk": "hexapod-walk",
 }
 THINKING = ("cma", "ite", "safe_ite")
-"""learners that are tried with a model; all are without one, too"""
+"""learners that are tried with a model, too; others are nothing without one"""
+KNOWN = [
+    (name, task)
+    for name in LEARNERS
+    for task in PRESETS
+    if not (task == "light" and registry.get(name).open_loop)
+]
+
+
+def _ideal(*, robot, damage, reality, start, **others):
+    told = {"robot": robot, "damage": damage, "reality": reality, "start": start}
+    return worlds.make("static-snn", **told)
+
+
+MODELS = {
+    "navigation": ("test-ideal", _ideal),
+    "light": ("test-light", lambda **told: FakeLightWorld()),
+    "walk": ("test-slider", lambda **told: Slider()),
+}
+for model in MODELS.values():
+    worlds.register(*model)
 GIVEN = {"columns": ("fitness", "fitness_best", "solved", "reached", "commands")}
 
 
@@ -41,6 +62,9 @@ def small(learner: str, task: str):
         sizes = {"population": 12, "generations": 2, "tournament": 3}
         evolution = {f"evolution.{name}": size for name, size in sizes.items()}
         config = config.with_({**evolution, "snn.epochs": 4, "compiled": "no"})
+    if registry.get(learner).needs_model:
+        prior = {"prior.world": MODELS[task][0], "prior.evaluations": 200}
+        config = config.with_({**prior, "settings.first": 20, "settings.each": 40})
     return replace(config, trials=4, replicates=2, record_replicates=1, threads=1)
 
 
@@ -53,12 +77,14 @@ def world(task: str, **settings) -> World:
 def made(config, task: str, **settings):
     """A learner of the configuration's runs, with a model where it wants one."""
     runs = config.replicates
-    models = [CountedWorld(world(task), 60) for _ in range(runs)]
+    models = make_models(config)
+    if config.learner in THINKING:
+        models = [CountedWorld(world(task), 60) for _ in range(runs)]
     return registry.get(config.learner)(
         [config] * runs,
         replicates=range(runs),
         onsets=[-1] * runs,
-        models=models if config.learner in THINKING else (),
+        models=models,
         **settings,
     )
 
@@ -77,8 +103,7 @@ def advance(learner, task: str, trials: range) -> list[dict[str, np.ndarray]]:
     return rows
 
 
-@pytest.mark.parametrize("task", PRESETS)
-@pytest.mark.parametrize("name", LEARNERS)
+@pytest.mark.parametrize(("name", "task"), KNOWN)
 class TestEveryLearnerOnEveryTask:
     def test_the_same_seed_gives_the_same_and_another_one_another(self, name, task):
         first, again = (
@@ -120,7 +145,7 @@ class TestEveryLearnerOnEveryTask:
 
         monkeypatch.setattr(kind, "observe", listen)
         config = small(name, task)
-        batch = Batch([config], [Telling(world(task))])
+        batch = Batch([config], [Telling(world(task))], models=make_models(config))
         batch.advance(0)
         batch.advance(1)
         assert len(heard) >= 4
@@ -201,6 +226,21 @@ class TestRefused:
     def test_an_unknown_learner(self):
         with pytest.raises(UnknownNameError, match="learner"):
             train(replace(small("bns", "navigation"), learner="bsn"))
+
+    @pytest.mark.parametrize(
+        "name", [name for name in LEARNERS if registry.get(name).needs_model]
+    )
+    def test_no_model_where_one_is_needed(self, name):
+        config = small(name, "navigation").with_({"prior.world": ""})
+        with pytest.raises(BnsError, match=r"give --prior\.world"):
+            made(config, "navigation")
+
+    @pytest.mark.parametrize(
+        "name", [name for name in LEARNERS if registry.get(name).open_loop]
+    )
+    def test_a_task_that_it_does_not_know(self, name):
+        with pytest.raises(BnsError, match="take another learner"):
+            made(small(name, "light"), "light")
 
     def test_a_task_in_the_place_of_a_learner(self):
         with pytest.raises(BnsError, match=r"give --task\.name"):

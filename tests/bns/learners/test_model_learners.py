@@ -1,0 +1,177 @@
+"""Learners that evolve controllers in a model, on robots whose damage is planted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bns import presets
+from bns.errors import BnsError
+from bns.experiment.batch import Batch
+from bns.experiment.loading import with_learner
+from bns.learners import registry
+from bns.worlds import registry as worlds
+from bns.worlds.damage import Damage
+from bns.worlds.world import CountedWorld
+from tests.bns.walkers import Slider
+
+SLOW = "wheel_gain:wheel=left,factor=0.8"
+FITTING = ("anytime", "back_to_reality", "self_modelling")
+TRANSFERRING = ("transferability", "t_resilience")
+EVOLVING = FITTING + TRANSFERRING
+
+
+def wheels(damage=()):
+    start = (0.0, 0.0, 0.0)
+    return worlds.make("static-snn", robot="khepera3", damage=damage, start=start)
+
+
+def batch(
+    learner,
+    world,
+    model,
+    *,
+    runs=2,
+    most=5000,
+    preset="khepera-simple",
+    damage=(),
+    **own,
+):
+    """Runs in a world, each with a model of its own."""
+    base = replace(presets.load(preset), replicates=runs, trials=40, threads=1)
+    told = {f"settings.{name}": value for name, value in own.items()}
+    config = with_learner(base, learner).with_({**told, "world.damage": damage})
+    models = [CountedWorld(model, most) for _ in range(runs)]
+    return Batch([config], [world], models=models), models
+
+
+@pytest.mark.parametrize("learner", FITTING)
+def test_the_wheel_that_is_slow_is_found(learner):
+    own = {"first": 30, "each": 200, "replayed": 6}
+    made, _ = batch(learner, wheels([SLOW]), wheels(), runs=3, **own)
+    misses = [made.advance(trial)[0].columns["model_miss"] for trial in range(9)]
+    memories = made.learner.memories
+    found = np.median([made.learner.best_guess(memory) for memory in memories], axis=0)
+    np.testing.assert_allclose(found, [0.8, 1.0], atol=0.06)
+    assert np.median(misses[-1]) < 0.5 * np.median(misses[2]) or learner != "anytime"
+
+
+def test_what_is_no_number_of_the_model_is_not_explained():
+    late = "command_latency:delay=0.3"
+    misses = {}
+    for damage in (SLOW, late):
+        own = {"first": 30, "each": 200, "replayed": 6}
+        made, _ = batch("self_modelling", wheels([damage]), wheels(), runs=1, **own)
+        rows = [made.advance(trial)[0].columns["model_miss"] for trial in range(9)]
+        misses[damage] = float(rows[-1][0])
+    assert misses[late] > 2 * misses[SLOW]
+
+
+def test_a_leg_that_is_held_up_is_named_by_self_modelling():
+    raised = Slider([Damage.parse(["leg_raised:legs=3,blend=1"])] * 3)
+    own = {"first": 20, "each": 400}
+    made, _ = batch(
+        "self_modelling", raised, Slider(), runs=3, preset="hexapod-walk", **own
+    )
+    for trial in range(9):
+        made.advance(trial)
+    learner = made.learner
+    named = [learner.best_guess(memory).argmax() for memory in learner.memories]
+    assert named.count(2) >= 2
+
+
+@pytest.mark.parametrize("learner", EVOLVING)
+def test_each_spends_what_it_may_and_then_goes_on_without(learner):
+    own = {"first": 40, "each": 30}
+    made, models = batch(learner, wheels([SLOW]), wheels(), most=100, **own)
+    spent = []
+    for trial in range(5):
+        made.advance(trial)
+        spent.append(models[0].spent)
+    assert 0 < spent[0] <= 40 and spent[1] <= spent[0] + 30
+    assert spent[-1] <= 100 and np.isfinite(made.learner.memories[0].seen).all()
+
+
+@pytest.mark.parametrize("learner", EVOLVING)
+def test_deployed_is_the_best_that_was_seen_since_the_robot_changed(learner):
+    own = {"first": 60, "each": 40}
+    late = [SLOW + "@3"]
+    made, _ = batch(learner, wheels(late), wheels(), runs=1, damage=late, **own)
+    for trial in range(8):
+        step, _ = made.advance(trial)
+        if trial == 3:
+            memory = made.learner.memories[0]
+            assert len(memory.seen) == 4
+            before = memory.tests[memory.seen.argmax()]
+            newest = memory.tests[-1]
+    memory = made.learner.memories[0]
+    assert len(memory.seen) == 5  # the first with the damage is remembered
+    np.testing.assert_array_equal(memory.tests[0], newest)
+    assert (memory.tests[:2] == before).all(1).any()  # what was deployed is tried again
+    best = memory.tests[memory.seen.argmax()]
+    np.testing.assert_array_equal(made.learner.deployed(memory), best)
+    worth = -step.columns["fitness_best"][0]
+    assert worth == pytest.approx(memory.seen[:-1].max(), rel=1e-5)
+
+
+def test_told_never_nothing_is_forgotten_but_the_oldest():
+    own = {"first": 20, "each": 10, "told": "never", "remembered": 6}
+    late = [SLOW + "@3"]
+    made, _ = batch("t_resilience", wheels(late), wheels(), runs=1, damage=late, **own)
+    for trial in range(8):
+        made.advance(trial)
+    assert len(made.learner.memories[0].seen) == 6
+
+
+class Forked:
+    """Walks as the model does, less the more it is to be on legs 1 and 2."""
+
+    name, robot = "forked", "phantomx"
+
+    def run(self, commands, **told):
+        found = Slider().run(commands)
+        down = [(item.values[:, [1, 4]] <= 0).mean() for item in commands]
+        return [
+            trial.replace(observed=(1 - much) ** 3 * trial.observed)
+            for trial, much in zip(found, down, strict=True)
+        ]
+
+
+def test_t_resilience_learns_what_transfers_and_chooses_it():
+    own = {"first": 400, "each": 40, "tests": 15}
+    made, _ = batch(
+        "t_resilience", Forked(), Slider(), preset="hexapod-walk", runs=3, **own
+    )
+    rows = [made.advance(trial)[0].columns for trial in range(25)]
+    learner, deployed = made.learner, np.sqrt(-rows[-1]["fitness_best"]) / 100
+    alone = []
+    for memory in learner.memories:
+        best = learner.controllers(memory.genes[[memory.worth.argmax()]])
+        alone.append(learner.task.worth(Forked().run(best))[0])
+    assert np.median(deployed) > 1.3 * np.median(alone)
+    expected = learner.expected(learner.memories[0], learner.memories[0].done)
+    assert expected.std() > 0
+
+
+class TestRefused:
+    def test_a_range_that_cannot_be_read(self):
+        with pytest.raises(BnsError, match="no effect with a range"):
+            batch("anytime", wheels(), wheels(), unknown=["wheel_gain"])
+
+    def test_a_model_that_effects_cannot_change(self):
+        class Stiff:
+            name, robot = "stiff", "khepera3"
+
+            def run(self, commands, **told):
+                return wheels().run(commands)
+
+        made, _ = batch("anytime", wheels(), Stiff(), first=5, each=20)
+        with pytest.raises(BnsError, match="cannot be changed by effects"):
+            made.advance(0)
+            made.advance(1)
+
+    def test_settings_out_of_bounds(self):
+        config = with_learner(presets.load("khepera-simple"), "self_modelling")
+        with pytest.raises(BnsError, match=r"settings\.jury"):
+            config.with_({"settings.jury": 1})
+        assert registry.get("anytime").open_loop
