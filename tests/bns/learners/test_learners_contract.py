@@ -48,9 +48,13 @@ MODELS = {
     "light": ("test-light", lambda **told: FakeLightWorld()),
     "walk": ("test-slider", lambda **told: Slider()),
 }
-for model in MODELS.values():
-    worlds.register(*model)
 GIVEN = {"columns": ("fitness", "fitness_best", "solved", "reached", "commands")}
+
+
+@pytest.fixture(autouse=True)
+def models(monkeypatch):
+    """The models are known by name, to the tests of this file alone."""
+    monkeypatch.setattr(worlds, "_registered", dict(MODELS.values()))
 
 
 def small(learner: str, task: str):
