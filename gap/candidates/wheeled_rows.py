@@ -64,7 +64,7 @@ _SMOOTH: tuple[tuple[str, float, float, float, bool, dict[str, Any]], ...] = (
     ("battery_sag.per_metre", 0.08, 0, 2, False, {}),
     ("battery_fade", 0.01, 0, 0.2, False, {"per_trial": True}),
     ("dead_zone", 0.015, 0, 0.1, True, {}),
-    ("caster_drag", 0.2, 0, 1, False, {"step": 0.05}),
+    ("caster_drag", 0.2, 0, 1, False, {"step": 0.05, "levels": (0.2, 0.5)}),
     ("wheel_backlash", 0.004, 0, 0.03, True, {"step": 1e-3, "levels": (0.005,)}),
 )  # fmt: skip
 # a mass that is carried and its moments about the middle of the axle, and about the top
