@@ -124,6 +124,10 @@ class Corrected(GapModel):
         """See `GapModel.motion`."""
         return self.model.motion(features)
 
+    def patterns(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
+        """See `GapModel.patterns`."""
+        return self.model.patterns(trial, windows)
+
     def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
         """See `GapModel.regime`."""
         return self.model.regime(trial, windows)
