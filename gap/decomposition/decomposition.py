@@ -152,12 +152,7 @@ def decompose(
         seed: of the noise that measures the floor.
         tell: is told when a stage begins (`bns.gap.stages`).
     """
-    start = descent.nothing(problem)
-    known = rest.floor(problem, start.noise.starts, seed=seed)
-    unstable = rest.unstable(problem, start.slopes, known)
-    if unstable.any() and not unstable.all():
-        problem = problem.without(unstable)
-        start = descent.nothing(problem)
+    problem, start, known, unstable = _steady(problem, seed)
     tell("explanations")
     tried = Singles(problem, start)
     point = descent.decompose(tried)
@@ -203,6 +198,20 @@ def decompose(
         if point.support
         else "",
     )
+
+
+def _steady(
+    problem: Problem, seed: int
+) -> tuple[Problem, Point, rest.Floor, np.ndarray]:
+    """A recording without trials that may go anywhere, the nominal model in it, the
+    floor, and the windows ``(N,)`` of these trials."""
+    start = descent.nothing(problem)
+    known = rest.floor(problem, start.noise.starts, seed=seed)
+    unstable = rest.unstable(problem, start.slopes, known)
+    if unstable.any() and not unstable.all():
+        problem = problem.without(unstable)
+        start = descent.nothing(problem)
+    return problem, start, known, unstable
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import pytest
 
 from tests.sources import modules
 
-BASE = {"bns", "bns.errors", "bns.seeding", "bns.storage"} | {
+BASE = {"bns", "bns.errors", "bns.progress", "bns.seeding", "bns.storage"} | {
     f"bns.storage.{name}"
     for name in (
         "arrays",
