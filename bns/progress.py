@@ -107,6 +107,12 @@ class Bar:
         if self.bar:
             self.bar.update(self.task, total=self.total)
 
+    def through(self, items: Sequence[Item]) -> Iterator[Item]:
+        """Go through items, each of which is one of the total."""
+        for item in items:
+            yield item
+            self.update(self.done + 1)
+
     def _told(self, now: float) -> str:
         here = self.done - self.before
         count = f"{self.done:g} of {self.total:g}"
@@ -124,9 +130,7 @@ def each(name: str, items: Sequence[Item]) -> Iterator[Item]:
         items: all of them, a second of work each or more.
     """
     with Bar(name, len(items)) as bar:
-        for number, item in enumerate(items, 1):
-            yield item
-            bar.update(number)
+        yield from bar.through(items)
 
 
 @contextmanager
@@ -146,9 +150,7 @@ def counting(name: str) -> Iterator[Each]:
 
         def each(items: Sequence[Item]) -> Iterator[Item]:
             bar.extend(len(items))
-            for item in items:
-                yield item
-                bar.update(bar.done + 1)
+            yield from bar.through(items)
 
         yield each
 

@@ -1,6 +1,7 @@
 """One call from a recording to a verdict."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from bns.errors import BnsError
 from bns.gap.decomposition import diagnosis
@@ -42,26 +43,10 @@ def diagnose(
         BnsError: too few trials, faults that cannot be repaired, channels that do not
             fit the model.
     """
+    given: Any = dict(seed=seed, rows=rows, full=full, reference=reference, tell=tell)
     if light_model.told_by(model, (*trials, *reference)):
-        return light.diagnose(
-            trials,
-            model,
-            single,
-            seed=seed,
-            rows=rows,
-            full=full,
-            reference=reference,
-            tell=tell,
-        )
-    return single(
-        trials,
-        model,
-        seed=seed,
-        rows=rows,
-        full=full,
-        reference=reference,
-        tell=tell,
-    )
+        return light.diagnose(trials, model, single, **given)
+    return single(trials, model, **given)
 
 
 def single(

@@ -27,8 +27,6 @@ class SelfModellingSettings(ModellingSettings):
     """see ModelLearnerSettings"""
     guesses: int = 15
     """models that are kept"""
-    replayed: int = 3
-    """tests that models are judged by, the newest; the original: all"""
     rounds: int = 15
     """tests of a robot that are chosen to tell models apart"""
     candidates: int = 4

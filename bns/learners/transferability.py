@@ -86,8 +86,7 @@ class Transferability(ModelLearner[TransferMemory]):
 
     Settings = TransferSettings
     columns: ClassVar[Mapping[str, str]] = {
-        "worth_seen": "what the controller tried achieved (walking: m; elsewhere the "
-        "cost, its sign turned)",
+        **ModelLearner.columns,
         "worth_foreseen": "what it achieves in the model",
         "disparity": "how much the robot differed from the model",
         "disparity_foreseen": "how much it was expected to",
@@ -112,8 +111,7 @@ class Transferability(ModelLearner[TransferMemory]):
 
     def changed(self, memory: TransferMemory) -> None:
         """See `ModelLearner.changed`."""
-        best = int(memory.seen.argmax())
-        memory.does, memory.foreseen = memory.tested[best].copy(), memory.model[[best]]
+        self.retake(memory)
         super().changed(memory)
 
     def does(self, trials: Sequence[Trial]) -> np.ndarray:
@@ -175,6 +173,10 @@ class Transferability(ModelLearner[TransferMemory]):
             row = untested[self.likeliest(memory, untested)]
             if self.hoped(memory, int(row)) > memory.seen.max(initial=-np.inf):
                 return self.take(memory, int(row))
+        return self.retake(memory)
+
+    def retake(self, memory: TransferMemory) -> np.ndarray:
+        """Genes of the test that achieved most, which is tried again, ``(D,)``."""
         best = int(memory.seen.argmax())
         memory.does, memory.foreseen = memory.tested[best].copy(), memory.model[[best]]
         return np.array(memory.tests[best])

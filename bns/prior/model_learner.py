@@ -141,6 +141,10 @@ class ModelLearner(Learner, Generic[MemoryT]):
     """R runs that evolve controllers in a model; arguments as `Learner`."""
 
     Settings: ClassVar[type[LearnerSettings]] = ModelLearnerSettings
+    columns: ClassVar[Mapping[str, str]] = {
+        "worth_seen": "what the controller tried achieved (walking: m; elsewhere the "
+        "cost, its sign turned)",
+    }
     needs_model = True
     deploys = True
 

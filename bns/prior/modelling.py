@@ -66,6 +66,13 @@ class ModellingMemory(Memory):
         self.misses = self.misses[:, max(self.misses.shape[1] - newest, 0) :]
 
     @property
+    def best(self) -> np.ndarray:
+        """The guess that explains most, ``(P,)``; without guesses `model`."""
+        if not len(self.guesses):
+            return self.model
+        return np.asarray(self.guesses[self.miss.argmin()])
+
+    @property
     def miss(self) -> np.ndarray:
         """Root mean square over the tests, ``(M,)``."""
         found: np.ndarray = np.sqrt((self.misses**2).mean(1))
@@ -78,8 +85,7 @@ class Modeller(ModelLearner[ModellingMemory]):
     Settings = ModellingSettings
     open_loop = True
     columns: ClassVar[Mapping[str, str]] = {
-        "worth_seen": "what the controller tried achieved (walking: m; elsewhere the "
-        "cost, its sign turned)",
+        **ModelLearner.columns,
         "model_miss": "how far the best model is from what was seen in the tests (m; "
         "back-to-reality: as worth_seen)",
     }
@@ -185,9 +191,7 @@ class Modeller(ModelLearner[ModellingMemory]):
 
     def adopt(self, memory: ModellingMemory, rollouts: Rollouts) -> None:
         """Judge the population anew where another guess is the best one now."""
-        if not len(memory.guesses):
-            return
-        best = memory.guesses[memory.miss.argmin()]
+        best = memory.best
         if np.array_equal(best, memory.model) or rollouts.room < len(memory.genes):
             return
         memory.model = best.copy()
@@ -209,13 +213,8 @@ class Modeller(ModelLearner[ModellingMemory]):
         return {"model_miss": float(miss), "numbers": self.best_guess(memory)}
 
     def best_guess(self, memory: ModellingMemory) -> np.ndarray:
-        """What is wrong as far as is known, in the effects' units, ``(P,)``.
-
-        Where nothing was fitted yet, nothing is.
-        """
-        if not len(memory.guesses):
-            return self.unknowns.values(memory.model)
-        return self.unknowns.values(memory.guesses[memory.miss.argmin()])
+        """What is wrong as far as is known, in the effects' units, ``(P,)``."""
+        return self.unknowns.values(memory.best)
 
 
 def places(trials: Sequence[Trial], most: int = 0) -> np.ndarray:

@@ -9,7 +9,7 @@ diagnosis.
 """
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from bns.gap.bench.cases import Answer, Case
 from bns.gap.diagnose import diagnose
 from bns.gap.models.base import GapModel
 from bns.gap.records import plain
+from bns.progress import Each, uncounted
 from bns.storage import files, journal, reading, seal
 from bns.storage.lock import Lock
 from bns.worlds.data import dataset
@@ -64,7 +65,7 @@ def run(
     said: Path,
     *,
     seed: int = 0,
-    through: Callable[[Sequence[Path]], Iterable[Path]] = iter,
+    each: Each = uncounted,
 ) -> int:
     """Diagnose the cases that are missing in `said`, appending as they come.
 
@@ -73,7 +74,7 @@ def run(
         model: nominal model.
         said: JSON Lines file of diagnoses; cases named in it are skipped.
         seed: of what each diagnosis draws.
-        through: goes through the cases and shows how far it is.
+        each: goes through the cases, and may count them.
 
     Returns:
         How many were run.
@@ -86,7 +87,7 @@ def run(
         done = {row["name"] for row in _lines(said)}
         places = sorted(p for p in Path(directory).iterdir() if p.is_dir())
         left = [place for place in places if place.name not in done]
-        return _run(through(left), model, said, seed)
+        return _run(each(left), model, said, seed)
 
 
 def _run(places: Iterable[Path], model: GapModel, said: Path, seed: int) -> int:

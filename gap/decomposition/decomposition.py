@@ -80,7 +80,7 @@ class Decomposition:
     @property
     def left(self) -> float:
         """Share of the gap that is left."""
-        return max(self.after, 0.0) / max(self.before, self.after, 1e-9)
+        return _share(self.after, self.before, self.after)
 
     @property
     def recurring(self) -> bool:
@@ -97,7 +97,7 @@ class Decomposition:
     def unexplained(self) -> float:
         """Share of the gap that is left and is not what differs between repeats."""
         apart = 0.0 if self.broken else self.scatter
-        return max(self.after - apart, 0.0) / max(self.before, self.after, 1e-9)
+        return _share(self.after - apart, self.before, self.after)
 
     @property
     def lasting(self) -> bool:
@@ -234,6 +234,7 @@ class _Sizes:
     def of(
         cls, problem: Problem, start: Point, point: Point, known: rest.Floor
     ) -> "_Sizes":
+        """Of a point, beside the nominal model."""
         linear = point.linear
         full = linear.rest(linear.solve(linear.free))
         inside = rest.kept(problem, full, point.noise.sd)
@@ -254,7 +255,13 @@ class _Sizes:
     @property
     def unexplained(self) -> float:
         """Share of the gap that is left and is not what differs between repeats."""
-        return max(self.after - self.scatter, 0.0) / max(self.before, self.after, 1e-9)
+        return _share(self.after - self.scatter, self.before, self.after)
+
+
+def _share(size: float, before: float, after: float) -> float:
+    """An excess over the floor as a share of the gap, the larger of what was there
+    before and after the fit."""
+    return max(size, 0.0) / max(before, after, 1e-9)
 
 
 def _numbers(problem: Problem, windows: np.ndarray) -> tuple[int, ...]:

@@ -126,7 +126,7 @@ def _run(given: Run) -> int:
         Path(given.cases),
         model,
         Path(given.said),
-        through=partial(each, "diagnosing"),
+        each=partial(each, "diagnosing"),
     )
     print(f"{count} cases diagnosed: {given.said}")
     return 0
