@@ -47,6 +47,8 @@ _SMOOTH: tuple[tuple[str, float, float, float, bool, dict[str, Any]], ...] = (
     ("tracker_latency", 0.05, 0, 1, False, {"step": 0.01}),
     ("rolling_drag.torque", 0.004, 0, 0.03, True,
      {"step": 5e-4, "levels": (0.004, 0.01)}),
+    ("rolling_drag.breakaway", 0.003, 0, 0.03, True,
+     {"step": 5e-4, "levels": (0.002, 0.004, 0.008)}),
     ("rolling_drag.viscous", 2e-4, 0, 0.01, True, {"step": 2e-5}),
     ("centre_of_mass.dx", 0.008, -0.02, 0.03, False,
      {"slack": 7e-4, "family": "centre_of_mass"}),
@@ -75,11 +77,25 @@ _LOAD: tuple[tuple[str, float, float, float, str, dict[str, Any]], ...] = (
     ("payload.my", 0.015, -0.1, 0.1, "kg m", {"slack": 4e-4}),
     ("payload.mz", 0.04, -0.1, 0.3, "kg m", {}),
 )
-_PLANES = (
+_ROUND = (
     ("floor_slope", 0.03, 0.3, False, ()),
     ("wheel_eccentricity", 1e-3, 4e-3, True, (-1.5e-3, 1.5e-3)),
 )
 """explanations with a size and a direction: two rows each, along x and y"""
+PLANES = tuple(name for name, *_ in _ROUND)
+STICKS = {"rolling_drag.torque": ("rolling_drag.torque", "rolling_drag.breakaway")}
+"""rows of one explanation: dry friction, and what is beyond it at standstill"""
+
+
+def term(name: str) -> str:
+    """The explanation that a row belongs to."""
+    stem, bracket, rest = name.partition("[")
+    if stem.startswith(PLANES) or stem.startswith("payload."):
+        return name.rpartition(".")[0]
+    for whole, parts in STICKS.items():
+        if stem in parts:
+            return whole + bracket + rest
+    return name.partition("@")[0] if rest else name
 
 
 def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
@@ -97,7 +113,7 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
     ]  # fmt: skip
     lead = max(0.003, command_moments.unknown(trials) / 2)
     made.append(Row(LEAD, 0.0, lead, -0.06, 0.06, unit="s", nuisance=True, step=0.001))
-    for name, sd, high, sided, levels in _PLANES:
+    for name, sd, high, sided, levels in _ROUND:
         for side in SIDES[:2] if sided else ("",):
             term = f"{name}[{side}]" if side else name
             made += [
@@ -139,13 +155,15 @@ def _smooth(
         given = dict(more)
         if name == "motor_lag" and side == "both":
             given["slack"] = 1e-3
+        full = f"{name}[{side}]" if side else name
         yield Row(
-            f"{name}[{side}]" if side else name,
+            full,
             float(about.nominal),
             sd,
             low,
             high,
             unit=about.unit,
+            group=term(full),
             excite=EXCITE.get(stem, "any drive"),
             **given,
         )

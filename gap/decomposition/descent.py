@@ -208,15 +208,17 @@ def pruned(problem: Problem, point: Point) -> Point:
 def joined(problem: Problem, point: Point) -> Point:
     """A point with one explanation for several where they hold alike: one dead band of
     both wheels for one of each."""
-    for row in problem.rows:
-        if not row.joins or not set(row.joins) <= point.support:
+    at = {row.name: number for number, row in enumerate(problem.rows)}
+    for name, numbers in problem.terms.items():
+        joins = [[at[part] for part in problem.rows[k].joins] for k in numbers]
+        whole = {problem.rows[k].term for parts in joins for k in parts}
+        if not all(joins) or not whole <= point.support:
             continue
         values = point.values.copy()
-        parts = [k for name in row.joins for k in problem.terms[name]]
-        (number,) = problem.terms[row.term]
-        values[number] = values[parts].mean()
-        values[parts] = problem.nominal[parts]
-        support = (point.support - set(row.joins)) | {row.term}
+        for number, parts in zip(numbers, joins, strict=True):
+            values[number] = values[parts].mean()
+            values[parts] = problem.nominal[parts]
+        support = (point.support - whole) | {name}
         other = fitted_at(problem, replace(point, values=values), support)
         least, here = costs(problem, [other, point])
         if least <= here:

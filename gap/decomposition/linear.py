@@ -241,7 +241,9 @@ class Linear:
         """Minus the log evidence of a set with its prior, but for a constant.
 
         Where a row of it would leave its bounds the set is no better than the one
-        without that explanation, and costs more.
+        without that explanation, and costs more; but where that bound is the nominal
+        value and others of its rows stay inside, the row alone is out: a dry friction
+        that does not break away is one.
         """
         key = frozenset(support)
         if key not in self._costs:
@@ -255,13 +257,33 @@ class Linear:
         rows = [row for name in key for row in self.terms[name]]
         plain = self._spread(frozenset())
         value, found = plain.changed(rows, 1.0 - self.slack[rows] ** 2)
+        beyond = self._beyond(rows, found)
+        if inside := self._without_edges(key, rows, beyond):
+            rows = inside
+            value, found = plain.changed(rows, 1.0 - self.slack[rows] ** 2)
+            beyond = self._beyond(rows, found)
         value += self._paid(key) + tail(found)
-        beyond = (found < self.low[rows] - 1e-6) | (found > self.high[rows] + 1e-6)
         if beyond.any():
             far = {row for row, out in zip(rows, beyond, strict=True) if out}
             out = {name for name in key if far & set(self.terms[name])}
             value = max(value, self.cost(key - out) + KAPPA * len(out))
         return float(value)
+
+    def _beyond(self, rows: list[int], found: np.ndarray) -> np.ndarray:
+        return (found < self.low[rows] - 1e-6) | (found > self.high[rows] + 1e-6)
+
+    def _without_edges(
+        self, key: Support, rows: list[int], beyond: np.ndarray
+    ) -> list[int]:
+        """Rows of a set without those that want to be beyond a bound that is their
+        nominal value, while others of their explanation do not; none = all stay."""
+        far = {row for row, out in zip(rows, beyond, strict=True) if out}
+        out: set[int] = set()
+        for name in key:
+            mine = far & set(self.terms[name])
+            if mine and mine < set(self.terms[name]):
+                out |= {row for row in mine if 0.0 in (self.low[row], self.high[row])}
+        return [row for row in rows if row not in out] if out else []
 
     def _spread(self, support: Support) -> Spread:
         """What was recorded, as it may spread under a set's prior; kept for none."""

@@ -182,6 +182,8 @@ def _main(made: Decomposition, part: Part) -> tuple[str, str]:
     """Unit and name of the row that stands for an explanation."""
     rows = {row.name: row for row in made.problem.rows}
     moved = [n for n in part.values if part.values[n] != rows[n].nominal]
+    if part.name in moved:
+        return rows[part.name].unit, part.name
     name = (moved or [*part.values])[0]
     alike = [n for n in moved if rows[n].unit == rows[name].unit]
     if alike:
@@ -241,18 +243,20 @@ def shown_effect(
         part: its values and intervals.
 
     Returns:
-        text; magnitude, which for several numbers is the length of the departure of the
-        first two; its interval; unit of the first.
+        text; magnitude, which for several numbers is that called as the explanation
+        or, without one, the length of the departure of the first two; its interval;
+        unit of the first.
     """
     rows = {row.name: row for row in problem.rows}
     units = rows[next(iter(part.values))].unit
     made = problem.model.effect(name, part.values)
     values = np.array(list(part.values.values()))
     middle = np.array([rows[n].nominal for n in part.values])
-    if len(values) == 1:
-        (value,) = values
-        (low,), (high,) = part.low.values(), part.high.values()
-        return str(made), float(value), (float(low), float(high)), units
+    first = next(iter(part.values))
+    called = name if name in part.values else first
+    if len(values) == 1 or (called == name and part.values[name] != rows[name].nominal):
+        edges = float(part.low[called]), float(part.high[called])
+        return str(made), float(part.values[called]), edges, rows[called].unit
     length = float(np.hypot(*(values - middle)[:2]))
     width = np.array(list(part.high.values())) - np.array(list(part.low.values()))
     half = float(np.abs((values - middle) @ width) / max(length, 1e-12)) / 2

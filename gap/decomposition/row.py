@@ -32,8 +32,8 @@ class Row:
             in and out together.
         family: name of the cause that explanations share; one of them or all cost as
             much. "" = its own.
-        joins: explanations that are this one where they hold alike: its change is the
-            sum of theirs, or for a factor (nominally 1) their product.
+        joins: rows that are this one where they hold alike: its change is the sum of
+            theirs, or for a factor (nominally 1) their product.
         covers: explanations that this one can be, too: beside it they explain nothing.
         excite: which commands make it felt, in words.
         effect: name of the effect in the library that it is a number of; "" = the

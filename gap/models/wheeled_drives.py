@@ -9,22 +9,21 @@ from functools import lru_cache
 import numpy as np
 
 from bns import models
-from bns.gap.candidates.wheeled_rows import LEAD, parameter
+from bns.gap.candidates.wheeled_rows import LEAD, PLANES, STICKS, parameter, term
 from bns.gap.recordings import trial_labels
 from bns.gap.recordings.segments import moved
 from bns.worlds.effects import bodies, registry
 from bns.worlds.effects.base import CommandEffect, ControlSignal, Effect, ModelEdit
-from bns.worlds.physics import compile, observe, servo_joint
-from bns.worlds.physics.rollout import Compiled, Job, Pool, Segment
+from bns.worlds.physics import compile, observe
+from bns.worlds.physics.rollout import Job, Pool, Segment
 from bns.worlds.trial import Commands, Trial
 
 FINE, COARSE = 0.002, 0.005  # [s] physics steps: of residuals, of differences
+STICKING = 0.001  # [s] of residuals with a friction that breaks away
 KEPT = 0.01  # [s] between two poses that are kept
 DRIVES = 8_000  # kept, about 24 kB each
-SCENES = 200  # that are kept, some 3 MB each
 AFTER = 0.05  # [s] that are simulated beyond the last command
 RESTING = 0.2  # [s] over which the pose at the start is the median of what was seen
-PLANES = ("floor_slope", "wheel_eccentricity")
 TRACKING = ("marker_mount", "tracker_latency", "tracker_scale", "clock_drift", LEAD)
 LATENCY = "command_latency"  # comes before all others, at any fraction of a step
 ORDER = (
@@ -77,7 +76,7 @@ class Changes:
         late = terms.pop(LATENCY, {}).get(LATENCY, 0.0)
         made = load(terms.pop("payload"), robot) if "payload" in terms else []
         for name, rows in terms.items():
-            whole = name.startswith(PLANES)
+            whole = name.startswith((*PLANES, *STICKS))
             parts = [rows] if whole else [{row: rows[row]} for row in rows]
             made += [effect(name, part) for part in parts]
         body = _edits(made)
@@ -118,14 +117,6 @@ def _place(name: str) -> int:
     return ORDER.index(name) if name in ORDER else len(ORDER)
 
 
-def term(name: str) -> str:
-    """The explanation that a row belongs to."""
-    stem, _, rest = name.partition("[")
-    if stem.startswith(PLANES) or stem.startswith("payload."):
-        return name.rpartition(".")[0]
-    return name.partition("@")[0] if rest else name
-
-
 def effect(name: str, values: Mapping[str, float]) -> Effect:
     """The effect of an explanation.
 
@@ -142,15 +133,14 @@ def effect(name: str, values: Mapping[str, float]) -> Effect:
         return registry.make(stem, **given, **{size: length, way: np.arctan2(y, x)})
     if stem == "payload":
         return carried(values)
-    moved = [item for item in values.items() if item[1]]
-    row, value = (moved or [*values.items()])[0]
-    if "@" in row:
-        given["direction"] = row.partition("@")[2]
-    about = parameter(stem)
-    value = min(max(float(value), about.low), about.high)
-    kind = stem.partition(".")[0]
-    given[about.name] = round(value) if about.integer else value
-    return registry.make(kind, **given)
+    moved = [item for item in values.items() if item[1]] or [*values.items()]
+    for row, value in moved if stem in STICKS else moved[:1]:
+        if "@" in row:
+            given["direction"] = row.partition("@")[2]
+        about = parameter(row.partition("[")[0])
+        value = min(max(float(value), about.low), about.high)
+        given[about.name] = round(value) if about.integer else value
+    return registry.make(stem.partition(".")[0], **given)
 
 
 def carried(values: Mapping[str, float]) -> Effect:
@@ -200,7 +190,7 @@ def base_mass(robot: str) -> float:
     return bodies.Inertial.of(spec, bodies.base(spec)).mass
 
 
-@lru_cache(maxsize=2 * SCENES)
+@lru_cache(maxsize=512)
 def begun(robot: str, body: tuple[ModelEdit, ...], dt: float, yaw: float) -> np.ndarray:
     """Full physics state at rest at the origin with a heading. On a level floor a robot
     comes to rest alike at every heading.
@@ -211,7 +201,7 @@ def begun(robot: str, body: tuple[ModelEdit, ...], dt: float, yaw: float) -> np.
         dt: physics step [s].
         yaw: the heading [rad].
     """
-    compiled = scene(robot, body, dt)
+    compiled = compile.compiled(robot, body, dt)
     if np.any(compiled.model.opt.gravity[:2]):
         return compile.start_state(compiled, (0.0, 0.0, yaw))
     state = compile.start_state(compiled, (0.0, 0.0, 0.0)).copy()
@@ -219,24 +209,6 @@ def begun(robot: str, body: tuple[ModelEdit, ...], dt: float, yaw: float) -> np.
     free = slice(1 + place.start, 1 + place.stop)
     state[free] = compile.posed(state[free], (0.0, 0.0, yaw))
     return state
-
-
-@lru_cache(maxsize=SCENES)
-def scene(robot: str, body: tuple[ModelEdit, ...], dt: float) -> Compiled:
-    """The robot's scene with edits, at a step [s].
-
-    Args:
-        robot: by name.
-        body: edits of the model, applied in order.
-        dt: physics step [s].
-    """
-    spec = models.spec(robot, visuals=False)
-    servo_joint.fit(spec, models.robot(robot))
-    spec.option.timestep = dt
-    for item in body:
-        item.edit(spec)
-    spec.memory = compile.ARENA
-    return Compiled(spec.compile())
 
 
 class Drives:
@@ -309,25 +281,29 @@ class Drives:
 
     def _run(self, wanted: Mapping[bytes, tuple], dt: float) -> dict[bytes, np.ndarray]:
         """Poses from the origin every `KEPT` seconds, ``(S, 3)`` by key."""
-        jobs, yaws = [], []
+        jobs, yaws, every = [], [], []
         for trial, changes, begin in wanted.values():
-            compiled = scene(self.robot, changes.body, dt)
+            compiled = compile.compiled(self.robot, changes.body, dt)
+            step = STICKING if compiled.hidden and dt == FINE else dt
+            if step != dt:
+                compiled = compile.compiled(self.robot, changes.body, step)
             yaw = heading(changes, begin)
-            speeds = told(trial.commands, changes.command, dt, changes.late)
+            speeds = told(trial.commands, changes.command, step, changes.late)
             speeds = speeds * (1 - changes.lost)
             jobs.append(
                 Job(
-                    begun(self.robot, changes.body, dt, yaw),
+                    begun(self.robot, changes.body, step, yaw),
                     (Segment(compiled, speeds * self._per_command),),
                 )
             )
             yaws.append(yaw)
-        every = round(KEPT / dt)
-        place = compile.free_joint(scene(self.robot, (), dt).model)
+            every.append(round(KEPT / step))
+        place = compile.free_joint(compile.compiled(self.robot, (), dt).model)
         free = slice(1 + place.start, 1 + place.stop)
+        motions = zip(wanted, self._pool.map(jobs), yaws, every, strict=True)
         made = {
-            key: observe.planar(motion.states[:, free], yaw)[::every].copy()
-            for key, motion, yaw in zip(wanted, self._pool.map(jobs), yaws, strict=True)
+            key: observe.planar(motion.states[:, free], yaw)[::kept].copy()
+            for key, motion, yaw, kept in motions
         }
         self._cache.update(made)
         return made

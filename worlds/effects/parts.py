@@ -122,6 +122,45 @@ def in_file(spec: Any, joint: Any, value: float) -> float:
     return float(np.rad2deg(value)) if hinge and spec.compiler.degree else value
 
 
+REST = 1e-3  # share of a sticking friction that stays; it must not vanish
+QUICKNESS = 0.4  # of the bristles, per physics step
+
+
+def stick(spec: Any, held: Sequence[Any], torque: float, speed: float) -> None:
+    """Give joints a dry friction that fades with speed (Stribeck).
+
+    friction = torque exp(-(v / speed)^2) in steady motion, by bristles that give way
+    (LuGre: Canudas de Wit et al., IEEE TAC 40(3), 1995; MuJoCo's dcmotor). Their
+    stiffness and damping follow from the joint's inertia and the physics step: before
+    it slips, a joint moves by torque / stiffness. Each is an actuator of its own,
+    behind the others, which nothing controls.
+
+    Args:
+        spec: a `mujoco.MjSpec`.
+        held: its joints.
+        torque: at standstill [N m or N].
+        speed: at which it has faded to 37 % [rad/s or m/s].
+    """
+    import mujoco
+
+    model, rate = spec.copy().compile(), QUICKNESS / spec.option.timestep
+    for joint in held:
+        inertia = model.dof_M0[model.joint(joint.name).dofadr[0]]
+        bristles = spec.add_actuator(
+            name=f"{joint.name}_stribeck{len(spec.actuators)}",
+            trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            target=joint.name,
+        )
+        bristles.set_to_dcmotor(
+            motorconst=[1e-9, 1e-9],  # no motor
+            resistance=1.0,
+            lugre=[inertia * rate**2, 2 * inertia * rate, REST * torque, torque, speed],
+        )
+        for key in spec.keys:
+            key.ctrl = np.append(np.array(key.ctrl), 0.0) if len(key.ctrl) else []
+            key.act = np.append(np.array(key.act), 0.0) if len(key.act) else []
+
+
 def loosen(
     spec: Any, joint: Any, play: float, soft: tuple[float, float] | None = None
 ) -> None:

@@ -35,11 +35,13 @@ def compiled(
     if step:
         spec.option.timestep = step
     servo_joint.fit(spec, models.robot(robot))
+    own = len(spec.actuators)
     for effect in effects:
         effect.edit(spec)
     if spec.memory < 0:  # not said in the model
         spec.memory = ARENA
-    return Compiled(mjcf.compiled(spec, f"the model of {robot}"))
+    model = mjcf.compiled(spec, f"the model of {robot}")
+    return Compiled(model, hidden=model.nu - own)
 
 
 @lru_cache(maxsize=256)
@@ -60,15 +62,18 @@ def start_state(scene: Compiled, start: tuple[float, float, float]) -> np.ndarra
     data.qpos[place] = posed(data.qpos[place], start)
     state = np.empty(mujoco.mj_stateSize(model, STATE))
     mujoco.mj_getState(model, data, state, STATE)
-    rest = np.zeros((round(SETTLE / model.opt.timestep), model.nu))
-    rest[:] = data.ctrl
-    motion = run(Job(state, (Segment(scene, rest),)))
+    kept = len(state) - scene.hidden
+    rest = np.zeros((round(SETTLE / model.opt.timestep), model.nu - scene.hidden))
+    rest[:] = data.ctrl[: rest.shape[1]]
+    motion = run(Job(state[:kept], (Segment(scene, rest),)))
     if motion.diverged < 0:
-        mujoco.mj_setState(model, data, motion.states[-1], STATE)
+        state[:kept] = motion.states[-1]
+        mujoco.mj_setState(model, data, state, STATE)
         data.time = 0.0
         data.qvel[:] = 0.0
         data.qpos[place] = posed(data.qpos[place], start)
         mujoco.mj_getState(model, data, state, STATE)
+    state = state[:kept]
     state.setflags(write=False)
     return state
 

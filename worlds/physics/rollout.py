@@ -36,9 +36,13 @@ class Compiled:
 
     Attributes:
         model: shared, never written to.
+        hidden: actuators that effects have put behind the robot's own, each with one
+            state. Nobody controls them and their states end with a segment: controls
+            and states are those of the robot's own.
     """
 
     model: mujoco.MjModel
+    hidden: int = 0
     _spare: list[mujoco.MjData] = field(default_factory=list)
 
     def take(self) -> mujoco.MjData:
@@ -110,17 +114,25 @@ def run(job: Job) -> Motion:
     for compiled, control in job.segments:
         data = compiled.take()
         count = len(control)
+        part = states[at : at + 1 + count]
+        whole = part
+        if compiled.hidden:
+            more = np.zeros((count, compiled.hidden))
+            control = np.hstack([control, more])
+            whole = np.hstack([part, np.zeros((count + 1, compiled.hidden))])
         roller.rollout(
             [compiled.model],
             [data],
-            states[at : at + 1],
+            whole[:1],
             control[None],
             control_spec=CONTROL,
             skip_checks=True,
             nstep=count,
             initial_warmstart=warm,
-            state=states[None, at + 1 : at + 1 + count],
+            state=whole[None, 1:],
         )
+        if compiled.hidden:
+            part[1:] = whole[1:, : part.shape[1]]
         warm = data.qacc_warmstart[None].copy()
         warned = bool(data.warning.number.any())
         compiled.give_back(data)

@@ -70,10 +70,7 @@ class JointStiffness(_JointNumber):
 class JointStribeck(BodyEffect):
     """A joint sticks: extra dry friction at low speed (Stribeck).
 
-    friction = torque exp(-(v / speed)^2) in steady motion, by bristles that give way
-    (LuGre). Their stiffness and damping follow from the joint's inertia and the
-    physics step: before it slips, the joint moves by torque / stiffness. It is an
-    actuator of its own, behind the others, which nothing controls.
+    See `parts.stick`.
     """
 
     name = "joint_stribeck"
@@ -96,34 +93,10 @@ class JointStribeck(BodyEffect):
             scales=False,
         ),
     )
-    rest: ClassVar[float] = 1e-3  # share of the friction that stays; it must not vanish
-    quickness: ClassVar[float] = 0.4  # of the bristles, per physics step
 
     def _write(self, spec: Any) -> None:
-        import mujoco
-
-        model, rate = spec.copy().compile(), self.quickness / spec.option.timestep
-        for joint in parts.joints(spec, self["part"]):
-            inertia = model.dof_M0[model.joint(joint.name).dofadr[0]]
-            bristles = spec.add_actuator(
-                name=f"{joint.name}_stribeck",
-                trntype=mujoco.mjtTrn.mjTRN_JOINT,
-                target=joint.name,
-            )
-            bristles.set_to_dcmotor(
-                motorconst=[1e-9, 1e-9],  # no motor
-                resistance=1.0,
-                lugre=[
-                    inertia * rate**2,
-                    2 * inertia * rate,
-                    self.rest * self["torque"],
-                    self["torque"],
-                    self["speed"],
-                ],
-            )
-            for key in spec.keys:
-                key.ctrl = np.append(np.array(key.ctrl), 0.0) if len(key.ctrl) else []
-                key.act = np.append(np.array(key.act), 0.0) if len(key.act) else []
+        held = parts.joints(spec, self["part"])
+        parts.stick(spec, held, self["torque"], self["speed"])
 
 
 class JointBacklash(BodyEffect):

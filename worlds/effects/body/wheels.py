@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from bns.errors import BnsError
-from bns.worlds.effects import bodies
+from bns.worlds.effects import bodies, parts
 from bns.worlds.effects.base import BodyEffect, factor, strength
 from bns.worlds.effects.common import WHEEL
 
@@ -58,10 +58,16 @@ class WheelDiameter(BodyEffect):
 
 
 class RollingDrag(BodyEffect):
-    """A wheel turns against friction."""
+    """A wheel turns against friction.
+
+    friction = torque + viscous |v| + breakaway exp(-(v / FADES)^2) in steady motion.
+    """
 
     name = "rolling_drag"
-    source = "Coulomb and viscous model assumed; a wheel's motor gives up to 0.057 N m"
+    source = (
+        "Coulomb, viscous and Stribeck model assumed; a wheel's motor gives up to "
+        "0.057 N m"
+    )
     choices = (WHEEL,)
     parameters = (
         strength(
@@ -78,6 +84,13 @@ class RollingDrag(BodyEffect):
             "friction per wheel speed; bounds assumed",
             example=0.0002,
         ),
+        strength(
+            "breakaway",
+            "N m",
+            (0.0, 0.057),
+            "dry friction at standstill beyond `torque`, which fades with speed",
+            example=0.003,
+        ),
     )
 
     def _write(self, spec: Any) -> None:
@@ -85,8 +98,12 @@ class RollingDrag(BodyEffect):
             joint = bodies.joint(spec, side)
             joint.frictionloss += self["torque"]
             joint.damping[0] += self["viscous"]
+        if self["breakaway"]:
+            held = [bodies.joint(spec, side) for side in self.wheels()]
+            parts.stick(spec, held, self["breakaway"], FADES)
 
 
+FADES = 1.0  # [rad/s] of a wheel, at which its breakaway is 37 %; 2 cm/s; assumed
 LEAST = 1e-9  # of the torque; MuJoCo takes a range of nothing for no limit at all
 
 
