@@ -210,7 +210,7 @@ def joined(problem: Problem, point: Point) -> Point:
     both wheels for one of each."""
     at = {row.name: number for number, row in enumerate(problem.rows)}
     for name, numbers in problem.terms.items():
-        joins = [[at[part] for part in problem.rows[k].joins] for k in numbers]
+        joins = [[at[n] for n in problem.rows[k].joins if n in at] for k in numbers]
         whole = {problem.rows[k].term for parts in joins for k in parts}
         if not all(joins) or not whole <= point.support:
             continue

@@ -19,7 +19,6 @@ from bns.worlds.physics.rollout import Job, Pool, Segment
 from bns.worlds.trial import Commands, Trial
 
 FINE, COARSE = 0.002, 0.005  # [s] physics steps: of residuals, of differences
-STICKING = 0.001  # [s] of residuals with a friction that breaks away
 KEPT = 0.01  # [s] between two poses that are kept
 DRIVES = 8_000  # kept, about 24 kB each
 AFTER = 0.05  # [s] that are simulated beyond the last command
@@ -281,29 +280,25 @@ class Drives:
 
     def _run(self, wanted: Mapping[bytes, tuple], dt: float) -> dict[bytes, np.ndarray]:
         """Poses from the origin every `KEPT` seconds, ``(S, 3)`` by key."""
-        jobs, yaws, every = [], [], []
+        jobs, yaws = [], []
+        every = round(KEPT / dt)
         for trial, changes, begin in wanted.values():
             compiled = compile.compiled(self.robot, changes.body, dt)
-            step = STICKING if compiled.hidden and dt == FINE else dt
-            if step != dt:
-                compiled = compile.compiled(self.robot, changes.body, step)
             yaw = heading(changes, begin)
-            speeds = told(trial.commands, changes.command, step, changes.late)
+            speeds = told(trial.commands, changes.command, dt, changes.late)
             speeds = speeds * (1 - changes.lost)
             jobs.append(
                 Job(
-                    begun(self.robot, changes.body, step, yaw),
+                    begun(self.robot, changes.body, dt, yaw),
                     (Segment(compiled, speeds * self._per_command),),
                 )
             )
             yaws.append(yaw)
-            every.append(round(KEPT / step))
         place = compile.free_joint(compile.compiled(self.robot, (), dt).model)
         free = slice(1 + place.start, 1 + place.stop)
-        motions = zip(wanted, self._pool.map(jobs), yaws, every, strict=True)
         made = {
-            key: observe.planar(motion.states[:, free], yaw)[::kept].copy()
-            for key, motion, yaw, kept in motions
+            key: observe.planar(motion.states[:, free], yaw)[::every].copy()
+            for key, motion, yaw in zip(wanted, self._pool.map(jobs), yaws, strict=True)
         }
         self._cache.update(made)
         return made

@@ -50,6 +50,8 @@ DAMAGES = [
     ("motor_lag:time_constant=0.1",),
     ("wheel_intermittent:every=3", "battery_sag:per_second=0.01"),
     ("wheel_diameter:wheel=left,factor=0.9@0:1.3s..0:2.55s",),
+    ("rolling_drag:wheel=left,breakaway=0.002@0:1.3s..0:2.55s",),
+    ("rolling_drag:torque=0.0005,breakaway=0.001",),
     ("payload:mass=0.2", "command_latency:delay=0.07"),
 ]
 

@@ -138,6 +138,7 @@ def test_a_model_compiled_anew_and_unchanged_goes_on_to_the_same_bytes():
     [
         "wheel_gain:wheel=left,factor=0.5@0:1.0s..0:1.5s",
         "wheel_diameter:wheel=left,factor=0.8@0:1.0s..0:1.5s",
+        "rolling_drag:wheel=left,torque=0.002,breakaway=0.004@0:1.0s..0:1.5s",
     ],
 )
 def test_damage_within_a_trial_starts_and_stops_there(text):

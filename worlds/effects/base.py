@@ -214,7 +214,8 @@ class BodyEffect(Effect):
         """Write the effect into `spec` (a `mujoco.MjSpec`), elements found by name.
 
         Keeps the sizes of the model, unless the class says that it `resizes`; one that
-        changes the number of joints can not set in within a trial.
+        changes the number of joints can not set in within a trial. Actuators that it
+        adds are controlled by nobody.
         """
         if not self.is_nominal:
             self._write(spec)

@@ -123,7 +123,7 @@ def in_file(spec: Any, joint: Any, value: float) -> float:
 
 
 REST = 1e-3  # share of a sticking friction that stays; it must not vanish
-QUICKNESS = 0.4  # of the bristles, per physics step
+QUICKNESS = 0.8  # of the bristles, per physics step; stable below 2
 
 
 def stick(spec: Any, held: Sequence[Any], torque: float, speed: float) -> None:
@@ -131,9 +131,10 @@ def stick(spec: Any, held: Sequence[Any], torque: float, speed: float) -> None:
 
     friction = torque exp(-(v / speed)^2) in steady motion, by bristles that give way
     (LuGre: Canudas de Wit et al., IEEE TAC 40(3), 1995; MuJoCo's dcmotor). Their
-    stiffness and damping follow from the joint's inertia and the physics step: before
-    it slips, a joint moves by torque / stiffness. Each is an actuator of its own,
-    behind the others, which nothing controls.
+    stiffness follows from the joint's inertia and the physics step: before it slips, a
+    joint moves by torque / stiffness. They are not damped: MuJoCo's implicit steps
+    would take that for less inertia. Each is an actuator of its own, behind the others,
+    which nothing controls.
 
     Args:
         spec: a `mujoco.MjSpec`.
@@ -154,7 +155,7 @@ def stick(spec: Any, held: Sequence[Any], torque: float, speed: float) -> None:
         bristles.set_to_dcmotor(
             motorconst=[1e-9, 1e-9],  # no motor
             resistance=1.0,
-            lugre=[inertia * rate**2, 2 * inertia * rate, REST * torque, torque, speed],
+            lugre=[inertia * rate**2, 0.0, REST * torque, torque, speed],
         )
         for key in spec.keys:
             key.ctrl = np.append(np.array(key.ctrl), 0.0) if len(key.ctrl) else []

@@ -37,8 +37,7 @@ class Compiled:
     Attributes:
         model: shared, never written to.
         hidden: actuators that effects have put behind the robot's own, each with one
-            state. Nobody controls them and their states end with a segment: controls
-            and states are those of the robot's own.
+            state. Nobody controls them, and `Motion.states` leaves theirs out.
     """
 
     model: mujoco.MjModel
@@ -70,8 +69,8 @@ class Job(NamedTuple):
     Attributes:
         start: full physics state (time, qpos, qvel, ...), shape ``(n,)``.
         segments: in order of time; the states go through.
-        warm: where the solver starts, shape ``(nv,)``, as the `Motion` before left it:
-            with it a motion goes on to the same bytes. None = from scratch.
+        warm: where the solver and hidden actuators start, as the `Motion` before left
+            them: with it a motion goes on to the same bytes. None = from scratch.
         out: where the states are to be written, as `Motion.states`; None = anywhere.
     """
 
@@ -88,7 +87,7 @@ class Motion(NamedTuple):
         states: full physics states, shape ``(S + 1, n)``, the start included; NaN from
             `diverged` on.
         diverged: index of the first state that is not valid; -1 = all are.
-        warm: where the solver goes on, shape ``(nv,)``.
+        warm: where the solver goes on, shape ``(nv,)``, and after it hidden actuators.
     """
 
     states: np.ndarray
@@ -108,18 +107,19 @@ def run(job: Job) -> Motion:
         total = sum(len(segment.control) for segment in job.segments)
         states = np.empty((total + 1, len(job.start)))
     states[0] = job.start
-    warm = None if job.warm is None else job.warm[None]
-    at = 0
+    warm, inner, at = job.warm, np.zeros(0), 0
     roller = Rollout()
     for compiled, control in job.segments:
         data = compiled.take()
-        count = len(control)
-        part = states[at : at + 1 + count]
-        whole = part
+        count, nv = len(control), compiled.model.nv
+        part = whole = states[at : at + 1 + count]
+        if warm is not None:
+            warm, inner = warm[None, :nv], warm[nv:]
         if compiled.hidden:
-            more = np.zeros((count, compiled.hidden))
-            control = np.hstack([control, more])
+            control = np.hstack([control, np.zeros((count, compiled.hidden))])
             whole = np.hstack([part, np.zeros((count + 1, compiled.hidden))])
+            if len(inner) == compiled.hidden:
+                whole[0, part.shape[1] :] = inner
         roller.rollout(
             [compiled.model],
             [data],
@@ -133,7 +133,7 @@ def run(job: Job) -> Motion:
         )
         if compiled.hidden:
             part[1:] = whole[1:, : part.shape[1]]
-        warm = data.qacc_warmstart[None].copy()
+        warm = np.append(data.qacc_warmstart, whole[-1, part.shape[1] :])
         warned = bool(data.warning.number.any())
         compiled.give_back(data)
         bad = _first_bad(states[at : at + 1 + count], warned)
@@ -141,7 +141,7 @@ def run(job: Job) -> Motion:
             states[at + bad :] = np.nan
             return Motion(states, at + bad)
         at += count
-    return Motion(states, -1, None if warm is None else warm[0])
+    return Motion(states, -1, warm)
 
 
 def _first_bad(states: np.ndarray, warned: bool) -> int:

@@ -327,6 +327,13 @@ class TestBodies:
         plain, slowed = driven(compiled()), driven(compiled("rolling_drag:torque=1e-3"))
         assert plain.qvel[6:] - slowed.qvel[6:] == pytest.approx(1e-3 / KV, rel=0.01)
 
+    def test_a_wheel_that_sticks_breaks_away_and_then_rolls_freely(self):
+        model = compiled("rolling_drag:torque=1e-3,breakaway=2e-3")
+        told = 3e-3 / KV  # [rad/s] that the motor gives as much torque for
+        assert np.abs(driven(model, 0.5 * told).qvel[6:]).max() < 0.01
+        rolling = driven(model, 1.3 * told).qvel[6:]
+        assert rolling == pytest.approx(1.3 * told - 1e-3 / KV, rel=0.01)
+
     def test_torque_limit_bounds_the_torque(self):
         data = driven(compiled("torque_limit:factor=0.01,wheel=left"), seconds=0.05)
         assert data.actuator_force[0] == pytest.approx(0.01 * 0.057)

@@ -69,6 +69,7 @@ class RollingDrag(BodyEffect):
         "0.057 N m"
     )
     choices = (WHEEL,)
+    resizes = True
     parameters = (
         strength(
             "torque",
