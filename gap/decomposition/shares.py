@@ -199,14 +199,15 @@ def guarded(problem: Problem, point: Point) -> Support:
 
 def weighty(point: Point, left: float) -> Support:
     """The set of a point without trifles: what closes, added last, hardly any of the
-    gap, and less than a part of what no explanation closes: that may look like it.
+    gap, and less than a part of what no explanation closes: that may look like it. So
+    may the others, within what they are simulated to.
 
     Args:
         point: the fit.
         left: share of the gap that is left and is not scatter.
     """
     linear, support = point.linear, point.support
-    least = min(SLIGHT * left, TRIFLE)
+    least = max(min(SLIGHT * left, TRIFLE), fit.INEXACT**2)
     least *= linear.squares(()) - linear.squares(linear.free)
     while len(support) > 1:
         here = linear.squares(support)
