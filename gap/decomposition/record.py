@@ -141,7 +141,7 @@ def statements(made: Decomposition) -> list[str]:
         return ["No gap beyond what the recording scatters by itself." + apart]
     before, beyond = _sizes(made, made.start.rest)
     _, left = _sizes(made, made.point.rest)
-    listed = [words.part(part, *_main(made, part)) for part in made.parts]
+    listed = [words.part(p, *_main(made, p), _beside(made, p)) for p in made.parts]
     date = ""
     if made.onset:
         date = f"{made.onset.name} sets in at trial {made.onset.trial}."
@@ -189,6 +189,19 @@ def _main(made: Decomposition, part: Part) -> tuple[str, str]:
     if alike:
         name = max(alike, key=lambda n: abs(part.values[n] - rows[n].nominal))
     return rows[name].unit, name
+
+
+def _beside(made: Decomposition, part: Part) -> list[str]:
+    """Further numbers of an explanation that is called as its first: what a dry
+    friction takes to break away."""
+    rows = {row.name: row for row in made.problem.rows}
+    return [
+        f"{name.partition('[')[0].rpartition('.')[2]} {value:.4g} {rows[name].unit}"
+        for name, value in part.values.items()
+        if part.name in part.values
+        and name != part.name
+        and value != rows[name].nominal
+    ]
 
 
 def _fits(made: Decomposition) -> tuple[Fit, ...]:

@@ -1,9 +1,12 @@
 """Effects that look alike at one speed are told apart by others."""
 
+import numpy as np
+
 from bns.gap.diagnose import diagnose
 from bns.gap.models.wheeled import WheeledModel
 from bns.gap.planning import excitation
 from bns.worlds.physics.wheeled_world import MujocoWorld
+from bns.worlds.trial import Commands
 
 NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.008"
 DRAG = "rolling_drag:wheel=both,torque=1e-4,viscous=0"
@@ -20,3 +23,17 @@ def test_dry_friction_is_told_from_viscous():
     found = diagnose(trials, model, rows=NAMES, full=False)
     assert found.verdict.named == (("rolling_drag.torque[both]",),)
     assert abs(found.best.magnitudes[0] - 1e-4) < 1e-5
+
+
+def test_a_wheel_that_sticks_is_told_from_a_dead_band():
+    model = WheeledModel("khepera3", threads=1)
+    sticks = "rolling_drag:wheel=right,torque=0.002,breakaway=0.004"
+    speeds = [0.05, 0.09, 0.14, 0.2]
+    told = [[[v, v], [0.0, 0.0], [-v, -v]] for v in speeds]
+    world = MujocoWorld("khepera3", reality=[sticks, NOISE], threads=1)
+    trials = world.run([Commands(np.array(row), np.full(3, 1.2)) for row in told * 2])
+    names = [f"{name}[right]" for name in ("rolling_drag.torque", "dead_band")]
+    found = diagnose(trials, model, rows=names, full=False)
+    assert found.verdict.named == (("rolling_drag.torque[right]",),)
+    assert abs(found.best.magnitudes[0] - 0.002) < 1e-4
+    assert ", breakaway 0.0" in found.verdict.sentence
