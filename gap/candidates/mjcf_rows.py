@@ -95,12 +95,6 @@ def grouped(candidates: Sequence[Row]) -> list[Row]:
     return made
 
 
-def term(name: str) -> str:
-    """The explanation that a row belongs to: its name up to the part's."""
-    stem, bracket, rest = name.partition("[")
-    return stem + bracket + rest.partition("]")[0] + ("]" if bracket else "")
-
-
 def _of(item: Row, trials: Sequence[Trial], lead: float) -> Iterable[Row]:
     excite = EXCITE.get(item.effect, "any command")
     row = partial(Row, low=item.low, high=item.high, unit=item.unit, excite=excite)

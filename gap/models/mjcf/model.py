@@ -110,7 +110,8 @@ class OwnModel(GapModel):
         made: list[Effect] = []
         loads: dict[str, dict[str, float]] = {}
         for name, value in values.items():
-            item = self._terms.get(mjcf_rows.term(name))
+            whole = name if name in self._terms else name.rpartition(".")[0]
+            item = self._terms.get(whole)
             if item and item.effect == "body_mass":
                 loads.setdefault(item.name, {})[name] = value
             elif item:
