@@ -57,6 +57,9 @@ class WheelDiameter(BodyEffect):
             body.pos[2] += (self["factor"] - 1) * radius
 
 
+FADES = 1.0  # [rad/s] of a wheel, at which its breakaway is 37 %; 2 cm/s; assumed
+
+
 class RollingDrag(BodyEffect):
     """A wheel turns against friction.
 
@@ -89,7 +92,7 @@ class RollingDrag(BodyEffect):
             "breakaway",
             "N m",
             (0.0, 0.057),
-            "dry friction at standstill beyond `torque`, which fades with speed",
+            "dry friction at standstill beyond `torque`; bounds as there",
             example=0.003,
         ),
     )
@@ -104,7 +107,6 @@ class RollingDrag(BodyEffect):
             parts.stick(spec, held, self["breakaway"], FADES)
 
 
-FADES = 1.0  # [rad/s] of a wheel, at which its breakaway is 37 %; 2 cm/s; assumed
 LEAST = 1e-9  # of the torque; MuJoCo takes a range of nothing for no limit at all
 
 
