@@ -83,8 +83,8 @@ _ROUND = (
 )
 """explanations with a size and a direction: two rows each, along x and y"""
 PLANES = tuple(name for name, *_ in _ROUND)
-STICKS = {"rolling_drag.torque": ("rolling_drag.torque", "rolling_drag.breakaway")}
-"""rows of one explanation: dry friction, and what is beyond it at standstill"""
+STICKS = {"rolling_drag.breakaway": "rolling_drag.torque"}
+"""rows that belong to the explanation of another: dry friction that breaks away"""
 
 
 def term(name: str) -> str:
@@ -92,9 +92,8 @@ def term(name: str) -> str:
     stem, bracket, rest = name.partition("[")
     if stem.startswith(PLANES) or stem.startswith("payload."):
         return name.rpartition(".")[0]
-    for whole, parts in STICKS.items():
-        if stem in parts:
-            return whole + bracket + rest
+    if stem in STICKS:
+        return STICKS[stem] + bracket + rest
     return name.partition("@")[0] if rest else name
 
 
@@ -115,15 +114,15 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
     made.append(Row(LEAD, 0.0, lead, -0.06, 0.06, unit="s", nuisance=True, step=0.001))
     for name, sd, high, sided, levels in _ROUND:
         for side in SIDES[:2] if sided else ("",):
-            term = f"{name}[{side}]" if side else name
+            whole = f"{name}[{side}]" if side else name
             made += [
                 Row(
-                    f"{term}.{axis}",
+                    f"{whole}.{axis}",
                     0.0,
                     sd,
                     -high,
                     high,
-                    group=term,
+                    group=whole,
                     levels=levels,
                     unit=_unit(name),
                     excite=EXCITE.get(name, "any drive"),

@@ -239,7 +239,8 @@ def refitted(problem: Problem, point: Point, support: Support) -> Point:
 
 
 def fitted_at(problem: Problem, point: Point, support: Iterable[str]) -> Point:
-    """A set fitted from a point's values.
+    """A set fitted from a point's values, without what has no slope and came back to
+    its nominal value.
 
     Args:
         problem: the recording.
@@ -251,7 +252,7 @@ def fitted_at(problem: Problem, point: Point, support: Iterable[str]) -> Point:
     values, rest = newton(problem, point.values, fitted, point.noise)
     values, rest = levels.zoomed(problem, values, rest, support, point.noise)
     linear, known, slopes = linearised(problem, values, rest, point.noise)
-    return Point(values, support, rest, linear, slopes, known)
+    return Point(values, support & set(linear.terms), rest, linear, slopes, known)
 
 
 def _several(tried: Singles, found: Support, best: Point) -> Point:

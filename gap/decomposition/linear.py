@@ -257,33 +257,31 @@ class Linear:
         rows = [row for name in key for row in self.terms[name]]
         plain = self._spread(frozenset())
         value, found = plain.changed(rows, 1.0 - self.slack[rows] ** 2)
-        beyond = self._beyond(rows, found)
-        if inside := self._without_edges(key, rows, beyond):
-            rows = inside
+        far = self._beyond(rows, found)
+        if edges := self._edges(key, far):
+            rows = [row for row in rows if row not in edges]
             value, found = plain.changed(rows, 1.0 - self.slack[rows] ** 2)
-            beyond = self._beyond(rows, found)
+            far = self._beyond(rows, found)
         value += self._paid(key) + tail(found)
-        if beyond.any():
-            far = {row for row, out in zip(rows, beyond, strict=True) if out}
+        if far:
             out = {name for name in key if far & set(self.terms[name])}
             value = max(value, self.cost(key - out) + KAPPA * len(out))
         return float(value)
 
-    def _beyond(self, rows: list[int], found: np.ndarray) -> np.ndarray:
-        return (found < self.low[rows] - 1e-6) | (found > self.high[rows] + 1e-6)
+    def _beyond(self, rows: list[int], found: np.ndarray) -> set[int]:
+        """Rows whose most probable values lie beyond their bounds."""
+        out = (found < self.low[rows] - 1e-6) | (found > self.high[rows] + 1e-6)
+        return {row for row, beyond in zip(rows, out, strict=True) if beyond}
 
-    def _without_edges(
-        self, key: Support, rows: list[int], beyond: np.ndarray
-    ) -> list[int]:
-        """Rows of a set without those that want to be beyond a bound that is their
-        nominal value, while others of their explanation do not; none = all stay."""
-        far = {row for row, out in zip(rows, beyond, strict=True) if out}
-        out: set[int] = set()
+    def _edges(self, key: Support, far: set[int]) -> set[int]:
+        """Rows of a set that want to be beyond a bound that is their nominal value,
+        while others of their explanation stay inside theirs."""
+        edges: set[int] = set()
         for name in key:
             mine = far & set(self.terms[name])
-            if mine and mine < set(self.terms[name]):
-                out |= {row for row in mine if 0.0 in (self.low[row], self.high[row])}
-        return [row for row in rows if row not in out] if out else []
+            if mine < set(self.terms[name]):
+                edges |= {r for r in mine if 0.0 in (self.low[r], self.high[r])}
+        return edges
 
     def _spread(self, support: Support) -> Spread:
         """What was recorded, as it may spread under a set's prior; kept for none."""

@@ -181,9 +181,9 @@ def _sizes(made: Decomposition, left: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def _main(made: Decomposition, part: Part) -> tuple[str, str]:
     """Unit and name of the row that stands for an explanation."""
     rows = {row.name: row for row in made.problem.rows}
-    moved = [n for n in part.values if part.values[n] != rows[n].nominal]
-    if part.name in moved:
+    if part.name in part.values:
         return rows[part.name].unit, part.name
+    moved = [n for n in part.values if part.values[n] != rows[n].nominal]
     name = (moved or [*part.values])[0]
     alike = [n for n in moved if rows[n].unit == rows[name].unit]
     if alike:
@@ -194,13 +194,13 @@ def _main(made: Decomposition, part: Part) -> tuple[str, str]:
 def _beside(made: Decomposition, part: Part) -> list[str]:
     """Further numbers of an explanation that is called as its first: what a dry
     friction takes to break away."""
+    if part.name not in part.values:
+        return []
     rows = {row.name: row for row in made.problem.rows}
     return [
         f"{name.partition('[')[0].rpartition('.')[2]} {value:.4g} {rows[name].unit}"
         for name, value in part.values.items()
-        if part.name in part.values
-        and name != part.name
-        and value != rows[name].nominal
+        if name != part.name and value != rows[name].nominal
     ]
 
 

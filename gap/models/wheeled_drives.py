@@ -75,7 +75,7 @@ class Changes:
         late = terms.pop(LATENCY, {}).get(LATENCY, 0.0)
         made = load(terms.pop("payload"), robot) if "payload" in terms else []
         for name, rows in terms.items():
-            whole = name.startswith((*PLANES, *STICKS))
+            whole = name.startswith((*PLANES, *STICKS.values()))
             parts = [rows] if whole else [{row: rows[row]} for row in rows]
             made += [effect(name, part) for part in parts]
         body = _edits(made)
@@ -133,7 +133,7 @@ def effect(name: str, values: Mapping[str, float]) -> Effect:
     if stem == "payload":
         return carried(values)
     moved = [item for item in values.items() if item[1]] or [*values.items()]
-    for row, value in moved if stem in STICKS else moved[:1]:
+    for row, value in moved if stem in STICKS.values() else moved[:1]:
         if "@" in row:
             given["direction"] = row.partition("@")[2]
         about = parameter(row.partition("[")[0])

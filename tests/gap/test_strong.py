@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from bns.gap.decomposition import descent
+from bns.gap.decomposition.problem import Problem
 from bns.gap.diagnose import diagnose
 from bns.gap.models.wheeled import WheeledModel
 from bns.gap.planning import excitation
@@ -37,3 +39,14 @@ def test_a_wheel_that_sticks_is_told_from_a_dead_band():
     assert found.verdict.named == (("rolling_drag.torque[right]",),)
     assert abs(found.best.magnitudes[0] - 0.002) < 1e-4
     assert ", breakaway 0.0" in found.verdict.sentence
+
+
+def test_a_limit_that_came_back_to_the_nominal_explains_nothing():
+    model = WheeledModel("khepera3", threads=1)
+    told = Commands(np.array([[0.1, 0.1], [0.05, 0.15]]), np.array([1.0, 1.0]))
+    trials = MujocoWorld("khepera3", reality=[NOISE], threads=1).run([told] * 3)
+    names = ["wheel_gain[left]", "speed_saturation[right]"]
+    problem = Problem.of(trials, model)
+    point = descent.fitted_at(problem, descent.nothing(problem), names)
+    assert point.support == {"wheel_gain[left]"}
+    assert np.isfinite(point.cost)
