@@ -28,7 +28,7 @@ class Plan:
     tasks: tuple[str, ...] = ()
     """walk, navigate, light; none means all"""
     priors: tuple[str, ...] = ()
-    """P0 none, P1 exact, P2 off by a fixed gap; none means all that a rival has"""
+    """P0 none, P1 exact, P2 off by a fixed gap, PG geometry; none: all of a rival"""
     kinds: tuple[str, ...] = ()
     """sets of damages: inside, outside; none means both"""
     damages: tuple[str, ...] = ()

@@ -6,7 +6,8 @@ learned for as long as the dissertation lets BNS; with one they need less. What 
 is, is the same for all that have it:
 
 P0: none. P1: the exact undamaged robot. P2: the nominal model, while the robot differs
-from it everywhere by a little (`bns.prior.mismatch`).
+from it everywhere by a little (`bns.prior.mismatch`). PG: where feet are and what they
+bear, without physics (`bns.learners.bns.nominal`), which is a learner's own.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,6 +25,7 @@ PRIORS = {
     "P0": "no prior",
     "P1": "an exact model of the undamaged robot",
     "P2": "a nominal model of a robot that differs from it by a fixed gap",
+    "PG": "the geometry and statics of the legs, no physics",
 }
 SETS = ("inside", "outside")
 """damages of the kinds that BNS was tuned on, and others"""
@@ -158,6 +160,13 @@ RIVALS = {
         settings=_SEEN | {"evolution.cells": 3},
         tasks=("walk", "navigate"),
     ),
+    "nominal": Rival(
+        learner="bns",
+        priors=("PG",),
+        presets={"walk": "hexapod-nominal"},
+        settings=_SEEN,
+        tasks=("walk",),
+    ),
     "random": Rival(learner="random"),
     "cma": Rival(learner="cma", priors=("P0", "P1", "P2")),
     "ite": Rival(learner="ite", priors=("P0", "P1", "P2"), repertoire=True),
@@ -287,4 +296,4 @@ def config(task: str, side: Rival, prior: str, damage: str) -> RunConfig:
     base = replace(base, preset="", trials=onset + design.after, world=world)
     known = design.repertoire if side.repertoire else {}
     told = {f"prior.{n}": v for n, v in (known or design.model).items()}
-    return base.with_({**side.settings, **(told if prior != "P0" else {})})
+    return base.with_({**side.settings, **(told if prior in _MODELS else {})})

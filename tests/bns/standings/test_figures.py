@@ -32,7 +32,8 @@ class TestCells:
             assert config.trials - onset == 50
             assert bool(config.world.reality) == (entry.prior == "P2")
             prior = config.prior.world or config.prior.repertoire
-            assert bool(prior) == (entry.prior != "P0")
+            assert bool(prior) == (entry.prior in ("P1", "P2"))
+            assert config.walk.nominal == (entry.prior == "PG")
             assert not config.prior.reality  # the model is nominal
 
     def test_any_learner_takes_part_by_its_name(self, monkeypatch):
