@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bns.gap.decomposition import fit, levels
+from bns.gap.decomposition import fit, levels, search
 from bns.gap.decomposition.fit import Noise, Point, linearised, newton, placed
 from bns.gap.decomposition.linear import Linear, Support
 from bns.gap.decomposition.problem import Problem
@@ -46,7 +46,7 @@ def _held_out(problem: Problem, point: Point) -> float:
     """Plain held-out error of the set of highest evidence: whether an autoregression
     helps is for this to say. It does where errors are random walks, not where they are
     the model's."""
-    _, support = point.linear.search()
+    _, support = search.best(point.linear)
     return float(HeldOut.of(problem, point).error(support).sum())
 
 
@@ -73,7 +73,7 @@ def descend(
         at = at if near else values.copy()
         kept = slopes if near else None
         linear, known, slopes = linearised(problem, values, rest, known, kept)
-        found = linear.search(start=support, backward=not problem.model.singly)[1]
+        found = search.best(linear, start=support, backward=not problem.model.singly)[1]
         if found == support:
             break
         support = found
@@ -138,7 +138,7 @@ def decompose(tried: Singles) -> Point:
     """
     problem, start = tried.problem, tried.start
     several = not problem.model.singly
-    found = start.linear.search()[1] if several else frozenset()
+    found = search.best(start.linear)[1] if several else frozenset()
     best = start if several else _alone(tried)
     if len(found) == 1:
         best = _followed(problem, start, found)
@@ -319,6 +319,6 @@ def _from_all(problem: Problem, start: Point) -> Point:
     for _ in range(3):
         values, rest = newton(problem, values, everything, known)
         linear, known, _ = linearised(problem, values, rest, known)
-    found = linear.search()[1]
+    found = search.best(linear)[1]
     values = placed(problem, linear, found, values)
     return descend(problem, values, found, known)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from bns.gap.decomposition import search
 from bns.gap.decomposition.fit import Noise, Point
 from bns.gap.decomposition.linear import KAPPA, Linear, Support, stretches
 from bns.gap.decomposition.problem import Problem
@@ -120,7 +121,7 @@ def _level(
     problem: Problem, point: Point, number: int, value: float, linear: Linear
 ) -> Level:
     known = min((point.support, frozenset()), key=lambda s: linear.cost(_in(linear, s)))
-    cost, support = linear.search(start=known, quick=True)
+    cost, support = search.best(linear, start=known, quick=True)
     row = problem.rows[number]
     values = _values(problem, point, number, value, linear, support)
     paid = cost + KAPPA + np.log(len(row.levels)) + 0.5

@@ -9,7 +9,6 @@ recording, so that thousands of sets, stretches left out and moments at which a 
 sets in cost no simulation.
 """
 
-import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -24,9 +23,6 @@ KAPPA = 3.0
 explanations of a usual model, so that about one in all is expected"""
 EDGE = 0.1  # of a level's departure, by which a fit may leave its bounds: whole losses
 # are at theirs
-FEW = 12  # explanations of which each is dropped by way of trial on the way backward
-TRIED = 3  # of more: those that look weakest
-MERGED = 5  # explanations up to which two are tried against one
 
 Support = frozenset[str]
 
@@ -255,14 +251,14 @@ class Linear:
             if name in key and covered & key:
                 return self.cost(key - covered) + KAPPA * len(covered & key)
         rows = [row for name in key for row in self.terms[name]]
-        plain = self._spread(frozenset())
+        plain = self.spread(frozenset())
         value, found = plain.changed(rows, 1.0 - self.slack[rows] ** 2)
         far = self._beyond(rows, found)
         if edges := self._edges(key, far):
             rows = [row for row in rows if row not in edges]
             value, found = plain.changed(rows, 1.0 - self.slack[rows] ** 2)
             far = self._beyond(rows, found)
-        value += self._paid(key) + tail(found)
+        value += self.paid(key) + tail(found)
         if far:
             out = {name for name in key if far & set(self.terms[name])}
             value = max(value, self.cost(key - out) + KAPPA * len(out))
@@ -283,7 +279,7 @@ class Linear:
                 edges |= {r for r in mine if 0.0 in (self.low[r], self.high[r])}
         return edges
 
-    def _spread(self, support: Support) -> Spread:
+    def spread(self, support: Support) -> Spread:
         """What was recorded, as it may spread under a set's prior; kept for none."""
         if "none" in self._sums and not support:
             return self._sums["none"]
@@ -293,7 +289,7 @@ class Linear:
             self._sums["none"] = made
         return made
 
-    def _paid(self, support: Support) -> float:
+    def paid(self, support: Support) -> float:
         """What a set costs: each family once, its dearest member."""
         most: dict[str, float] = {}
         for name in support:
@@ -301,99 +297,10 @@ class Linear:
             most[family] = max(most.get(family, 0.0), self.penalty[name])
         return sum(most.values())
 
-    def search(
-        self,
-        start: Iterable[str] | None = None,
-        *,
-        quick: bool = False,
-        backward: bool = True,
-    ) -> tuple[float, Support]:
-        """The set of highest evidence: from all backward, from none forward and from a
-        given one, each improved by adding, dropping and swapping.
-
-        Args:
-            start: a further set to start from.
-            quick: from there alone, and without trying two against one.
-            backward: from all as well; of hundreds that takes long and says little.
-
-        Returns:
-            its cost, and the set.
-        """
-        starts: list[Support] = [] if quick else [frozenset()]
-        if backward and not quick:
-            starts.insert(0, self._backward())
-        if start is not None:
-            starts.append(frozenset(start) & frozenset(self.free))
-        found = [self._improved(item, merge=not quick) for item in starts]
-        return min(found, key=lambda item: item[0])
-
-    def _backward(self) -> Support:
-        kept = frozenset(self.free)
-        while kept:
-            tried = kept if len(kept) <= FEW else self._weakest(kept)
-            best = min((self.cost(kept - {n}), n) for n in sorted(tried))
-            if best[0] > self.cost(kept):
-                break
-            kept -= {best[1]}
-        return kept
-
-    def _weakest(self, kept: Support) -> set[str]:
-        """The explanations of a set that look as if they cost least to drop: by their
-        evidence, for being beyond their bounds, or covered by others."""
-        spread, paid = self._spread(kept), self._paid(kept)
-        rising, beyond = {}, {}
-        for name in kept:
-            rows = list(self.terms[name])
-            now = spread.changed(rows, np.zeros(len(rows)))[1]
-            beyond[name] = float(
-                np.maximum(self.low[rows] - now, now - self.high[rows]).max()
-            )
-            value, _ = spread.changed(rows, self.slack[rows] ** 2 - 1.0)
-            rising[name] = value + self._paid(kept - {name}) - paid
-        order = sorted(kept, key=lambda name: (rising[name], name))[:TRIED]
-        far = [name for name in kept if beyond[name] > 0]
-        far = sorted(far, key=lambda name: (-beyond[name], name))[:TRIED]
-        covered = kept & frozenset().union(*self.covers.values())
-        return {*order, *far, *covered}
-
-    def _improved(self, support: Support, merge: bool) -> tuple[float, Support]:
-        best = self.cost(support)
-        while True:
-            moves = list(self._moves(support, merge))
-            costs = [self.cost(item) for item in moves]
-            if not costs or min(costs) >= best - 1e-9:
-                return best, support
-            at = int(np.argmin(costs))
-            best, support = costs[at], moves[at]
-
-    def _moves(self, support: Support, merge: bool) -> Iterable[Support]:
-        inside, outside = sorted(support), [n for n in self.free if n not in support]
-        yield from (support - {name} for name in inside)
-        yield from (support | {name} for name in outside)
-        for name in inside:
-            yield from ((support - {name}) | {other} for other in outside)
-        if merge and len(support) <= MERGED:
-            for pair in itertools.combinations(inside, 2):
-                yield from ((support - set(pair)) | {other} for other in outside)
-
-    def _weighed(self) -> None:
-        if not self._costs:
-            self.search()
-
-    def near(self, within: float) -> list[tuple[float, Support]]:
-        """Sets that were weighed and cost no more than so much beyond the best."""
-        self._weighed()
-        least = min(self._costs.values())
-        found = [(c - least, s) for s, c in self._costs.items() if c <= least + within]
-        return sorted(found, key=lambda item: (item[0], sorted(item[1])))
-
-    def inclusion(self, name: str) -> float:
-        """Posterior probability of an explanation over all sets that were weighed."""
-        self._weighed()
-        costs = np.array(list(self._costs.values()))
-        inside = np.array([name in support for support in self._costs])
-        odds = np.exp(costs.min() - costs)
-        return float(odds[inside].sum() / odds.sum())
+    @property
+    def weighed(self) -> Mapping[Support, float]:
+        """Cost of each set that was asked for so far."""
+        return self._costs
 
     def rest(self, values: np.ndarray) -> np.ndarray:
         """Residuals at values of the rows, ``(N, C)``."""

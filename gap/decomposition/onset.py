@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bns.gap.decomposition import descent
+from bns.gap.decomposition import descent, search
 from bns.gap.decomposition.fit import Point, placed
 from bns.gap.decomposition.linear import KAPPA, Linear, Support
 from bns.gap.decomposition.problem import Problem
@@ -54,7 +54,7 @@ def dated(
         return None
     tries = []
     for point in (start, best):
-        base = point.linear.search(start=best.support)[1]
+        base = search.best(point.linear, start=best.support)[1]
         tries.append((*_best(point.linear, base, best.support, cuts), point, base))
     cost, cut, support, point, base = min(tries, key=lambda item: item[0])
     gain = point.linear.cost(base) - cost
@@ -127,7 +127,7 @@ def _lasting(linear: Linear, base: Support, cut: _Cut, support: Support) -> bool
     count = len(linear.square)
     for out in range(count):
         kept = np.arange(count) != out
-        without = linear.of_blocks(kept).search(start=base, quick=True)[0]
+        without = search.best(linear.of_blocks(kept), start=base, quick=True)[0]
         if late.of_blocks(kept).cost(support) > without - WORTH:
             return False
     return True

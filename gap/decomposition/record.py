@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bns.gap.decomposition import fit as fits
-from bns.gap.decomposition import rest, shares, words
+from bns.gap.decomposition import rest, search, shares, words
 from bns.gap.decomposition.decomposition import Decomposition
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.problem import Problem
@@ -103,7 +103,7 @@ def _verdict(made: Decomposition) -> Verdict:
 
 
 def _rivals(made: Decomposition) -> list[tuple[float, Support]]:
-    near = made.point.linear.near(50.0)
+    near = search.near(made.point.linear, 50.0)
     return [(cost, s) for cost, s in near if s not in made.tied and cost > 0]
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bns.gap.decomposition import fit
+from bns.gap.decomposition import fit, search
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import KAPPA, Linear, Support
 from bns.gap.decomposition.problem import Problem
@@ -59,7 +59,7 @@ def parts(problem: Problem, point: Point) -> list[Part]:
                 high=high,
                 last=(linear.squares(support - {name}) - left) / whole,
                 alone=(none - linear.squares({name})) / whole,
-                sure=linear.inclusion(name),
+                sure=search.inclusion(linear, name),
             )
         )
     return sorted(made, key=lambda part: (-part.last, part.name))
@@ -181,7 +181,7 @@ def guarded(problem: Problem, point: Point) -> Support:
         return point.support
     held = HeldOut.of(problem, point)
     support = point.support
-    near = [s for cost, s in point.linear.near(CHOICE) if len(s ^ support) <= 2]
+    near = [s for cost, s in search.near(point.linear, CHOICE) if len(s ^ support) <= 2]
     near = [s for s in near if len(s) <= len(support)]
     best = support
     if len(support) > 3:  # several at once: which of them is for the held-out error
