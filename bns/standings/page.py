@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bns.prior import repertoire
 from bns.standings import figures
 from bns.standings.design import DESIGNS, PRIORS
 from bns.standings.figures import Cell, Row
@@ -59,11 +60,30 @@ def _group(task: str, prior: str, kind: str, cells: Sequence[Cell]) -> str:
     lines = [
         f"\n## {task}, {prior}: {PRIORS[prior]}\n",
         f"Damages ({kind}): {', '.join(names)}{left}.\n",
+        *_repertoires(cells),
         *table(rows),
         "",
         *duels(cells),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _repertoires(cells: Sequence[Cell]) -> list[str]:
+    """What the repertoires of some cells hold, and whether that can do the task."""
+    lines = []
+    for name in sorted({c.entry.member.config.prior.repertoire for c in cells} - {""}):
+        found = repertoire.read(name)
+        best, bar = found.worth.max(), min(cell.bar for cell in cells)
+        short = (
+            f", less than the {bar:.2f} m of the task: nobody who keeps to it can do it"
+            if best < bar
+            else ""
+        )
+        lines.append(
+            f"Repertoire `{name}`: {len(found)} controllers of {found.head.evaluations} "
+            f"evaluations; the best does {best:.2f} m in the undamaged model{short}.\n"
+        )
+    return lines
 
 
 def table(rows: Sequence[Row]) -> list[str]:

@@ -77,9 +77,10 @@ class TestPlan:
         assert len(jobs(cells, 4, done, tmp_path)) == 8
 
 
-def cells(rival, values, damage="type0", tried=None):
+def cells(rival, values, damage="type0", tried=None, prior="P0"):
     """A cell whose runs deploy some distances, the same in all trials of a run."""
-    (entry, *_) = design.entries(replace(WALK, rivals=(rival,), damages=(damage,)))
+    part = replace(WALK, rivals=(rival,), damages=(damage,), priors=(prior,))
+    (entry,) = design.entries(part)
     far = np.asarray(values, float)
     return Cell(entry, far, far if tried is None else tried, 1.0, 2.0,
                 np.zeros(len(far)), np.zeros(len(far)))  # fmt: skip
@@ -127,6 +128,12 @@ def test_the_page_says_n_and_what_was_not_run():
     assert lines[2].startswith("| cma") and lines[3].startswith("| random")
     assert "never [-, never], 3 of 3" in lines[3]
     assert "Nothing has been run" in page.page([])
+
+
+def test_the_page_says_what_a_repertoire_could_do():
+    low = page.page([cells("ite", np.full((3, 50), 0.2), prior="P1")])
+    assert "Repertoire `phantomx-1`" in low and "0.75 m in the undamaged model" in low
+    assert "less than the" in low  # the ceiling that the map is, before what is found
 
 
 class TestGap:
