@@ -80,8 +80,9 @@ def _repertoires(cells: Sequence[Cell]) -> list[str]:
             else ""
         )
         lines.append(
-            f"Repertoire `{name}`: {len(found)} controllers of {found.head.evaluations} "
-            f"evaluations; the best does {best:.2f} m in the undamaged model{short}.\n"
+            f"Repertoire `{name}`: {len(found)} controllers of "
+            f"{found.head.evaluations} evaluations; the best does {best:.2f} m in the "
+            f"undamaged model{short}.\n"
         )
     return lines
 
