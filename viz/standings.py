@@ -1,6 +1,7 @@
 """Picture of the standings: what is deployed over the trials after the damage."""
 
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,11 @@ from bns.storage import files
 from bns.viz import style
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+WRAPPED = 44
+"""letters of a title's line"""
 
 
 def write(cells: Sequence[Cell], folder: Path) -> list[Path]:
@@ -54,24 +59,32 @@ def curves(cells: Sequence[Cell]) -> "Figure":
     with style.plotting() as figure_class:
         width = max(4.0 * len(groups), style.WIDE.width)
         figure = figure_class(figsize=(width, 4.2), layout="constrained")
-        panels = figure.subplots(1, len(groups), sharey=True, squeeze=False)[0]
-        for axes, ((_, prior, kind), held) in zip(panels, groups.items(), strict=True):
-            for name, some in figures.by_rival(held).items():
-                over = np.mean([_shares(cell) for cell in some], axis=0)
-                runs = min(cell.runs for cell in some)
-                trials = np.arange(1, len(over) + 1)
-                said = f"{name} (n = {runs} x {len(some)})"
-                axes.plot(trials, over, color=colours[name], label=said)
-            axes.set_title(f"{prior}: {PRIORS[prior]}\n({kind})", fontsize="small")
-            axes.set_xlabel("trial from the damage on")
-            axes.set_ylim(bottom=0)
-            axes.legend(fontsize="x-small")
-        panels[0].set_ylabel("deployed: share of the ceiling (or solved)")
+        panels = figure.subplots(1, len(groups), squeeze=False)[0]
+        for axes, (group, held) in zip(panels, groups.items(), strict=True):
+            _panel(axes, group, held, colours)
     return figure
 
 
-def _shares(cell: Cell) -> np.ndarray:
-    """Mean over runs, ``(T,)``; metres where the ceiling is not known."""
-    top = cell.ceiling if np.isfinite(cell.ceiling) else 1.0
-    found: np.ndarray = cell.deployed.mean(0) / top
-    return found
+def _panel(
+    axes: "Axes",
+    group: tuple[str, str, str],
+    cells: Sequence[Cell],
+    colours: Mapping[str, str],
+) -> None:
+    """One task, prior and set of damages: a line a learner."""
+    task, prior, kind = group
+    for name, some in figures.by_rival(cells).items():
+        known = figures.comparable(some)
+        if not known:
+            continue
+        over = np.mean([c.deployed.mean(0) / top for c, top in known], axis=0)
+        trials = np.arange(1, len(over) + 1)
+        label = f"{name} (n = {min(c.runs for c, _ in known)} x {len(known)})"
+        axes.plot(trials, over, color=colours[name], label=label)
+    said = "\n".join(textwrap.wrap(f"{prior}: {PRIORS[prior]}", WRAPPED))
+    measure = figures.measure(task, kind)
+    axes.set_title(f"{said}\n({kind})", fontsize="small")
+    axes.set_ylabel(f"deployed: {measure}")
+    axes.set_xlabel("trial from the damage on")
+    axes.set_ylim(0, None if measure == "distance [m]" else 1)
+    axes.legend(fontsize="x-small")

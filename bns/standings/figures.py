@@ -133,9 +133,9 @@ class Row:
         runs: least of a damage, how many damages, and least of runs that differ.
         waits: bar by name -> median of trials and its exact interval, and how many of
             how many runs never got there.
-        deployed, tried, last: mean share of the ceiling (or of trials solved): of the
-            one deployed and the one tried over all trials, and deployed in the last
-            five.
+        deployed, tried, last: mean of what `measure` says: of the one deployed and the
+            one tried over all trials, and deployed in the last five; NaN where no
+            ceiling is known.
         harmed: share of trials that did harm.
         evaluations: of the model, median.
     """
@@ -148,6 +148,29 @@ class Row:
     last: float
     harmed: float
     evaluations: float
+
+
+def measure(task: str, kind: str) -> str:
+    """What the means of a task and a set of damages are of, in words."""
+    design = DESIGNS[task]
+    if not design.ceilings:
+        return "share solved"
+    known = set(design.damages[kind]) & set(design.ceilings)
+    return "share of the ceiling" if known else "distance [m]"
+
+
+def comparable(cells: Sequence[Cell]) -> list[tuple[Cell, float]]:
+    """Cells of one task and set whose means can be taken together, each with what it
+    is divided by: where shares of the ceiling are meant, those whose ceiling is known.
+    """
+    entry = cells[0].entry
+    if measure(entry.task, entry.kind) != "share of the ceiling":
+        return [(cell, 1.0) for cell in cells]
+    return [(cell, cell.ceiling) for cell in cells if np.isfinite(cell.ceiling)]
+
+
+def _mean(shares: Sequence[float]) -> float:
+    return float(np.mean(shares)) if shares else float("nan")
 
 
 def row(rival: str, cells: Sequence[Cell]) -> Row:
@@ -163,8 +186,7 @@ def row(rival: str, cells: Sequence[Cell]) -> Row:
         pooled = pooled[~np.isnan(pooled)]
         middle = stats.median_interval(pooled)
         waits[name] = (middle, int(np.isinf(pooled).sum()), len(pooled))
-    scaled = [(c, c.ceiling if np.isfinite(c.ceiling) else 1.0) for c in cells]
-    known = [p for p in scaled if np.isfinite(p[0].ceiling)] or scaled
+    known = comparable(cells)
     trials = sum(c.tried.size for c in cells)
     return Row(
         rival,
@@ -174,9 +196,9 @@ def row(rival: str, cells: Sequence[Cell]) -> Row:
             min(c.distinct for c in cells),
         ),
         waits,
-        float(np.mean([c.deployed.mean() / top for c, top in known])),
-        float(np.mean([c.tried.mean() / top for c, top in known])),
-        float(np.mean([c.deployed[:, -5:].mean() / top for c, top in known])),
+        _mean([c.deployed.mean() / top for c, top in known]),
+        _mean([c.tried.mean() / top for c, top in known]),
+        _mean([c.deployed[:, -5:].mean() / top for c, top in known]),
         float(sum(c.harmed.sum() for c in cells) / trials),
         float(np.median(np.concatenate([c.evaluations for c in cells]))),
     )

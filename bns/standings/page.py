@@ -61,7 +61,7 @@ def _group(task: str, prior: str, kind: str, cells: Sequence[Cell]) -> str:
         f"\n## {task}, {prior}: {PRIORS[prior]}\n",
         f"Damages ({kind}): {', '.join(names)}{left}.\n",
         *_repertoires(cells),
-        *table(rows),
+        *table(rows, figures.measure(task, kind)),
         "",
         *duels(cells),
     ]
@@ -87,13 +87,23 @@ def _repertoires(cells: Sequence[Cell]) -> list[str]:
     return lines
 
 
-def table(rows: Sequence[Row]) -> list[str]:
-    """Lines of the table of learners, best first."""
+def table(rows: Sequence[Row], measure: str) -> list[str]:
+    """Lines of the table of learners, best first.
+
+    Args:
+        rows: of one task, prior and set of damages.
+        measure: what their means are of, see `figures.measure`.
+    """
     bars = list(dict.fromkeys(bar for row in rows for bar in row.waits))
-    share = "mean share of the ceiling" if len(bars) > 1 else "mean share solved"
     heads = ["learner", "n"]
     heads += [f"trials to {bar}: median [95 %], never" for bar in bars]
-    heads += [f"{share}: deployed", "last five", "tried", "harmed", "evaluations"]
+    heads += [
+        f"mean {measure}: deployed",
+        "last five",
+        "tried",
+        "harmed",
+        "evaluations",
+    ]
     lines = [_line(heads), _line(["---"] * len(heads))]
     for row in sorted(rows, key=lambda each: -each.deployed):
         runs, damages, distinct = row.runs

@@ -98,6 +98,15 @@ class TestFigures:
         middle, never, runs = found.waits["50% of the ceiling"]
         assert (never, runs) == (1, 2) and np.isinf(middle.value)
 
+    def test_metres_are_never_averaged_with_shares_of_a_ceiling(self):
+        far = np.full((2, 5), 1.0)
+        known, metres = cells("random", far), cells("random", far, damage="weak")
+        metres = replace(metres, ceiling=np.nan)
+        assert figures.row("random", [known, metres]).deployed == pytest.approx(0.5)
+        assert np.isnan(figures.row("random", [metres]).deployed)
+        assert figures.measure("walk", "outside") == "distance [m]"
+        assert figures.measure("navigate", "inside") == "share solved"
+
     def test_wins_are_those_that_chance_does_not_explain(self):
         rng = np.random.default_rng(0)
         low, high = (base + rng.uniform(0, 0.1, (12, 5)) for base in (0.2, 1.0))
