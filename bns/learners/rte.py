@@ -1,4 +1,4 @@
-"""RTE (Chatzilygeroudis et al. 2018): plans a trial from behaviours, then corrects them.
+"""RTE (Chatzilygeroudis et al. 2018): composes short drives and corrects them.
 
 A repertoire of short drives says where each takes the robot: made in a model
 (`prior.world`), or, without one, out of what the first trials drove at random. A
@@ -223,7 +223,7 @@ class Rte(Learner):
         memory.moved = np.vstack([memory.moved, moved[good]])
 
     def _choose(self, memory: Memory, trial: int, rng: np.random.Generator) -> None:
-        """What is tried: the list that solved the task, a plan, or at first anything."""
+        """What is tried: the list that solved the task, a plan, or anything."""
         explores = not self.models and trial < self.rule.explored
         if explores or not len(memory.genes):
             memory.tried, memory.rows = self.random(1, rng)[0], memory.rows[:0]
