@@ -116,7 +116,14 @@ class Memory:
     def add(
         self, rows: np.ndarray, seen: np.ndarray, trial: int, *, remembered: int
     ) -> None:
-        """Remember what behaviours did; arguments as the attributes."""
+        """Remember what behaviours did.
+
+        Args:
+            rows: theirs in the repertoire, ``(B,)``.
+            seen: what came of them, as `driving.targets`, ``(B, 4)``.
+            trial: in which.
+            remembered: the newest that are kept.
+        """
         self.at = np.append(self.at, rows)
         self.seen = np.vstack([self.seen, seen])
         self.trial = np.append(self.trial, np.full(len(rows), trial))

@@ -74,7 +74,14 @@ def scaled(values: np.ndarray, of: np.ndarray) -> np.ndarray:
 
 
 def moved_by(pose: Pose, x: float, y: float, turn: float) -> Pose:
-    """A pose in the world after a displacement in the frame of the robot there."""
+    """A pose in the world after a displacement in the frame of the robot there.
+
+    Args:
+        pose: before it.
+        x: forward [m].
+        y: left [m].
+        turn: counter-clockwise [rad].
+    """
     east, north, yaw = pose
     cos, sin = math.cos(yaw), math.sin(yaw)
     return east + cos * x - sin * y, north + sin * x + cos * y, yaw + turn

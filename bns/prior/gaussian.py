@@ -27,7 +27,16 @@ def matern(one: np.ndarray, other: np.ndarray, reach: float) -> np.ndarray:
 
 
 def exponential(one: np.ndarray, other: np.ndarray, reach: float) -> np.ndarray:
-    """Squared exponential correlation of points, 1 at no distance; see `matern`."""
+    """Squared exponential correlation of points, 1 at no distance.
+
+    Args:
+        one: ``(N, B)``.
+        other: ``(M, B)``.
+        reach: length scale.
+
+    Returns:
+        ``(N, M)``.
+    """
     found: np.ndarray = np.exp(-0.5 * _square(one, other) / reach**2)
     return found
 

@@ -22,7 +22,16 @@ class Problem(Protocol):
     def outcome(
         self, state: Any, action: Any, rng: np.random.Generator
     ) -> tuple[Any, float, bool]:
-        """One drawn outcome: the next state, the reward, whether it ends there."""
+        """One drawn outcome.
+
+        Args:
+            state: before the action.
+            action: as `proposed` gives them.
+            rng: the only source of randomness.
+
+        Returns:
+            the next state, the reward, whether it ends there.
+        """
         ...
 
     def rollout(self, state: Any, rng: np.random.Generator) -> float:
