@@ -101,6 +101,8 @@ class Learner(ABC):
     """whether it is nothing without a model world (`prior.world`)"""
     open_loop: ClassVar[bool] = False
     """whether it knows lists of commands alone, and no controllers that steer"""
+    kinds: ClassVar[tuple[str, ...]] = ()
+    """the kinds of task that it knows; none = all"""
 
     deploys: bool = False
     """whether `Proposal.best` is what a user would run, and its figures are recorded
@@ -125,6 +127,13 @@ class Learner(ABC):
     def _check_known(self) -> None:
         """Refuse a task or a prior with which it is nothing."""
         name = f"The learner {self.config.learner!r}"
+        kind = tasks.kind(self.config.task.name)
+        if self.kinds and kind not in self.kinds:
+            raise BnsError(
+                f"{name} knows tasks of the kind {', '.join(self.kinds)} alone, and "
+                f"{self.config.task.name!r} is of the kind {kind}: take another "
+                "learner."
+            )
         if self.open_loop and self.task.closed_loop:
             raise BnsError(
                 f"{name} knows lists of commands; in the task "

@@ -176,6 +176,7 @@ RIVALS = {
     "anytime": Rival(learner="anytime", priors=_MODELS, tasks=_LISTS),
     "self_modelling": Rival(learner="self_modelling", priors=_MODELS, tasks=_LISTS),
     "back_to_reality": Rival(learner="back_to_reality", priors=_MODELS, tasks=_LISTS),
+    "rte": Rival(learner="rte", priors=("P0", "P1"), tasks=("navigate",)),
 }
 """those that are there; any other learner takes part by its own name"""
 

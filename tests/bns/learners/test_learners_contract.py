@@ -28,13 +28,14 @@ PRESETS = {
     "light": "khepera-light",
     "walk": "hexapod-walk",
 }
-THINKING = ("cma", "ite", "safe_ite")
+THINKING = ("cma", "ite", "rte", "safe_ite")
 """learners that are tried with a model, too; others are nothing without one"""
 KNOWN = [
     (name, task)
     for name in LEARNERS
     for task in PRESETS
     if not (task == "light" and registry.get(name).open_loop)
+    and task in (registry.get(name).kinds or PRESETS)
 ]
 
 

@@ -1,0 +1,129 @@
+"""RTE on wheels whose damage is planted, and the parts of its planner."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bns import presets
+from bns.errors import BnsError
+from bns.experiment.batch import Batch
+from bns.experiment.loading import with_learner
+from bns.prior import driving
+from bns.worlds import registry as worlds
+from bns.worlds.world import CountedWorld
+
+SLOW = "wheel_gain:wheel=left,factor=0.8"
+QUICK = {"iterations": 200, "evaluations": 40}
+
+
+def wheels(damage=()):
+    start = (0.0, 0.0, 0.0)
+    return worlds.make("static-snn", robot="khepera3", damage=damage, start=start)
+
+
+def batch(onset, *, model=True, most=4000, **own):
+    """Runs in the kinematic world, the left wheel slower from a trial on."""
+    damage = [f"{SLOW}@{onset}"]
+    base = replace(presets.load("khepera-simple"), replicates=2, threads=1)
+    told = {f"settings.{name}": value for name, value in (QUICK | own).items()}
+    config = with_learner(base, "rte").with_({**told, "world.damage": damage})
+    models = [CountedWorld(wheels(), most) for _ in range(2)] if model else []
+    return Batch([config], [wheels(damage)], models=models)
+
+
+def rows(made, trials):
+    steps = [made.advance(trial)[0].columns for trial in range(trials)]
+    return {name: np.stack([step[name] for step in steps]) for name in steps[0]}
+
+
+def test_it_solves_the_task_at_once_and_again_after_damage():
+    made = batch(2)
+    found = rows(made, 8)
+    assert (found["solved"][:2] == 1).all() and (found["solved"][2] == 0).all()
+    assert (found["solved"][-1] == 1).all() and (found["solved_best"][-1] == 1).all()
+    assert found["behaviour_miss"][-1].max() < 0.1 * found["behaviour_miss"][2].min()
+    assert [model.spent for model in made.learner.models] == [40, 40]
+
+
+def test_without_the_process_it_does_not():
+    found = rows(batch(2, learning=False), 8)
+    assert (found["solved"][:2] == 1).all() and (found["solved"][2:] == 0).all()
+
+
+def test_without_a_model_its_repertoire_is_what_was_driven():
+    found = rows(batch(7, model=False, explored=6), 13)
+    assert (found["repertoire"][:6, 0] == 18 * np.arange(1, 7)).all()
+    assert np.isnan(found["behaviour_miss"][:6]).all()
+    assert (found["solved"][6] == 1).all() and (found["solved"][-1] == 1).all()
+
+
+def test_nobody_tells_and_it_sees_for_itself():
+    made = batch(2, told="never")
+    found = rows(made, 8)
+    assert (found["solved"][-1] == 1).all()
+    assert all((memory.trial >= 2).all() for memory in made.learner.memories)
+
+
+def test_the_process_finds_what_a_planted_wheel_gain_does_to_behaviours_not_driven():
+    made = batch(0)
+    made.advance(0)
+    made.advance(1)
+    learner, memory = made.learner, made.learner.memories[0]
+    lists = learner.controllers([genes[None] for genes in memory.genes])
+    true, _ = driving.displacements(wheels([SLOW]).run(lists), learner.each)
+    mean, spread = learner.expected(memory)
+    others = np.setdiff1d(np.arange(len(mean)), memory.at)
+    off = [
+        np.linalg.norm(guess - driving.targets(true), axis=1)[others].mean()
+        for guess in (mean, driving.targets(memory.moved))
+    ]
+    assert len(others) > 50 and off[0] < 0.5 * off[1]
+    assert spread[memory.at].max() < spread[others].mean()
+
+
+def test_each_behaviour_ends_at_rest_and_lists_are_no_longer_than_allowed():
+    made = batch(9)
+    learner = made.learner
+    genes = learner.random(1, np.random.default_rng(0))[0]
+    (commands,) = learner.controllers([genes])
+    assert len(commands) == 36 and (commands.values[1::2] == 0).all()
+    np.testing.assert_allclose(commands.durations[::2], genes[:, 2], rtol=1e-6)
+
+
+def test_no_more_is_spent_than_there_is():
+    made = batch(9, most=7)
+    made.advance(0)
+    assert made.learner.models[0].spent == 7
+
+
+def test_displacements_compose_to_where_the_robot_is_seen():
+    world = wheels()
+    learner = batch(9).learner
+    genes = list(learner.random(3, np.random.default_rng(1)))
+    trials = world.run(learner.controllers(genes))
+    moved, good = driving.displacements(trials, learner.each)
+    assert good.all() and moved.shape == (3 * 18, 3)
+    pose = tuple(trials[0].command_poses_world[0])
+    for x, y, turn in moved[:18]:
+        pose = driving.moved_by(pose, x, y, turn)
+    np.testing.assert_allclose(pose, trials[0].command_poses_world[-1], atol=1e-9)
+
+
+def test_what_was_not_seen_or_not_left_alone_is_not_learned_from():
+    trial = wheels().run(batch(9).learner.controllers([np.full((3, 3), 0.1)]))[0]
+    poses = trial.observed.copy()
+    poses[trial.boundaries[2]] = np.nan
+    _, good = driving.displacements([trial.replace(observed=poses)], 2)
+    assert good.tolist() == [False, False, True]
+    handled = np.array([False, False, False, False, True, False])
+    _, good = driving.displacements([trial.replace(handled=handled)], 2)
+    assert good.tolist() == [True, True, False]
+
+
+@pytest.mark.parametrize("task", ["park", "walk"])
+def test_a_task_without_objectives_in_order_is_refused(task):
+    preset = "hexapod-walk" if task == "walk" else "khepera-simple"
+    config = with_learner(presets.load(preset), "rte").with_({"task.name": task})
+    with pytest.raises(BnsError, match="knows tasks of the kind navigation"):
+        Batch([config], [wheels()])
