@@ -43,7 +43,7 @@ class PetsSettings(LearnerSettings):
     """controllers that the distribution is fitted to; no sample has fewer than two for
     each of them"""
     kept: float = 0.3
-    """share of the elites that stay in the next sample, and in the next trial's first"""
+    """share of the elites that stay in the next sample, and for the next trial"""
     momentum: float = 0.1
     """share of its old mean and spread that the distribution keeps"""
     spread: float = 0.25
