@@ -17,6 +17,7 @@ from typing import Any
 from bns import seeding
 from bns.experiment.config import RunConfig, WorldConfig
 from bns.experiment.validate import leaves
+from bns.learners import registry as learners
 from bns.learners.bns.config import BNS_SECTIONS, AdaptationConfig
 from bns.tasks import registry as tasks
 
@@ -39,9 +40,8 @@ def settings(config: RunConfig) -> dict[str, Any]:
 def foreign(config: RunConfig) -> list[str]:
     """Sections of the configuration that belong to other tasks and learners."""
     others = [name for name in TASK_SECTIONS if name != tasks.kind(config.task.name)]
-    if config.learner != "bns":
-        others += BNS_SECTIONS
-    return others
+    own = learners.sections(config.learner)
+    return others + [name for name in BNS_SECTIONS if name not in own]
 
 
 def _own(config: RunConfig) -> Iterator[tuple[str, Any]]:

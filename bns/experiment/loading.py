@@ -37,7 +37,7 @@ def from_mapping(
 def with_learner(config: RunConfig, learner: str) -> RunConfig:
     """The same experiment for another learner, whose settings are the usual ones.
 
-    Sections that belong to the learner before go back to their defaults.
+    Sections that belong to the learner before alone go back to their defaults.
 
     Raises:
         UnknownNameError: no such learner.
@@ -47,8 +47,8 @@ def with_learner(config: RunConfig, learner: str) -> RunConfig:
     kind, usual = _settings(learner), RunConfig()
     fresh: dict[str, Any] = {}
     if learner != config.learner and config.learner in registry.names():
-        bns = config.learner == "bns"
-        names = BNS_SECTIONS if bns else registry.get(config.learner).sections
+        kept = registry.sections(learner)
+        names = [n for n in registry.sections(config.learner) if n not in kept]
         fresh = {name: getattr(usual, name) for name in names}
     return replace(config, learner=learner, settings=kind(), **fresh)
 
@@ -147,9 +147,12 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def to_mapping(config: RunConfig) -> dict[str, Any]:
     """The whole configuration as plain values, ready for JSON."""
+    from bns.learners import registry
+
     content: dict[str, Any] = json.loads(json.dumps(asdict(config)))
     if config.learner != "bns":
-        content = {k: v for k, v in content.items() if k not in BNS_SECTIONS}
+        others = set(BNS_SECTIONS) - set(registry.sections(config.learner))
+        content = {k: v for k, v in content.items() if k not in others}
     if config.prior == PriorConfig():
         content.pop("prior")
     if not content["settings"]:

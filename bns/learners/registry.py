@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import bns.learners
 from bns.errors import BnsError, UnknownNameError
+from bns.learners.bns.config import BNS_SECTIONS
 
 if TYPE_CHECKING:
     from bns.learners.base import Learner
@@ -55,6 +56,17 @@ def describe(name: str) -> str:
     """A learner in one line."""
     doc = import_module(get(name).__module__).__doc__ or ""
     return doc.split("\n", 1)[0]
+
+
+def sections(name: str) -> tuple[str, ...]:
+    """Sections and settings of a configuration that a learner has beside `settings`.
+
+    Those of bns are known without loading it.
+
+    Raises:
+        UnknownNameError: no such learner.
+    """
+    return BNS_SECTIONS if name == "bns" else get(name).sections
 
 
 def get(name: str) -> "type[Learner]":

@@ -167,6 +167,8 @@ RIVALS = {
         settings=_SEEN,
         tasks=("walk",),
     ),
+    "pets": Rival(learner="pets", presets=_OWN, settings=_SEEN, tasks=_LISTS),
+    "static_snn": Rival(learner="static_snn"),
     "random": Rival(learner="random"),
     "cma": Rival(learner="cma", priors=("P0", "P1", "P2")),
     "ite": Rival(learner="ite", priors=("P0", "P1", "P2"), repertoire=True),

@@ -12,6 +12,7 @@ from bns.claims import schedule
 from bns.claims.runner import Session, work
 from bns.experiment import versions
 from bns.experiment.batch import check_world
+from bns.learners import registry as learners
 from bns.standings.design import Entry
 from bns.storage.lock import Lock
 
@@ -45,7 +46,7 @@ def hours(entries: Sequence[Entry], runs: int) -> dict[tuple[str, str, str], flo
     found: dict[tuple[str, str, str], float] = {}
     for entry in entries:
         config, key = entry.member.config, (entry.task, entry.rival, entry.prior)
-        kind = "bns" if config.learner == "bns" else "other"
+        kind = "bns" if "snn" in learners.sections(config.learner) else "other"
         second = SECONDS[entry.task, kind]
         onset = config.trials - 50
         evaluations = config.prior.evaluations if config.prior.world else 0

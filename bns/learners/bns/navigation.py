@@ -215,8 +215,14 @@ class Evaluator:
             lengths: commands of each individual ``(R, P)``.
             fused: use the form of the network meant for compilation.
         """
-        runs, count = lengths.shape
         outputs = predict(self.shape, theta, inputs, fused=fused)
+        return self.composed(outputs, lengths)
+
+    def composed(
+        self, outputs: Tensor, lengths: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """The path that scaled outputs ``(R, 3, K * P)`` make; see `path`."""
+        runs, count = lengths.shape
         moved = outputs.view(runs, 3, -1, count)
         places = torch.arange(moved.shape[2], device=lengths.device)[:, None]
         used = places < lengths.unsqueeze(1)

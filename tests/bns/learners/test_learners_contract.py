@@ -30,6 +30,11 @@ PRESETS = {
 }
 THINKING = ("cma", "ite", "rte", "safe_ite")
 """learners that are tried with a model, too; others are nothing without one"""
+CUT = {
+    "pets": {"settings.population": 12, "settings.iterations": 2, "settings.elites": 3},
+    "static_snn": {"settings.commands": 1, "settings.generations": 2},
+}
+"""settings of learners that would take longer than the tests have"""
 KNOWN = [
     (name, task)
     for name in LEARNERS
@@ -63,10 +68,12 @@ def small(learner: str, task: str):
     cut = {"light.cycles": 12, "light.circle_cycles": 5, "light.starts": 2}
     config = presets.load(PRESETS[task]).with_(cut)
     config = with_learner(config, learner) if learner != "bns" else config
-    if learner == "bns":
+    if "snn" in registry.sections(learner):
+        config = config.with_({"snn.epochs": 4, "compiled": "no"})
+    if "evolution" in registry.sections(learner):
         sizes = {"population": 12, "generations": 2, "tournament": 3}
-        evolution = {f"evolution.{name}": size for name, size in sizes.items()}
-        config = config.with_({**evolution, "snn.epochs": 4, "compiled": "no"})
+        config = config.with_({f"evolution.{name}": n for name, n in sizes.items()})
+    config = config.with_(CUT.get(learner, {}))
     if registry.get(learner).needs_model:
         prior = {"prior.world": MODELS[task][0], "prior.evaluations": 200}
         config = config.with_({**prior, "settings.first": 20, "settings.each": 40})
