@@ -17,6 +17,7 @@ from typing import Any
 from bns import seeding
 from bns.experiment.config import RunConfig, WorldConfig
 from bns.experiment.validate import leaves
+from bns.learners import registry
 from bns.learners.bns.config import BNS_SECTIONS, AdaptationConfig
 from bns.tasks import registry as tasks
 
@@ -40,7 +41,8 @@ def foreign(config: RunConfig) -> list[str]:
     """Sections of the configuration that belong to other tasks and learners."""
     others = [name for name in TASK_SECTIONS if name != tasks.kind(config.task.name)]
     if config.learner != "bns":
-        others += BNS_SECTIONS
+        heeded = registry.get(config.learner).sections
+        others += [name for name in BNS_SECTIONS if name not in heeded]
     return others
 
 

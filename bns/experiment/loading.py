@@ -37,7 +37,8 @@ def from_mapping(
 def with_learner(config: RunConfig, learner: str) -> RunConfig:
     """The same experiment for another learner, whose settings are the usual ones.
 
-    Sections that belong to the learner before go back to their defaults.
+    Sections that belong to the learner before, and not to this one, go back to their
+    defaults.
 
     Raises:
         UnknownNameError: no such learner.
@@ -47,10 +48,16 @@ def with_learner(config: RunConfig, learner: str) -> RunConfig:
     kind, usual = _settings(learner), RunConfig()
     fresh: dict[str, Any] = {}
     if learner != config.learner and config.learner in registry.names():
-        bns = config.learner == "bns"
-        names = BNS_SECTIONS if bns else registry.get(config.learner).sections
+        names = set(_sections(config.learner)) - set(_sections(learner))
         fresh = {name: getattr(usual, name) for name in names}
     return replace(config, learner=learner, settings=kind(), **fresh)
+
+
+def _sections(learner: str) -> tuple[str, ...]:
+    """Sections of a configuration that a learner heeds, beside `settings`."""
+    from bns.learners import registry
+
+    return BNS_SECTIONS if learner == "bns" else registry.get(learner).sections
 
 
 def _settings(learner: Any) -> type[LearnerSettings]:
@@ -148,8 +155,8 @@ def read_toml(path: Path) -> dict[str, Any]:
 def to_mapping(config: RunConfig) -> dict[str, Any]:
     """The whole configuration as plain values, ready for JSON."""
     content: dict[str, Any] = json.loads(json.dumps(asdict(config)))
-    if config.learner != "bns":
-        content = {k: v for k, v in content.items() if k not in BNS_SECTIONS}
+    idle = set(BNS_SECTIONS) - set(_sections(config.learner))
+    content = {name: value for name, value in content.items() if name not in idle}
     if config.prior == PriorConfig():
         content.pop("prior")
     if not content["settings"]:

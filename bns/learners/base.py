@@ -101,6 +101,8 @@ class Learner(ABC):
     """whether it is nothing without a model world (`prior.world`)"""
     open_loop: ClassVar[bool] = False
     """whether it knows lists of commands alone, and no controllers that steer"""
+    steers: ClassVar[bool] = False
+    """whether it knows controllers that steer alone, and no lists of commands"""
 
     deploys: bool = False
     """whether `Proposal.best` is what a user would run, and its figures are recorded
@@ -114,12 +116,12 @@ class Learner(ABC):
         onsets: Sequence[int],
         models: Sequence[CountedWorld] = (),
     ):
-        self.check_alike(configs)
         self.config, self.configs, self.runs = configs[0], list(configs), len(configs)
         self.replicates, self.models = list(replicates), list(models)
         self.onsets = list(onsets)
         self.task: Task = tasks.of(configs[0])
         self._check_known()
+        self.check_alike(configs)
         self.begin()
 
     def _check_known(self) -> None:
@@ -129,6 +131,12 @@ class Learner(ABC):
             raise BnsError(
                 f"{name} knows lists of commands; in the task "
                 f"{self.config.task.name!r} robots steer: take another learner."
+            )
+        if self.steers and not self.task.closed_loop:
+            raise BnsError(
+                f"{name} knows controllers that steer; in the task "
+                f"{self.config.task.name!r} robots follow lists of commands: take "
+                "another learner, or --task.name light."
             )
         if self.needs_model and not self.models:
             raise BnsError(

@@ -28,13 +28,14 @@ PRESETS = {
     "light": "khepera-light",
     "walk": "hexapod-walk",
 }
-THINKING = ("cma", "ite", "safe_ite")
+THINKING = ("cma", "ite", "neat", "safe_ite")
 """learners that are tried with a model, too; others are nothing without one"""
 KNOWN = [
     (name, task)
     for name in LEARNERS
     for task in PRESETS
     if not (task == "light" and registry.get(name).open_loop)
+    and not (task != "light" and registry.get(name).steers)
 ]
 
 
@@ -66,6 +67,10 @@ def small(learner: str, task: str):
         sizes = {"population": 12, "generations": 2, "tournament": 3}
         evolution = {f"evolution.{name}": size for name, size in sizes.items()}
         config = config.with_({**evolution, "snn.epochs": 4, "compiled": "no"})
+    if learner == "neat":
+        sizes = {"population": 12, "generations": 2, "add_node": 0.3}
+        cut = {f"settings.{name}": size for name, size in sizes.items()}
+        config = config.with_({**cut, "snn.epochs": 4})
     if registry.get(learner).needs_model:
         prior = {"prior.world": MODELS[task][0], "prior.evaluations": 200}
         config = config.with_({**prior, "settings.first": 20, "settings.each": 40})
@@ -245,6 +250,14 @@ class TestRefused:
     def test_a_task_that_it_does_not_know(self, name):
         with pytest.raises(BnsError, match="take another learner"):
             made(small(name, "light"), "light")
+
+    @pytest.mark.parametrize(
+        "name", [name for name in LEARNERS if registry.get(name).steers]
+    )
+    def test_a_task_in_which_robots_do_not_steer(self, name):
+        config = with_learner(presets.load("khepera-simple"), name)
+        with pytest.raises(BnsError, match="take another learner"):
+            made(config, "navigation")
 
     def test_a_task_in_the_place_of_a_learner(self):
         with pytest.raises(BnsError, match=r"give --task\.name"):
