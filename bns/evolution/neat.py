@@ -1,9 +1,9 @@
 """NEAT (Stanley and Miikkulainen 2002): topologies and weights evolve together.
 
-All numbers are those of the paper, but for the population's size; where it is silent,
-what its authors' program does: what grows a child does not change its weights besides,
-and of two parents that do equally well the smaller one gives the structure. Genomes are
-arrays, see `bns.evolution.topology`.
+All numbers are those of the paper, but for the population's size. Where it is silent:
+a child may grow and have its weights changed at once, weights are limited (without,
+they grow until all sigmoids are saturated), and of two parents that do equally well the
+smaller one gives the structure. Genomes are arrays, see `bns.evolution.topology`.
 
 Written by hand because neat-python 2.0 draws from Python's global `random` and keeps
 its state by pickle.
@@ -42,16 +42,21 @@ class NeatSettings(LearnerSettings):
     """connections of a network at most (own)"""
     power: float = 2.5
     """weights are drawn and perturbed uniformly by up to this"""
+    limit: float = 8.0
+    """weights stay between - and + this (silent in the paper)"""
     threshold: float = 3.0
     """networks that differ by no more share a species"""
     structure: float = 1.0
     """what a gene counts that only one of two networks has (c1 and c2)"""
     weights: float = 0.4
     """what the mean difference of the weights of the others counts (c3)"""
-    stale: int = 15
-    """a species that has not improved for so many generations has no children"""
-    stuck: int = 20
-    """if nothing has improved for more generations, two species have children"""
+    stale: int = 0
+    """a species that has not improved for so many generations has no children; 0 =
+    never: generations that are judged from other starts do not compare; 15 in the
+    paper"""
+    stuck: int = 0
+    """if nothing has improved for more generations, two species have children; 0 =
+    never; 20 in the paper"""
     champions: int = 5
     """the best of a species with more networks than this lives on unchanged"""
     survivors: float = 0.2
@@ -76,11 +81,12 @@ class NeatSettings(LearnerSettings):
         "generations": (0, 100_000, "generations"),
         "most": (4, 1000, "connections"),
         "power": (0, 1000, "1"),
+        "limit": (0, 1000, "1"),
         "threshold": (0, 1000, "1"),
         "structure": (0, 1000, "1"),
         "weights": (0, 1000, "1"),
-        "stale": (1, 100_000, "generations"),
-        "stuck": (1, 100_000, "generations"),
+        "stale": (0, 100_000, "generations"),
+        "stuck": (0, 100_000, "generations"),
         "champions": (0, 100_000, "networks"),
         "survivors": (0, 1, "1"),
         "mutated_only": (0, 1, "1"),
@@ -162,11 +168,12 @@ class Lineage:
     def breeding(self, rule: NeatSettings, worth: np.ndarray) -> list[Species]:
         """The species that may have children, the one with the best network first."""
         order = sorted(self.species, key=lambda s: -float(worth[s.members].max()))
-        if self.stale > rule.stuck:
+        if 0 < rule.stuck < self.stale:
             for each in (self, *order[:2]):
                 each.stale = 0
             return order[:2]
-        return [s for s in order if s is order[0] or s.stale < rule.stale]
+        limit = rule.stale or np.inf
+        return [s for s in order if s is order[0] or s.stale < limit]
 
 
 def distance(genes: np.ndarray, other: np.ndarray, rule: NeatSettings) -> np.ndarray:
@@ -319,8 +326,8 @@ def _mutate(
     marks.new_generation()
     coins = rng.random((3, len(genes)))
     node = which & (coins[0] < rule.add_node)
-    link = which & ~node & (coins[1] < rule.add_connection)
-    weights = which & ~node & ~link & (coins[2] < rule.weights_mutated)
+    link = which & (coins[1] < rule.add_connection)
+    weights = which & (coins[2] < rule.weights_mutated)
     for row in np.flatnonzero(node):
         add_node(genes[row], marks, rng)
     for row in np.flatnonzero(link):
@@ -328,5 +335,6 @@ def _mutate(
     drawn = rng.uniform(-rule.power, rule.power, genes.shape[:2])
     kept = rng.random(drawn.shape) < rule.perturbed
     changed = np.where(kept, genes[..., WEIGHT], 0) + drawn
+    changed = changed.clip(-rule.limit, rule.limit)
     real = weights[:, None] & (genes[..., INNOVATION] > 0)
     genes[..., WEIGHT] = np.where(real, changed, genes[..., WEIGHT])

@@ -24,7 +24,7 @@ from bns.evolution import neat
 from bns.evolution.chromosome import Population
 from bns.evolution.generation import Rates
 from bns.evolution.neat import Lineage, NeatSettings
-from bns.evolution.topology import KINDS, SLOPE, WEIGHT, Ends, Marks, networks, sizes
+from bns.evolution.topology import KINDS, SLOPE, Ends, Marks, networks, sizes
 from bns.experiment.config import RunConfig
 from bns.learners.base import Curves, Panel, Proposal
 from bns.learners.bns.adaptation import Adaptations
@@ -218,10 +218,7 @@ class NeatProblem(LightProblem):
             marks = self.marks[row // self.islands]
             told = (lineages[row], marks, self.kind.ends, self.rule, rng)
             made.append(neat.bred(genes[row], worth[row] + 1e-12, *told))
-        bred = np.stack(made)
-        limit = self.config.light.weight_limit
-        bred[..., WEIGHT] = bred[..., WEIGHT].clip(-limit, limit)
-        numbers = torch.from_numpy(bred.reshape(rows, size, -1, 1))
+        numbers = torch.from_numpy(np.stack(made).reshape(rows, size, -1, 1))
         return population._replace(genes=numbers.to(population.genes))
 
     def genes(self, population: Population) -> np.ndarray:
