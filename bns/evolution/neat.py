@@ -166,7 +166,12 @@ class Lineage:
             each.best = max(each.best, now)
 
     def breeding(self, rule: NeatSettings, worth: np.ndarray) -> list[Species]:
-        """The species that may have children, the one with the best network first."""
+        """The species that may have children, the one with the best network first.
+
+        Args:
+            rule: when a species is stale.
+            worth: of each network, ``(P,)``.
+        """
         order = sorted(self.species, key=lambda s: -float(worth[s.members].max()))
         if 0 < rule.stuck < self.stale:
             for each in (self, *order[:2]):
