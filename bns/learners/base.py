@@ -116,12 +116,12 @@ class Learner(ABC):
         onsets: Sequence[int],
         models: Sequence[CountedWorld] = (),
     ):
-        self.check_alike(configs)
         self.config, self.configs, self.runs = configs[0], list(configs), len(configs)
         self.replicates, self.models = list(replicates), list(models)
         self.onsets = list(onsets)
         self.task: Task = tasks.of(configs[0])
         self._check_known()
+        self.check_alike(configs)
         self.begin()
 
     def _check_known(self) -> None:

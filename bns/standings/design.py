@@ -172,6 +172,12 @@ RIVALS = {
     "random": Rival(learner="random"),
     "cma": Rival(learner="cma", priors=("P0", "P1", "P2")),
     "ite": Rival(learner="ite", priors=("P0", "P1", "P2"), repertoire=True),
+    "neat": Rival(
+        learner="neat",
+        priors=("P0", "P1"),
+        settings=_SEEN | {"light.islands": 1, "light.renewed": 0},
+        tasks=("light",),
+    ),
     "safe_ite": Rival(learner="safe_ite", priors=("P1", "P2"), repertoire=True),
     "t_resilience": Rival(learner="t_resilience", priors=_MODELS),
     "transferability": Rival(learner="transferability", priors=_MODELS),

@@ -8,6 +8,7 @@ layers are tanh (silent); an output of -1 is the lowest speed, 1 the highest.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -191,11 +192,12 @@ class GenomePolicy:
                 f"Genome {int(bad.nonzero()[0, 0])} holds NaN or infinity; give finite "
                 "weights."
             )
-        self._layers()
+        _ = self._layers  # refuses genomes of the wrong length
 
     def __len__(self) -> int:
         return len(self.genomes)
 
+    @cached_property
     def _layers(self) -> tuple[Tensor, ...]:
         return self.controllers.layers(self.genomes.unsqueeze(1))
 
@@ -220,7 +222,7 @@ class GenomePolicy:
             [self.controllers.see(brightness(readings)), memory], axis=1
         )
         inputs = torch.from_numpy(seen.astype(np.float32)).T[..., None, None]
-        outputs = self.controllers.act(self._layers(), list(inputs))
+        outputs = self.controllers.act(self._layers, list(inputs))
         speeds = torch.cat([self.controllers.speed(o)[:, 0] for o in outputs], dim=1)
         told = torch.cat([output[:, 0] for output in outputs], dim=1)
         kept = told.double().numpy() if self.controllers.memory else memory

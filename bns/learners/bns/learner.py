@@ -102,7 +102,7 @@ class Bns(Learner):
         models: Sequence[CountedWorld] = (),
     ):
         super().__init__(configs, replicates=replicates, onsets=onsets, models=models)
-        config, kind = self.config, self.task.problem()
+        config, kind = self.config, self.kind(self.task)
         torch.set_num_threads(config.threads)
         watch = config.watch
         if watch.detect and not kind.channels:
@@ -130,7 +130,7 @@ class Bns(Learner):
     def check_alike(self, configs: Sequence[RunConfig]) -> None:
         """See `Learner.check_alike`; more is free in light following."""
         task = tasks.of(configs[0])
-        kind: type[Problem] = task.problem()
+        kind = self.kind(task)
         first = kind.shared(configs[0], configs[0])
         if any(kind.shared(config, configs[0]) != first for config in configs):
             raise BnsError(
@@ -139,9 +139,18 @@ class Bns(Learner):
             )
 
     @classmethod
+    def kind(cls, task: Task) -> type[Problem]:
+        """How a task is seen; what is another way to evolve in the SNNs has its own.
+
+        Raises:
+            BnsError: the task cannot be learned so.
+        """
+        return task.problem()
+
+    @classmethod
     def figures_of(cls, task: Task) -> list[Curves | str]:
         """See `Learner.figures_of`; beside, those of the task's networks."""
-        return [SNN_ERROR, *task.problem().figures, "displacement", DIVERSITY]
+        return [SNN_ERROR, *cls.kind(task).figures, "displacement", DIVERSITY]
 
     @classmethod
     def compiles(cls, config: RunConfig) -> bool:
@@ -150,7 +159,7 @@ class Bns(Learner):
         Raises:
             MissingDependencyError: asked for, but there is no C++ compiler.
         """
-        return should_compile(config, tasks.of(config).problem().relative_cost)
+        return should_compile(config, cls.kind(tasks.of(config)).relative_cost)
 
     @property
     def theta(self) -> Tensor:

@@ -1,6 +1,7 @@
 """What every learner keeps to on every task; a new one brings no new test."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -28,9 +29,14 @@ PRESETS = {
     "light": "khepera-light",
     "walk": "hexapod-walk",
 }
-THINKING = ("cma", "ite", "rte", "safe_ite")
+THINKING = ("cma", "ite", "neat", "rte", "safe_ite")
 """learners that are tried with a model, too; others are nothing without one"""
 CUT = {
+    "neat": {
+        "settings.population": 12,
+        "settings.generations": 2,
+        "settings.add_node": 0.3,
+    },
     "pets": {"settings.population": 12, "settings.iterations": 2, "settings.elites": 3},
     "static_snn": {"settings.commands": 1, "settings.generations": 2},
 }
@@ -69,7 +75,9 @@ def small(learner: str, task: str):
     config = presets.load(PRESETS[task]).with_(cut)
     config = with_learner(config, learner) if learner != "bns" else config
     if "snn" in registry.sections(learner):
-        config = config.with_({"snn.epochs": 4, "compiled": "no"})
+        config = config.with_({"snn.epochs": 4})
+    if "compiled" in registry.sections(learner):
+        config = config.with_({"compiled": "no"})
     if "evolution" in registry.sections(learner):
         sizes = {"population": 12, "generations": 2, "tournament": 3}
         config = config.with_({f"evolution.{name}": n for name, n in sizes.items()})
@@ -248,11 +256,11 @@ class TestRefused:
             made(config, "navigation")
 
     @pytest.mark.parametrize(
-        "name", [name for name in LEARNERS if registry.get(name).open_loop]
+        ("name", "task"), [o for o in product(LEARNERS, PRESETS) if o not in KNOWN]
     )
-    def test_a_task_that_it_does_not_know(self, name):
+    def test_a_task_that_it_does_not_know(self, name, task):
         with pytest.raises(BnsError, match="take another learner"):
-            made(small(name, "light"), "light")
+            made(small(name, task), task)
 
     def test_a_task_in_the_place_of_a_learner(self):
         with pytest.raises(BnsError, match=r"give --task\.name"):
