@@ -159,9 +159,11 @@ class Lineage:
 
     def note(self, worth: np.ndarray) -> None:
         """Who has improved, by what each network is worth, ``(P,)``."""
-        for each in (self, *self.species):
-            rows = each.members if isinstance(each, Species) else slice(None)
-            now = float(worth[rows].max())
+        now = float(worth.max())
+        self.stale = 0 if now > self.best else self.stale + 1
+        self.best = max(self.best, now)
+        for each in self.species:
+            now = float(worth[each.members].max())
             each.stale = 0 if now > each.best else each.stale + 1
             each.best = max(each.best, now)
 
@@ -174,7 +176,8 @@ class Lineage:
         """
         order = sorted(self.species, key=lambda s: -float(worth[s.members].max()))
         if 0 < rule.stuck < self.stale:
-            for each in (self, *order[:2]):
+            self.stale = 0
+            for each in order[:2]:
                 each.stale = 0
             return order[:2]
         limit = rule.stale or np.inf

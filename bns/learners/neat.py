@@ -11,7 +11,7 @@ from one generation to the next, but not from one trial to the next.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 import torch
@@ -155,7 +155,7 @@ class NeatProblem(LightProblem):
     ):
         super().__init__(task, configs, draws, adaptations)
         plain = self.simulator.controllers
-        self.rule: Any = self.config.settings
+        self.rule = cast(NeatSettings, configs[0].settings)
         common = {name: getattr(plain, name) for name in plain.__dataclass_fields__}
         self.kind = NeatControllers(**common, most=self.rule.most)
         if self.kind.ends.links > self.rule.most:
@@ -330,10 +330,10 @@ class Neat(Bns):
 
     def _evolve_in_models(self) -> None:
         """Whole generations in each run's model, as long as there are evaluations."""
-        problem, size = self.problem, self.config.settings.population
+        rule, problem = cast(NeatSettings, self.config.settings), self.problem
         lineages = [Lineage() for _ in range(self.runs * problem.islands)]
         rng, generation = problem.generator(), 0
-        while min(model.left for model in self.models) >= size:
+        while min(model.left for model in self.models) >= rule.population:
             if generation:
                 self.population = problem.next(
                     self.population, self.cost, lineages, rng
@@ -343,7 +343,7 @@ class Neat(Bns):
         if not generation:
             raise BnsError(
                 f"prior.evaluations = {self.models[0].limit} is less than the "
-                f"{size} networks of a generation: give more, or fewer networks."
+                f"{rule.population} networks of a generation: give more, or fewer networks."
             )
 
     def _cost_in_models(self, generation: int) -> Tensor:

@@ -69,7 +69,7 @@ class StaticSnn(Bns):
         self._encoding: Genes = self.problem.encoding
         each = config.light.cycles
         if not self.task.closed_loop:
-            each = self._encoding.max_commands
+            each = cast(Encoding, self._encoding).max_commands
         if isinstance(self._encoding, Encoding):  # random lists are of full length
             self._encoding = replace(self._encoding, initial=(each, each))
         self.random_trials = math.ceil(self.rule.commands / each)

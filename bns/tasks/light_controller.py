@@ -87,7 +87,7 @@ class Controllers:
         """A brightness, 0 to 1, as the networks take it."""
         return 2 * bright - 1 if self.balanced else bright
 
-    def layers(self, genomes: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    def layers(self, genomes: Tensor) -> tuple[Tensor, ...]:
         """The weights of genomes, the individual as the last axis.
 
         Args:

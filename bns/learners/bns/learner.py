@@ -79,7 +79,7 @@ class Bns(Learner):
     `deploy` = "seen" what was seen to work is held on to.
     """
 
-    sections = BNS_SECTIONS
+    sections: ClassVar[tuple[str, ...]] = BNS_SECTIONS
     columns: ClassVar[Mapping[str, str]] = {
         "fitness_predicted": "of the controller tried, inside the SNN before the trial",
         "snn_forward": "RMS error of the SNN on this trial before training on it [m]",
