@@ -343,7 +343,8 @@ class Neat(Bns):
         if not generation:
             raise BnsError(
                 f"prior.evaluations = {self.models[0].limit} is less than the "
-                f"{rule.population} networks of a generation: give more, or fewer networks."
+                f"{rule.population} networks of a generation: give more, or fewer "
+                "networks."
             )
 
     def _cost_in_models(self, generation: int) -> Tensor:
