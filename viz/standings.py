@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WRAPPED = 44
+WRAPPED = 36
 """letters of a title's line"""
 
 
@@ -45,7 +45,7 @@ def write(cells: Sequence[Cell], folder: Path) -> list[Path]:
 
 
 def curves(cells: Sequence[Cell]) -> "Figure":
-    """Mean of all runs and damages, a panel for each prior and set of damages.
+    """Mean of all runs and damages: a column for each prior, a row for each set.
 
     Args:
         cells: of one task.
@@ -56,12 +56,20 @@ def curves(cells: Sequence[Cell]) -> "Figure":
     groups = figures.groups(cells)
     names = list(dict.fromkeys(cell.entry.rival for cell in cells))
     colours = dict(zip(names, [*style.CYCLE] * 3, strict=False))
+    priors = list(dict.fromkeys(prior for _, prior, _ in groups))
+    kinds = list(dict.fromkeys(kind for *_, kind in groups))
     with style.plotting() as figure_class:
-        width = max(4.0 * len(groups), style.WIDE.width)
-        figure = figure_class(figsize=(width, 4.2), layout="constrained")
-        panels = figure.subplots(1, len(groups), squeeze=False)[0]
-        for axes, (group, held) in zip(panels, groups.items(), strict=True):
-            _panel(axes, group, held, colours)
+        size = (max(3.2 * len(priors), style.WIDE.width), 3.4 * len(kinds))
+        figure = figure_class(figsize=size, layout="constrained")
+        panels = figure.subplots(
+            len(kinds), len(priors), sharex=True, sharey="row", squeeze=False
+        )
+        for axes in panels.flat:
+            axes.set_visible(False)
+        for (task, prior, kind), held in groups.items():
+            axes = panels[kinds.index(kind)][priors.index(prior)]
+            axes.set_visible(True)
+            _panel(axes, (task, prior, kind), held, colours)
     return figure
 
 
@@ -83,8 +91,11 @@ def _panel(
         axes.plot(trials, over, color=colours[name], label=label)
     said = "\n".join(textwrap.wrap(f"{prior}: {PRIORS[prior]}", WRAPPED))
     measure = figures.measure(task, kind)
-    axes.set_title(f"{said}\n({kind})", fontsize="small")
-    axes.set_ylabel(f"deployed: {measure}")
+    axes.set_title(f"{said}\ndamages {kind}", fontsize="small")
+    axes.set_ylabel(f"deployed: {measure}", fontsize="small")
+    axes.tick_params(labelbottom=True)
     axes.set_xlabel("trial from the damage on")
-    axes.set_ylim(0, None if measure == "distance [m]" else 1)
+    if measure != "distance [m]":
+        axes.set_ylim(0, 1)
+    axes.set_ylim(bottom=0)
     axes.legend(fontsize="x-small")

@@ -133,11 +133,14 @@ def _run(given: Run) -> int:
 def _table(given: Table) -> int:
     from bns.standings import figures, page
     from bns.storage import files
+    from bns.viz import standings
 
     cells = figures.read(_entries(given), Path(given.root))
     if given.write:
-        files.write_text(Path(given.write), page.page(cells))
-        print(f"{len(cells)} cells: {given.write}")
+        path = Path(given.write)
+        files.write_text(path, page.page(cells))
+        made = standings.write(cells, path.parent / page.PICTURES)
+        print(f"{len(cells)} cells: {path}", *made, sep="\n")
         return 0
     rows = []
     for key, held in figures.groups(cells).items():

@@ -40,13 +40,18 @@ HOW = """
 what is missing, and `bns standings table --write docs/standings.md` makes this page
 from it. `--rivals NAME` takes any learner into the table, one of your own as well.
 """
-PICTURE = "images/standings-{task}.png"
+PICTURES = "images"
+"""folder of the pictures, beside the page"""
 
 
 def page(cells: Sequence[Cell]) -> str:
     """The page of some cells, none of them = that nothing was run."""
-    parts = [INTRO]
+    parts, shown = [INTRO], ""
     for (task, prior, kind), held in figures.groups(cells).items():
+        if task != shown:
+            title = f"{task}: what is deployed over the trials after the damage"
+            parts.append(f"\n![{title}]({PICTURES}/standings-{task}.png)\n")
+            shown = task
         parts.append(_group(task, prior, kind, held))
     return "".join(parts) + ("" if cells else EMPTY) + HOW
 
@@ -58,8 +63,8 @@ def _group(task: str, prior: str, kind: str, cells: Sequence[Cell]) -> str:
     missing = [name for name in wanted if name not in names]
     left = f"; not run: {', '.join(missing)}" if missing else ""
     lines = [
-        f"\n## {task}, {prior}: {PRIORS[prior]}\n",
-        f"Damages ({kind}): {', '.join(names)}{left}.\n",
+        f"\n## {task}, {prior}: {PRIORS[prior]}; damages {kind}\n",
+        f"{', '.join(names)}{left}.\n",
         *_repertoires(cells),
         *table(rows, figures.measure(task, kind)),
         "",

@@ -136,6 +136,7 @@ def test_the_page_says_n_and_what_was_not_run():
     lines = [line for line in text.splitlines() if line.startswith("| ")]
     assert lines[2].startswith("| cma") and lines[3].startswith("| random")
     assert "never [-, never], 3 of 3" in lines[3]
+    assert text.count("images/standings-walk.png") == 1
     assert "Nothing has been run" in page.page([])
 
 
