@@ -22,7 +22,7 @@ FILE = DIRECTORY / "gap4_plan.jsonl"
 @bench("ties that the planned command resolves", bar=">= 0.8 of ties")
 def gap_plan(quick: bool) -> Result:
     """Look for ties, plan, record, diagnose again."""
-    from bns.gap.models.wheeled import WheeledModel
+    from bns.gap.models.wheeled.model import WheeledModel
 
     model = WheeledModel("khepera3", threads=1)
     rows: list[dict] = []

@@ -36,7 +36,7 @@ def gap_time(quick: bool) -> Result:
 def _wheeled() -> dict[str, float]:
     from bench.gap.strange_effects import other_solver
     from bns.gap.bench.wheeled_cases import WheeledStand
-    from bns.gap.models.wheeled import WheeledModel
+    from bns.gap.models.wheeled.model import WheeledModel
 
     stand = WheeledStand(WheeledModel(), other_solver())
     case = cases.build(SEED, "single", stand, wanted="wheel_gain[left]")

@@ -33,7 +33,7 @@ def one(kind: str, seed: int) -> dict[str, Any]:
     from bns.gap.diagnose import diagnose, single
     from bns.gap.models.light import diagnosis
     from bns.gap.models.light.model import SightModel
-    from bns.gap.models.wheeled import WheeledModel
+    from bns.gap.models.wheeled.model import WheeledModel
     from bns.gap.records import plain
 
     model = WheeledModel("khepera3", threads=1)

@@ -68,7 +68,7 @@ def _case(number: int, text: str, quick: bool) -> dict:
     from bns.gap import store
     from bns.gap.bench import wheeled_cases as cases
     from bns.gap.diagnose import diagnose
-    from bns.gap.models.wheeled import WheeledModel
+    from bns.gap.models.wheeled.model import WheeledModel
     from bns.worlds.effects import registry
 
     model = WheeledModel("khepera3", threads=1)

@@ -74,7 +74,7 @@ def one(kind: str, seed: int) -> dict:
     from bns.gap.bench import cases, scoring
     from bns.gap.bench.wheeled_cases import WheeledStand
     from bns.gap.diagnose import diagnose
-    from bns.gap.models.wheeled import WheeledModel
+    from bns.gap.models.wheeled.model import WheeledModel
     from bns.gap.records import plain
 
     model = WheeledModel("khepera3", threads=1)

@@ -50,7 +50,7 @@ def hardware_gap(quick: bool) -> Result:
 def _rehearsed(effects: Sequence[str], count: int):
     """Diagnosis, world and trials of an emulated robot that was recorded."""
     from bns.gap.diagnose import diagnose
-    from bns.gap.models.wheeled import WheeledModel
+    from bns.gap.models.wheeled.model import WheeledModel
     from bns.hardware.driving.excitation import START, commands
     from bns.hardware.emulators import virtual
     from bns.hardware.worlds.wheeled import HardwareWorld

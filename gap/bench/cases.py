@@ -372,7 +372,8 @@ def _lengths(problem: Problem, point: Point, effects: Sequence[Effect]) -> np.nd
     curvature = heavy.T @ design + np.eye(len(used))
     found = []
     for path in made:
-        change = np.where(problem.seen, path - base, 0.0).ravel()
+        change = np.where(problem.seen, path - base, 0.0)
+        change = point.noise.innovations(change).ravel()
         pull = heavy.T @ change
         square = weight @ change**2 - pull @ np.linalg.solve(curvature, pull)
         found.append(np.sqrt(max(square, 0.0)))

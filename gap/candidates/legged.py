@@ -1,6 +1,7 @@
 """Numbers of a walking robot that may be off, and how far they plausibly are."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -83,6 +84,12 @@ def unsure(joints: Sequence[str] = JOINTS) -> tuple[Row, ...]:
     names_ = ("servo_gain[all]", "servo_voltage[all]", "foot_slippery[all]", "payload")
     every = rows(Suspects((), (), True), joints)
     return tuple(row for row in every if row.name in (*names_, shin))
+
+
+def known(rows: Iterable[Row]) -> tuple[Row, ...]:
+    """Rows without the slack of what all legs share, where what that slack does to a
+    walk is told otherwise (`bns.gap.models.legged.scatter`): not twice."""
+    return tuple(replace(row, slack=min(row.slack, SHARE * row.sd)) for row in rows)
 
 
 def lost(signs: Signs) -> tuple[Row, ...]:

@@ -59,7 +59,7 @@ def model(name: str, *, threads: int = 2) -> GapModel:
         )
     kind = models.robot(name).kind
     if kind == "wheeled":
-        from bns.gap.models.wheeled import WheeledModel
+        from bns.gap.models.wheeled.model import WheeledModel
 
         return WheeledModel(name, threads=threads)
     if kind == "servo":

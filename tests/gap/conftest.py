@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bns.gap.bench.wheeled_cases import commands
-from bns.gap.models.wheeled import WheeledModel
+from bns.gap.models.wheeled.model import WheeledModel
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import pytest
 from bns.errors import BnsError
 from bns.gap.bench import benchmark_io, cases, scoring
 from bns.gap.bench.wheeled_cases import WheeledStand
-from bns.gap.models.wheeled import WheeledModel
+from bns.gap.models.wheeled.model import WheeledModel
 from bns.gap.recordings import check
 
 

@@ -11,7 +11,7 @@ from bns.gap.decomposition.decomposition import Decomposition
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
 from bns.gap.diagnose import diagnose
-from bns.gap.models import wheeled_drives
+from bns.gap.models.wheeled import changes, drives
 from bns.gap.recordings import check
 from bns.worlds.physics.wheeled_world import MujocoWorld
 from bns.worlds.trial import Commands
@@ -83,14 +83,12 @@ def test_every_row_of_a_wheeled_robot_makes_its_effect(recorded, model):
         if row.nuisance:
             continue
         value = row.levels[0] if row.levels else row.nominal + row.difference
-        made = wheeled_drives.effect(row.term, {row.name: value})
+        made = changes.effect(row.term, {row.name: value})
         assert not made.in_trial(1).is_nominal, row.name
 
 
 def test_speeds_told_are_averaged_over_a_step():
-    told = wheeled_drives.told(
-        Commands([[0.1, 0.2], [0.0, 0.0]], [0.013, 0.1]), (), 0.01
-    )
+    told = drives.told(Commands([[0.1, 0.2], [0.0, 0.0]], [0.013, 0.1]), (), 0.01)
     np.testing.assert_allclose(told[:3], [[0.1, 0.2], [0.03, 0.06], [0.0, 0.0]])
 
 

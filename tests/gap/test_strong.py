@@ -5,7 +5,7 @@ import numpy as np
 from bns.gap.decomposition import descent
 from bns.gap.decomposition.problem import Problem
 from bns.gap.diagnose import diagnose
-from bns.gap.models.wheeled import WheeledModel
+from bns.gap.models.wheeled.model import WheeledModel
 from bns.gap.planning import excitation
 from bns.worlds.physics.wheeled_world import MujocoWorld
 from bns.worlds.trial import Commands

@@ -10,7 +10,7 @@ from bns import models
 from bns.errors import BnsError
 from bns.gap import diagnose
 from bns.gap.bench.light_cases import Wanderer
-from bns.gap.models.wheeled import WheeledModel
+from bns.gap.models.wheeled.model import WheeledModel
 from bns.models import check, new
 from bns.worlds import registry
 from bns.worlds.light import sensors as light_sensors

@@ -92,7 +92,7 @@ def _stand(model: Any) -> Any:
     from bns.gap.bench import mjcf_cases, walk_cases, wheeled_cases
     from bns.gap.models.legged.model import WalkModel
     from bns.gap.models.mjcf.model import OwnModel
-    from bns.gap.models.wheeled import WheeledModel
+    from bns.gap.models.wheeled.model import WheeledModel
 
     if isinstance(model, OwnModel):
         return mjcf_cases.OwnStand(model)

@@ -94,7 +94,7 @@ class WalkModel(LibraryModel):
         rests = scatter.without(rests, walks, WOBBLE)
         found = where.suspects(rests, self.joints, READING)
         listed = legged.rows(found, self.joints, signs)
-        return self.remembered((*listed, *scatter.rows()))
+        return self.remembered((*legged.known(listed), *scatter.rows()))
 
     def _scatter(self, trials: Sequence[Trial], lost: Sequence[Effect]) -> None:
         """Simulate the robots that this one may be, see `scatter`."""

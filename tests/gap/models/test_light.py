@@ -19,7 +19,7 @@ from bns.gap.diagnose import diagnose, single
 from bns.gap.models.light import diagnosis
 from bns.gap.models.light.model import SightModel, sees, unlikely
 from bns.gap.models.light.reader import _clipped
-from bns.gap.models.wheeled import WheeledModel
+from bns.gap.models.wheeled.model import WheeledModel
 from bns.gap.records import Verdict
 from bns.worlds.effects import registry
 from bns.worlds.trial import Commands, Trial

@@ -8,8 +8,8 @@ from bns import models
 from bns.errors import BnsError
 from bns.gap.candidates import wheeled_rows
 from bns.gap.decomposition.row import Row
-from bns.gap.models import wheeled_drives
 from bns.gap.models.base import GapModel, Windows
+from bns.gap.models.wheeled import changes, drives
 from bns.gap.recordings import segments as pieces
 from bns.worlds.effects.base import Effect
 from bns.worlds.physics import compile
@@ -56,7 +56,7 @@ class WheeledModel(GapModel):
         self.process = np.array(process, dtype=float)
         self.resolution = np.array(resolution, dtype=float)
         self.limits = {c.name: (c.low, c.high, c.unit) for c in self._robot.commands}
-        self._drives = wheeled_drives.Drives(robot, Pool(threads))
+        self._drives = drives.Drives(robot, Pool(threads))
 
     @property
     def least(self) -> np.ndarray:
@@ -87,7 +87,7 @@ class WheeledModel(GapModel):
 
     def effect(self, term: str, values: Mapping[str, float]) -> Effect:
         """The effect of an explanation."""
-        return wheeled_drives.effect(term, values)
+        return changes.effect(term, values)
 
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
