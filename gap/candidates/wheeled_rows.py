@@ -48,7 +48,7 @@ _SMOOTH: tuple[tuple[str, float, float, float, bool, dict[str, Any]], ...] = (
     ("rolling_drag.torque", 0.004, 0, 0.03, True,
      {"step": 5e-4, "levels": (0.004, 0.01)}),
     ("rolling_drag.breakaway", 0.003, 0, 0.03, True,
-     {"step": 5e-4, "levels": (0.002, 0.004, 0.008)}),
+     {"step": 5e-4, "levels": (0.002, 0.004, 0.008), "inexact": 0.05}),
     ("rolling_drag.viscous", 2e-4, 0, 0.01, True, {"step": 2e-5}),
     ("centre_of_mass.dx", 0.008, -0.02, 0.03, False,
      {"slack": 7e-4, "family": "centre_of_mass"}),

@@ -5,17 +5,21 @@ from functools import cached_property
 
 import numpy as np
 
-from bns.gap.decomposition import descent, fit, flexible, onset, rest, shares, ties
+from bns.gap.decomposition import descent, flexible, onset, rest, shares, ties
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.onset import Onset
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.shares import Part
 from bns.gap.decomposition.singles import Singles
 from bns.gap.recordings import command_moments
 from bns.progress import Tell, unheard
 
 MOST = 0.5  # share of the gap beyond which what is left is most of it
+PINNED = 0.15  # the same where an explanation ended at the edge of what is possible
+SPREAD = 0.25  # the same where no explanation alone closes half of it
+EDGE = 0.01  # plausible departures from a bound that are at it
 FELT = 0.02  # of the floor's variance: a gap below shows in no picture
 LARGE = 2.0  # variances of the floor: more than heavy tails of any camera's noise
 SCATTER = 3.0  # times what differs between repeats
@@ -109,7 +113,7 @@ class Decomposition:
         """
         if self.broken:
             return True
-        if self.after <= max(self.scatter, fit.INEXACT**2 * self.moved):
+        if self.after <= max(self.scatter, Row.inexact**2 * self.moved):
             return False
         if self.recurring:
             return self.after > FELT
@@ -125,10 +129,26 @@ class Decomposition:
         return large and self.closed < 1 - MOST
 
     @property
+    def strained(self) -> bool:
+        """Whether explanations bend to something else: one of them ended at the edge of
+        what is possible, or none alone closes half, and much is left."""
+        if not self.lasting:
+            return False
+        low, high = self.problem.bounds
+        rows, values = self.problem.rows, self.point.values
+        edge = np.minimum(values - low, high - values) < EDGE * self.problem.sd
+        off = np.abs(values - self.problem.nominal) > self.problem.sd
+        smooth = np.array([r.smooth and r.term in self.point.support for r in rows])
+        if (edge & off & smooth).any():
+            return self.unexplained > PINNED
+        weak = max((part.alone for part in self.parts), default=1.0) < 1 - MOST
+        return weak and self.unexplained > SPREAD
+
+    @property
     def foreign(self) -> bool:
         """Whether the library lacks what most of the gap comes from."""
         most = self.lasting and self.unexplained > MOST
-        return most or self.failing or bool(self.goes)
+        return most or self.failing or self.strained or bool(self.goes)
 
     @property
     def kind(self) -> str:
@@ -166,7 +186,7 @@ def decompose(
     if _worse(problem, start, point, known):
         point = descent.refitted(problem, point, frozenset())
     size = _Sizes.of(problem, start, point, known)
-    support = shares.weighty(point, size.unexplained)
+    support = shares.weighty(problem, point, size.unexplained)
     if support != point.support:
         point = descent.refitted(problem, point, support)
         size = _Sizes.of(problem, start, point, known)

@@ -8,6 +8,7 @@ import numpy as np
 
 from bns.gap.decomposition import fit, levels, search
 from bns.gap.decomposition.fit import Noise, Point, linearised, newton, placed
+from bns.gap.decomposition.levels import Level
 from bns.gap.decomposition.linear import Linear, Support
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.shares import HeldOut
@@ -62,10 +63,12 @@ def descend(
         known: noise to start from.
 
     Returns:
-        the last point, after `TURNS` searches at most.
+        the point of highest evidence on the way, after `TURNS` searches at most: around
+        a strong effect a linear model may lead away from it.
     """
     support, at = frozenset(support), None
     slopes: Mapping[int, np.ndarray] = {}
+    passed: list[Point] = []
     for _ in range(TURNS):
         values, rest = newton(problem, values, _fitted(problem, support), known)
         values, rest = levels.zoomed(problem, values, rest, support, known)
@@ -76,11 +79,13 @@ def descend(
         found = search.best(linear, start=support, backward=not problem.model.singly)[1]
         if found == support:
             break
+        passed.append(Point(values, support, rest, linear, slopes, known))
         support = found
         values = placed(problem, linear, support, values)
     # the last fit was under the noise of the point before
-    values, rest = newton(problem, values, _fitted(problem, support), known, turns=2)
-    return Point(values, support, rest, linear, slopes, known)
+    values, rest = newton(problem, values, _fitted(problem, support), known)
+    last = Point(values, support, rest, linear, slopes, known)
+    return better(problem, [last, *passed])
 
 
 def _fitted(problem: Problem, support: Iterable[str]) -> set[str]:
@@ -148,13 +153,24 @@ def decompose(tried: Singles) -> Point:
         level = levels.best(problem, best)
         if level is None or level.cost > best.cost - WORTH:
             break
-        other = descend(problem, level.values, level.support, best.noise)
-        chosen = better(problem, [best, other])
+        others = [descend(problem, level.values, level.support, best.noise)]
+        if level.support > {level.name}:
+            others.append(_by_itself(problem, level, best.noise))
+        chosen = better(problem, [best, *others])
         if chosen is best:
             break
         best = chosen
     best = narrowed(problem, best)
     return best if problem.model.many else pruned(problem, best)
+
+
+def _by_itself(problem: Problem, level: Level, known: Noise) -> Point:
+    """A point from the explanation of a level alone: what was found before it may have
+    stood in its place."""
+    values = problem.nominal.copy()
+    rows = list(problem.terms[level.name])
+    values[rows] = level.values[rows]
+    return descend(problem, values, {level.name}, known)
 
 
 def narrowed(problem: Problem, point: Point) -> Point:
@@ -194,8 +210,9 @@ def pruned(problem: Problem, point: Point) -> Point:
             for name in support
         }
         weak = sorted((n for n in last if last[n] < WEAK), key=lambda n: (last[n], n))
-        for name in weak[:TRIED]:
-            smaller = refitted(problem, point, support - {name})
+        together = [set(weak)] if 1 < len(weak) < len(support) else []
+        for names in (*together, *({name} for name in weak[:TRIED])):
+            smaller = refitted(problem, point, support - names)
             least, here = costs(problem, [smaller, point])
             if least <= here:
                 point = smaller

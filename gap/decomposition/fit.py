@@ -9,14 +9,14 @@ from bns.gap.decomposition import noise
 from bns.gap.decomposition.linear import Linear, Support, inflation, tail
 from bns.gap.decomposition.noise import Memory
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.starts import Starts
 
 DAMPING = (0.0, 2.0, 20.0, 200.0)  # added to the curvature, in units of the prior
 LONGEST = 4.0  # prior standard deviations of one step
 STILL = 0.02  # prior standard deviations below which a fit has converged
 FAR = 0.3  # prior standard deviations beyond which slopes are taken anew
-INEXACT = 0.01  # of what effects change: how well they are simulated at best (assumed);
-# another integrator or way to model an effect is no second effect
+APART = 0.25  # plausible departures from which it counts how exact a row is simulated
 MEASURED = 4  # times that noise is measured from what it leaves
 ROUGH = 20.0  # [s] of recording for comparing these
 
@@ -197,6 +197,7 @@ def linearised(
     predicted = np.where(problem.seen, problem.recorded, 0.0) - np.nan_to_num(rest)
     motion = problem.model.motion(predicted)
     moved = np.nan_to_num(problem.gap - rest)
+    exact = inexact(problem, values)
     left = rest
     for turn in range(MEASURED):
         made = _linear(problem, values, slopes, whole, known, left)
@@ -209,12 +210,21 @@ def linearised(
         change = np.abs(known.innovations(moved))
         felt = None if problem.model.many else change
         sd = noise.scale(seen, motion, problem.model.least, felt)
-        known = replace(known, sd=np.hypot(sd, INEXACT * change), lam=1.0)
+        known = replace(known, sd=np.hypot(sd, exact * change), lam=1.0)
     made = _linear(problem, values, slopes, whole, known, left)
     found = made.solve(made.free)
     whitened = np.sqrt(made.weight) * made.rest(found)
     lam = max(noise.correlated(whitened, problem.trial), inflation(made, found))
     return made.correlated(lam), replace(known, lam=lam), slopes
+
+
+def inexact(problem: Problem, values: np.ndarray) -> float:
+    """Share of what values ``(R,)`` change to which they are simulated: another
+    integrator, or another law of friction, is no second effect."""
+    rows = problem.rows
+    away = np.abs(values - problem.nominal) > APART * problem.sd
+    mine = (row.inexact for row, far in zip(rows, away, strict=True) if far)
+    return max(mine, default=Row.inexact)
 
 
 def _linear(
@@ -252,7 +262,7 @@ def newton(
     support: Iterable[str],
     known: Noise,
     *,
-    turns: int = 3,
+    turns: int = 5,
     only: list[int] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Most probable values of the rows of a set, the others as they are.

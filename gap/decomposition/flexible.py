@@ -3,8 +3,9 @@
 A regression on the motion and on what else an effect may go with (the heading, the
 place) predicts trials that it has not seen. An explanation that is right makes what is
 left simpler; one that imitates something else makes it harder to predict than the gap
-was. Kennedy and O'Hagan (2001, section 4) call what such a regression describes the
-discrepancy of a model.
+was, or it is the mean of what goes with the heading or the place, and leaves much that
+these predict. Kennedy and O'Hagan (2001, section 4) call what such a regression
+describes the discrepancy of a model.
 """
 
 from collections.abc import Mapping
@@ -20,6 +21,9 @@ RIDGE = 1.0  # precision of a standardized regressor's weight, in units of the f
 FEWEST = 4  # trials, each predicted from the others
 BETTER = 0.75  # of what explanations leave: something else explains it better
 SMALL = 0.5  # of the floor's variance: less is not worth another explanation
+MUCH = 0.2  # of the gap: what explanations leave where they are the mean of something
+WELL = 0.4  # of that: what goes with a pattern leaves so little
+MOTION = "the motion"
 
 
 def imitated(
@@ -43,12 +47,13 @@ def imitated(
     if not tried.patterns or np.count_nonzero(tried.count) < FEWEST:
         return ""
     goes, other = tried.best(gap)
-    ours = min(tried.squares(rest / known.sd), tried.best(rest)[1], key=tried.total)
-    told = tried.count > 0
-    mostly = np.log(ours[told] / other[told]).mean() > 0
-    large = tried.total(ours) > SMALL
-    better = tried.total(other) < BETTER * tried.total(ours)
-    return goes if large and better and mostly else ""
+    plain = tried.squares(rest / known.sd)
+    ours = min(plain, tried.best(rest)[1], key=tried.total)
+    if tried.beats(other, ours, BETTER):
+        return goes
+    much = tried.total(plain) > MUCH * tried.total(tried.squares(gap / known.sd))
+    mean = goes != MOTION and much and tried.beats(other, plain, WELL)
+    return goes if mean else ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +88,7 @@ class Regression:
         made = np.nan_to_num(self.problem.recorded - left)
         span = np.concatenate([w.durations for w in self.problem.windows])[:, None]
         base = np.hstack([made, np.abs(made), made**2, span])
-        tried = {"the motion": base}
+        tried = {MOTION: base}
         for name, pattern in self.patterns.items():
             told = np.hstack([made, span])
             both = (told[:, :, None] * pattern[:, None, :]).reshape(len(span), -1)
@@ -91,6 +96,14 @@ class Regression:
         found = {name: self._errors(left, parts) for name, parts in tried.items()}
         name = min(found, key=lambda n: self.total(found[n]))
         return name, found[name]
+
+    def beats(self, other: np.ndarray, ours: np.ndarray, share: float) -> bool:
+        """Whether mean squares of trials ``(T,)`` are less than a share of others that
+        are worth it, in most trials."""
+        told = self.count > 0
+        mostly = np.log(ours[told] / other[told]).mean() > 0
+        large = self.total(ours) > SMALL
+        return bool(large and mostly and self.total(other) < share * self.total(ours))
 
     def _errors(self, left: np.ndarray, parts: np.ndarray) -> np.ndarray:
         """Mean square of each trial, predicted from the others by regressors

@@ -25,8 +25,16 @@ GAIN = 0.5  # of the loss that a new value has to bring
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """A row set to a value on top of a fit, with what evidence says goes with it."""
+    """A row set to a value on top of a fit, with what evidence says goes with it.
 
+    Attributes:
+        name: of the row's explanation.
+        cost: minus the log evidence of the set, with what a level costs.
+        values: of all rows, ``(R,)``.
+        support: the set.
+    """
+
+    name: str
     cost: float
     values: np.ndarray
     support: Support
@@ -125,7 +133,7 @@ def _level(
     row = problem.rows[number]
     values = _values(problem, point, number, value, linear, support)
     paid = cost + KAPPA + np.log(len(row.levels)) + 0.5
-    return Level(float(paid), values, support | {row.term})
+    return Level(row.term, float(paid), values, support | {row.term})
 
 
 def _values(

@@ -27,6 +27,8 @@ class Row:
             search among values fits it.
         nuisance: fitted always and never an answer.
         step: for differences; 0 = a tenth of `sd`.
+        inexact: share of what it changes to which the simulation shows it at best: less
+            where a law of friction is one of several; assumed.
         per_trial: whether its effect grows with the number of the trial.
         group: name of the explanation it belongs to; "" = its own. Rows of a group go
             in and out together.
@@ -55,6 +57,7 @@ class Row:
     stepped: bool = False
     nuisance: bool = False
     step: float = 0.0
+    inexact: float = 0.01
     per_trial: bool = False
     group: str = ""
     family: str = ""

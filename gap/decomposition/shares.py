@@ -197,17 +197,18 @@ def guarded(problem: Problem, point: Point) -> Support:
     return best
 
 
-def weighty(point: Point, left: float) -> Support:
+def weighty(problem: Problem, point: Point, left: float) -> Support:
     """The set of a point without trifles: what closes, added last, hardly any of the
     gap, and less than a part of what no explanation closes: that may look like it. So
     may the others, within what they are simulated to.
 
     Args:
+        problem: the recording.
         point: the fit.
         left: share of the gap that is left and is not scatter.
     """
     linear, support = point.linear, point.support
-    least = max(min(SLIGHT * left, TRIFLE), fit.INEXACT**2)
+    least = max(min(SLIGHT * left, TRIFLE), fit.inexact(problem, point.values) ** 2)
     least *= linear.squares(()) - linear.squares(linear.free)
     while len(support) > 1:
         here = linear.squares(support)

@@ -41,6 +41,18 @@ def test_a_wheel_that_sticks_is_told_from_a_dead_band():
     assert ", breakaway 0.0" in found.verdict.sentence
 
 
+def test_a_floor_that_is_slippery_carries_nothing():
+    model = WheeledModel("khepera3", threads=1)
+    slips = "floor_friction:factor=0.05"
+    told = [[[v, v], [-v, v], [0.0, 0.0], [-v, -v]] for v in (0.1, 0.2, 0.29)]
+    world = MujocoWorld("khepera3", reality=[slips, NOISE], threads=1)
+    trials = world.run([Commands(np.array(row), np.full(4, 1.0)) for row in told * 2])
+    names = ["floor_friction", "payload", "motor_lag[both]", "dead_zone[right]"]
+    found = diagnose(trials, model, rows=names, full=False)
+    assert found.verdict.named == (("floor_friction",),)
+    assert abs(found.best.magnitudes[0] - 0.05) < 5e-3
+
+
 def test_a_limit_that_came_back_to_the_nominal_explains_nothing():
     model = WheeledModel("khepera3", threads=1)
     told = Commands(np.array([[0.1, 0.1], [0.05, 0.15]]), np.array([1.0, 1.0]))

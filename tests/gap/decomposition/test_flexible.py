@@ -61,6 +61,15 @@ def test_what_goes_with_the_heading_is_no_change_by_trials():
     assert said(gap, rest) == "the heading"
 
 
+@pytest.mark.parametrize(("mean", "says"), [(1.0, "the heading"), (10.0, "")])
+def test_the_mean_of_what_goes_with_the_heading_is_no_explanation(mean, says):
+    _, motion, yaw, noise = recording()
+    gap, rest = noise.copy(), noise.copy()
+    gap[:, 2] += 2.0 * motion[:, 0] * (mean + np.cos(yaw))
+    rest[:, 2] += 2.0 * motion[:, 0] * np.cos(yaw)
+    assert said(gap, rest) == says
+
+
 def test_an_explanation_that_is_right_stands():
     gap, _, noise = slipping()
     assert said(gap, noise) == ""
