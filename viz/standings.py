@@ -1,9 +1,10 @@
 """Picture of the standings: what is deployed over the trials after the damage."""
 
+import itertools
 import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 WRAPPED = 36
 """letters of a title's line"""
+LINES = "-", "--", ":"
+"""of the first seven learners, of the next, and so on"""
 
 
 def write(cells: Sequence[Cell], folder: Path) -> list[Path]:
@@ -55,7 +58,12 @@ def curves(cells: Sequence[Cell]) -> "Figure":
     """
     groups = figures.groups(cells)
     names = list(dict.fromkeys(cell.entry.rival for cell in cells))
-    colours = dict(zip(names, [*style.CYCLE] * 3, strict=False))
+    looks = {
+        name: {"color": colour, "linestyle": line}
+        for name, (line, colour) in zip(
+            names, itertools.product(LINES, style.CYCLE), strict=False
+        )
+    }
     priors = list(dict.fromkeys(prior for _, prior, _ in groups))
     kinds = list(dict.fromkeys(kind for *_, kind in groups))
     with style.plotting() as figure_class:
@@ -69,7 +77,7 @@ def curves(cells: Sequence[Cell]) -> "Figure":
         for (task, prior, kind), held in groups.items():
             axes = panels[kinds.index(kind)][priors.index(prior)]
             axes.set_visible(True)
-            _panel(axes, (task, prior, kind), held, colours)
+            _panel(axes, (task, prior, kind), held, looks)
     return figure
 
 
@@ -77,7 +85,7 @@ def _panel(
     axes: "Axes",
     group: tuple[str, str, str],
     cells: Sequence[Cell],
-    colours: Mapping[str, str],
+    looks: Mapping[str, Mapping[str, Any]],
 ) -> None:
     """One task, prior and set of damages: a line a learner."""
     task, prior, kind = group
@@ -88,7 +96,7 @@ def _panel(
         over = np.mean([c.deployed.mean(0) / top for c, top in known], axis=0)
         trials = np.arange(1, len(over) + 1)
         label = f"{name} (n = {min(c.runs for c, _ in known)} x {len(known)})"
-        axes.plot(trials, over, color=colours[name], label=label)
+        axes.plot(trials, over, **looks[name], label=label)
     said = "\n".join(textwrap.wrap(f"{prior}: {PRIORS[prior]}", WRAPPED))
     measure = figures.measure(task, kind)
     axes.set_title(f"{said}\ndamages {kind}", fontsize="small")
@@ -96,6 +104,6 @@ def _panel(
     axes.tick_params(labelbottom=True)
     axes.set_xlabel("trial from the damage on")
     if measure != "distance [m]":
-        axes.set_ylim(0, 1)
+        axes.set_ylim(0, 1.02)
     axes.set_ylim(bottom=0)
     axes.legend(fontsize="x-small")

@@ -56,7 +56,8 @@ class Table(Plan):
     root: str = "runs/standings"
     """where runs are kept"""
     write: str = ""
-    """write the page to this file (docs/standings.md)"""
+    """write the page to this file (docs/standings.md); tasks without a run here keep
+    what it says of them"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,7 +139,8 @@ def _table(given: Table) -> int:
     cells = figures.read(_entries(given), Path(given.root))
     if given.write:
         path = Path(given.write)
-        files.write_text(path, page.page(cells))
+        before = path.read_text(encoding="utf-8") if path.is_file() else ""
+        files.write_text(path, page.page(cells, before))
         made = standings.write(cells, path.parent / page.PICTURES)
         print(f"{len(cells)} cells: {path}", *made, sep="\n")
         return 0

@@ -1,5 +1,6 @@
 """docs/standings.md, generated from what has been run."""
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -40,20 +41,27 @@ HOW = """
 what is missing, and `bns standings table --write docs/standings.md` makes this page
 from it. `--rivals NAME` takes any learner into the table, one of your own as well.
 """
+SECTION = re.compile(r"\n!\[(\w+): what is deployed.*?(?=\n!\[|\n## How)", re.DOTALL)
+"""what the page says of a task, which it begins with"""
 PICTURES = "images"
 """folder of the pictures, beside the page"""
 
 
-def page(cells: Sequence[Cell]) -> str:
-    """The page of some cells, none of them = that nothing was run."""
-    parts, shown = [INTRO], ""
+def page(cells: Sequence[Cell], before: str = "") -> str:
+    """The page of some cells, none of them = that nothing was run.
+
+    Args:
+        cells: what has been run.
+        before: the page as it was; what it says of tasks without a cell is kept.
+    """
+    parts = {found[1]: found[0] for found in SECTION.finditer(before)}
+    for task in dict.fromkeys(task for task, *_ in figures.groups(cells)):
+        title = f"{task}: what is deployed over the trials after the damage"
+        parts[task] = f"\n![{title}]({PICTURES}/standings-{task}.png)\n"
     for (task, prior, kind), held in figures.groups(cells).items():
-        if task != shown:
-            title = f"{task}: what is deployed over the trials after the damage"
-            parts.append(f"\n![{title}]({PICTURES}/standings-{task}.png)\n")
-            shown = task
-        parts.append(_group(task, prior, kind, held))
-    return "".join(parts) + ("" if cells else EMPTY) + HOW
+        parts[task] += _group(task, prior, kind, held)
+    told = [parts[task] for task in DESIGNS if task in parts]
+    return "".join([INTRO, *(told or [EMPTY]), HOW])
 
 
 def _group(task: str, prior: str, kind: str, cells: Sequence[Cell]) -> str:

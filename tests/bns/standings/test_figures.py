@@ -140,6 +140,16 @@ def test_the_page_says_n_and_what_was_not_run():
     assert "Nothing has been run" in page.page([])
 
 
+def test_the_page_keeps_what_it_says_of_other_tasks():
+    walked = page.page([cells("random", np.full((3, 50), 0.2))])
+    other = walked.replace("walk", "navigate").replace("random", "somebody")
+    both = page.page([cells("cma", np.full((3, 50), 0.4))], other)
+    assert "| somebody" in both and "| cma" in both and "| random" not in both
+    assert both.index("| cma") < both.index("| somebody") < both.index("## How")
+    assert page.page([cells("random", np.full((3, 50), 0.2))], walked) == walked
+    assert page.page([], walked) == walked
+
+
 def test_the_page_says_what_a_repertoire_could_do():
     low = page.page([cells("ite", np.full((3, 50), 0.2), prior="P1")])
     assert "Repertoire `phantomx-1`" in low and "0.75 m in the undamaged model" in low
