@@ -21,7 +21,7 @@ RIDGE = 1.0  # precision of a standardized regressor's weight, in units of the f
 FEWEST = 4  # trials, each predicted from the others
 BETTER = 0.75  # of what explanations leave: something else explains it better
 SMALL = 0.5  # of the floor's variance: less is not worth another explanation
-MUCH = 0.2  # of the gap: what explanations leave where they are the mean of something
+MUCH = 0.1  # of the gap: what explanations leave where they are the mean of something
 WELL = 0.4  # of that: what goes with a pattern leaves so little
 MOTION = "the motion"
 
