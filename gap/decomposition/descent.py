@@ -15,6 +15,7 @@ from bns.gap.decomposition.shares import HeldOut
 from bns.gap.decomposition.singles import Single, Singles
 
 TURNS = 4  # of fitting and searching
+STEPS = 5  # of a fit; a walker, whose contacts make steps dear, takes fewer
 FEW = 2  # explanations that need no other start if they leave little
 ENOUGH = 1.2  # times what all explanations leave: little more
 ROUNDS = 2  # of levels
@@ -70,7 +71,10 @@ def descend(
     slopes: Mapping[int, np.ndarray] = {}
     passed: list[Point] = []
     for _ in range(TURNS):
-        values, rest = newton(problem, values, _fitted(problem, support), known)
+        most = 3 if problem.model.singly else STEPS
+        values, rest = newton(
+            problem, values, _fitted(problem, support), known, turns=most
+        )
         values, rest = levels.zoomed(problem, values, rest, support, known)
         near = at is not None and np.abs((values - at) / problem.sd).max() <= fit.FAR
         at = at if near else values.copy()
@@ -83,7 +87,8 @@ def descend(
         support = found
         values = placed(problem, linear, support, values)
     # the last fit was under the noise of the point before
-    values, rest = newton(problem, values, _fitted(problem, support), known)
+    most = 2 if problem.model.singly else STEPS
+    values, rest = newton(problem, values, _fitted(problem, support), known, turns=most)
     last = Point(values, support, rest, linear, slopes, known)
     return better(problem, [last, *passed])
 
@@ -154,7 +159,7 @@ def decompose(tried: Singles) -> Point:
         if level is None or level.cost > best.cost - WORTH:
             break
         others = [descend(problem, level.values, level.support, best.noise)]
-        if level.support > {level.name}:
+        if several and level.support > {level.name}:
             others.append(_by_itself(problem, level, best.noise))
         chosen = better(problem, [best, *others])
         if chosen is best:
@@ -210,7 +215,8 @@ def pruned(problem: Problem, point: Point) -> Point:
             for name in support
         }
         weak = sorted((n for n in last if last[n] < WEAK), key=lambda n: (last[n], n))
-        together = [set(weak)] if 1 < len(weak) < len(support) else []
+        several = not problem.model.singly and 1 < len(weak) < len(support)
+        together = [set(weak)] if several else []
         for names in (*together, *({name} for name in weak[:TRIED])):
             smaller = refitted(problem, point, support - names)
             least, here = costs(problem, [smaller, point])
@@ -266,7 +272,8 @@ def fitted_at(problem: Problem, point: Point, support: Iterable[str]) -> Point:
     """
     support = frozenset(support)
     fitted = _fitted(problem, support)
-    values, rest = newton(problem, point.values, fitted, point.noise)
+    most = 3 if problem.model.singly else STEPS
+    values, rest = newton(problem, point.values, fitted, point.noise, turns=most)
     values, rest = levels.zoomed(problem, values, rest, support, point.noise)
     linear, known, slopes = linearised(problem, values, rest, point.noise)
     return Point(values, support & set(linear.terms), rest, linear, slopes, known)

@@ -262,7 +262,7 @@ def newton(
     support: Iterable[str],
     known: Noise,
     *,
-    turns: int = 5,
+    turns: int = 3,
     only: list[int] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Most probable values of the rows of a set, the others as they are.
