@@ -18,7 +18,6 @@ from bns.progress import Tell, unheard
 
 MOST = 0.5  # share of the gap beyond which what is left is most of it
 PINNED = 0.15  # the same where an explanation ended at the edge of what is possible
-SPREAD = 0.25  # the same where no explanation alone closes half of it
 EDGE = 0.01  # plausible departures from a bound that are at it
 FELT = 0.02  # of the floor's variance: a gap below shows in no picture
 LARGE = 2.0  # variances of the floor: more than heavy tails of any camera's noise
@@ -130,19 +129,16 @@ class Decomposition:
 
     @property
     def strained(self) -> bool:
-        """Whether explanations bend to something else: one of them ended at the edge of
-        what is possible, or none alone closes half, and much is left."""
-        if not self.lasting:
+        """Whether much is left although an explanation ended at the edge of what is
+        possible: it bends to something else."""
+        if not self.lasting or self.unexplained < PINNED:
             return False
         low, high = self.problem.bounds
         rows, values = self.problem.rows, self.point.values
         edge = np.minimum(values - low, high - values) < EDGE * self.problem.sd
         off = np.abs(values - self.problem.nominal) > self.problem.sd
         smooth = np.array([r.smooth and r.term in self.point.support for r in rows])
-        if (edge & off & smooth).any():
-            return self.unexplained > PINNED
-        weak = max((part.alone for part in self.parts), default=1.0) < 1 - MOST
-        return weak and self.unexplained > SPREAD
+        return bool((edge & off & smooth).any())
 
     @property
     def foreign(self) -> bool:

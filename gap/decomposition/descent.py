@@ -83,7 +83,8 @@ def descend(
         found = search.best(linear, start=support, backward=not problem.model.singly)[1]
         if found == support:
             break
-        passed.append(Point(values, support, rest, linear, slopes, known))
+        inside = support & set(linear.terms)  # without what came back to nominal
+        passed.append(Point(values, inside, rest, linear, slopes, known))
         support = found
         values = placed(problem, linear, support, values)
     # the last fit was under the noise of the point before
