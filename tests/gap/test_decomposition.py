@@ -116,6 +116,7 @@ def test_what_holds_for_the_fitted_motion_alone_is_no_answer(before, closed, kin
         lasting=False,
         unexplained=0.1,
         goes="",
+        strained=False,
     )
     made.failing = Decomposition.failing.fget(made)
     made.foreign = Decomposition.foreign.fget(made)
