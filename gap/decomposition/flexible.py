@@ -98,8 +98,13 @@ class Regression:
         return name, found[name]
 
     def beats(self, other: np.ndarray, ours: np.ndarray, share: float) -> bool:
-        """Whether mean squares of trials ``(T,)`` are less than a share of others that
-        are worth it, in most trials."""
+        """Whether one prediction is clearly better than another, in most trials.
+
+        Args:
+            other: its mean square in each trial, ``(T,)``.
+            ours: that of the other, ``(T,)``; little beyond the floor is not worth it.
+            share: of that which is clearly less.
+        """
         told = self.count > 0
         mostly = np.log(ours[told] / other[told]).mean() > 0
         large = self.total(ours) > SMALL
