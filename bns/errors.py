@@ -13,6 +13,12 @@ from pathlib import Path
 LONGEST = 400
 """characters of a message; what is longer loses its middle"""
 
+ALIKE = 0.6
+"""how alike a name must be to be what was meant, 0 to 1 (`difflib`)"""
+
+EXACT = 2.0**53
+"""up to which every whole number is one of a computer's"""
+
 
 class BnsError(ValueError):
     """Base of every error that a user's input can cause: one short line of text."""
@@ -43,7 +49,7 @@ class UnknownNameError(BnsError):
 
     def __init__(self, kind: str, given: str, known: Iterable[str], also: str = ""):
         self.kind, self.given, self.known = kind, given, sorted(known)
-        close = get_close_matches(given, self.known, n=1, cutoff=0.5)
+        close = get_close_matches(given, self.known, n=1, cutoff=ALIKE)
         end = f" {also}" if also else ""
         said = f"Unknown {kind} {one_line(given, 60)!r}."
         if close:
@@ -74,8 +80,14 @@ class OutOfBoundsError(BnsError):
         shown = f" {unit}" if unit and unit != "1" else ""
         super().__init__(
             f"{name} = {given}{shown} is not allowed: "
-            f"give a number from {low:g} to {high:g}{shown}."
+            f"give a number from {_plain(low)} to {_plain(high)}{shown}."
         )
+
+
+def _plain(value: float) -> str:
+    """A bound as a person writes it: 1000000, not 1e+06."""
+    whole = isinstance(value, int) or (value.is_integer() and abs(value) < EXACT)
+    return f"{int(value)}" if whole else f"{value:g}"
 
 
 class FormatError(BnsError):
