@@ -38,7 +38,11 @@ class Arguments:
 
 
 def main(verb: str, argv: list[str]) -> int:
-    """Run the verb; gives the exit code."""
+    """Run the verb; gives the exit code.
+
+    Raises:
+        BnsError: a file is there that is no schema, or cannot be written.
+    """
     del verb
     given = parse(Arguments, argv, prog="bns schema")
     text = json.dumps(SCHEMAS[given.kind](), indent=2, ensure_ascii=False)
