@@ -34,7 +34,7 @@ def test_check_says_how_many_trials_can_be_used(recording, capsys):
     [
         (["gap", "chek", "x"], "Did you mean 'check'"),
         (["gap", "check", "nowhere"], "There is no nowhere: give a dataset"),
-        (["gap", "check", "."], "give a dataset, or a finished run"),
+        (["gap", "check", "."], "or of a run to be finished"),
         (["gap", "check", ".", "--importer", "mrclam6"], "no RobotN_Odometry.dat"),
         (["gap", "check", ".", "--trials", "5-2"], "'5-2' is backwards; write 2-5"),
         (["gap", "diagnose", ".", "--seed", "-1"], "--seed = -1 is not allowed"),
