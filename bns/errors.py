@@ -16,9 +16,6 @@ LONGEST = 400
 ALIKE = 0.6
 """how alike a name must be to be what was meant, 0 to 1 (`difflib`)"""
 
-EXACT = 2.0**53
-"""up to which every whole number is one of a computer's"""
-
 
 class BnsError(ValueError):
     """Base of every error that a user's input can cause: one short line of text."""
@@ -85,9 +82,8 @@ class OutOfBoundsError(BnsError):
 
 
 def _plain(value: float) -> str:
-    """A bound as a person writes it: 1000000, not 1e+06."""
-    whole = isinstance(value, int) or (value.is_integer() and abs(value) < EXACT)
-    return f"{int(value)}" if whole else f"{value:g}"
+    """A bound as a person writes it: a count of 1000000 is not 1e+06."""
+    return f"{value}" if isinstance(value, int) else f"{value:g}"
 
 
 class FormatError(BnsError):
