@@ -13,7 +13,7 @@ from pathlib import Path
 LONGEST = 400
 """characters of a message; what is longer loses its middle"""
 
-ALIKE = 0.6
+ALIKE = 0.55
 """how alike a name must be to be what was meant, 0 to 1 (`difflib`)"""
 
 
@@ -41,7 +41,7 @@ class UnknownNameError(BnsError):
         kind: what was looked up, in singular ("effect", "preset", "world").
         given: the name that was given.
         known: the names that exist.
-        also: a sentence on what else may be given, where nothing is alike.
+        also: a sentence on what else may be given.
     """
 
     def __init__(self, kind: str, given: str, known: Iterable[str], also: str = ""):
@@ -50,7 +50,7 @@ class UnknownNameError(BnsError):
         end = f" {also}" if also else ""
         said = f"Unknown {kind} {one_line(given, 60)!r}."
         if close:
-            super().__init__(f"{said} Did you mean {close[0]!r}?")
+            super().__init__(f"{said} Did you mean {close[0]!r}?{end}")
             return
         said += " Available: "
         room = LONGEST - len(said) - len(end) - len(", ... (10000 in all).")
