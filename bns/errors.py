@@ -13,6 +13,9 @@ from pathlib import Path
 LONGEST = 400
 """characters of a message; what is longer loses its middle"""
 
+ALIKE = 0.55
+"""how alike a name must be to be what was meant, 0 to 1 (`difflib`)"""
+
 
 class BnsError(ValueError):
     """Base of every error that a user's input can cause: one short line of text."""
@@ -38,16 +41,16 @@ class UnknownNameError(BnsError):
         kind: what was looked up, in singular ("effect", "preset", "world").
         given: the name that was given.
         known: the names that exist.
-        also: a sentence on what else may be given, where nothing is alike.
+        also: a sentence on what else may be given.
     """
 
     def __init__(self, kind: str, given: str, known: Iterable[str], also: str = ""):
         self.kind, self.given, self.known = kind, given, sorted(known)
-        close = get_close_matches(given, self.known, n=1, cutoff=0.5)
+        close = get_close_matches(given, self.known, n=1, cutoff=ALIKE)
         end = f" {also}" if also else ""
         said = f"Unknown {kind} {one_line(given, 60)!r}."
         if close:
-            super().__init__(f"{said} Did you mean {close[0]!r}?")
+            super().__init__(f"{said} Did you mean {close[0]!r}?{end}")
             return
         said += " Available: "
         room = LONGEST - len(said) - len(end) - len(", ... (10000 in all).")
@@ -74,8 +77,13 @@ class OutOfBoundsError(BnsError):
         shown = f" {unit}" if unit and unit != "1" else ""
         super().__init__(
             f"{name} = {given}{shown} is not allowed: "
-            f"give a number from {low:g} to {high:g}{shown}."
+            f"give a number from {_plain(low)} to {_plain(high)}{shown}."
         )
+
+
+def _plain(value: float) -> str:
+    """A bound as a person writes it: a count of 1000000 is not 1e+06."""
+    return f"{value}" if isinstance(value, int) else f"{value:g}"
 
 
 class FormatError(BnsError):

@@ -132,5 +132,5 @@ def _sentence(
         said = "is no better than with it: the effect is still there, or is another one"
     return (
         f"Taking {what} away {rest}: the prediction {said} "
-        f"({error:.2f} of the floor; with it {losses['kept']:.2f})."
+        f"({error:.2f} of the noise floor; with it {losses['kept']:.2f})."
     )

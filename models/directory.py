@@ -15,8 +15,11 @@ def named(directory: Path) -> str:
     """The name that a robot gets from its directory, which is to be made.
 
     Raises:
-        BnsError: a name that no model can have; something is there already.
+        BnsError: a name that no model can have, or that another has; something is
+            there already.
     """
+    from bns import models
+
     if not re.fullmatch(r"[A-Za-z]\w*", directory.name, re.ASCII):
         raise BnsError(
             f"{directory.name!r} cannot be a robot's name: give a directory whose name "
@@ -24,6 +27,11 @@ def named(directory: Path) -> str:
         )
     if directory.exists():
         raise BnsError(f"{directory} is there already: give another name.")
+    if directory.name in models.names():
+        raise BnsError(
+            f"{directory.name!r} is the name of a robot already (`bns robots`): give "
+            "another."
+        )
     return directory.name
 
 

@@ -9,7 +9,7 @@ import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from bns.errors import BnsError
+from bns.errors import BnsError, OutOfBoundsError
 from bns.models.directory import make, named, short, texts
 from bns.models.legged_body import box
 
@@ -41,8 +41,14 @@ FILES = {
     "robot.toml": "wheeled_robot.toml.jinja",
     "numbers.toml": "wheeled_numbers.toml.jinja",
 }
-NEEDED = ("wheel_radius", "axle_length", "mass", "top_speed")
-OPTIONAL = ("length", "width", "height")
+LENGTH = (0.01, 10.0, "m")
+NEEDED = {
+    "wheel_radius": (0.001, 2.0, "m"),
+    "axle_length": LENGTH,
+    "mass": (0.001, 2000.0, "kg"),
+    "top_speed": (0.001, 50.0, "m/s"),
+}
+OPTIONAL = dict.fromkeys(("length", "width", "height"), LENGTH)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +56,7 @@ class Wheeled:
     """What is known of the robot.
 
     Raises:
-        BnsError: a number that is not positive; wheels larger than the axle.
+        BnsError: a number that no such robot has; wheels larger than the axle.
     """
 
     wheel_radius: float
@@ -72,13 +78,12 @@ class Wheeled:
     """eight of them around the body, for the world `light`"""
 
     def __post_init__(self) -> None:
-        for name in (*NEEDED, *OPTIONAL):
+        for name, bounds in {**NEEDED, **OPTIONAL}.items():
             value = getattr(self, name)
-            if not math.isfinite(value) or value < 0 or not (value or name in OPTIONAL):
-                raise BnsError(
-                    f"{name} = {value} is not possible: give a number above 0, in m, "
-                    "kg or m/s."
-                )
+            if value == 0 and name in OPTIONAL:
+                continue
+            if not bounds[0] <= value <= bounds[1]:
+                raise OutOfBoundsError(name, value, *bounds)
         if self.wheel_radius > self.axle_length:
             raise BnsError(
                 f"Wheels of radius {self.wheel_radius} m do not go on an axle of "

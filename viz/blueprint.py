@@ -104,7 +104,7 @@ def _bars(rrb: Any, path: str, name: str) -> Any:
 def _readings(rrb: Any, seconds: float) -> Any:
     return rrb.TimeSeriesView(
         origin=f"/{READINGS}",
-        name="Light sensors [counts]; smaller is brighter; thin: as the SNNs foresaw",
+        name="Light sensors [counts]; smaller is brighter; thin: predicted",
         axis_x=_axis(rrb, seconds),
         plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
     )

@@ -47,11 +47,14 @@ def save(
     Raises:
         FormatError: there is no such recording.
         MissingDependencyError: the viewer or Vulkan is missing.
-        BnsError: the viewer did not draw.
+        BnsError: the viewer did not draw, or cannot write there.
     """
     rrd, png = Path(rrd).resolve(), Path(png).resolve()
     if not rrd.is_file():
         raise FormatError(f"{rrd} is not a recording: there is no such file.")
+    if png.suffix.lower() != ".png":
+        raise BnsError(f"{png.name} is no PNG: give a name that ends in .png.")
+    files.check_writable(png)
     with viewer() as shown:
         shown.open(str(rrd))
         _go(shown, trial, at)

@@ -49,7 +49,7 @@ CAPTIONS = {
         "drops from the median."
     ),
     "displacement": (
-        "Each dot is one command: the motion the SNN foresaw against the motion that "
+        "Each dot is one command: the motion the SNN predicted against the motion that "
         "came. On the diagonal the SNN is right; a cloud off the diagonal shows what "
         "the damage changed, and the dots of the last trials whether it was learned. "
         "Dots beyond the frame are drawn at its edge."
@@ -63,7 +63,7 @@ TITLES = {
     "fitness": "Fitness",
     "solved": "Objectives reached",
     "waits": "Trials needed",
-    "displacement": "Foreseen against real motion",
+    "displacement": "Predicted against real motion",
 }
 
 

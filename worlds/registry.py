@@ -76,7 +76,7 @@ def get(name: str) -> Callable[..., World]:
             "run there, name the file in $BNS_WORLDS, or keep it for all directories "
             "with `bns gap apply ... --user`."
         )
-    also = "Worlds of `bns gap apply` are read where they are kept; --user: everywhere."
+    also = "A world that `bns gap apply` kept is known beside its worlds.toml."
     raise UnknownNameError("world", name, names(), also)
 
 

@@ -24,7 +24,7 @@ from typing import (
     get_type_hints,
 )
 
-from bns.errors import BnsError, UnknownNameError
+from bns.errors import BnsError, OutOfBoundsError, UnknownNameError
 
 T = TypeVar("T")
 
@@ -37,12 +37,31 @@ class Mark(Enum):
     RARE = "rare"
 
 
+@dataclass(frozen=True)
+class Within:
+    """The whole numbers that an option takes.
+
+    Args:
+        low: the smallest.
+        high: the largest.
+    """
+
+    low: int
+    high: int
+
+
 Positional = Annotated[T, Mark.POSITIONAL]
 """given by its place, without a name"""
 Flat = Annotated[T, Mark.FLAT]
 """a dataclass whose settings are named without its own name before them"""
 Rare = Annotated[T, Mark.RARE]
 """shown by `--help-all` alone"""
+Seed = Annotated[int, Within(0, 2**63 - 1)]
+"""what random draws begin from"""
+Threads = Annotated[int, Within(1, 1024)]
+"""threads of the physics"""
+Count = Annotated[int, Within(1, 1_000_000)]
+"""how many are made"""
 
 
 @dataclass(frozen=True)
@@ -59,6 +78,7 @@ class Setting:
         title: what that dataclass is.
         positional: given by its place.
         rare: left out of the short manual.
+        within: the whole numbers that it takes; None = what its type takes.
     """
 
     path: tuple[str, ...]
@@ -70,6 +90,7 @@ class Setting:
     title: str
     positional: bool
     rare: bool
+    within: Within | None = None
 
     @property
     def several(self) -> bool:
@@ -121,7 +142,10 @@ def convert(setting: Setting, words: list[str]) -> Any:
     """
     flag = setting.name if setting.positional else f"--{setting.name}"
     if not setting.several:
-        return _value(setting.kind, words[0], flag)
+        value, within = _value(setting.kind, words[0], flag), setting.within
+        if within and not within.low <= value <= within.high:
+            raise OutOfBoundsError(flag, value, within.low, within.high, "")
+        return value
     parts = get_args(setting.kind)
     if parts[-1] is Ellipsis:
         return tuple(_value(parts[0], word, flag) for word in words)
@@ -181,6 +205,7 @@ def _walk(
             title,
             Mark.POSITIONAL in marks,
             Mark.RARE in marks,
+            next((mark for mark in marks if isinstance(mark, Within)), None),
         )
 
 

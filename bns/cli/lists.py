@@ -114,7 +114,8 @@ def robots() -> Rows:
     for name in models.names():
         robot = models.robot(name)
         told = [
-            f"{c.name} {c.low:.4g} to {c.high:.4g} {c.unit}" for c in robot.commands
+            f"{c.name} {c.low:.4g} to {c.high:.4g} {c.unit}".removesuffix(" 1")
+            for c in robot.commands
         ]
         if len(told) > FEW:
             told = [*told[: FEW - 1], f"and {len(told) - FEW + 1} more"]
@@ -184,6 +185,11 @@ def _parameters(found: list[Any]) -> Rows:
 
 def _examples(given: Examples) -> int:
     if given.copy:
+        if given.name:
+            raise BnsError(
+                f"--copy takes all examples, not {given.name!r} alone: leave the name "
+                f"out, or write `bns examples {given.name} > FILE`."
+            )
         return _copy(Path(given.copy))
     scripts = {path.stem: path for path in sorted(PLACE.glob("*.py"))}
     if not given.name:
@@ -211,7 +217,10 @@ def _copy(to: Path) -> int:
     try:
         shutil.copytree(PLACE, to, ignore=LEFT_OUT)
     except OSError as error:
-        raise BnsError(f"{to} cannot be written: {error}.") from error
+        raise BnsError(
+            f"Cannot write {to}: {error.strerror or 'not all of it'}. Give a directory "
+            "that can be written."
+        ) from error
     print(f"examples:  {to}")
     return 0
 

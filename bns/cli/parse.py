@@ -285,11 +285,12 @@ def _values(
     for setting in known:
         words = found.get(setting.name)
         if words is None or (setting.positional and words == []):
-            if setting.default is MISSING and not setting.several:
+            asked = setting.default is MISSING
+            if asked and not (setting.several and setting.positional):
                 flag = setting.name.upper()
                 shown = flag if setting.positional else f"--{setting.name}"
                 raise BnsError(f"Missing: {shown}. See `{prog} --help`.")
-            if setting.default is MISSING:
+            if asked:
                 values[setting.path] = ()
             continue
         values[setting.path] = convert(

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from bns.cli.fields import Positional
+from bns.cli.fields import Positional, Seed
 from bns.cli.parse import Verbs, dispatch
 from bns.cli.tables import show
 from bns.errors import BnsError
@@ -44,7 +44,7 @@ class Make:
     """of the grid along each behaviour"""
     step: float = 0.008
     """physics step of a hexapod's model [s]; 0 = the world's own"""
-    seed: int = 1
+    seed: Seed = 1
     """of all that is drawn"""
     out: str = "."
     """folder for the file"""

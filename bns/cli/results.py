@@ -79,6 +79,8 @@ def _report(given: Report) -> int:
         if load(directory).trials == 0:
             raise BnsError(f"{directory} has no trial yet: let it run for a while.")
     path = Path(given.out) if given.out else directories[0] / REPORT
+    if path.suffix not in (".html", ".htm"):
+        raise BnsError(f"{path} is no HTML: give an --out that ends in .html.")
     if not given.force and path.exists() and not ours(path):
         raise BnsError(
             f"{path} was not made by `bns report`: add --force to replace it, or give "
@@ -155,6 +157,8 @@ def span(interval: tuple[float, float, float]) -> str:
 def _export(given: Export) -> int:
     from bns.worlds.data import dataset, export
 
+    if given.to == "parquet" and (given.fps or given.task):
+        raise BnsError("--fps and --task are for --to lerobot: leave them out.")
     inside = Path(given.data) / "dataset"
     data = dataset.read(inside if inside.is_dir() else given.data)
     if given.to == "parquet":

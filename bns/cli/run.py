@@ -4,6 +4,7 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -94,7 +95,7 @@ def _for_learner(config: RunConfig, words: list[str]) -> RunConfig:
 
     named = [
         value or after
-        for word, after in zip(words, [*words[1:], ""], strict=True)
+        for word, after in pairwise([*words, ""])
         for flag, _, value in [word.partition("=")]
         if flag == "--learner"
     ]

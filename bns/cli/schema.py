@@ -10,6 +10,8 @@ from bns.cli.fields import Positional, Setting, settings
 from bns.cli.file_schemas import DIALECT
 from bns.cli.file_schemas import SCHEMAS as OTHERS
 from bns.cli.parse import parse
+from bns.errors import BnsError
+from bns.storage import files
 
 ANY_NUMBER = {"type": "number"}
 
@@ -36,12 +38,21 @@ class Arguments:
 
 
 def main(verb: str, argv: list[str]) -> int:
-    """Run the verb; gives the exit code."""
+    """Run the verb; gives the exit code.
+
+    Raises:
+        BnsError: a file is there that is no schema, or cannot be written.
+    """
     del verb
     given = parse(Arguments, argv, prog="bns schema")
     text = json.dumps(SCHEMAS[given.kind](), indent=2, ensure_ascii=False)
     if given.out:
-        Path(given.out).write_text(text + "\n", encoding="utf-8")
+        path = Path(given.out)
+        if path.is_file() and DIALECT not in path.read_text("utf-8", "replace"):
+            raise BnsError(
+                f"{path} is no JSON Schema and is not overwritten; give another --out."
+            )
+        files.write_text(path, text + "\n")
         print(given.out)
     else:
         print(text)

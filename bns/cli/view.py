@@ -87,7 +87,10 @@ def film(given: Arguments) -> Path:
 
     path = Path(given.gif or given.mp4)
     if path.suffix != (".gif" if given.gif else ".mp4"):
-        raise BnsError(f"{path} does not end in {'.gif' if given.gif else '.mp4'}.")
+        end = ".gif" if given.gif else ".mp4"
+        raise BnsError(
+            f"{path} is no {end[1:].upper()}: give a name that ends in {end}."
+        )
     record = load(Path(given.directory))
     if record.trials == 0:
         raise BnsError(f"{given.directory} has no trial yet: let it run for a while.")

@@ -34,6 +34,24 @@ def storage_error(path: Path, error: OSError) -> StorageError:
     )
 
 
+def check_writable(path: Path | str) -> None:
+    """Stop before long work whose result could not be written.
+
+    Raises:
+        StorageError: `path` is no file, or its directory is missing or read-only.
+    """
+    path = Path(os.path.realpath(path))
+    if path.exists() and not path.is_file():
+        raise StorageError(f"{path} is there and is no file: give another name.")
+    temporary = path.with_name(f"{TEMPORARY}{os.getpid()}-{path.name}")
+    try:
+        temporary.touch()
+    except OSError as error:
+        raise storage_error(path, error) from error
+    finally:
+        remove(temporary)
+
+
 def make_directory(path: Path) -> None:
     """Create a directory and its parents.
 

@@ -170,7 +170,7 @@ def unreadable(error: Exception, name: object) -> FormatError:
     """The error for a file that cannot be parsed."""
     if isinstance(error, FormatError):
         return error
-    return FormatError(f"{name} cannot be read as Parquet: {error}.")
+    return FormatError(f"{name} cannot be read as Parquet: {str(error).rstrip('.')}.")
 
 
 def check(table: Any, name: object) -> None:

@@ -39,15 +39,18 @@ def make(directory: Path, answers: Path, cases: Iterable[tuple[str, Case]]) -> i
         How many were written.
 
     Raises:
-        BnsError: the answers would lie beside the cases, a case exists, or another
-            process is writing there.
+        BnsError: the answers would lie beside the cases or cannot be written, a case
+            exists, or another process is writing there.
     """
     directory, answers = Path(directory), Path(answers)
     if directory.resolve() in answers.resolve().parents:
         raise BnsError(
-            f"{answers} lies in the casebook {directory}: who runs the cases would "
-            "see the answers; put it elsewhere."
+            f"{answers} lies in {directory}, beside the cases: who runs them would see "
+            "the answers; put it elsewhere."
         )
+    if directory.is_file():
+        raise BnsError(f"{directory} is a file: give a directory for the cases.")
+    files.check_writable(answers)
     known: dict[str, Any] = {}
     with Lock(directory):
         for name, case in cases:
@@ -80,12 +83,17 @@ def run(
         How many were run.
 
     Raises:
-        BnsError: another process is writing in the directory of `said`.
+        BnsError: there is no case, or another process is writing in the directory of
+            `said`.
     """
     said = Path(said)
     with Lock(said.parent):
         done = {row["name"] for row in _lines(said)}
         places = sorted(p for p in Path(directory).iterdir() if p.is_dir())
+        if not places:
+            raise BnsError(
+                f"{directory} holds no cases: make some with `bns gap bench make`."
+            )
         left = [place for place in places if place.name not in done]
         return _run(each(left), model, said, seed)
 

@@ -154,7 +154,7 @@ def _log(path: str, columns: str) -> list[Trial]:
     from bns.worlds.data import importing
 
     if not Path(path).exists():
-        raise FormatError(f"{path} is neither a dataset directory nor a log.")
+        raise FormatError(f"There is no {path}: give a dataset directory or a log.")
     if not columns:
         raise BnsError(f"{path} is no dataset directory; a log needs --columns FILE.")
     if path.endswith(".mcap"):
@@ -169,7 +169,12 @@ def _imported(name: str, path: str) -> list[Trial]:
         raise UnknownNameError("importer", name, IMPORTERS)
     reader: Any = import_module(f"bns.gap.importers.{name}")
     if name == "mrclam6":
-        parts = [reader.read(path, n, seconds=PART) for n in reader.robots(path)]
+        numbers = reader.robots(path)
+        if not numbers:
+            raise FormatError(
+                f"{path} holds no RobotN_Odometry.dat: give a directory of MRCLAM."
+            )
+        parts = [reader.read(path, n, seconds=PART) for n in numbers]
         return [trial for part in parts for trial in part]
     found = reader.read(path)
     return [found] if isinstance(found, Trial) else list(found)

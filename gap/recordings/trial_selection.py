@@ -54,6 +54,10 @@ def numbered(text: str) -> Callable[[int], bool]:
         first, dash, last = match.groups()
         low = int(first or 0)
         high = int(last) if last else (np.inf if dash else low)
+        if high < low:
+            raise BnsError(
+                f"--trials {text}: {part.strip()!r} is backwards; write {high}-{low}."
+            )
         ranges.append((low, high))
     return lambda number: any(low <= number <= high for low, high in ranges)
 

@@ -289,8 +289,9 @@ class EmulatedCamera:
         except OSError as error:
             self._socket.close()
             raise BnsError(
-                f"There is no emulated camera beside {port}: start the robot with "
-                "`bns hardware emulate khepera3`, or give the number of a real one."
+                f"No emulated camera is there for --port {port or '(none given)'}: "
+                "start a robot with `bns hardware emulate khepera3`, or give the "
+                "number of a real one as --camera."
             ) from error
         self._buffer = b""
         self._number, self._image = -1, np.zeros((0, 0), np.uint8)

@@ -68,8 +68,16 @@ def test_the_report_answers_the_questions_in_one_file(home):
         "bns gap diagnose",
     ):
         assert said in page, said
+    assert "-0 %" not in page
     assert page.count("data:image/svg+xml;base64,") == 2 * 5  # wide and narrow
     assert not re.findall(r'(?:src|href)="(?!data:)', page)
+
+
+def test_the_command_in_the_report_takes_the_same_trials(home):
+    found = store.load(home / "out")
+    asked = replace(found, provenance={**found.provenance, "trials": "1-2"})
+    assert "--trials 1-2" in report._command(asked)
+    assert "--trials" not in report._command(found)
 
 
 def test_all_that_is_written_in_figures_can_be_read(home, tmp_path, illegible):

@@ -49,7 +49,7 @@ def readings(record: RunRecord, *, replicate: int | None = None) -> "Figure":
                     color=style.BLACK,
                     linewidth=1.0,
                     ls=(0, (3, 2)),
-                    label="as the SNN foresaw it",
+                    label="as the SNN predicted it",
                 )
                 axes.plot(
                     times,

@@ -47,7 +47,7 @@ def displacement(record: RunRecord) -> "Figure":
             axes.axline((0, 0), slope=1, color=style.BLACK, linewidth=0.8)
             axes.set_title(f"{name} [{unit}]")
             axes.set_xlabel("real")
-        panels[0].set_ylabel("foreseen")
+        panels[0].set_ylabel("predicted")
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(
             handles, labels, loc="outside lower center", ncols=3, markerscale=2
@@ -162,7 +162,7 @@ def _objectives(axes: "Axes", record: RunRecord) -> None:
 def _paths(axes: "Axes", record: RunRecord, at: tuple[int, int], colour: str) -> None:
     """Foreseen and real path; what follows the last objective is faint."""
     shown: Any = (
-        (record.predicted[at], _FORESEEN, "as the SNN foresaw it"),
+        (record.predicted[at], _FORESEEN, "as the SNN predicted it"),
         (record.poses[at], {"color": colour, "linewidth": 2.0}, "as the robot drove"),
     )
     for poses, line, label in shown:

@@ -71,7 +71,7 @@ def closing(found: Diagnosis) -> "Figure":
         axes.text(
             closed["floor"],
             1.01,
-            "floor",
+            "noise floor",
             color=style.GREEN,
             ha="center",
             va="bottom",
@@ -119,7 +119,7 @@ def horizons(found: Diagnosis, view: View) -> "Figure":
                 factor * rms[1][:, column],
                 color=style.GREEN,
                 ls="--",
-                label="floor",
+                label="noise floor",
             )
             axes.set_xticks(place, labels)
             style.logarithmic(axes.yaxis, axes.set_yscale)
@@ -151,14 +151,20 @@ def over_time(view: View) -> "Figure":
             unit, factor = ROUND.get(feature.unit, (feature.unit, 1.0))
             band = 2 * factor * scatter[:, column]
             axes.fill_between(
-                times, -band, band, color=style.GREEN, alpha=0.18, lw=0, label="floor"
+                times,
+                -band,
+                band,
+                color=style.GREEN,
+                alpha=0.18,
+                lw=0,
+                label="noise floor",
             )
             axes.plot(times, factor * gap[:, column], color=NOMINAL, lw=1.2)
             if view.effects:
                 axes.plot(times, factor * left[:, column], color=CORRECTED, lw=1.2)
             axes.set_ylabel(f"{feature.name} [{unit}]")
         panels[-1].set_xlabel("time in the trial [s]")
-        _legend(figure, view, "floor, two deviations")
+        _legend(figure, view, "noise floor, two deviations")
     return figure
 
 

@@ -26,6 +26,9 @@ GAP = 1.0
 TRIALS = 6
 """trials that are shown at most, those with the largest gap"""
 
+FLOOR = "noise_floor"
+"""what the noise floor is called among the residuals"""
+
 
 def write(
     found: Diagnosis, trials: Sequence[Trial], model: GapModel, path: str | Path
@@ -76,12 +79,16 @@ def _starts(seen: View, chosen: Sequence[int]) -> list[float]:
 def _styles(stream: "RecordingStream", seen: View) -> None:
     import rerun as rr
 
-    colours = {"nominal": NOMINAL, "corrected": CORRECTED, "floor": style.GREEN}
+    colours = {"nominal": NOMINAL, "corrected": CORRECTED, FLOOR: style.GREEN}
     for feature in seen.problem.model.features:
         for name, colour in colours.items():
             stream.log(
                 f"residuals/{feature.name}/{name}",
-                rr.SeriesLines(names=name, colors=style.rgb(colour), widths=1.5),
+                rr.SeriesLines(
+                    names=name.replace("_", " "),
+                    colors=style.rgb(colour),
+                    widths=1.5,
+                ),
                 static=True,
             )
     bright = {"recorded": "#ffffff", "nominal": NOMINAL, "corrected": style.SKY}
@@ -100,7 +107,7 @@ def _residuals(
     """Recorded minus predicted motion, window by window, in the features' units."""
     windows = seen.problem.windows[number]
     at = start + windows.times - seen.trials[number].times[0]
-    shown = {"nominal": seen.gap(number), "floor": 2 * seen.scatter(number)}
+    shown = {"nominal": seen.gap(number), FLOOR: 2 * seen.scatter(number)}
     if seen.effects:
         shown["corrected"] = seen.left[number]
     for column, feature in enumerate(seen.problem.model.features):

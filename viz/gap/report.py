@@ -96,7 +96,7 @@ def _command(found: Diagnosis) -> str:
     about = found.provenance
     words = ["bns gap diagnose", *about.get("data", ("DATA",))]
     words.append(f"--model {about.get('model', found.model)}")
-    for key in ("importer", "columns"):
+    for key in ("importer", "columns", "trials"):
         if about.get(key):
             words.append(f"--{key} {about[key]}")
     for key in ("only", "reference"):
@@ -251,8 +251,8 @@ def how_far(found: Diagnosis) -> str:
     shown, factor = ROUND.get(unit.rstrip("]"), (unit.rstrip("]"), 1.0))
     return (
         f"{text} Over {plain['horizon']:g} s the error of {channel} falls from "
-        f"{factor * before:.3g} to {factor * after:.3g} {shown} (floor "
-        f"{factor * least:.3g})."
+        f"{factor * before:.3g} to {factor * after:.3g} {shown} (noise "
+        f"floor {factor * least:.3g})."
     )
 
 
@@ -290,7 +290,7 @@ def _row(found: Diagnosis, fit: Fit, nothing: Fit | None, count: float) -> list[
     if nothing is not None and found.closed and fit.names:
         whole = nothing.held_out / count - found.closed["floor"]
         gone = (nothing.held_out - fit.held_out) / count
-        share = f"{100 * min(max(gone / max(whole, 1e-12), -1), 1):.0f} %"
+        share = f"{100 * min(max(gone / max(whole, 1e-12), -1), 1):z.0f} %"
     sizes = [
         f"{_number(v)} {_unit(u)} [{_number(low)}, {_number(high)}]".replace("  ", " ")
         for v, u, (low, high) in zip(

@@ -227,7 +227,8 @@ def _read_header(directory: Path) -> dict:
     path = directory / HEADER
     if not path.exists():
         raise FormatError(
-            f"{directory} holds no {HEADER}: it is no dataset, or a half-written one."
+            f"{directory} holds no {HEADER}: it is no dataset, a half-written one, or "
+            "of a run to be finished (`bns run DIR --resume`)."
         )
     given = reading.read_json(path, most=HEAD)
     if given.get("schema") != SCHEMA:

@@ -46,7 +46,8 @@ class Parameter:
             number = float("nan")
         whole = not self.integer or number == np.floor(number)
         if not (np.isfinite(number) and self.low <= number <= self.high and whole):
-            unit = f"{self.unit}, whole numbers only" if self.integer else self.unit
+            unit = "" if self.unit == "1" else f"{self.unit} "
+            unit = f"{unit}(whole numbers only)" if self.integer else self.unit
             raise OutOfBoundsError(
                 f"{effect}:{self.name}", value, self.low, self.high, unit
             )

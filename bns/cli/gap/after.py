@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bns.cli.fields import Positional
+from bns.cli.fields import Positional, Seed
 from bns.cli.parse import parse
 from bns.errors import BnsError, UnknownNameError
 from bns.progress import counting, working
@@ -22,7 +22,7 @@ class Planned:
     """file for the commands, CSV (default: DIRECTORY/next_command.csv)"""
     arena: tuple[float, float] = (2.7, 1.8)
     """size of the board along x and y [m]; drives start at its centre"""
-    seed: int = 0
+    seed: Seed = 0
     """of the random commands among those considered"""
 
 
@@ -156,7 +156,8 @@ def _edit(given: Edit) -> int:
             )
         )
         print(
-            f"  {name:<9} {loss:8.3f} of the floor; over {made.horizon:g} s: {errors}"
+            f"  {name:<9} {loss:8.3f} of the noise floor; "
+            f"over {made.horizon:g} s: {errors}"
         )
     return 0
 
@@ -175,10 +176,15 @@ def _apply(given: Apply) -> int:
 
     own = isinstance(model, OwnModel)
     if own or given.xml:
-        if not (own and given.xml):
+        if not own:
             raise BnsError(
-                "A model of your own is corrected by --xml FILE (a robot of `bns "
-                "robots` by --world NAME)."
+                f"This diagnosis is of {found.model}: leave --xml out, which is for a "
+                "model of your own, and give --world NAME."
+            )
+        if not given.xml or given.world:
+            raise BnsError(
+                f"This diagnosis is of {found.model}, a model of your own: give --xml "
+                "FILE for the corrected MJCF, and no --world."
             )
         left = model.write_corrected(fit.effects, given.xml)
         print(f"model:     {given.xml}")

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from bns.cli.fields import Positional
+from bns.cli.fields import Count, Positional, Seed, Threads
 from bns.cli.parse import Verbs, dispatch
 from bns.errors import BnsError, FormatError, UnknownNameError
 from bns.progress import each
@@ -31,12 +31,12 @@ class Make:
     """file for the answers, JSON; may not lie in the directory of the cases"""
     model: str = "khepera3"
     """nominal robot, or the TOML file of a model of your own"""
-    count: int = 5
+    count: Count = 5
     """cases of each kind"""
     kinds: tuple[str, ...] = ("single", "none")
     """single, none; pair, fault for robots on wheels and models of your own;
     off-library for the latter; lost (a leg, or a joint) for walkers"""
-    seed: int = 0
+    seed: Seed = 0
     """of the first case"""
 
 
@@ -50,7 +50,7 @@ class Run:
     """file for what is said, a JSON line per case; appended to"""
     model: str = "khepera3"
     """nominal robot, or the TOML file of a model of your own"""
-    threads: int = 2
+    threads: Threads = 2
     """threads of the physics"""
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from bns.cli.extras import attempt
-from bns.cli.fields import Positional
+from bns.cli.fields import Positional, Seed, Threads
 from bns.cli.parse import parse
 from bns.errors import BnsError, FormatError, install
 from bns.progress import Each, Tell, counting, working
@@ -55,9 +55,9 @@ class Diagnose(Check):
     reference: tuple[str, ...] = ()
     """recordings of the same robot in which nothing was changed: they tell how far the
     nominal model is off anyway"""
-    seed: int = 0
+    seed: Seed = 0
     """of what is drawn (bootstraps)"""
-    threads: int = 2
+    threads: Threads = 2
     """threads of the physics"""
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from bns.cli.fields import Positional
+from bns.cli.fields import Positional, Seed
 from bns.cli.parse import dispatch
 from bns.errors import BnsError
 
@@ -54,7 +54,7 @@ class Emulate:
     """probability that a packet is corrupted"""
     rate: float = 30.0
     """pictures of the camera a second"""
-    seed: int = 0
+    seed: Seed = 0
     """of what is random"""
     log: str = ""
     """file for a line whenever set point or motion, or the hexapod's torque, change"""
@@ -90,7 +90,7 @@ class Rehearse:
     """commands of a trial"""
     out: str = "rehearsal"
     """directory to write"""
-    seed: int = 0
+    seed: Seed = 0
     """of what is random"""
 
 
@@ -174,7 +174,7 @@ class Record(Connection):
     """drive these commands instead: a file that `bns gap plan` wrote"""
     damage: tuple[str, ...] = ()
     """software damage, see `bns effects`"""
-    seed: int = 0
+    seed: Seed = 0
     """of the commands"""
     move: bool = False
     """say that the robot may move"""

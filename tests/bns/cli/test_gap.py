@@ -33,7 +33,13 @@ def test_check_says_how_many_trials_can_be_used(recording, capsys):
     ("words", "said"),
     [
         (["gap", "chek", "x"], "Did you mean 'check'"),
-        (["gap", "check", "nowhere"], "nowhere"),
+        (["gap", "check", "nowhere"], "There is no nowhere: give a dataset"),
+        (["gap", "check", "."], "or of a run to be finished"),
+        (["gap", "check", ".", "--importer", "mrclam6"], "no RobotN_Odometry.dat"),
+        (["gap", "check", ".", "--trials", "5-2"], "'5-2' is backwards; write 2-5"),
+        (["gap", "diagnose", ".", "--seed", "-1"], "--seed = -1 is not allowed"),
+        (["gap", "diagnose", ".", "--threads", "0"], "give a number from 1 to 1024"),
+        (["gap", "edit", "x", "--remove", "a"], "Missing: --predict."),
         (["gap", "diagnose", "x", "--model", "khepera4"], "khepera"),
         (["gap", "check", "x", "--model", "robot.xml"], "TOML file that maps"),
         (["gap", "check", "x", "--importer", "xl33"], "Did you mean 'xl330'"),
@@ -141,6 +147,9 @@ def test_scores_are_of_what_was_said(made, capsys):
     [
         (["make", "c", "--answers", "c/a.json"], "see the answers"),
         (["make", "c", "--answers", "a", "--kinds", "sngle"], "Did you mean 'single'"),
+        (["make", "c", "--answers", "."], "is there and is no file"),
+        (["make", "c", "--answers", "a", "--count", "0"], "--count = 0 is not allowed"),
+        (["make", __file__, "--answers", "a"], "give a directory for the cases"),
         (["run", "nowhere", "--said", "s"], "no directory nowhere"),
         (["score", "nowhere", "nothing"], "nothing cannot be read"),
         (["scor"], "Did you mean 'score'"),
@@ -150,3 +159,10 @@ def test_wrong_input_of_the_bench_is_one_line_and_exit_code_2(words, wanted, cap
     assert main(["gap", "bench", *words]) == 2
     error = capsys.readouterr().err
     assert wanted in error and error.count("\n") == 1
+
+
+def test_a_directory_without_cases_is_not_diagnosed(tmp_path, capsys):
+    (tmp_path / "cases").mkdir()
+    words = ["gap", "bench", "run", str(tmp_path / "cases")]
+    assert main([*words, "--said", str(tmp_path / "said.jsonl")]) == 2
+    assert "holds no cases: make some with" in capsys.readouterr().err

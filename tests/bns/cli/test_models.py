@@ -75,10 +75,12 @@ def test_a_robot_is_made_of_its_numbers(capsys, tmp_path):
     "place, changed, expected",
     [
         ("my robot", (), "cannot be a robot's name"),
-        ("mine", ("--mass", "0"), "mass = 0.0 is not possible"),
-        ("mine", ("--height", "-1"), "height = -1.0 is not possible"),
-        ("mine", ("--top-speed", "nan"), "top_speed = nan is not possible"),
-        ("mine", ("--wheel-radius", "20"), "do not go on an axle"),
+        ("khepera3", (), "'khepera3' is the name of a robot already"),
+        ("mine", ("--mass", "0"), "mass = 0.0 kg is not allowed"),
+        ("mine", ("--height", "-1"), "height = -1.0 m is not allowed"),
+        ("mine", ("--top-speed", "nan"), "top_speed = nan m/s is not allowed"),
+        ("mine", ("--wheel-radius", "33"), "give a number from 0.001 to 2 m"),
+        ("mine", ("--wheel-radius", "1.5"), "do not go on an axle"),
     ],
 )
 def test_what_no_robot_can_be_is_not_made(capsys, tmp_path, place, changed, expected):

@@ -47,7 +47,8 @@ def test_values_out_of_bounds_name_bound_and_unit(name):
         with pytest.raises(OutOfBoundsError) as caught:
             check(_changed(RunConfig(), name, value))
         said = str(caught.value)
-        assert said.startswith(f"{name} = ") and f"{high:g}" in said
+        most = f"{high}" if isinstance(high, int) else f"{high:g}"
+        assert said.startswith(f"{name} = ") and f"to {most}" in said
         assert unit == "1" or unit in said
 
 

@@ -176,7 +176,12 @@ class TestEveryEffect:
                     registry.make(name, **{item.name: bad})
                 message = str(caught.value)
                 assert f"{name}:{item.name} = {bad}" in message
-                assert f"from {item.low:g} to {item.high:g}" in message
+                low, high = (
+                    f"{bound}" if isinstance(bound, int) else f"{bound:g}"
+                    for bound in (item.low, item.high)
+                )
+                assert f"from {low} to {high}" in message
+                assert " 1, whole" not in message
                 assert item.unit in message or item.unit == "1"
 
     def test_unknown_parameters_and_options_are_refused(self, name):
