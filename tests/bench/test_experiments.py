@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.learning import branching, experiments, forking, solving
+from bench.learning import experiments, forking, solving
 from bns.errors import BnsError
 from bns.experiment.config import WorldConfig
 from bns.experiment.run import train
@@ -34,7 +34,7 @@ def trunk(tmp_path, monkeypatch):
 def test_a_branch_has_the_bytes_of_a_run_from_the_start(trunk, tmp_path):
     branch = damaged(trunk)
     train(trunk, experiments.directory(trunk))
-    branching.begin(trunk, branch)
+    forking.begin(trunk, branch)
     place = experiments.directory(branch)
     assert len(list((place / "steps").iterdir())) == ONSET, "it goes on, not anew"
     train(branch, place, resume=True)
@@ -52,15 +52,15 @@ def test_a_branch_has_the_bytes_of_a_run_from_the_start(trunk, tmp_path):
 )
 def test_a_branch_that_differs_earlier_is_refused(trunk, changes):
     with pytest.raises(BnsError, match="branch is no continuation of trunk"):
-        branching.begin(trunk, damaged(trunk, **changes))
+        forking.begin(trunk, damaged(trunk, **changes))
 
 
 def test_a_section_that_did_nothing_in_the_trunk_may_differ(trunk):
     branch = damaged(trunk, watch=replace(trunk.watch, forget=True))
     train(trunk, experiments.directory(trunk))
     with pytest.raises(BnsError, match="no continuation"):
-        branching.begin(trunk, branch)
-    branching.begin(trunk, branch, idle=("watch",))
+        forking.begin(trunk, branch)
+    forking.begin(trunk, branch, idle=("watch",))
     place = experiments.directory(branch)
     assert len(list((place / "steps").iterdir())) == ONSET
     assert RunStore.open(place).config.watch.forget
