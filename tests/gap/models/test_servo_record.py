@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.gap.models.servo import record
+from bns.gap.models.servo import diagnosis
 from bns.gap.models.servo.model import ServoModel
 from bns.gap.planning import plan
 from bns.gap.records import Diagnosis
@@ -48,7 +48,7 @@ def unchanged(model, usual):
 def test_a_payload_is_named_beside_unchanged_runs(model, usual, unchanged):
     heavier = registry.parse("servo_payload:mass=0.15")
     mine = drive(model, CELLS[0], 50, *usual, heavier)
-    found = record.record(mine, [*unchanged, *mine], nominal=model.nominal)
+    found = diagnosis.record(mine, [*unchanged, *mine], nominal=model.nominal)
     assert found.verdict.kind in ("effect", "either")
     assert ("servo_payload",) in found.verdict.named
     fit = next(fit for fit in found.fits if fit.names == ("servo_payload",))
@@ -61,6 +61,6 @@ def test_what_is_missing_is_said(model, unchanged):
     mine = drive(model, CELLS[0], 50)
     bare = [trial.replace(conditions={"mass": 0.4}) for trial in mine]
     with pytest.raises(BnsError, match="lever, gain, trajectory"):
-        record.record(bare, unchanged)
+        diagnosis.record(bare, unchanged)
     with pytest.raises(BnsError, match="No unchanged recording"):
-        record.record(mine, mine)
+        diagnosis.record(mine, mine)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bns.errors import FormatError
-from bns.gap.recordings import check, stuck_channels
+from bns.gap.recordings import check
 from bns.worlds.physics.wheeled_world import MujocoWorld
 from bns.worlds.trial import Commands
 
@@ -58,7 +58,7 @@ def test_a_robot_that_stands_still_is_no_stuck_channel(model):
     there = Commands([[0.1, 0.1], [0.0, 0.0]], [1.0, 1.0])
     dead = "wheel_gain:wheel=both,factor=0"
     trials = MujocoWorld(reality=[dead], threads=1).run([there])
-    assert not stuck_channels.dropped(trials[0], model)[1]
+    assert not check.without_stuck(trials[0], model)[1]
 
 
 def test_a_motion_that_turns_back_is_no_spike(model):
