@@ -11,9 +11,9 @@ from bns.experiment.config import WorldConfig
 from bns.experiment.run import train
 from bns.learners.bns.config import AdaptationConfig, WatchConfig
 from bns.storage.store import RunStore
-from tests.bns import light_fakes
+from tests.bns import robots
 from tests.bns.contents import contents
-from tests.bns.walkers import small
+from tests.bns.robots import small
 
 ONSET = 6
 
@@ -69,7 +69,7 @@ def test_a_section_that_did_nothing_in_the_trunk_may_differ(trunk):
 
 
 def side(damage="wheel_gain:wheel=left,factor=0.5@2", **settings):
-    config = light_fakes.small()
+    config = robots.small_light()
     world = WorldConfig(name="light", damage=(damage,))
     settings = {"adaptation": AdaptationConfig(population_reset=True)} | settings
     config = replace(config, preset="side", trials=4, world=world, **settings)

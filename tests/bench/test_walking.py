@@ -11,7 +11,7 @@ from bench.walking import recover as recover_hexapod
 from bench.walking import runs as hexapod_runs
 from bns import presets
 from bns.experiment.record import RunRecord
-from tests.bns.walkers import small
+from tests.bns.robots import small
 
 
 def record(ways, *, seconds=10.0, onset=-1):

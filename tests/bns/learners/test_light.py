@@ -13,7 +13,7 @@ from bns.learners.bns.light import patterns
 from bns.learners.bns.light.simulator import Simulator, Thetas
 from bns.tasks.light import LampGoal, lost
 from bns.tasks.light_controller import Controllers, GenomePolicy, brightness, counts
-from tests.bns.light_fakes import FakeLightWorld, small
+from tests.bns.robots import FakeLightWorld, small_light
 
 TASK = LampGoal.of(LightConfig(goal=0.3, circle_cycles=40))
 
@@ -151,7 +151,7 @@ class TestSimulator:
 
     @pytest.mark.parametrize("recurrent", [False, True])
     def test_a_cycle_by_hand(self, recurrent):
-        config = small(recurrent=recurrent, hidden=3)
+        config = small_light(recurrent=recurrent, hidden=3)
         simulator, draws = Simulator.of(config), Draws(5)
         kind = simulator.controllers
         genome = draws.uniform(1, 1, kind.genes) * 4 - 2
@@ -179,7 +179,7 @@ class TestSimulator:
         assert state.error.item() == pytest.approx(total, abs=1e-5)
 
     def test_inside_the_boundary_robots_stand(self):
-        simulator, draws = Simulator.of(small()), Draws(1)
+        simulator, draws = Simulator.of(small_light()), Draws(1)
         thetas = Thetas(
             simulator.motion.random(1, draws), simulator.sensors.random(1, draws)
         )
@@ -195,8 +195,8 @@ class TestSimulator:
         ("charge", "expected"), [("stand", 0.3), ("start", 0.6), ("far", 1.0)]
     )
     def test_what_a_stopped_robots_cycle_costs(self, charge, expected):
-        light = replace(small().light, goal=0.4, charge_stopped=charge)
-        simulator, draws = Simulator.of(replace(small(), light=light)), Draws(1)
+        light = replace(small_light().light, goal=0.4, charge_stopped=charge)
+        simulator, draws = Simulator.of(replace(small_light(), light=light)), Draws(1)
         thetas = Thetas(
             simulator.motion.random(1, draws), simulator.sensors.random(1, draws)
         )
@@ -220,7 +220,7 @@ class TestPatterns:
         return trial.replace(handled=handled)
 
     def scales(self):
-        return Simulator.of(small()).scales
+        return Simulator.of(small_light()).scales
 
     def test_handled_cycles_teach_no_motion(self):
         trial = self.trial()
