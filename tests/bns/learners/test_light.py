@@ -9,7 +9,7 @@ import torch
 from bns.draws import Draws
 from bns.errors import BnsError
 from bns.experiment.task_settings import LightConfig
-from bns.learners.bns.light import patterns
+from bns.learners.bns.light import simulator as simulated
 from bns.learners.bns.light.simulator import Simulator, Thetas
 from bns.tasks.light import LampGoal, lost
 from bns.tasks.light_controller import Controllers, GenomePolicy, brightness, counts
@@ -173,7 +173,7 @@ class TestSimulator:
             cos, sin = np.cos(pose[2]), np.sin(pose[2])
             pose += [cos * forward - sin * left, sin * forward + cos * left, turn]
             total += abs(np.hypot(*(lamp - pose[:2])) - config.light.goal)
-        here = patterns.in_body(pose[None], tuple(lamp))[0]
+        here = simulated.in_body(pose[None], tuple(lamp))[0]
         np.testing.assert_allclose(state.ahead.item(), here[0], atol=1e-5)
         np.testing.assert_allclose(state.left.item(), here[1], atol=1e-5)
         assert state.error.item() == pytest.approx(total, abs=1e-5)
@@ -224,7 +224,7 @@ class TestPatterns:
 
     def test_handled_cycles_teach_no_motion(self):
         trial = self.trial()
-        found = patterns.motion(trial, self.scales())
+        found = simulated.motion_patterns(trial, self.scales())
         assert len(found.inputs) == 6
         assert not found.inputs[0, :2].any()
         assert not found.inputs[3, :2].any()  # cycle 4 begins at rest
@@ -232,7 +232,7 @@ class TestPatterns:
         np.testing.assert_allclose(found.inputs[4, 2:], told)
 
     def test_sensors_teach_until_the_robot_is_stopped(self):
-        found = patterns.sensors(self.trial(), (0.0, 0.0))
+        found = simulated.sensor_patterns(self.trial(), (0.0, 0.0))
         assert len(found.inputs) == 9  # the start and eight cycles
         away = np.hypot(*found.inputs.T)
         real = np.hypot(*self.trial().command_poses_world[:9, :2].T)
@@ -248,8 +248,16 @@ class TestPatterns:
         commands = replace(trial.commands, values=trial.commands.values[:, ::-1])
         other = trial.replace(observed=turned, commands=commands)
         for kind, mirror, extra in (
-            (patterns.motion, patterns.mirrored_motion, self.scales()),
-            (patterns.sensors, patterns.mirrored_sensors, (0.0, 0.0)),
+            (
+                simulated.motion_patterns,
+                simulated.mirrored_motion,
+                self.scales(),
+            ),
+            (
+                simulated.sensor_patterns,
+                simulated.mirrored_sensors,
+                (0.0, 0.0),
+            ),
         ):
             expected, found = kind(other, extra), mirror(kind(trial, extra))
             np.testing.assert_allclose(found.inputs, expected.inputs, atol=1e-9)
