@@ -1,18 +1,22 @@
-"""What a diagnosis was asked for, kept in its directory until it is done.
+"""A diagnosis that is not finished: what was asked for, and what is known until then.
 
-A process that is killed leaves it there: the same command then goes on, or starts over.
+The request is kept in the diagnosis's directory until it is done. A process that is
+killed leaves it there: the same command then goes on, or starts over. Where a diagnosis
+has to stop, what its check found is kept instead.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from bns.errors import BnsError
-from bns.gap.report.partial import FILE as PARTIAL
+from bns.gap.models.base import GapModel
+from bns.gap.recordings import check
 from bns.gap.store import FILE as DIAGNOSIS
 from bns.storage import files, reading, seal
+from bns.worlds.trial import Trial
 
 FILE = "request.json"
 FORMAT = "bns-diagnosis-request"
@@ -71,3 +75,37 @@ def end(out: Path) -> None:
 def drop(out: Path) -> None:
     """Forget the request: what was asked for cannot be had."""
     (out / FILE).unlink(missing_ok=True)
+
+
+PARTIAL = "partial.json"
+SCHEMA, VERSION = "bns-diagnosis-partial", 1
+
+
+def write_partial(
+    trials: Sequence[Trial], model: GapModel, error: BnsError, out: Path
+) -> Path:
+    """Keep what the check found, and why the rest is missing; gives the file.
+
+    Args:
+        trials: the recording.
+        model: nominal model.
+        error: what stopped the diagnosis.
+        out: directory for the file, made if missing.
+    """
+    try:
+        usable, faults = check.check(trials, model)
+    except BnsError:
+        usable, faults = (), ()
+    content = {
+        "schema": SCHEMA,
+        "version": VERSION,
+        "model": model.name,
+        "trials": len(trials),
+        "usable": len(usable),
+        "faults": list(faults),
+        "stopped by": str(error),
+    }
+    files.make_directory(Path(out))
+    path = Path(out) / PARTIAL
+    files.write_json(path, content)
+    return path

@@ -23,7 +23,7 @@ import numpy as np
 
 from bns.errors import FormatError
 from bns.storage import reading
-from bns.storage.numbers import Finite
+from bns.storage.reading import Finite
 
 Basis = Literal["published", "derived", "calibrated", "assumed"]
 

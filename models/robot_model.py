@@ -14,7 +14,7 @@ import numpy as np
 
 from bns.errors import FormatError, UnknownNameError
 from bns.storage import reading
-from bns.storage.numbers import Finite, Name, Positive
+from bns.storage.reading import Finite, Name, Positive
 
 FACTS = "robot.toml"
 

@@ -14,7 +14,7 @@ import msgspec
 from bns.errors import FormatError
 from bns.models.numbers import Basis
 from bns.storage import reading
-from bns.storage.numbers import Finite
+from bns.storage.reading import Finite
 
 LAW = "law.toml"
 

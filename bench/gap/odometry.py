@@ -1,4 +1,7 @@
-"""Odometry's diagnosis: a real Khepera III, and sensors mounted anywhere."""
+"""Diagnoses of other laboratories' wheeled robots; sensors mounted anywhere."""
+
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -188,3 +191,60 @@ def off(found, truth: np.ndarray) -> float:
     error = found.values - truth
     error[motions.TURN] = motions.wrapped(error[motions.TURN])
     return float(np.abs(error / found.spread)[:-1].max())
+
+
+LATE = ("command_lag[all]", "command_delay[all]")
+"""which of them it is, smooth commands do not tell"""
+GAIN = "command_gain[forward_speed]"
+
+
+@bench(
+    "MRCLAM 6: robots whose lag and forward gain are named with their shares",
+    bar="5 of 5",
+)
+def gap_mrclam6(quick: bool) -> Result:
+    """One diagnosis a robot, about 10 s each; quick: the first robot alone."""
+    from bns.gap.importers import mrclam6
+
+    home = needed("mrclam6")
+    robots = mrclam6.robots(home)[: 1 if quick else None]
+    rows = {robot: _one(home, robot) for robot in robots}
+    named = [row["named"] for row in rows.values()]
+    return Result(
+        figure=sum(named) / len(named),
+        unit="share",
+        holds=all(named),
+        n=len(named),
+        details={f"robot {robot}": row for robot, row in rows.items()},
+    )
+
+
+def _one(home: Any, robot: int) -> dict[str, Any]:
+    from bns.gap.diagnose import diagnose
+    from bns.gap.models.unicycle import UnicycleModel
+    from bns.gap.recordings import load_recordings
+
+    model = UnicycleModel()
+    trials = load_recordings.trials([str(home)], model, importer="mrclam6")
+    trials = [t for t in trials if t.conditions["robot_number"] == robot]
+    found = diagnose(trials, model, full=False)
+    parts = {part["name"]: part for part in found.decomposition["parts"]}
+    named = found.verdict.named  # where some tie, all sets of them
+    return {
+        "named": bool(named) and all(_right(names) for names in named),
+        "verdict": found.verdict.kind,
+        "sets": named,
+        "trials": len(trials),
+        "parts": {
+            name: {key: part[key] for key in ("values", "low", "high", "last", "alone")}
+            for name, part in parts.items()
+        },
+        "closed": found.closed["closed"],
+        "left": found.decomposition["left"],
+        "seconds": found.seconds,
+    }
+
+
+def _right(names: Sequence[str]) -> bool:
+    """Whether a set of explanations has the gain and what makes the robot late."""
+    return GAIN in names and any(name in names for name in LATE)

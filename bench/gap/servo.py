@@ -1,18 +1,139 @@
 """Which setting of a real servo is not as told? Named from its recordings alone."""
 
 from collections import Counter, defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bench.gap import servo_cases
-from bench.gap.servo_cases import KINDS, Case
+from bench.gap.real_data import needed
 from bench.result import Result, bench
+from bns.gap.importers import kscale_sts3215
+from bns.gap.models.servo import curves
+from bns.gap.models.servo import nominal as servo_nominal
+from bns.gap.models.servo.curves import features
+from bns.gap.models.servo.nominal import Nominal
+from bns.gap.models.servo.runs import SAMPLE, Runs, cells, merged, runs
+from bns.worlds.effects import registry
+
+SET = "kscale_sts3215"
+KINDS = ("payload", "lever", "gain", "none")
+SECONDS = 5.9  # of each run; all last 6 s
+FITTED = ((0.535, 0.10, 4.0), (0.741, 0.15, 16.0), (0.969, 0.10, 32.0))
+"""cells whose first repeats the nominal law is fitted to, beside the next"""
+FITTED_TOO = (1.168, 0.15, 8.0)
+
+
+FROZEN = 1.0  # [s] that a frozen run stands still
+
+
+@dataclass(frozen=True)
+class Case:
+    """One cell whose runs are told one wrong setting.
+
+    Attributes:
+        kind: which setting is wrong; "none" = all are right.
+        true: (mass, lever, gain) of the runs.
+        told: what the diagnosis is told.
+    """
+
+    kind: str
+    true: tuple[float, float, float]
+    told: tuple[float, float, float]
+
+    @property
+    def change(self) -> float:
+        """True over told setting (a ratio)."""
+        at = KINDS.index(self.kind)
+        return self.true[at] / self.told[at]
+
+
+def load() -> Runs:
+    """All runs of the set."""
+    return runs(kscale_sts3215.read(needed(SET)), seconds=SECONDS)
+
+
+def nominal(every: Runs) -> Nominal:
+    """The law fitted to the first repeats of four cells, 20 runs."""
+    wanted = {tuple(np.round(cell, 2)) for cell in (*FITTED, FITTED_TOO)}
+    here = np.array([tuple(np.round(cell, 2)) in wanted for cell in cells(every)])
+    first = every.where(lambda number: number == 0, "repeat")
+    return servo_nominal.fit(every.take(here & first))
+
+
+def frozen(
+    every: Runs, share: float, rng: np.random.Generator
+) -> tuple[Runs, np.ndarray]:
+    """The runs, some of whose angles stand still for `FROZEN` seconds.
+
+    Args:
+        every: all runs.
+        share: of the runs that freeze.
+        rng: draws which, and when.
+
+    Returns:
+        The runs, and the indices of the frozen ones.
+    """
+    angles, width = every.angles.copy(), round(FROZEN / SAMPLE)
+    chosen = rng.permutation(len(every))[: round(share * len(every))]
+    for index in chosen:
+        begin = int(rng.integers(angles.shape[1] - width))
+        angles[index, begin : begin + width] = angles[index, begin]
+    return replace(every, angles=angles), chosen
+
+
+def draw(every: Runs, each: int, rng: np.random.Generator) -> Iterator[Case]:
+    """Cases of every kind, cells drawn without replacement within a kind.
+
+    Args:
+        every: all runs.
+        each: cases of each kind; of "none" half as many again.
+        rng: draws the cells and the wrong settings.
+    """
+    known = sorted(set(cells(every)))
+    levels = [sorted({cell[i] for cell in known}) for i in range(3)]
+    for at, kind in enumerate(KINDS):
+        count = each if kind != "none" else 3 * each // 2
+        for index in rng.permutation(len(known))[:count]:
+            true = known[index]
+            told = list(true)
+            if kind != "none":
+                others = [value for value in levels[at] if value != true[at]]
+                told[at] = float(rng.choice(others))
+            yield Case(kind, true, tuple(told))
+
+
+def of_cell(every: Runs, cell: tuple[float, ...], repeats: tuple[int, ...]) -> Runs:
+    """Runs of a cell, some repeats."""
+    mine = np.array([name == cell for name in cells(every)])
+    return every.take(mine & every.where(lambda r: r in repeats, "repeat"))
+
+
+def retold(every: Runs, told: tuple[float, ...]) -> Runs:
+    """The runs, told another setting; the lever's own mass follows its length."""
+    arm = kscale_sts3215.ARM_MASSES[round(told[1], 3)]
+    return every.retold(mass=told[0], lever=told[1], gain=told[2], arm_mass=arm)
+
+
+def error(every: Runs, law: Nominal, effect: str = "") -> float:
+    """Root mean square error on runs, with an effect (as text) or without [rad]."""
+    together = merged(every)
+    if not effect:
+        rest = curves.residuals(together, law)
+    else:
+        from bns.gap.models.servo.candidates import columns
+        from bns.worlds.physics.servo_rollout import simulate
+
+        made = columns(law.told(together), [[registry.parse(effect)]])
+        angles = simulate(made, together.drive)[:, 0]
+        rest = features(together.angles) - features(angles)
+    return float(np.sqrt((rest**2).mean()))
+
 
 BAR_VALUE, FROZEN_BAR = 0.95, 0.93
 FREEZE = 0.05  # share of all runs that stand still for a second in the second row
 SEED, EACH, QUICK = 2027, 32, 6  # 2026 was used while the tool was made
-FITTED, HELD_OUT = (1, 2), (3,)  # repeats that are diagnosed and that are predicted
+LEARNED, HELD_OUT = (1, 2), (3,)  # repeats that are diagnosed and that are predicted
 SMOOTH = ("sin_sin", "sin_time_square", "up_and_down")
 EDITED = 2  # predictions of another payload per case
 CLASSES = {"servo_voltage": "servo_gain"}  # alike while the duty does not saturate
@@ -27,19 +148,19 @@ def gap_servo(quick: bool) -> Result:
     """Four kinds of cases; quick takes 6 of each instead of 32 (of none: 9 of 48)."""
     from bns.gap.models.servo import diagnosis
 
-    every = servo_cases.load()
-    law = servo_cases.nominal(every)
+    every = load()
+    law = nominal(every)
     reference = diagnosis.learn(every.take(every.where(lambda r: r > 0, "repeat")), law)
     rng = np.random.default_rng(SEED)
-    cases = list(servo_cases.draw(every, QUICK if quick else EACH, rng))
-    rows = [_row(case, every, reference, FITTED) for case in cases]
+    cases = list(draw(every, QUICK if quick else EACH, rng))
+    rows = [_row(case, every, reference, LEARNED) for case in cases]
     for row in rows:
         row |= _consequences(every, row["case"], row, law)
     named = np.array([row["named"] == row["truth"] for row in rows])
     details = _details(rows)
     errors = details["median_relative_error"]
-    frozen = _frozen(cases, every)
-    held = named.mean() >= BAR_VALUE and frozen["named"] >= FROZEN_BAR
+    still = _frozen(cases, every)
+    held = named.mean() >= BAR_VALUE and still["named"] >= FROZEN_BAR
     holds = held and all(errors[kind] <= bar for kind, bar in ERROR_BARS.items())
     return Result(
         figure=round(float(named.mean()), 4),
@@ -48,7 +169,7 @@ def gap_servo(quick: bool) -> Result:
         n=len(rows),
         details={
             **details,
-            "frozen_for_a_second": frozen,
+            "frozen_for_a_second": still,
             "left_out_as_recorded": reference.left_out,
             **({} if quick else _harder(cases, every, law)),
             "candidates": len(reference.candidates),
@@ -63,11 +184,11 @@ def _frozen(cases: list[Case], every) -> dict[str, object]:
     from bns.gap.models.servo import diagnosis, repeats
 
     rng = np.random.default_rng(SEED)
-    stuck, chosen = servo_cases.frozen(every, FREEZE, rng)
-    law = servo_cases.nominal(repeats.sound(stuck)[0])
+    stuck, chosen = frozen(every, FREEZE, rng)
+    law = nominal(repeats.sound(stuck)[0])
     past = stuck.take(stuck.where(lambda r: r > 0, "repeat"))
     reference = diagnosis.learn(past, law)
-    rows = [_row(case, stuck, reference, FITTED) for case in cases]
+    rows = [_row(case, stuck, reference, LEARNED) for case in cases]
     found = set(repeats.odd(stuck))
     return {
         "named": _share(rows),
@@ -90,7 +211,7 @@ def _harder(cases: list[Case], every, law) -> dict[str, object]:
     smooth = every.take(every.where(lambda kind: kind in SMOOTH, "trajectory"))
     past = smooth.take(smooth.where(lambda r: r > 0, "repeat"))
     reference = diagnosis.learn(past, law)
-    rows = [_row(case, smooth, reference, FITTED[:1]) for case in cases]
+    rows = [_row(case, smooth, reference, LEARNED[:1]) for case in cases]
     sets = [row["truth"] in row["sets"] for row in rows]
     return {
         "one_repeat_of_smooth_runs": {
@@ -107,8 +228,8 @@ def _harder(cases: list[Case], every, law) -> dict[str, object]:
 def _row(case: Case, every, reference, repeats) -> dict[str, object]:
     from bns.gap.models.servo import diagnosis
 
-    mine = servo_cases.of_cell(every, case.true, repeats)
-    told = servo_cases.retold(mine, case.told)
+    mine = of_cell(every, case.true, repeats)
+    told = retold(mine, case.told)
     found, scores = diagnosis.diagnose(told, reference, without=[case.true])
     truth = "none" if case.kind == "none" else f"servo_{case.kind}"
     best = scores.ranked[0]
@@ -138,22 +259,22 @@ def _row(case: Case, every, reference, repeats) -> dict[str, object]:
 
 def _consequences(every, case: Case, row: Mapping, law) -> dict[str, float]:
     """How much closer the chosen effect brings held-out runs and another payload's."""
-    held = servo_cases.of_cell(every, case.true, HELD_OUT)
-    told = servo_cases.retold(held, case.told)
-    before = servo_cases.error(told, law)
-    after = servo_cases.error(told, law, row["effect"])
-    oracle = servo_cases.error(held, law)
+    held = of_cell(every, case.true, HELD_OUT)
+    told = retold(held, case.told)
+    before = error(told, law)
+    after = error(told, law, row["effect"])
+    oracle = error(held, law)
     result = {"before": before, "after": after, "oracle": oracle}
-    masses = sorted({c[0] for c in servo_cases.cells(every)} - {case.true[0]})
+    masses = sorted({c[0] for c in cells(every)} - {case.true[0]})
     ratios = []
     for mass in masses[:EDITED]:
-        runs = servo_cases.of_cell(every, (mass, *case.true[1:]), HELD_OUT)
+        runs = of_cell(every, (mass, *case.true[1:]), HELD_OUT)
         shifted = case.told[0] + mass - case.true[0]
         if shifted <= 0:
             continue
-        edited = servo_cases.retold(runs, (shifted, *case.told[1:]))
-        chosen = servo_cases.error(edited, law, row["effect"])
-        ratios.append(chosen / servo_cases.error(runs, law))
+        edited = retold(runs, (shifted, *case.told[1:]))
+        chosen = error(edited, law, row["effect"])
+        ratios.append(chosen / error(runs, law))
     return result | {"edit": float(np.mean(ratios)) if ratios else float("nan")}
 
 

@@ -1,8 +1,9 @@
-"""Deployed controllers of BNS after damage; IT&E as the original's tests had it.
+"""Deployed controllers of BNS after damage; rivals with a repertoire, IT&E and RTE.
 
-The original: Mailer, Nitschke and Raw (2021). Compared are numbers of tests, not
-speeds: walking that rests after each command is no gait of 1 Hz, and how far a map's
-gaits get is a matter of the evaluations spent on it.
+IT&E is as the original's tests had it: Mailer, Nitschke and Raw (2021). Compared are
+numbers of tests, not speeds: walking that rests after each command is no gait of 1 Hz,
+and how far a map's gaits get is a matter of the evaluations spent on it. RTE is
+compared with the same planner without the process that corrects its behaviours.
 """
 
 from collections.abc import Mapping
@@ -207,3 +208,74 @@ def prior_off(quick: bool) -> Result:
             "evaluations of the map": found.head.evaluations,
         },
     )
+
+
+WHEELS = {
+    f"{side}-{lost}": f"wheel_gain:wheel={side},factor={1 - lost / 100:g}"
+    for side in ("left", "right")
+    for lost in (20, 50)
+}
+ONSET, AFTER = 1, 10  # trials
+LEARNED = 10  # of each damage
+
+
+@bench(
+    "trials that RTE needs to solve navigation after damage, worst of four wheels",
+    bar="fewer than the same planner without the process, on each damage",
+)
+def faithful_rte(quick: bool) -> Result:
+    """`LEARNED` of each, P1, at most `AFTER` trials; quick: two of one damage, six."""
+    names = list(WHEELS)[: 1 if quick else None]
+    runs, after = (2, 6) if quick else (LEARNED, AFTER)
+    found = {
+        name: {
+            kind: trials_to_solve(WHEELS[name], learning, runs, after)
+            for kind, learning in (("with", True), ("without", False))
+        }
+        for name in names
+    }
+    medians = {
+        name: {kind: float(np.median(trials)) for kind, trials in row.items()}
+        for name, row in found.items()
+    }
+    return Result(
+        figure=max(row["with"] for row in medians.values()),
+        unit="trials",
+        holds=all(row["with"] < row["without"] for row in medians.values()),
+        n=runs * len(names),
+        details={
+            "trials, one more than the most = never": found,
+            "medians": medians,
+            "most": after,
+        },
+    )
+
+
+def trials_to_solve(damage: str, learning: bool, runs: int, after: int) -> list[int]:
+    """Trials from the damage on, the one that solves counted; `after` + 1 = none.
+
+    Args:
+        damage: effect as text.
+        learning: whether behaviours are corrected.
+        runs: replicates.
+        after: trials from the damage on.
+    """
+    from bns.experiment.batch import Batch
+    from bns.experiment.loading import with_learner
+    from bns.experiment.world_factory import make_models, make_world
+
+    base = replace(presets.load("khepera-simple"), replicates=runs, threads=1)
+    config = with_learner(base, "rte").with_(
+        {
+            "prior.world": "mujoco",
+            "settings.learning": learning,
+            "world.damage": [f"{damage}@{ONSET}"],
+        }
+    )
+    batch = Batch([config], [make_world(config)], models=make_models(config))
+    solved = np.array(
+        [batch.advance(trial)[0].columns["solved"] for trial in range(ONSET + after)]
+    )[ONSET:]
+    ever = solved.any(axis=0)
+    first: list[int] = np.where(ever, solved.argmax(axis=0) + 1, after + 1).tolist()
+    return first

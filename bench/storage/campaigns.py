@@ -1,5 +1,6 @@
-"""Campaigns that benches share: small batches of real runs."""
+"""What benches share: campaigns of small batches of real runs, drives, kept rows."""
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -44,3 +45,23 @@ def held(directory: Path) -> Mapping[str, bytes]:
         for path in sorted(directory.rglob("*"))
         if path.is_file() and path.name != "log.jsonl"
     }
+
+
+def rows_of(path: Path) -> list[dict]:
+    """The rows that a bench has kept so far, a line of JSON each."""
+    if not path.exists():
+        return []
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+
+
+def drives(path: Path) -> None:
+    """Write four drives of the Khepera III as a dataset."""
+    import numpy as np
+
+    from bns.worlds import registry
+    from bns.worlds.data import dataset
+    from bns.worlds.trial import Commands
+
+    world = registry.make("mujoco", robot="khepera3", threads=1)
+    told = [Commands(np.full((2, 2), 0.1), [0.4, 0.3 + 0.1 * k]) for k in range(4)]
+    dataset.write(path, world.run(told))

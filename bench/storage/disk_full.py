@@ -12,7 +12,7 @@ from pathlib import Path
 from unittest import mock
 
 from bench.result import Result, bench
-from bench.storage.campaigns import tiny
+from bench.storage.campaigns import drives, tiny
 from bns.errors import BnsError
 
 SMALL = (8, 24, 48, 96, 160, 256, 384, 640, 1024)  # [KiB] of real file systems
@@ -103,7 +103,7 @@ def _acts(home: Path) -> dict[str, Act]:
     campaign = tiny(2, trials=2)
     config = campaign.members[0].config
     home.mkdir(exist_ok=True)
-    _recording(home / "drives")
+    drives(home / "drives")
 
     def trained(out: Path) -> None:
         train(config, out / "run", resume=True)
@@ -115,18 +115,6 @@ def _acts(home: Path) -> dict[str, Act]:
         _diagnosed(home / "drives", out)
 
     return {"run": trained, "campaign": driven, "diagnosis": diagnosed}
-
-
-def _recording(path: Path) -> None:
-    import numpy as np
-
-    from bns.worlds import registry
-    from bns.worlds.data import dataset
-    from bns.worlds.trial import Commands
-
-    world = registry.make("mujoco", robot="khepera3", threads=1)
-    drives = [Commands(np.full((2, 2), 0.1), [0.4, 0.3 + 0.1 * k]) for k in range(4)]
-    dataset.write(path, world.run(drives))
 
 
 def _diagnosed(drives: Path, out: Path) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 
 from bench.result import Result, bench
 from bench.runner import RESULTS
+from bench.storage.campaigns import rows_of
 from bench.storage.mutations import mutated, strange
 from bench.storage.readers import Reader, fingerprint, readers
 from bench.storage.sample_files import make
@@ -167,7 +168,7 @@ def fuzz(quick: bool) -> Result:
         count = len(readers())
         size = QUICK // count if quick else BLOCK
         wanted = 1 if quick else -(-INPUTS // (size * count))
-        rows = [] if quick else _kept()
+        rows = [] if quick else rows_of(KEPT)
         todo = [b for b in range(wanted) if b not in {row["block"] for row in rows}]
         for row in _worked(home, todo, size):
             rows.append(row)
@@ -180,12 +181,6 @@ def fuzz(quick: bool) -> Result:
 def _memory() -> str | None:
     """Where temporary files need no disk, if there is such a place."""
     return "/dev/shm" if Path("/dev/shm").is_dir() else None
-
-
-def _kept() -> list[dict]:
-    if not KEPT.exists():
-        return []
-    return [json.loads(line) for line in KEPT.read_text(encoding="utf-8").splitlines()]
 
 
 def _worked(home: Path, todo: list[int], size: int):

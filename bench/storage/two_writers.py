@@ -12,7 +12,7 @@ from pathlib import Path
 
 from bench.result import Result, bench
 from bench.runner import RESULTS
-from bench.storage.campaigns import text
+from bench.storage.campaigns import drives, rows_of, text
 from bns import seeding
 
 PAIRS = 200
@@ -38,10 +38,10 @@ def two_writers(quick: bool) -> Result:
     """The two have other seeds, so that what is mixed can be told."""
     count = 4 if quick else PAIRS
     rng = seeding.generator(0, "bench", "two-writers")
-    rows, began = [] if quick else _kept(), time.monotonic()
+    rows, began = [] if quick else rows_of(KEPT), time.monotonic()
     with tempfile.TemporaryDirectory() as name:
         home = Path(name)
-        _recording(home / "drives")
+        drives(home / "drives")
         for index in range(count):
             kind = KINDS[index % len(KINDS)]
             offset = float(rng.uniform(0, LATEST)) * float(rng.random() < 0.8)
@@ -64,24 +64,6 @@ def two_writers(quick: bool) -> Result:
             "seconds in this session": round(time.monotonic() - began),
         },
     )
-
-
-def _kept() -> list[dict]:
-    if not KEPT.exists():
-        return []
-    return [json.loads(line) for line in KEPT.read_text(encoding="utf-8").splitlines()]
-
-
-def _recording(path: Path) -> None:
-    import numpy as np
-
-    from bns.worlds import registry
-    from bns.worlds.data import dataset
-    from bns.worlds.trial import Commands
-
-    world = registry.make("mujoco", robot="khepera3", threads=1)
-    drives = [Commands(np.full((2, 2), 0.1), [0.4, 0.3 + 0.1 * k]) for k in range(4)]
-    dataset.write(path, world.run(drives))
 
 
 def _words(home: Path, out: Path, kind: str, seed: int) -> list[str]:

@@ -1,7 +1,7 @@
 """The walking experiments that several benches share (investigation D).
 
 Undamaged runs come in groups of ten; the runs of each damage begin as copies of such a
-group after its last trial, since up to there nothing differs (`branching`).
+group after its last trial, since up to there nothing differs (`forking`).
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,15 +11,17 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
+import torch
 
-from bench.learning import branching, experiments, solving
-from bench.walking import evidence
+from bench.learning import experiments, forking, solving
 from bns import presets
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
+from bns.learners.bns.change_detection import changed
+from bns.learners.bns.walking import MOVED, goal_inputs
 from bns.storage.store import RunStore
-from bns.worlds.trial import Trial
+from bns.worlds.trial import Trial, body_displacements
 
 Kind = Literal["window", "forget", "own", "nominal"]  # of recovering, see `damaged`
 ONSET = 100  # trial of the damage (dissertation, table 7.4)
@@ -148,10 +150,10 @@ def recovering(kind: Kind, *, quick: bool = False) -> Mapping[str, RunRecord]:
     if not quick:
         trunks = records(_trunk(kind, group) for group in groups)
         told = kind in ("forget", "own")  # the trunks were run without
-        if told and any(evidence.forgets(trunk).any() for trunk in trunks.values()):
+        if told and any(forgets(trunk).any() for trunk in trunks.values()):
             raise BnsError("Run the undamaged runs with watch.forget, too.")
         for (_, group), config in configs.items():
-            branching.begin(_trunk(kind, group), config, idle=("watch", "walk"))
+            forking.begin(_trunk(kind, group), config, idle=("watch", "walk"))
     found = records(configs.values(), quick=quick)
     return {
         legs: joined([found[configs[legs, group].preset] for group in groups])
@@ -275,3 +277,23 @@ def spread(values: np.ndarray) -> dict[str, float]:
 
 def _place(config: RunConfig) -> Path:
     return experiments.directory(config)
+
+
+def forgets(record: RunRecord) -> np.ndarray:
+    """Whether a change of the robot would have been seen after a trial, ``(R, T)``.
+
+    As long as it would not, runs with `watch.forget` are those without.
+    """
+    walk, window = record.config.walk, record.config.adaptation.window
+    found = np.zeros(record.sent.shape[:2], dtype=bool)
+    for run in range(record.replicates):
+        goals = torch.from_numpy(record.sent[run].copy())
+        seen = goal_inputs(goals).numpy().astype(np.float32)
+        moved = body_displacements(record.poses[run]) / np.array(MOVED)
+        for trial in range(record.trials):
+            rows = [
+                part[: trial + 1].reshape(-1, part.shape[-1])[-window:]
+                for part in (seen, moved.astype(np.float32))
+            ]
+            found[run, trial] = changed(*rows, walk.commands) > 0
+    return found

@@ -9,7 +9,7 @@ import inspect
 import re
 from typing import Any
 
-from bns.storage.numbers import BEYOND
+from bns.storage.reading import BEYOND
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 Schema = dict[str, Any]

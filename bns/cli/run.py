@@ -149,9 +149,9 @@ def source(text: str) -> tuple[RunConfig, str]:
 def execute(given: Arguments) -> int:
     """Train, draw, and say what happened."""
     if given.config.world.name == "hardware":
-        from bns.cli.hardware import run
+        from bns.cli.hardware import session
 
-        return run.execute(given)
+        return session.learn(given)
     from bns.storage.lock import Lock
 
     out = Path(given.out)

@@ -213,3 +213,28 @@ class Learner(ABC):
     def think(self) -> bool:
         """A short piece of thinking while a trial runs; False: there is none left."""
         return False
+
+
+class RememberingLearner(Learner):
+    """A learner that keeps what it knows of each run in one object of plain arrays.
+
+    Attributes:
+        memories: R objects, all of whose attributes are arrays.
+    """
+
+    memories: Sequence[Any]
+
+    def state(self) -> dict[str, np.ndarray]:
+        """See `Learner.state`: all that each run knows, and what models have spent."""
+        found = {"spent": np.array([model.spent for model in self.models], np.int64)}
+        for run, memory in enumerate(self.memories):
+            found |= {f"{run}.{name}": array for name, array in vars(memory).items()}
+        return found
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """See `Learner.restore`."""
+        for run, memory in enumerate(self.memories):
+            for name in vars(memory):
+                setattr(memory, name, arrays[f"{run}.{name}"].copy())
+        for model, spent in zip(self.models, arrays["spent"], strict=True):
+            model.spent = int(spent)

@@ -16,7 +16,7 @@ import numpy as np
 
 from bns import seeding
 from bns.experiment.config import LearnerSettings
-from bns.learners.base import Curves, Learner, Panel, Proposal
+from bns.learners.base import Curves, Panel, Proposal, RememberingLearner
 from bns.prior import driving, gaussian, tree
 from bns.tasks.navigation import NavigationTask
 from bns.worlds.trial import Trial
@@ -135,7 +135,7 @@ class Memory:
         )
 
 
-class Rte(Learner):
+class Rte(RememberingLearner):
     """R runs of RTE; arguments as `Learner`."""
 
     Settings = RteSettings
@@ -329,21 +329,6 @@ class Rte(Learner):
         if again or cost < memory.cost[0]:
             memory.best, memory.best_rows = memory.tried.copy(), memory.rows.copy()
             memory.cost = np.array([cost, solved])
-
-    def state(self) -> dict[str, np.ndarray]:
-        """See `Learner.state`: all that each run knows, and what models have spent."""
-        found = {"spent": np.array([model.spent for model in self.models], np.int64)}
-        for run, memory in enumerate(self.memories):
-            found |= {f"{run}.{name}": array for name, array in vars(memory).items()}
-        return found
-
-    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """See `Learner.restore`."""
-        for run, memory in enumerate(self.memories):
-            for name in vars(memory):
-                setattr(memory, name, arrays[f"{run}.{name}"].copy())
-        for model, spent in zip(self.models, arrays["spent"], strict=True):
-            model.spent = int(spent)
 
 
 LEARNER = Rte

@@ -15,7 +15,7 @@ import numpy as np
 
 from bns import seeding
 from bns.experiment.config import LearnerSettings
-from bns.learners.base import Learner, Proposal
+from bns.learners.base import Proposal, RememberingLearner
 from bns.prior.breeding import bred
 from bns.tasks.base import Space, Task
 from bns.worlds.damage import Damage
@@ -137,7 +137,7 @@ def controllers(space: Space, genes: np.ndarray) -> list[Any]:
     return space.controllers(space.low + genes * (space.high - space.low))
 
 
-class ModelLearner(Learner, Generic[MemoryT]):
+class ModelLearner(RememberingLearner, Generic[MemoryT]):
     """R runs that evolve controllers in a model; arguments as `Learner`."""
 
     Settings: ClassVar[type[LearnerSettings]] = ModelLearnerSettings
@@ -274,18 +274,3 @@ class ModelLearner(Learner, Generic[MemoryT]):
         Returns:
             The learner's own columns.
         """
-
-    def state(self) -> dict[str, np.ndarray]:
-        """See `Learner.state`: all that each run knows, and what models have spent."""
-        found = {"spent": np.array([model.spent for model in self.models], np.int64)}
-        for run, memory in enumerate(self.memories):
-            found |= {f"{run}.{name}": array for name, array in vars(memory).items()}
-        return found
-
-    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """See `Learner.restore`."""
-        for run, memory in enumerate(self.memories):
-            for name in vars(memory):
-                setattr(memory, name, arrays[f"{run}.{name}"].copy())
-        for model, spent in zip(self.models, arrays["spent"], strict=True):
-            model.spent = int(spent)

@@ -14,11 +14,21 @@ import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO, TypeVar
+from typing import Annotated, Any, BinaryIO, TypeVar
 
 import msgspec
 
 from bns.errors import FormatError
+
+BEYOND = 1e9
+
+Finite = Annotated[float, msgspec.Meta(ge=-BEYOND, le=BEYOND)]
+"""any number; NaN and infinity are none"""
+
+Positive = Annotated[float, msgspec.Meta(ge=1 / BEYOND, le=BEYOND)]
+Least = Annotated[float, msgspec.Meta(ge=0, le=BEYOND)]
+Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
+
 
 TEXT = 16 << 20  # [bytes] descriptions, settings, heads
 DATA = 4 << 30  # [bytes] recordings, arrays and tables; unpacked as well

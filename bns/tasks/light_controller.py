@@ -166,7 +166,7 @@ class LightController:
 
 @dataclass(frozen=True, eq=False)
 class GenomePolicy:
-    """N genomes, one a robot; a `bns.worlds.closed_loop.Policy`.
+    """N genomes, one a robot; a `bns.worlds.world.Policy`.
 
     Attributes:
         controllers: what they have in common.

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from bns.errors import FormatError
-from bns.storage import csv_table, numbers
+from bns.storage import csv_table, reading
 
 TIME, TRIAL, SENT = "time", "trial", "command_time"
 """columns that a log may have under these names, beside its channels"""
@@ -201,7 +201,7 @@ def checked(table: Table, path: Path) -> Table:
     for column in table.columns:
         if table.names.count(column.name) > 1:
             raise FormatError(f"{path}: the column {column.name!r} is there twice.")
-        most = numbers.BEYOND if column.role else MOST
+        most = reading.BEYOND if column.role else MOST
         largest = float(np.nanmax(np.abs(column.values), initial=0.0))
         if largest > most:
             raise FormatError(

@@ -19,7 +19,6 @@ from bns.errors import BnsError
 from bns.gap import store
 from bns.gap.models.base import GapModel
 from bns.gap.planning import excitation as excite
-from bns.gap.planning import plan_words
 from bns.gap.planning.excitation import Excitation
 from bns.gap.planning.plan_runs import repeats, runs
 from bns.gap.recordings import load_recordings
@@ -96,7 +95,7 @@ def plan(
     """
     fits = tied(found)
     if len(fits) < 2:
-        return Plan(tuple(f.names for f in fits), (), 0, plan_words.nothing(found))
+        return Plan(tuple(f.names for f in fits), (), 0, why_nothing(found))
     effects = [[store.parse(text, model) for text in fit.effects] for fit in fits]
     told = found.provenance.get("told", {})
     family = tuple(family) or _family(model, seed, told)
@@ -125,7 +124,7 @@ def _ranked(names: tuple[tuple[str, ...], ...], made: Sequence[Option]) -> Plan:
     steps = tuple((options[at], count) for at, count in counts.items())
     alike = tuple(p for p, parted in zip(pairs, open_, strict=True) if not parted)
     ranked = tuple(options[at] for at in order)
-    said = plan_words.sentence(names, steps or ((ranked[0], 0),), open_, alike)
+    said = in_words(names, steps or ((ranked[0], 0),), open_, alike)
     count = steps[0][1] if steps else 0
     return Plan(names, ranked, count, said, alike, steps)
 
@@ -306,3 +305,58 @@ def _strength(name: str, effect: Effect) -> Parameter:
     strengths = [item for item in effect.parameters if item.scales]
     said = [item for item in strengths if item.name == stem.rpartition(".")[2]]
     return (said or strengths)[0]
+
+
+def why_nothing(found: Diagnosis) -> str:
+    """Why there is nothing to plan."""
+    said = {
+        "no gap": "no gap was found",
+        "none of the library": "no effect of the library explains the gap",
+    }
+    reason = said.get(found.verdict.kind, "one explanation stands alone")
+    return f"Nothing is tied: {reason}."
+
+
+def in_words(
+    names: Sequence[tuple[str, ...]],
+    steps: Sequence[tuple[Option, int]],
+    open_: np.ndarray,
+    alike: Sequence[tuple[int, int]],
+) -> str:
+    """What to run, and what it will tell.
+
+    Args:
+        names: of the tied explanations.
+        steps: options and how often to run each; 0 = it is no use.
+        open_: which pairs some command parts, ``(pairs,)``.
+        alike: pairs that no command parts.
+    """
+    words = [" + ".join(name) for name in names]
+    tied_ = " or ".join(words)
+    best, count = steps[0]
+    if not count:
+        return (
+            f"Tied: {tied_}. No safe command of the family tells them apart (the best, "
+            f"{best.excitation.name}, by {best.distances.max():.2g} deviations): they "
+            "do the same whatever is commanded. Observe another quantity."
+        )
+    runs = ", and ".join(
+        f"{_often(count)}: {option.excitation.name} "
+        f"({option.excitation.commands.duration:.0f} s)"
+        for option, count in steps
+    )
+    squares = sum(count * option.distances[open_] ** 2 for option, count in steps)
+    parted = np.sqrt(squares)
+    wrong = norm.sf(parted / 2).mean()
+    text = (
+        f"Tied: {tied_}. Run {runs}; {'that' if len(steps) > 1 else 'it'} parts them "
+        f"by {parted.min():.2g} deviations (expected log Bayes factor "
+        f"{parted.min() ** 2 / 2:.3g}, wrong one named {100 * wrong:.2g} %)."
+    )
+    for first, second in alike:
+        text += f" No command parts {words[first]} from {words[second]}."
+    return text
+
+
+def _often(count: int) -> str:
+    return {1: "once", 2: "twice"}.get(count, f"{count} times")

@@ -13,7 +13,7 @@ from bns.hardware.driving import homing
 from bns.hardware.driving.motion import Mover, Point
 from bns.models.khepera3.units import WHEEL_DIAMETER
 from bns.storage import files, reading, seal
-from bns.storage.numbers import Least, Positive
+from bns.storage.reading import Least, Positive
 from bns.worlds.trial import body_displacements
 
 NOMINAL_AXLE = 0.0884  # m (khepera3toolbox, Sim.I.am)

@@ -13,15 +13,14 @@ import numpy as np
 from bns.hardware.driving import homing
 from bns.hardware.driving.motion import Mover, Performed, Point
 from bns.hardware.tracking.tracker import Sighting
-from bns.worlds import closed_loop
 from bns.worlds.active import Stages
-from bns.worlds.closed_loop import Policy
 from bns.worlds.light.sensing import LEAD, Changes
 from bns.worlds.light.sensors import LightSensors
 from bns.worlds.light.supervisor import Call, Supervisor
 from bns.worlds.physics import control
 from bns.worlds.physics.loop_control import LoopSignal
 from bns.worlds.trial import Channel, Commands
+from bns.worlds.world import Policy, checked_commands
 
 LATE = 0.1  # s by which a command may be late before the trial is void; assumed
 SEEN = 0.1  # s between two sights of a robot that is known to stand
@@ -136,7 +135,7 @@ class Steering:
 
     def _checked(self, given: object, number: int) -> np.ndarray:
         rules = self.rules
-        return closed_loop.checked(given, rules.channels, rules.limits, 1, number)[0]
+        return checked_commands(given, rules.channels, rules.limits, 1, number)[0]
 
     def _cycle(self, number: int, told: np.ndarray) -> None:
         """Drive by one command; whoever has to be is stopped, and turned."""

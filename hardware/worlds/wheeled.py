@@ -19,7 +19,6 @@ from bns.hardware.worlds.real_robot import RealRobot
 from bns.worlds import active, checks
 from bns.worlds.active import Stages
 from bns.worlds.checks import bounded
-from bns.worlds.closed_loop import CYCLE, CYCLES, Policy
 from bns.worlds.damage import Damage
 from bns.worlds.effects.base import OpticsEffect
 from bns.worlds.light import sensors
@@ -29,6 +28,7 @@ from bns.worlds.light.sensing import Changes
 from bns.worlds.light.supervisor import Supervisor
 from bns.worlds.physics.loop_control import LoopSignal
 from bns.worlds.trial import POSE_CHANNELS, Commands, Trial
+from bns.worlds.world import CYCLE, CYCLES, Policy
 
 
 @dataclass(eq=False)

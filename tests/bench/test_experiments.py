@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.learning import branching, experiments, forking, solving
+from bench.learning import experiments, forking, solving
 from bns.errors import BnsError
 from bns.experiment.config import WorldConfig
 from bns.experiment.run import train
 from bns.learners.bns.config import AdaptationConfig, WatchConfig
 from bns.storage.store import RunStore
-from tests.bns import light_fakes
+from tests.bns import robots
 from tests.bns.contents import contents
-from tests.bns.walkers import small
+from tests.bns.robots import small
 
 ONSET = 6
 
@@ -34,7 +34,7 @@ def trunk(tmp_path, monkeypatch):
 def test_a_branch_has_the_bytes_of_a_run_from_the_start(trunk, tmp_path):
     branch = damaged(trunk)
     train(trunk, experiments.directory(trunk))
-    branching.begin(trunk, branch)
+    forking.begin(trunk, branch)
     place = experiments.directory(branch)
     assert len(list((place / "steps").iterdir())) == ONSET, "it goes on, not anew"
     train(branch, place, resume=True)
@@ -52,15 +52,15 @@ def test_a_branch_has_the_bytes_of_a_run_from_the_start(trunk, tmp_path):
 )
 def test_a_branch_that_differs_earlier_is_refused(trunk, changes):
     with pytest.raises(BnsError, match="branch is no continuation of trunk"):
-        branching.begin(trunk, damaged(trunk, **changes))
+        forking.begin(trunk, damaged(trunk, **changes))
 
 
 def test_a_section_that_did_nothing_in_the_trunk_may_differ(trunk):
     branch = damaged(trunk, watch=replace(trunk.watch, forget=True))
     train(trunk, experiments.directory(trunk))
     with pytest.raises(BnsError, match="no continuation"):
-        branching.begin(trunk, branch)
-    branching.begin(trunk, branch, idle=("watch",))
+        forking.begin(trunk, branch)
+    forking.begin(trunk, branch, idle=("watch",))
     place = experiments.directory(branch)
     assert len(list((place / "steps").iterdir())) == ONSET
     assert RunStore.open(place).config.watch.forget
@@ -69,7 +69,7 @@ def test_a_section_that_did_nothing_in_the_trunk_may_differ(trunk):
 
 
 def side(damage="wheel_gain:wheel=left,factor=0.5@2", **settings):
-    config = light_fakes.small()
+    config = robots.small_light()
     world = WorldConfig(name="light", damage=(damage,))
     settings = {"adaptation": AdaptationConfig(population_reset=True)} | settings
     config = replace(config, preset="side", trials=4, world=world, **settings)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from bench.learning import solving
-from bench.walking import ceiling, evidence, gait
+from bench.walking import ceiling, gait
 from bench.walking import recover as recover_hexapod
 from bench.walking import runs as hexapod_runs
 from bns import presets
 from bns.experiment.record import RunRecord
-from tests.bns.walkers import small
+from tests.bns.robots import small
 
 
 def record(ways, *, seconds=10.0, onset=-1):
@@ -97,8 +97,8 @@ def test_what_a_learner_would_have_forgotten_is_told_from_its_record():
     runs = replace(record(np.zeros((2, 12))), sent=sent)
     runs.poses[..., 0] = np.linspace(0, 1, 12)
     runs.poses[1, 9:] *= -1.0  # the second robot goes the other way from trial 9 on
-    assert not evidence.forgets(runs)[0].any()
-    assert evidence.forgets(runs)[1].argmax() == 10  # one trial says nothing
+    assert not hexapod_runs.forgets(runs)[0].any()
+    assert hexapod_runs.forgets(runs)[1].argmax() == 10  # one trial says nothing
 
 
 def test_until_counts_trials_to_shares_of_the_ceilings_that_are_known(monkeypatch):

@@ -33,3 +33,10 @@ def said(capsys):
         return captured.err
 
     return run
+
+
+@pytest.fixture
+def run(fakes, tmp_path):
+    """A finished run of the fake learner."""
+    fakes.train(tmp_path / "run")
+    return tmp_path / "run"

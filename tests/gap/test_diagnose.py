@@ -1,16 +1,24 @@
-"""Known answers: planted effects are named, nothing is "no gap", aliases are sets."""
+"""Known answers: planted effects are named, nothing is "no gap", aliases are sets.
+
+Effects that look alike at one speed are told apart by others. Of a diagnosis that was
+killed the same command again is possible, another is not.
+"""
 
 import numpy as np
 import pytest
 
 from bns.errors import BnsError, FormatError
-from bns.gap import stages
+from bns.gap import request, stages
+from bns.gap.decomposition import descent
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.reference import Corrected
 from bns.gap.diagnose import diagnose
+from bns.gap.models.wheeled.model import WheeledModel
+from bns.gap.planning import excitation
 from bns.gap.recordings import check
 from bns.gap.records import Diagnosis
 from bns.gap.stages import BY_FITS, BY_TANGENT, WITH_LIGHT
+from bns.storage.files import TEMPORARY
 from bns.worlds.effects.base import CommandEffect, Parameter
 from bns.worlds.physics.wheeled_world import MujocoWorld
 from bns.worlds.trial import Channel, Commands
@@ -198,3 +206,93 @@ def test_a_small_rest_beside_a_large_effect_takes_no_name_away(find):
     assert found.verdict.named == (("wheel_gain[left]",),)
     assert "is explained by no effect of the library" in found.verdict.sentence
     assert "mm forward" in found.verdict.sentence
+
+
+ASKED = {"data": ["drives"], "seed": 0}
+
+
+def test_a_killed_one_may_be_repeated(tmp_path):
+    request.begin(tmp_path, ASKED)
+    (tmp_path / "diagnosis.json").write_text("{}")
+    (tmp_path / f"{TEMPORARY}1-report.html").write_text("half")
+    request.begin(tmp_path, ASKED)
+    held = {path.name for path in tmp_path.iterdir()}
+    assert held == {"request.json", "diagnosis.json"}
+
+
+def test_another_one_is_refused_and_changes_nothing(tmp_path):
+    request.begin(tmp_path, ASKED)
+    with pytest.raises(BnsError, match="unfinished diagnosis of something else"):
+        request.begin(tmp_path, ASKED | {"seed": 1})
+    request.begin(tmp_path, ASKED)
+
+
+@pytest.mark.parametrize("name", ["diagnosis.json", "notes.txt"])
+def test_what_is_there_is_not_overwritten(tmp_path, name):
+    (tmp_path / name).write_text("{}")
+    with pytest.raises(BnsError, match="not overwritten"):
+        request.begin(tmp_path, ASKED)
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_one_that_could_not_be_finished_may_be_asked_otherwise(tmp_path):
+    request.begin(tmp_path, ASKED)
+    (tmp_path / "partial.json").write_text("{}")
+    request.drop(tmp_path)
+    request.begin(tmp_path, ASKED | {"seed": 1})
+    request.end(tmp_path)
+    assert not any(tmp_path.iterdir())
+
+
+TURNING_NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.008"
+DRAG = "rolling_drag:wheel=both,torque=1e-4,viscous=0"
+NAMES = "rolling_drag.torque[both]", "rolling_drag.viscous[both]"
+
+
+def test_dry_friction_is_told_from_viscous():
+    model = WheeledModel("khepera3", threads=1)
+    family = {item.name: item.commands for item in excitation.wheeled()}
+    slow = family["medium turn in place, both ways, each for 5 s"]
+    fast = family["fast turn in place, both ways, each for 1.5 s"]
+    world = MujocoWorld("khepera3", reality=[DRAG, TURNING_NOISE], threads=1)
+    trials = world.run([slow] * 2 + [fast] * 5, seeds=range(7))
+    found = diagnose(trials, model, rows=NAMES, full=False)
+    assert found.verdict.named == (("rolling_drag.torque[both]",),)
+    assert abs(found.best.magnitudes[0] - 1e-4) < 1e-5
+
+
+def test_a_wheel_that_sticks_is_told_from_a_dead_band():
+    model = WheeledModel("khepera3", threads=1)
+    sticks = "rolling_drag:wheel=right,torque=0.002,breakaway=0.004"
+    speeds = [0.05, 0.09, 0.14, 0.2]
+    told = [[[v, v], [0.0, 0.0], [-v, -v]] for v in speeds]
+    world = MujocoWorld("khepera3", reality=[sticks, TURNING_NOISE], threads=1)
+    trials = world.run([Commands(np.array(row), np.full(3, 1.2)) for row in told * 2])
+    names = [f"{name}[right]" for name in ("rolling_drag.torque", "dead_band")]
+    found = diagnose(trials, model, rows=names, full=False)
+    assert found.verdict.named == (("rolling_drag.torque[right]",),)
+    assert abs(found.best.magnitudes[0] - 0.002) < 1e-4
+    assert ", breakaway 0.0" in found.verdict.sentence
+
+
+def test_a_floor_that_is_slippery_carries_nothing():
+    model = WheeledModel("khepera3", threads=1)
+    slips = "floor_friction:factor=0.05"
+    told = [[[v, v], [-v, v], [0.0, 0.0], [-v, -v]] for v in (0.1, 0.2, 0.29)]
+    world = MujocoWorld("khepera3", reality=[slips, TURNING_NOISE], threads=1)
+    trials = world.run([Commands(np.array(row), np.full(4, 1.0)) for row in told * 2])
+    names = ["floor_friction", "payload", "motor_lag[both]", "dead_zone[right]"]
+    found = diagnose(trials, model, rows=names, full=False)
+    assert found.verdict.named == (("floor_friction",),)
+    assert abs(found.best.magnitudes[0] - 0.05) < 5e-3
+
+
+def test_a_limit_that_came_back_to_the_nominal_explains_nothing():
+    model = WheeledModel("khepera3", threads=1)
+    told = Commands(np.array([[0.1, 0.1], [0.05, 0.15]]), np.array([1.0, 1.0]))
+    trials = MujocoWorld("khepera3", reality=[TURNING_NOISE], threads=1).run([told] * 3)
+    names = ["wheel_gain[left]", "speed_saturation[right]"]
+    problem = Problem.of(trials, model)
+    point = descent.fitted_at(problem, descent.nothing(problem), names)
+    assert point.support == {"wheel_gain[left]"}
+    assert np.isfinite(point.cost)

@@ -9,7 +9,7 @@ from bns.viz import figures, recording, report, scene
 from bns.viz.figures.light import moving_mean, roamed
 from bns.worlds.light import sensors
 from bns.worlds.light.field import LightField
-from tests.bns.light_fakes import FakeLightWorld, small
+from tests.bns.robots import FakeLightWorld, small_light
 
 SENSORS, FIELD = sensors.of("khepera3"), LightField()
 FORWARD = [at for at, name in enumerate(SENSORS.names) if "back" not in name]
@@ -101,7 +101,7 @@ def test_the_figure_shows_six_sensors_and_the_virtual_two():
 
 @pytest.fixture(scope="module")
 def record():
-    return train(small(), world=FakeLightWorld())
+    return train(small_light(), world=FakeLightWorld())
 
 
 def test_the_report_speaks_of_the_lamp(record, tmp_path):

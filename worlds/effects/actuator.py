@@ -3,8 +3,7 @@
 import numpy as np
 
 from bns.worlds.effects.base import ActuatorEffect, ControlSignal, Parameter, strength
-from bns.worlds.effects.common import WHEEL, columns, spans
-from bns.worlds.effects.signals import lagged
+from bns.worlds.effects.common import WHEEL, columns, lagged, spans
 
 
 class MotorLag(ActuatorEffect):

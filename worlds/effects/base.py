@@ -15,7 +15,7 @@ An effect is a class in a file here or in a folder here; `registry` finds it by 
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -24,7 +24,6 @@ from numpy.random import Generator
 from bns.errors import BnsError, UnknownNameError
 from bns.worlds.effects.leg_sets import SERVO, chosen
 from bns.worlds.effects.parameter import Choice, Parameter, factor, strength
-from bns.worlds.effects.signals import ControlSignal, PoseSignal
 from bns.worlds.physics.servo_law import clipped
 
 __all__ = [
@@ -46,6 +45,46 @@ __all__ = [
 ]
 
 STAGES = ("command", "actuator", "body", "sensor", "tracking")
+
+
+@dataclass(frozen=True, eq=False)
+class ControlSignal:
+    """What reaches a robot's actuators during one trial, on the physics grid.
+
+    Attributes:
+        times: start of each physics step [s], shape ``(S,)``.
+        values: command in force at each step, shape ``(S, C)``, SI units.
+        command: index of that command in the list, shape ``(S,)``; -1 after the last.
+        channels: names of the C columns.
+        dt: physics step [s].
+    """
+
+    times: np.ndarray
+    values: np.ndarray
+    command: np.ndarray
+    channels: tuple[str, ...]
+    dt: float
+
+    def column(self, name: str) -> int:
+        """Column index of a channel."""
+        return self.channels.index(name)
+
+
+@dataclass(frozen=True, eq=False)
+class PoseSignal:
+    """What the tracker sees during one trial: samples on the observation grid.
+
+    Attributes:
+        times: time stamps [s], shape ``(T,)``.
+        poses: planar poses in the world frame, shape ``(T, 3)``; NaN = lost.
+        fine_times: the physics grid [s], shape ``(S + 1,)``, for delays.
+        fine_poses: true poses on it, shape ``(S + 1, 3)``.
+    """
+
+    times: np.ndarray
+    poses: np.ndarray
+    fine_times: np.ndarray
+    fine_poses: np.ndarray
 
 
 class Effect(ABC):

@@ -17,8 +17,8 @@ from bns.worlds.effects.base import (
     factor,
     strength,
 )
+from bns.worlds.effects.common import lagged
 from bns.worlds.effects.parts import ANY, WIDE
-from bns.worlds.effects.signals import lagged
 
 
 def _number(

@@ -1,4 +1,4 @@
-"""What several effects share: wheel columns, spans of time, limits of the drive."""
+"""What effects share: wheel columns, spans of time, limits of the drive, lags."""
 
 from collections.abc import Iterator
 
@@ -39,3 +39,24 @@ def rarer(effect: Effect, severity: float) -> int:
         return 0
     every = round(every / severity)
     return every if every <= effect.parameters[0].high else 0
+
+
+def lagged(
+    told: np.ndarray, before: float, time_constant: float, dt: float
+) -> np.ndarray:
+    """What follows a signal as a first-order lag, its mean over each step, ``(S,)``.
+
+    Solved exactly for values that are constant over a step. The mean is late by the
+    time constant at any step; the value at a step's end would be early by half a step.
+
+    Args:
+        told: values, ``(S,)``.
+        before: value that was followed until then.
+        time_constant: [s], positive.
+        dt: step [s].
+    """
+    from scipy.signal import lfilter
+
+    keep = np.exp(-dt / time_constant)
+    begun = lfilter([0.0, 1 - keep], [1.0, -keep], told, zi=[before])[0]
+    return told + (begun - told) * (1 - keep) * time_constant / dt

@@ -16,7 +16,7 @@ from bns import models
 from bns.errors import BnsError, FormatError
 from bns.models import light_sites
 from bns.storage import files, reading
-from bns.storage.numbers import Finite
+from bns.storage.reading import Finite
 
 FILE = "sight.json"
 ELEVATIONS = np.radians(np.arange(0, 90, 10))

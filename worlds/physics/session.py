@@ -8,7 +8,6 @@ import numpy as np
 
 from bns import seeding
 from bns.errors import BnsError
-from bns.worlds import closed_loop
 from bns.worlds.active import Stages
 from bns.worlds.checks import bounded
 from bns.worlds.light.sensing import LEAD, Sensing
@@ -17,6 +16,7 @@ from bns.worlds.physics import compile, observe
 from bns.worlds.physics.loop_control import LoopControl
 from bns.worlds.physics.rollout import Job, Motion, Pool, Segment
 from bns.worlds.trial import Channel
+from bns.worlds.world import checked_commands
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +146,7 @@ class Session:
             raise BnsError(
                 f"The {setting.cycles} cycles of this trial are over; begin another."
             )
-        told = closed_loop.checked(commands, setting.channels, setting.limits, n, at)
+        told = checked_commands(commands, setting.channels, setting.limits, n, at)
         told[self.stopped | self.diverged] = 0.0
         self.commands[:, at] = told
         begin = at * self.setting.steps

@@ -9,7 +9,6 @@ from bns import models
 from bns.errors import BnsError
 from bns.worlds.active import Stages
 from bns.worlds.checks import bounded, checked_start, of_kind, shared
-from bns.worlds.closed_loop import CYCLE, CYCLES, Policy
 from bns.worlds.damage import Damage
 from bns.worlds.light.sensing import Sensing
 from bns.worlds.light.supervisor import Supervisor
@@ -18,6 +17,7 @@ from bns.worlds.physics.rollout import Job, Motion, Pool
 from bns.worlds.physics.session import Session, Setting
 from bns.worlds.physics.world import PhysicsWorld, Settings
 from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Trial
+from bns.worlds.world import CYCLE, CYCLES, Policy
 
 STAGES = ("command", "actuator", "body", "tracking")
 

@@ -13,7 +13,7 @@ from bns import seeding
 from bns.errors import BnsError, FormatError
 from bns.storage import arrays as npz
 from bns.storage import reading
-from bns.storage.numbers import BEYOND
+from bns.storage.reading import BEYOND
 
 SCHEMA, VERSION = "bns-static-nets", 1
 INPUTS, OUTPUTS = 5, 3

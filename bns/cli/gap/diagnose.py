@@ -188,9 +188,9 @@ def _before(out: Path | None) -> Any:
 def _general(
     given: Diagnose, model: Any, trials: list[Any], out: Path | None, tell: Tell
 ) -> Any:
+    from bns.gap import request, warnings
     from bns.gap.diagnose import diagnose
     from bns.gap.recordings import check, load_recordings
-    from bns.gap.report import partial, warnings
     from bns.storage.files import StorageError
 
     load_recordings.tellable(trials, model)
@@ -205,18 +205,18 @@ def _general(
         return replace(found, warnings=(*found.warnings, *more))
     except BnsError as error:
         if out and not isinstance(error, StorageError):
-            kept = partial.write(trials, model, error, out)
+            kept = request.write_partial(trials, model, error, out)
             raise BnsError(f"{error} What was found until then: {kept}") from error
         raise
 
 
 def _servo(given: Diagnose, model: Any, trials: Any) -> Any:
     """Beside unchanged runs of the same servo, all of them."""
-    from bns.gap.models.servo import record
+    from bns.gap.models.servo import diagnosis
 
     all_of = replace(given, data=given.reference, only=(), trials="")
     unchanged = recorded(all_of, model)
-    return record.record(trials, unchanged, seed=given.seed)
+    return diagnosis.record(trials, unchanged, seed=given.seed)
 
 
 def _odometry(given: Diagnose) -> Any:

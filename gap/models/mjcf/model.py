@@ -8,7 +8,7 @@ import numpy as np
 from bns.gap.candidates import mjcf, mjcf_rows
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, Windows
-from bns.gap.models.mjcf import cuts, horizon, log, masses, start
+from bns.gap.models.mjcf import cuts, log, masses, start
 from bns.gap.models.mjcf import effects as own_effects
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.models.mjcf.simulation import Simulation
@@ -79,7 +79,7 @@ class OwnModel(GapModel):
         trials = log.read(path, self.config)
         if self.config.cut:
             return cuts.refined(trials, self.config, self)
-        return horizon.foreseen(trials, self.config, self.physics.model, self)
+        return cuts.foreseen(trials, self.config, self.physics.model, self)
 
     @property
     def least(self) -> np.ndarray:

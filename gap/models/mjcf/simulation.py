@@ -8,8 +8,8 @@ from functools import cached_property
 import mujoco
 import numpy as np
 
-from bns.errors import FormatError, UnknownNameError
-from bns.gap.models.mjcf import lean, prepared, start, view
+from bns.errors import FormatError
+from bns.gap.models.mjcf import prepared, start, view
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.models import mjcf as mjcf_file
 from bns.worlds.effects.base import (
@@ -57,9 +57,13 @@ class Simulation:
         model = self.model
         self.dt = float(model.opt.timestep)
         self.finest = math.ceil(self.dt / FINEST - 1e-9)
-        self.actuators = [_index(model, "actuator", t.actuator) for t in config.told]
+        self.actuators = [
+            prepared.number(model, "actuator", t.actuator) for t in config.told
+        ]
         if config.keyframe:
-            _index(model, "key", config.keyframe)  # there, before anything runs
+            prepared.number(
+                model, "key", config.keyframe
+            )  # there, before anything runs
         self.view = view.View.of(config, model)
 
     @property
@@ -78,14 +82,16 @@ class Simulation:
         made = prepared.spec(self.config)
         model = mjcf_file.compiled(made, self.config.model)
         if effects and made.compiler.inertiafromgeom == BY_GEOMS:
-            lean.weighed(made, model)  # else what effects say of masses is not heard
+            prepared.weighed(
+                made, model
+            )  # else what effects say of masses is not heard
         _edit(made, effects)
         return made
 
     @cached_property
     def _lean(self) -> mujoco.MjSpec:
         """The model without what only draws it."""
-        return lean.lean(self.spec(()))
+        return prepared.lean(self.spec(()))
 
     def compiled(self, effects: Sequence[Effect], parts: int = 1) -> Compiled:
         """The compiled model with the effects on its parts.
@@ -155,7 +161,7 @@ class Simulation:
 
     def _rest(self, model: mujoco.MjModel) -> np.ndarray:
         if self.config.keyframe:
-            key = _index(model, "key", self.config.keyframe)
+            key = prepared.number(model, "key", self.config.keyframe)
             return np.array(model.key_ctrl[key])
         return np.zeros(model.nu)
 
@@ -195,7 +201,7 @@ class Simulation:
         model = self.model
         data = mujoco.MjData(model)
         if self.config.keyframe:
-            key = _index(model, "key", self.config.keyframe)
+            key = prepared.number(model, "key", self.config.keyframe)
             mujoco.mj_resetDataKeyframe(model, data, key)
         if self.config.recorded or start.STATE in trial.conditions:
             start.place(data, trial, self.view)
@@ -243,12 +249,3 @@ def _key(trial: Trial, effects: Sequence[Effect]) -> tuple:
         str(trial.conditions.get(start.STATE)),
         tuple(str(effect) for effect in effects),
     )
-
-
-def _index(model: mujoco.MjModel, kind: str, name: str) -> int:
-    try:
-        return int(getattr(model, kind)(name).id)
-    except KeyError:
-        count = {"actuator": model.nu, "key": model.nkey}[kind]
-        known = [getattr(model, kind)(number).name for number in range(count)]
-        raise UnknownNameError(f"{kind} of the model", name, known) from None

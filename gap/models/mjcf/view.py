@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from bns.errors import UnknownNameError
+from bns.gap.models.mjcf import prepared
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.worlds.physics.rollout import STATE
 
@@ -34,7 +34,7 @@ class View:
         columns, parts = [], []
         for item in config.seen:
             kind = "joint" if item.quantity == "speed" else item.quantity
-            number = _number(model, kind, item.part)
+            number = prepared.number(model, kind, item.part)
             at = -1
             if item.quantity == "joint":
                 at = 1 + int(model.jnt_qposadr[number])
@@ -72,12 +72,3 @@ class View:
         for channel, column in enumerate(self.columns):
             if 0 < column <= nq:
                 data.qpos[column - 1] = seen[channel]
-
-
-def _number(model: mujoco.MjModel, kind: str, name: str) -> int:
-    try:
-        return int(getattr(model, kind)(name).id)
-    except KeyError:
-        count = {"joint": model.njnt, "site": model.nsite, "body": model.nbody}[kind]
-        known = [getattr(model, kind)(number).name for number in range(count)]
-        raise UnknownNameError(f"{kind} of the model", name, known) from None

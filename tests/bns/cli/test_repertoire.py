@@ -11,7 +11,7 @@ from bns.campaign.file import Member
 from bns.prior import repertoire
 from bns.standings import design, figures, run
 from bns.worlds import registry as worlds
-from tests.bns.walkers import Slider
+from tests.bns.robots import Slider
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from bns.evolution import selection
 from bns.experiment.run import train
 from bns.learners import registry
 from bns.tasks.base import BOARD
-from tests.bns import light_fakes, walkers
+from tests.bns import robots
 
 
 def test_the_best_of_each_cell_lives_and_then_the_best_of_the_rest():
@@ -28,7 +28,7 @@ def test_cells_have_their_edges_where_they_belong():
 
 
 def hybrid(**changes):
-    config = walkers.small(**changes)
+    config = robots.small(**changes)
     grid = replace(config.evolution, cells=3, selection="random", generations=20)
     return replace(config, evolution=grid)
 
@@ -47,7 +47,7 @@ def filled(learner) -> int:
 
 def test_a_grid_keeps_more_kinds_of_gaits_than_a_population_does():
     counts = []
-    for config in (hybrid(evolve_from=0), walkers.small(evolve_from=0)):
+    for config in (hybrid(evolve_from=0), robots.small(evolve_from=0)):
         learner = made(config)
         before = learner.propose(0)
         assert len(before.tried) == 2
@@ -59,7 +59,7 @@ def test_a_grid_keeps_more_kinds_of_gaits_than_a_population_does():
 def test_behaviours_inside_the_snn_are_those_of_the_task():
     learner = made(hybrid())
     tried = learner.propose(0).tried
-    trials = walkers.Slider().run(tried)
+    trials = robots.Slider().run(tried)
     inside = learner.problem.behaviours(learner.memories, learner._chosen)[:, 0]
     assert inside.double().numpy() == pytest.approx(learner.task.behaviour(trials))
 
@@ -81,15 +81,15 @@ def test_on_wheels_behaviours_are_where_lists_are_predicted_to_end():
 def test_killed_and_resumed_it_gives_the_same_bytes(tmp_path):
     config = hybrid(trials=6)
     whole, cut = tmp_path / "whole", tmp_path / "cut"
-    train(config, whole, world=walkers.Slider())
+    train(config, whole, world=robots.Slider())
     asked = iter([False] * 3 + [True])
-    train(config, cut, world=walkers.Slider(), stop=lambda: next(asked))
-    train(config, cut, world=walkers.Slider(), resume=True)
+    train(config, cut, world=robots.Slider(), stop=lambda: next(asked))
+    train(config, cut, world=robots.Slider(), resume=True)
     assert (whole / "state.npz").read_bytes() == (cut / "state.npz").read_bytes()
 
 
 def test_it_is_refused_where_there_are_no_behaviours():
-    config = light_fakes.small()
+    config = robots.small_light()
     config = replace(config, evolution=replace(config.evolution, cells=3))
     with pytest.raises(BnsError, match=r"evolution\.cells is for walking"):
         made(config)

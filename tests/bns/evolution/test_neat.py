@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.rivals.neat import ENDS, RULE, answers, exclusive_or
+from bench.rivals.networks import ENDS, RULE, answers, exclusive_or
 from bns.evolution.neat import (
     Lineage,
     NeatSettings,

@@ -17,7 +17,7 @@ from bns.evolution.goals import COINS, TICK, GoalBreeder, Goals, repeated
 from bns.experiment.task_settings import ControllerConfig
 from bns.learners.bns.config import EvolutionConfig
 from bns.learners.bns.learner import Bns
-from tests.bns.walkers import small
+from tests.bns.robots import small
 
 COSTS = torch.tensor([[4.0, 1.0, 3.0, 2.0]])
 

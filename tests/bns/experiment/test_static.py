@@ -14,7 +14,7 @@ from bns.worlds import registry
 from bns.worlds.effects.legs import RAISED
 from bns.worlds.static_snn.nets import StaticNets, kinematic_nets
 from bns.worlds.trial import Commands
-from tests.bns.walkers import Slider, small
+from tests.bns.robots import Slider, small
 
 
 def test_imitates_a_known_world():

@@ -8,7 +8,7 @@ import pytest
 from bns.experiment.batch import Batch
 from bns.experiment.run import train
 from bns.learners.bns.deployed import AGE, PAUSE, Deployed, packed, unpack
-from tests.bns import light_fakes, walkers
+from tests.bns import robots
 
 
 def genes(number):
@@ -82,7 +82,7 @@ def test_it_comes_back_from_plain_arrays():
     assert again[0].best.costs == [3.0, 3.1] and again[1].best is None
 
 
-class Broken(walkers.Slider):
+class Broken(robots.Slider):
     """From trial 12 on it gets a third as far."""
 
     def run(self, commands, *, trial=0, seeds=()):
@@ -93,7 +93,7 @@ class Broken(walkers.Slider):
 
 
 def deploying(**changes):
-    return replace(walkers.small(**changes), deploy="seen")
+    return replace(robots.small(**changes), deploy="seen")
 
 
 def test_deployed_it_goes_as_far_as_was_seen_since_the_robot_changed():
@@ -115,10 +115,10 @@ def test_deployed_it_goes_as_far_as_was_seen_since_the_robot_changed():
 @pytest.mark.parametrize("small", [deploying, None])
 def test_killed_and_resumed_it_gives_the_same_bytes(tmp_path, small):
     config = deploying(trials=8)
-    world = walkers.Slider()
+    world = robots.Slider()
     if small is None:
-        config = replace(light_fakes.small(), deploy="seen", trials=8)
-        world = light_fakes.FakeLightWorld()
+        config = replace(robots.small_light(), deploy="seen", trials=8)
+        world = robots.FakeLightWorld()
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     record = train(config, whole, world=world)
     asked = iter([False] * 5 + [True])
@@ -129,15 +129,15 @@ def test_killed_and_resumed_it_gives_the_same_bytes(tmp_path, small):
 
 
 def test_off_it_is_as_it_was():
-    record = train(walkers.small(trials=3), world=walkers.Slider())
+    record = train(robots.small(trials=3), world=robots.Slider())
     assert not {"solved_best", "retried"} & set(record.columns)
 
 
 def test_a_report_shows_deployed_and_tried_apart(tmp_path):
     from bns.viz import report
 
-    record = train(deploying(trials=6), world=walkers.Slider())
+    record = train(deploying(trials=6), world=robots.Slider())
     page = report.write(record, tmp_path / "r.html").read_text()
     assert "Deployed, it solves" in page
-    plain = train(walkers.small(trials=3), world=walkers.Slider())
+    plain = train(robots.small(trials=3), world=robots.Slider())
     assert "Deployed" not in report.write(plain, tmp_path / "p.html").read_text()

@@ -14,7 +14,7 @@ from bns.learners import registry
 from bns.learners.safe_ite import improvement
 from bns.prior import maker
 from bns.worlds.world import CountedWorld
-from tests.bns.walkers import Slider
+from tests.bns.robots import Slider
 
 WALK = replace(presets.load("hexapod-walk"), threads=1, replicates=2, trials=30)
 ONSET = 3

@@ -9,11 +9,11 @@ import torch
 from bns.draws import Draws
 from bns.errors import BnsError
 from bns.experiment.task_settings import LightConfig
-from bns.learners.bns.light import patterns
+from bns.learners.bns.light import simulator as simulated
 from bns.learners.bns.light.simulator import Simulator, Thetas
 from bns.tasks.light import LampGoal, lost
 from bns.tasks.light_controller import Controllers, GenomePolicy, brightness, counts
-from tests.bns.light_fakes import FakeLightWorld, small
+from tests.bns.robots import FakeLightWorld, small_light
 
 TASK = LampGoal.of(LightConfig(goal=0.3, circle_cycles=40))
 
@@ -151,7 +151,7 @@ class TestSimulator:
 
     @pytest.mark.parametrize("recurrent", [False, True])
     def test_a_cycle_by_hand(self, recurrent):
-        config = small(recurrent=recurrent, hidden=3)
+        config = small_light(recurrent=recurrent, hidden=3)
         simulator, draws = Simulator.of(config), Draws(5)
         kind = simulator.controllers
         genome = draws.uniform(1, 1, kind.genes) * 4 - 2
@@ -173,13 +173,13 @@ class TestSimulator:
             cos, sin = np.cos(pose[2]), np.sin(pose[2])
             pose += [cos * forward - sin * left, sin * forward + cos * left, turn]
             total += abs(np.hypot(*(lamp - pose[:2])) - config.light.goal)
-        here = patterns.in_body(pose[None], tuple(lamp))[0]
+        here = simulated.in_body(pose[None], tuple(lamp))[0]
         np.testing.assert_allclose(state.ahead.item(), here[0], atol=1e-5)
         np.testing.assert_allclose(state.left.item(), here[1], atol=1e-5)
         assert state.error.item() == pytest.approx(total, abs=1e-5)
 
     def test_inside_the_boundary_robots_stand(self):
-        simulator, draws = Simulator.of(small()), Draws(1)
+        simulator, draws = Simulator.of(small_light()), Draws(1)
         thetas = Thetas(
             simulator.motion.random(1, draws), simulator.sensors.random(1, draws)
         )
@@ -195,8 +195,8 @@ class TestSimulator:
         ("charge", "expected"), [("stand", 0.3), ("start", 0.6), ("far", 1.0)]
     )
     def test_what_a_stopped_robots_cycle_costs(self, charge, expected):
-        light = replace(small().light, goal=0.4, charge_stopped=charge)
-        simulator, draws = Simulator.of(replace(small(), light=light)), Draws(1)
+        light = replace(small_light().light, goal=0.4, charge_stopped=charge)
+        simulator, draws = Simulator.of(replace(small_light(), light=light)), Draws(1)
         thetas = Thetas(
             simulator.motion.random(1, draws), simulator.sensors.random(1, draws)
         )
@@ -220,11 +220,11 @@ class TestPatterns:
         return trial.replace(handled=handled)
 
     def scales(self):
-        return Simulator.of(small()).scales
+        return Simulator.of(small_light()).scales
 
     def test_handled_cycles_teach_no_motion(self):
         trial = self.trial()
-        found = patterns.motion(trial, self.scales())
+        found = simulated.motion_patterns(trial, self.scales())
         assert len(found.inputs) == 6
         assert not found.inputs[0, :2].any()
         assert not found.inputs[3, :2].any()  # cycle 4 begins at rest
@@ -232,7 +232,7 @@ class TestPatterns:
         np.testing.assert_allclose(found.inputs[4, 2:], told)
 
     def test_sensors_teach_until_the_robot_is_stopped(self):
-        found = patterns.sensors(self.trial(), (0.0, 0.0))
+        found = simulated.sensor_patterns(self.trial(), (0.0, 0.0))
         assert len(found.inputs) == 9  # the start and eight cycles
         away = np.hypot(*found.inputs.T)
         real = np.hypot(*self.trial().command_poses_world[:9, :2].T)
@@ -248,8 +248,16 @@ class TestPatterns:
         commands = replace(trial.commands, values=trial.commands.values[:, ::-1])
         other = trial.replace(observed=turned, commands=commands)
         for kind, mirror, extra in (
-            (patterns.motion, patterns.mirrored_motion, self.scales()),
-            (patterns.sensors, patterns.mirrored_sensors, (0.0, 0.0)),
+            (
+                simulated.motion_patterns,
+                simulated.mirrored_motion,
+                self.scales(),
+            ),
+            (
+                simulated.sensor_patterns,
+                simulated.mirrored_sensors,
+                (0.0, 0.0),
+            ),
         ):
             expected, found = kind(other, extra), mirror(kind(trial, extra))
             np.testing.assert_allclose(found.inputs, expected.inputs, atol=1e-9)

@@ -20,7 +20,7 @@ from bns.learners.bns.light import islands
 from bns.learners.bns.light.problem import Weights
 from bns.tasks.light_controller import Controllers, GenomePolicy, LightController
 from tests.bns.contents import contents
-from tests.bns.light_fakes import FakeLightWorld, small
+from tests.bns.robots import FakeLightWorld, small_light
 
 
 class TestEvolution:
@@ -65,7 +65,7 @@ class TestEvolution:
             assert moved[row, cost[row].argmin()] == row
 
     def test_reset_keeps_as_many_as_asked_for(self):
-        configs = [small(reset_every=1, reset_elitists=n) for n in (0, 3)]
+        configs = [small_light(reset_every=1, reset_elitists=n) for n in (0, 3)]
         learner = Bns(configs, replicates=[0, 0], onsets=[-1, -1])
         before = learner.population.genes.clone()
         learner._reset(1)
@@ -73,7 +73,7 @@ class TestEvolution:
         assert same.any(2).sum(1).tolist() == [0, 3]
 
     def test_the_worst_islands_start_anew_and_the_others_do_not(self):
-        config = small(islands=4, renewed=3)
+        config = small_light(islands=4, renewed=3)
         learner = Bns([config] * 2, replicates=[0, 1], onsets=[-1, -1])
         before = learner.population.genes.clone()
         size = before.shape[1]
@@ -85,7 +85,7 @@ class TestEvolution:
         assert kept.tolist() == [True, *[False] * 4, True, False, False]
 
     def test_weights_stay_within_their_limit(self):
-        config = small(weight_limit=12.0)
+        config = small_light(weight_limit=12.0)
         learner = Bns([config], replicates=[0], onsets=[-1])
         for trial in (1, 2):
             learner.propose(trial)  # SBX would spread them beyond it
@@ -94,7 +94,7 @@ class TestEvolution:
 
 class TestLoop:
     def test_it_learns_to_come_closer(self):
-        config = small()
+        config = small_light()
         evolution = replace(config.evolution, population=60, generations=8)
         snn = replace(config.snn, epochs=60)
         light = replace(config.light, starts=4, cycles=40)
@@ -109,7 +109,7 @@ class TestLoop:
         "light", [{}, {"islands": 2, "migration_every": 1, "renewed": 1}]
     )
     def test_a_run_that_was_stopped_resumes_to_the_same_bytes(self, tmp_path, light):
-        config = small(**light)
+        config = small_light(**light)
         train(config, tmp_path / "whole", world=FakeLightWorld())
         asked = iter([False, True])
         part = {"world": FakeLightWorld(), "resume": True}
@@ -119,7 +119,7 @@ class TestLoop:
         assert whole == resumed
 
     def test_runs_of_a_batch_keep_their_own_settings(self):
-        configs = [small(mirror=True), small(mirror=False, weights=1.0)]
+        configs = [small_light(mirror=True), small_light(mirror=False, weights=1.0)]
         learner = Bns(configs, replicates=[0, 0], onsets=[-1, -1])
         reach = learner.population.genes.abs().amax((1, 2, 3))
         assert reach[0] > 9
@@ -133,7 +133,7 @@ class TestLoop:
 
     def test_a_batch_is_drawn_from_all_patterns_of_a_run(self):
         learner = Bns(
-            [small(batch=32, mirror=False), small(batch=32)],
+            [small_light(batch=32, mirror=False), small_light(batch=32)],
             replicates=[0, 0],
             onsets=[-1, -1],
         )
@@ -149,15 +149,19 @@ class TestLoop:
 
     def test_settings_that_cannot_differ(self):
         with pytest.raises(BnsError, match="light following may differ"):
-            Bns([small(), small(hidden=7)], replicates=[0, 1], onsets=[-1, -1])
+            Bns(
+                [small_light(), small_light(hidden=7)],
+                replicates=[0, 1],
+                onsets=[-1, -1],
+            )
         with pytest.raises(BnsError, match="multiple"):
-            Bns([small(islands=5)], replicates=[0], onsets=[-1])
+            Bns([small_light(islands=5)], replicates=[0], onsets=[-1])
         with pytest.raises(BnsError, match="nothing would be learned"):
-            Bns([small(renewed=1)], replicates=[0], onsets=[-1])
+            Bns([small_light(renewed=1)], replicates=[0], onsets=[-1])
 
     def test_foreseen_and_measured_agree_where_the_snns_are_right(self):
         """A robot that was seen to stand still is foreseen where it stands."""
-        config = small()
+        config = small_light()
         stops = replace(config.controller, speed_low=5000.0)
         config = replace(config, controller=stops)
         learner = Bns([config], replicates=[0], onsets=[-1])
@@ -177,7 +181,7 @@ class TestLoop:
 
 def test_windows_and_magnitudes_follow_the_adaptations():
     config = replace(
-        small(),
+        small_light(),
         adaptation=replace(RunConfig().adaptation, mutation_magnitude_after=0.3),
     )
     learner = Bns([config], replicates=[0], onsets=[1])
@@ -188,7 +192,7 @@ def test_windows_and_magnitudes_follow_the_adaptations():
 
 class TestDisagreement:
     def learner(self, **light):
-        config = small(**light)
+        config = small_light(**light)
         config = replace(config, choose="disagreement")
         config = replace(config, snn=replace(config.snn, kind="ensemble", members=4))
         return Bns([config] * 2, replicates=[0, 1], onsets=[-1, -1])
@@ -213,7 +217,7 @@ class TestDisagreement:
         assert (record["fitness_best"] != record["fitness"]).any()
 
     def test_needs_an_ensemble(self):
-        config = replace(small(), choose="disagreement")
+        config = replace(small_light(), choose="disagreement")
         learner = Bns([config], replicates=[0], onsets=[-1])
         with pytest.raises(BnsError, match="needs an ensemble"):
             learner.propose(0)

@@ -14,7 +14,7 @@ from bns.experiment.loading import from_mapping, to_mapping, with_learner
 from bns.learners.neat import Genomes, Neat, NeatControllers
 from bns.tasks.light_controller import GenomePolicy
 from bns.worlds.world import CountedWorld
-from tests.bns.light_fakes import FakeLightWorld
+from tests.bns.robots import FakeLightWorld
 
 KIND = NeatControllers(5, False, -0.1, 0.1, 0.0, most=20)
 

@@ -11,7 +11,7 @@ from bns.learners.bns.learner import Bns
 from bns.learners.bns.walking import GOAL, MOVED
 from bns.models.phantomx import gait, kinematics
 from bns.snn.fitting import Patterns
-from tests.bns.walkers import Slider, small
+from tests.bns.robots import Slider, small
 
 STANDING = np.zeros((1, 18))
 CROUCHED = gait.tripod(gait.Tripod(stride=0.02, height=0.12))[3:4]  # all feet down

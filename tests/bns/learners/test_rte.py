@@ -10,16 +10,11 @@ from bns.errors import BnsError
 from bns.experiment.batch import Batch
 from bns.experiment.loading import with_learner
 from bns.prior import driving
-from bns.worlds import registry as worlds
 from bns.worlds.world import CountedWorld
+from tests.bns.robots import wheels
 
 SLOW = "wheel_gain:wheel=left,factor=0.8"
 QUICK = {"iterations": 200, "evaluations": 40}
-
-
-def wheels(damage=()):
-    start = (0.0, 0.0, 0.0)
-    return worlds.make("static-snn", robot="khepera3", damage=damage, start=start)
 
 
 def batch(onset, *, model=True, most=4000, **own):

@@ -26,7 +26,7 @@ from bns.snn.network import Shape, forward
 from bns.tasks import walk as task
 from bns.tasks.walk import WalkTask
 from bns.worlds.trial import Commands, Outcome, Trial
-from tests.bns.walkers import STRIDE, Slider, small
+from tests.bns.robots import STRIDE, Slider, small
 
 SHAPE = Shape(groups=3, hidden=8, outputs=3, inputs=36, activation="relu")
 

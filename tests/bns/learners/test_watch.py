@@ -15,7 +15,7 @@ from bns.learners.bns.navigation import WheeledProblem, ways
 from bns.snn.scaling import AXLE
 from bns.tasks.light_controller import GenomePolicy
 from tests.bns.learners.test_learner import SMALL, batch, play
-from tests.bns.light_fakes import FakeLightWorld, small
+from tests.bns.robots import FakeLightWorld, small_light
 
 WATCH = WatchConfig()
 
@@ -254,7 +254,7 @@ class TestInTheLearner:
         ("broken", "name"), [(3, "left sensor"), (4, "right sensor")]
     )
     def test_a_dead_sensor_is_named_and_reacted_to(self, broken, name):
-        config = small()
+        config = small_light()
         config = replace(config, snn=replace(config.snn, epochs=60))
         watch = WatchConfig(detect=True, warmup=4, history=6)
         reset = replace(config.adaptation, population_reset=True)
@@ -272,7 +272,7 @@ class TestInTheLearner:
         assert learner.adaptations.resets(11).population.all()
 
     def test_what_is_contradicted_is_dropped_with_its_trial_numbers(self):
-        config = replace(small(), watch=WatchConfig(forget=True))
+        config = replace(small_light(), watch=WatchConfig(forget=True))
         learner = Bns([config], replicates=[0], onsets=[-1])
         for trial in range(3):
             row = learner.observe(trial, self.drive(learner, trial), None)

@@ -17,13 +17,6 @@ from tests.bns.contents import contents
 
 
 @pytest.fixture
-def run(fakes, tmp_path) -> Path:
-    """A finished run."""
-    fakes.train(tmp_path / "run")
-    return tmp_path / "run"
-
-
-@pytest.fixture
 def begun(fakes, tmp_path) -> Path:
     """A run stopped after two trials."""
     asked = iter([False, False, True])

@@ -10,7 +10,7 @@ from bns.gap.decomposition.reference import Corrected
 from bns.gap.describe import describe
 from bns.gap.diagnose import diagnose
 from bns.gap.models.base import GapModel
-from bns.gap.models.mjcf import cuts, lean
+from bns.gap.models.mjcf import cuts, prepared
 from bns.gap.models.mjcf.model import OwnModel
 
 CART = """<mujoco model="cart"><option timestep="0.01" integrator="RK4"/>
@@ -98,7 +98,7 @@ def test_trials_that_begin_in_a_known_state_stay_as_they_are(said):
 
 def test_a_lean_model_moves_alike_and_holds_no_pictures():
     spec = mujoco.MjSpec.from_string(CART)
-    whole, small = spec.compile(), lean.lean(spec).compile()
+    whole, small = spec.compile(), prepared.lean(spec).compile()
     assert small.nmesh == small.ntex == small.nmat == 0 < whole.nmesh
     assert small.nbuffer < 0.1 * whole.nbuffer
     ends = []
@@ -114,7 +114,7 @@ def test_a_mesh_that_a_sensor_needs_stays():
     sensor = '<sensor><framepos objtype="geom" objname="shell"/></sensor></mujoco>'
     named = CART.replace('mesh="hull" mass', 'mesh="hull" name="shell" mass')
     spec = mujoco.MjSpec.from_string(named.replace("</mujoco>", sensor))
-    assert lean.lean(spec).compile().nmesh == 1
+    assert prepared.lean(spec).compile().nmesh == 1
 
 
 def test_a_model_that_weighs_by_its_geoms_alone_can_be_loaded(tmp_path):

@@ -1,10 +1,11 @@
-"""Faults of recordings are repaired, left out or refused, and listed."""
+"""Recordings are checked and read: faults are repaired, left out or refused."""
 
 import numpy as np
 import pytest
 
 from bns.errors import FormatError
-from bns.gap.recordings import check, stuck_channels
+from bns.gap.recordings import check, segments
+from bns.gap.recordings.conditions import as_number
 from bns.worlds.physics.wheeled_world import MujocoWorld
 from bns.worlds.trial import Commands
 
@@ -58,7 +59,7 @@ def test_a_robot_that_stands_still_is_no_stuck_channel(model):
     there = Commands([[0.1, 0.1], [0.0, 0.0]], [1.0, 1.0])
     dead = "wheel_gain:wheel=both,factor=0"
     trials = MujocoWorld(reality=[dead], threads=1).run([there])
-    assert not stuck_channels.dropped(trials[0], model)[1]
+    assert not check.without_stuck(trials[0], model)[1]
 
 
 def test_a_motion_that_turns_back_is_no_spike(model):
@@ -84,3 +85,26 @@ def test_a_wrong_unit_is_refused(model, told):
     large = [t.replace(observed=t.observed * [1000, 1000, 1]) for t in trials]
     with pytest.raises(FormatError, match=r"x moves 1.* times as far"):
         check.check(large, model)
+
+
+@pytest.mark.parametrize("value", [0.1, np.float64(0.1), "0.1"])
+def test_a_condition_is_read_as_a_number(value):
+    assert as_number({"gain": value}, "gain") == 0.1
+
+
+def test_a_condition_that_is_missing_has_its_default():
+    assert as_number({}, "speed", 2.0) == 2.0
+
+
+@pytest.mark.parametrize("value", ["fast", None, [1.0]])
+def test_a_condition_that_is_no_number_is_named(value):
+    with pytest.raises(FormatError, match="'speed'"):
+        as_number({"speed": value}, "speed")
+
+
+def test_a_robot_that_stays_has_no_places():
+    noise = np.random.default_rng(0).normal(0, 1e-3, (50, 3))
+    coarse = segments.coarse(noise + np.array([0.4, -0.2, 3.1]))
+    assert np.ptp(coarse, axis=0).max() < 1e-12
+    along = np.linspace(0, 1, 50)[:, None] * [0.5, 0.0, 0.0]
+    assert len(np.unique(segments.coarse(along)[:, 0].round(9))) == 17  # 0.5 m / 3 cm

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.gap import store
+from bns.gap import store, warnings
 from bns.gap.diagnose import diagnose
 from bns.gap.models.unicycle import UnicycleModel
 from bns.gap.recordings import load_recordings
-from bns.gap.report import warnings
 from bns.worlds import registry
 from bns.worlds.data import dataset
 from bns.worlds.effects import registry as effects

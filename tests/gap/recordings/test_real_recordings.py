@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.gap import real_data, servo_cases
+from bench.gap import real_data, servo
 from bns.gap.importers import khepera3_odometry, mrclam6, xl330
 from bns.gap.models.odometry.diagnosis import diagnose
 from bns.gap.models.odometry.motions import Motions
@@ -46,9 +46,9 @@ def test_khepera_wheels_or_axle_and_the_mount():
     assert found.plan[0][0].startswith("long straight drive")
 
 
-@needs(servo_cases.SET)
+@needs(servo.SET)
 def test_servo_settings_that_are_mis_told():
-    every = servo_cases.load()
+    every = servo.load()
     assert len(every) == 960
     law = Nominal({**servo_pendulum.law(), "offset": 0.017}, 0.0)
     known = every.take(
@@ -57,13 +57,13 @@ def test_servo_settings_that_are_mis_told():
     assert np.abs(law.predict(known) - known.angles).mean() < 0.03
     reference = diagnosis.learn(known, law, candidates=candidates(CANDIDATES))
     for true in sorted(set(cells(known)))[5:7]:
-        mine = servo_cases.of_cell(known, true, (1, 2))
+        mine = servo.of_cell(known, true, (1, 2))
         for at, kind in enumerate(("payload", "lever", "gain", "none")):
             told = list(true)
             if kind != "none":
                 levels = sorted({cell[at] for cell in cells(known)} - {true[at]})
                 told[at] = levels[-1]
-            runs = servo_cases.retold(mine, tuple(told))
+            runs = servo.retold(mine, tuple(told))
             found, scores = diagnosis.diagnose(runs, reference, without=[true])
             if kind == "none":
                 assert found.kind == "no gap"

@@ -21,8 +21,6 @@ from bns.learners.base import Curves, Panel
 from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.forgetting import contradicted, newer
 from bns.learners.bns.light import innovations, islands
-from bns.learners.bns.light import patterns as light_patterns
-from bns.learners.bns.light.patterns import in_body
 from bns.learners.bns.light.simulator import (
     MOTION_OUTPUTS,
     SENSORS,
@@ -30,6 +28,11 @@ from bns.learners.bns.light.simulator import (
     Simulator,
     State,
     Thetas,
+    in_body,
+    mirrored_motion,
+    mirrored_sensors,
+    motion_patterns,
+    sensor_patterns,
 )
 from bns.learners.bns.memory import Memory, Patterns
 from bns.learners.bns.problem import Problem
@@ -348,12 +351,12 @@ class LightProblem(Problem):
 
     def patterns(self, run: int, trial: Trial) -> list[tuple[Patterns, ...]]:
         """See `Problem.patterns`: of motion and of sensors, then mirrored."""
-        moved = light_patterns.motion(trial, self.simulator.scales)
-        light = light_patterns.sensors(trial, self.task.goal.lamp)
+        moved = motion_patterns(trial, self.simulator.scales)
+        light = sensor_patterns(trial, self.task.goal.lamp)
         both = [(moved, self._views(light))]
         if self.configs[run].light.mirror:
-            mirrored = light_patterns.mirrored_sensors(light)
-            both.append((light_patterns.mirrored_motion(moved), self._views(mirrored)))
+            mirrored = mirrored_sensors(light)
+            both.append((mirrored_motion(moved), self._views(mirrored)))
         return list(both)
 
     def _views(self, light: Patterns) -> Patterns:

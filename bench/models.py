@@ -1,4 +1,4 @@
-"""How the hexapod is integrated: what a time step and a friction cone cost."""
+"""How models drive: what a time step costs the hexapod, and how near the Khepera is."""
 
 import time
 from typing import Any
@@ -101,3 +101,32 @@ def _ends(lists: np.ndarray, step: float, cone: str, impratio: float) -> Any:
     used = time.process_time() - begin
     places = np.array([states[0, -1, 1:3] for states, _ in ends])
     return places, used / (len(lists) * lists.shape[1] * HOLD)
+
+
+@bench(
+    "largest deviation of the Khepera's four calibration figures from the robot's",
+    bar="<= 100 % of what is allowed (3 % speed and spin, 10 % starting losses)",
+)
+def khepera_calibration(quick: bool) -> Result:
+    """Drive straight and spin from rest; quick changes nothing, it takes a second."""
+    from bns import models
+    from bns.models.khepera3 import calibration
+
+    measured = calibration.measure(models.spec("khepera3"))
+    shares = calibration.deviations(measured)
+    worst = 100 * max(shares.values())
+    return Result(
+        figure=round(worst, 2),
+        unit="% of what is allowed",
+        holds=worst <= 100,
+        n=len(shares),
+        details={
+            "measured": measured._asdict(),
+            "target": {k: float(v) for k, v in calibration.TARGET._asdict().items()},
+            "deviation_percent": {
+                name: round(100 * share * getattr(calibration.TOLERANCE, name), 3)
+                for name, share in shares.items()
+            },
+            "units": "speed m/s, spin rad/s, lost_distance m, lost_angle rad",
+        },
+    )
