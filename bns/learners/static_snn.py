@@ -91,7 +91,9 @@ class StaticSnn(Bns):
         """See `Learner.propose`; random controllers, then one that evolved."""
         self._trial = trial
         if self.learns_from(trial):
-            self._chosen = self._encoding.random(self.runs, 1, self.draws)
+            rows = len(self.population.lengths)  # of islands, where a run has some
+            drawn = self._by_run(self._encoding.random(rows, 1, self.draws))
+            self._chosen = drawn.pick(torch.zeros_like(drawn.lengths[:, 0]))
         elif trial == self.random_trials:
             self._transfer(trial)
         return Proposal(self.problem.controllers(self._chosen))

@@ -50,6 +50,7 @@ def make(directory: Path, answers: Path, cases: Iterable[tuple[str, Case]]) -> i
         )
     if directory.is_file():
         raise BnsError(f"{directory} is a file: give a directory for the cases.")
+    files.make_directory(answers.parent)
     files.check_writable(answers)
     known: dict[str, Any] = {}
     with Lock(directory):

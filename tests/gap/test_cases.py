@@ -70,7 +70,7 @@ def test_a_casebook_keeps_its_answers_apart(model, tmp_path):
     with pytest.raises(BnsError, match="see the answers"):
         benchmark_io.make(tmp_path / "book", tmp_path / "book" / "a.json", [])
     made = benchmark_io.make(
-        tmp_path / "book", tmp_path / "answers.json", [("c1", case)]
+        tmp_path / "book", tmp_path / "kept" / "answers.json", [("c1", case)]
     )
     assert made == 1
     assert "wheel_diameter" not in (tmp_path / "book/c1/dataset.json").read_text()
@@ -78,7 +78,7 @@ def test_a_casebook_keeps_its_answers_apart(model, tmp_path):
     few = FewRows(threads=1)
     assert benchmark_io.run(tmp_path / "book", few, said) == 1
     assert benchmark_io.run(tmp_path / "book", few, said) == 0
-    (row,) = benchmark_io.score(said, tmp_path / "answers.json")
+    (row,) = benchmark_io.score(said, tmp_path / "kept" / "answers.json")
     assert row["kind"] == "none"
     assert row["said"]["verdict"] == "no gap"
 

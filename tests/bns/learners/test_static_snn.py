@@ -87,3 +87,17 @@ def test_settings_of_bns_that_it_heeds_are_its_own_and_others_are_refused():
     back = with_learner(made, "bns")
     assert back.evolution.population == 40
     assert with_learner(back, "random").evolution.population == 100
+
+
+def test_runs_with_islands_draw_one_random_controller_each():
+    told = {"trials": 3, "replicates": 2, "compiled": "no"}
+    base = replace(presets.load("khepera-light-recover"), threads=1)
+    base = with_learner(base, "static_snn")
+    own = {"settings.commands": 40, "settings.generations": 2, "settings.trainings": 1}
+    made = base.with_({**told, **own, "snn.epochs": 5, "world.damage": []})
+    world = worlds.make("light", robot=made.world.robot, damage=())
+    batch = Batch([made], [world])
+    for trial in range(3):
+        batch.advance(trial)
+    assert made.light.islands > 1
+    assert np.isfinite(batch.learner.cost.numpy()).all()
