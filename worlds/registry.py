@@ -76,7 +76,7 @@ def get(name: str) -> Callable[..., World]:
             "run there, name the file in $BNS_WORLDS, or keep it for all directories "
             "with `bns gap apply ... --user`."
         )
-    also = "A world that `bns gap apply` kept is known beside its worlds.toml."
+    also = "A world of `bns gap apply` is known beside its file; --user: everywhere."
     raise UnknownNameError("world", name, names(), also)
 
 

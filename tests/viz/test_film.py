@@ -52,7 +52,7 @@ def test_what_cannot_be_is_refused(record, tmp_path, name, more, message):
     ("words", "message"),
     [
         (["--gif", "a.gif", "--png", "a.png"], "Give one of"),
-        (["--gif", "a.mp4"], "does not end in .gif"),
+        (["--gif", "a.mp4"], "give a name that ends in .gif"),
     ],
 )
 def test_wrong_words_are_one_line(words, message, capsys, tmp_path):
