@@ -1,6 +1,6 @@
 """Is a recording sound? Faults are repaired and listed, or stop the diagnosis."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -43,6 +43,7 @@ def check(
     seen: dict[bytes, str] = {}
     timed = model.timed  # else commands end by themselves
     odd = _odd_clocks(trials) if timed else {}
+    sound: list[tuple[int, str, Trial, list[str]]] = []
     for number, trial in enumerate(trials):
         label = trial_labels.of(trial, number)
         _channels(trial, model, label)
@@ -54,9 +55,10 @@ def check(
             notes.append(f"{label}: the same samples as {seen[same]}, left out")
             continue
         seen[same] = label
-        trial, found = _repaired(trial, label, timed)
-        notes += found
-        trial, found = without_stuck(trial, model)
+        sound.append((number, label, *_repaired(trial, label, timed)))
+    stuck = without_stuck([trial for _, _, trial, _ in sound], model)
+    for (number, label, _, repairs), (trial, found) in zip(sound, stuck, strict=True):
+        notes += repairs
         notes += [f"{label}: {note}" for note in found]
         fault = odd.get(number) or _unusable(trial, wanted)
         if fault:
@@ -264,25 +266,52 @@ SAME = 0.05  # share of repeated values from which a channel counts as coarse
 STEPS = 3.0  # times the smallest step of a quantised channel, likewise
 
 
-def without_stuck(trial: Trial, model: GapModel) -> tuple[Trial, list[str]]:
+def without_stuck(
+    trials: Sequence[Trial], model: GapModel
+) -> list[tuple[Trial, list[str]]]:
     """Samples dropped in which a channel keeps one value though it should move.
 
+    What stands still in one trial because of what it measures (a joint that is locked)
+    is no fault of a channel in another, where it may show less.
+
     Args:
-        trial: recorded trial.
+        trials: recorded trials.
         model: nominal model; what it predicts says what should move.
 
     Returns:
-        the trial; a note per channel.
+        each trial; a note per channel.
     """
-    runs = {
-        column: found
-        for column in range(len(model.channels))
-        if (found := _runs(trial.observed[:, column]))
+    runs = [
+        {
+            column: found
+            for column in range(len(model.channels))
+            if (found := _runs(trial.observed[:, column]))
+        }
+        for trial in trials
+    ]
+    paths = {
+        number: model.simulate([trial], [()])[0][0]
+        for number, trial in enumerate(trials)
+        if runs[number]
     }
-    if not runs:
-        return trial, []
-    ((predicted,),) = model.simulate([trial], [()])
-    explained = model.at_rest(trial, predicted)
+    explained: set[str] = set()
+    for number, predicted in paths.items():
+        explained |= model.at_rest(trials[number], predicted)
+    return [
+        _without(trial, model, runs[number], paths[number], explained)
+        if runs[number]
+        else (trial, [])
+        for number, trial in enumerate(trials)
+    ]
+
+
+def _without(
+    trial: Trial,
+    model: GapModel,
+    runs: Mapping[int, Sequence[tuple[int, int]]],
+    predicted: np.ndarray,
+    explained: Collection[str],
+) -> tuple[Trial, list[str]]:
     observed, notes = trial.observed.copy(), []
     for column, found in runs.items():
         if model.channels[column].name in explained:

@@ -59,7 +59,8 @@ def test_a_robot_that_stands_still_is_no_stuck_channel(model):
     there = Commands([[0.1, 0.1], [0.0, 0.0]], [1.0, 1.0])
     dead = "wheel_gain:wheel=both,factor=0"
     trials = MujocoWorld(reality=[dead], threads=1).run([there])
-    assert not check.without_stuck(trials[0], model)[1]
+    ((_, notes),) = check.without_stuck(trials[:1], model)
+    assert not notes
 
 
 def test_a_motion_that_turns_back_is_no_spike(model):
@@ -108,3 +109,19 @@ def test_a_robot_that_stays_has_no_places():
     assert np.ptp(coarse, axis=0).max() < 1e-12
     along = np.linspace(0, 1, 50)[:, None] * [0.5, 0.0, 0.0]
     assert len(np.unique(segments.coarse(along)[:, 0].round(9))) == 17  # 0.5 m / 3 cm
+
+
+def test_what_rests_in_one_trial_is_no_fault_of_a_channel_in_another(
+    model, told, monkeypatch
+):
+    trials = MujocoWorld(reality=[NOISE], threads=1).run(told, seeds=range(2))
+    held = []
+    for trial in trials:
+        observed = trial.observed.copy()
+        observed[:, 1] = 0.1
+        held.append(trial.replace(observed=observed))
+    assert any(notes for _, notes in check.without_stuck(held, model))
+    monkeypatch.setattr(
+        type(model), "at_rest", lambda _, trial, __: {"y"} if trial is held[1] else ()
+    )
+    assert not any(notes for _, notes in check.without_stuck(held, model))
