@@ -1,4 +1,4 @@
-"""Domain randomisation (Tobin et al. 2017): a policy trained on robots damaged at random.
+"""Domain randomisation (Tobin et al. 2017): one policy, trained on damage at random.
 
 In light following. Before the first trial a policy is trained in a model
 (`prior.world light`) whose robots have something wrong with them, drawn anew for each
@@ -128,7 +128,7 @@ class DomainRandomised(RememberingLearner):
         "cost_model": "mean cost of the policy in the model, over damages at random",
         "cost_seen": "cost in the world, mean of all trials until then",
     }
-    figures = (
+    figures: ClassVar[tuple[Curves | str, ...]] = (
         Curves(
             name="cost_seen",
             title="Cost of the one policy so far",
@@ -148,7 +148,7 @@ class DomainRandomised(RememberingLearner):
         Raises:
             BnsError: effects that cannot be, or too few evaluations.
         """
-        self.rule: Any = self.config.settings
+        self.rule = cast(RandomisedSettings, self.config.settings)
         self.light = cast(LightTask, self.task)
         self.unknowns = Unknowns(self.rule.unknown or self.task.unknowns)
         self.memories = [self.memory() for _ in range(self.runs)]

@@ -227,7 +227,9 @@ class Rma(DomainRandomised):
     def begin(self) -> None:
         """See `DomainRandomised.begin`."""
         super().begin()
-        plain, rule = replace(self.light.controllers, recurrent=False), self.rule
+        plain = replace(self.light.controllers, recurrent=False)
+        self.rule: RmaSettings = cast(RmaSettings, self.config.settings)
+        rule = self.rule
         names = Controllers.__dataclass_fields__
         common = {name: getattr(plain, name) for name in names}
         self.told = RmaControllers(**common, latent=rule.latent)
@@ -324,12 +326,24 @@ class Rma(DomainRandomised):
         robots = np.nonzero(own)[0]
         return Patterns(np.stack(known, 1)[own], said[robots], held[robots])
 
+    def says(self, memory: Adapted, known: Tensor) -> Tensor:
+        """What a run's module says is wrong, ``(M, latent)``.
+
+        Args:
+            memory: of the run.
+            known: what was remembered, ``(M, memory)``.
+        """
+        theta = torch.from_numpy(memory.module).float()
+        return self.adapting.said(self._module(theta), known)
+
     def _fit(
         self, memory: Adapted, rounds: Sequence[Patterns], rng: np.random.Generator
     ) -> None:
         """Train the module on all patterns so far."""
         kind = self.adapting
-        known, wanted, held = (np.concatenate(part) for part in zip(*rounds))
+        known, wanted, held = (
+            np.concatenate(part) for part in zip(*rounds, strict=True)
+        )
         if not len(memory.module):
             fan = [kind.memory, 1, kind.neurons, 1]
             scale = np.repeat(np.sqrt([1 / fan[0], 0, 1 / fan[2], 0]), kind.sizes)
@@ -352,7 +366,7 @@ class Rma(DomainRandomised):
         if last.held.any():
             with torch.no_grad():
                 past = torch.from_numpy(last.known[last.held]).float()
-                made = kind.said(self._module(theta), past).double().numpy()
+                made = self.says(memory, past).double().numpy()
             right = last.wanted[last.held]
             off = np.sqrt(((made - right) ** 2).mean())
             memory.miss = np.array(off / max(float(wanted.std(0).mean()), 1e-9))
