@@ -41,9 +41,9 @@ class RandomisedSettings(LearnerSettings):
     """False: it is trained on the undamaged robot alone, to compare with"""
     sigma: float = 0.05
     """first step size of CMA-ES, as a share of the range of each weight"""
-    population: int = 16
+    population: int = 14
     """candidates of a generation"""
-    situations: int = 4
+    situations: int = 2
     """damages and starts that each of them meets, the first one undamaged"""
     finalists: int = 6
     """bests of the last generations among which the policy is chosen"""

@@ -43,6 +43,8 @@ CYCLE = READINGS + OUTPUTS
 """numbers that are remembered of a cycle"""
 RATE, PART, HELD = 0.003, 256, 5
 """of Adam, patterns of a step, and every so-manieth drive that is not learned from"""
+LOOK = 50
+"""steps after which the module is judged by those drives; the best one is kept"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -303,7 +305,7 @@ class Rma(DomainRandomised):
             )
             trials = situations.drive(tried, points, seeds)
             patterns.append(self.patterns(trials, said))
-            self._fit(known, patterns, situations.rng)
+            self.fit(known, patterns, situations.rng)
 
     def patterns(self, trials: Sequence[Trial], said: np.ndarray) -> Patterns:
         """What was remembered before each cycle of N drives, and what is to be said.
@@ -336,10 +338,16 @@ class Rma(DomainRandomised):
         theta = torch.from_numpy(memory.module).float()
         return self.adapting.said(self._module(theta), known)
 
-    def _fit(
+    def fit(
         self, memory: Adapted, rounds: Sequence[Patterns], rng: np.random.Generator
     ) -> None:
-        """Train the module on all patterns so far."""
+        """Train the adaptation module of a run.
+
+        Args:
+            memory: whose module and `miss` it is.
+            rounds: patterns of all drives so far, those of each round.
+            rng: of all that is drawn.
+        """
         kind = self.adapting
         known, wanted, held = (
             np.concatenate(part) for part in zip(*rounds, strict=True)
@@ -353,6 +361,7 @@ class Rma(DomainRandomised):
             torch.from_numpy(part[~held]).float() for part in (known, wanted)
         )
         state, rate = AdamState.fresh(theta), torch.tensor(RATE)
+        best, miss = theta, self._miss(theta, known[held], wanted[held])
         for step in range(self.rule.steps):
             rows = torch.from_numpy(rng.integers(len(inputs), size=PART))
             leaf = theta.detach().requires_grad_()
@@ -361,15 +370,20 @@ class Rma(DomainRandomised):
             (grad,) = torch.autograd.grad(error, leaf)
             number = torch.tensor(float(step + 1))
             theta, state = adam(theta, grad, state, rate, number)
-        memory.module = theta.double().numpy()
-        last = rounds[-1]
-        if last.held.any():
-            with torch.no_grad():
-                past = torch.from_numpy(last.known[last.held]).float()
-                made = self.says(memory, past).double().numpy()
-            right = last.wanted[last.held]
-            off = np.sqrt(((made - right) ** 2).mean())
-            memory.miss = np.array(off / max(float(wanted.std(0).mean()), 1e-9))
+            if (step + 1) % LOOK == 0:
+                now = self._miss(theta, known[held], wanted[held])
+                best, miss = (theta, now) if now <= miss else (best, miss)
+        memory.module = best.double().numpy()
+        memory.miss = np.array(miss / max(float(wanted.std(0).mean()), 1e-9))
+
+    def _miss(self, theta: Tensor, known: np.ndarray, wanted: np.ndarray) -> float:
+        """Root mean square error of a module; infinite where there is nothing."""
+        if not len(known):
+            return float(np.inf)
+        with torch.no_grad():
+            past = torch.from_numpy(known).float()
+            made = self.adapting.said(self._module(theta), past).double().numpy()
+        return float(np.sqrt(((made - wanted) ** 2).mean()))
 
     def _module(self, weights: Tensor) -> list[Tensor]:
         return [part.unsqueeze(0) for part in weights.split(self.adapting.sizes)]

@@ -8,7 +8,7 @@ import torch
 
 from bns.errors import BnsError
 from bns.experiment.loading import with_learner
-from bns.learners.rma import CYCLE, Rma, RmaControllers
+from bns.learners.rma import CYCLE, Patterns, Rma, RmaControllers
 from bns.tasks.light import readings
 from bns.tasks.light_controller import Controllers, GenomePolicy, brightness
 from bns.worlds.world import CountedWorld
@@ -110,7 +110,24 @@ def test_all_evaluations_are_counted_and_none_are_beyond_the_limit():
     assert [model.spent for model in learner.models] == [392] * 2
 
 
-def test_the_module_says_what_is_wrong_better_than_its_mean():
-    learner = made(config(**{"settings.steps": 1000}), evaluations=1500)
-    learner.propose(0)
-    assert max(float(memory.miss) for memory in learner.memories) < 0.9
+def test_the_module_learns_what_is_planted_and_says_how_well():
+    learner = made(config(**{"settings.steps": 1000}))
+    rng, memory = np.random.default_rng(3), learner.memories[0]
+    known = rng.normal(size=(3000, learner.adapting.memory))
+    wanted = np.tanh(known[:, :2] - known[:, 2:4])
+    held = np.arange(3000) % 5 == 4
+    learner.fit(memory, [Patterns(known, wanted, held)], rng)
+    assert memory.miss < 0.35
+    noise = rng.normal(size=wanted.shape)
+    other = learner.memories[1]
+    learner.fit(other, [Patterns(known, noise, held)], rng)
+    assert 0.9 < other.miss < 1.3  # nothing can be said, and it is not learned by heart
+
+
+def test_a_trained_run_says_how_well_its_module_does():
+    learner = made(config())
+    tried = learner.propose(0).tried
+    trials = FakeLightWorld().drive(GenomePolicy.of(tried), cycles=40, seeds=[1, 2])
+    row = learner.observe(0, trials, None)
+    assert np.isfinite(row["encoding_miss"]).all()
+    assert (row["encoding_miss"] > 0).all()
