@@ -19,6 +19,8 @@ from bns.experiment.world_factory import make_models, make_world
 from bns.learners import registry
 
 RUNS, DRIVES, BATCH = 3, 200, 50
+SEED = 1
+"""the settings were chosen on seed 0"""
 HOLDS = 0.8
 
 
@@ -51,7 +53,8 @@ class Driven(NamedTuple):
 
 
 def _config(name: str, runs: int, *, random: bool) -> RunConfig:
-    base = replace(presets.load("khepera-light-recover"), replicates=runs, threads=1)
+    base = presets.load("khepera-light-recover")
+    base = replace(base, replicates=runs, seed=SEED, threads=1)
     told = {"prior.world": "light", "settings.random": random, "world.damage": []}
     return with_learner(base, name).with_(told)
 
@@ -109,16 +112,17 @@ def faithful_domain_randomised(quick: bool) -> Result:
     )
     both = [with_it.undamaged, without.undamaged]
     possible = max(float(np.max(np.mean(both, axis=1))), 1e-9)
-    share, other = (float(np.mean(one.in_range)) / possible for one in (with_it, without))
+    share = float(np.mean(with_it.in_range)) / possible
+    other = float(np.mean(without.in_range)) / possible
     return Result(
-        figure=round(float(share), 4),
+        figure=round(share, 4),
         unit="1",
         holds=None if quick else bool(share >= HOLDS and share > other),
         n=runs,
         details={
             "trained on damage": with_it.shown,
             "trained without": without.shown,
-            "share of the one trained without": round(float(other), 4),
+            "share of the one trained without": round(other, 4),
         },
     )
 

@@ -232,7 +232,13 @@ class DomainRandomised(RememberingLearner):
     def judge(
         self, vectors: np.ndarray, situations: Situations, count: int
     ) -> np.ndarray:
-        """Cost of each of N candidates in the same situations, ``(N, count)``."""
+        """Cost of each of N candidates in the same situations, ``(N, count)``.
+
+        Args:
+            vectors: of the candidates, ``(N, D)``.
+            situations: of the run.
+            count: how many are drawn.
+        """
         points, seeds = situations.draw(count)
         met = np.tile(points, (len(vectors), 1))
         tried = self.candidates(np.repeat(vectors, count, axis=0), met)
