@@ -185,6 +185,10 @@ RIVALS = {
     "self_modelling": Rival(learner="self_modelling", priors=_MODELS, tasks=_LISTS),
     "back_to_reality": Rival(learner="back_to_reality", priors=_MODELS, tasks=_LISTS),
     "rte": Rival(learner="rte", priors=("P0", "P1"), tasks=("navigate",)),
+    "domain_randomised": Rival(
+        learner="domain_randomised", priors=("P1",), tasks=("light",)
+    ),
+    "rma": Rival(learner="rma", priors=("P1",), tasks=("light",)),
 }
 """those that are there; any other learner takes part by its own name"""
 

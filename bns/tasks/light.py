@@ -260,6 +260,12 @@ class LightTask(Task):
             decode=lambda v: self.attempts(torch.from_numpy(v).float()),
         )
 
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """The gains of both wheels; below one half no command drives straight."""
+        gain = "wheel_gain:wheel={},factor=0.5..1.2"
+        return tuple(gain.format(side) for side in ("left", "right"))
+
     def attempts(self, genomes: torch.Tensor) -> list[LightController]:
         """Genomes ``(N, genes)`` as controllers, each for one trial."""
         light = self.config.light

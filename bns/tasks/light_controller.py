@@ -135,6 +135,19 @@ class Controllers:
             for side in range(OUTPUTS)
         ]
 
+    def remembered(
+        self, memory: np.ndarray, seen: np.ndarray, told: np.ndarray
+    ) -> np.ndarray:
+        """What n controllers remember after a cycle, ``(n, memory)``.
+
+        Args:
+            memory: before it, ``(n, memory)``.
+            seen: the readings as they were seen, ``(n, 2)``.
+            told: the outputs, ``(n, 2)``.
+        """
+        del seen
+        return told if self.memory else memory
+
     def speed(self, output: Tensor) -> Tensor:
         """A wheel's speed [m/s] from an output."""
         middle = (self.fastest + self.slowest) / 2
@@ -218,12 +231,11 @@ class GenomePolicy:
                 f"Readings of shape {np.shape(readings)} for {len(self)} controllers: "
                 f"they need ({len(self)}, 2), the left and the right light sensor."
             )
-        seen = np.concatenate(
-            [self.controllers.see(brightness(readings)), memory], axis=1
-        )
-        inputs = torch.from_numpy(seen.astype(np.float32)).T[..., None, None]
+        seen = self.controllers.see(brightness(readings))
+        known = np.concatenate([seen, memory], axis=1).astype(np.float32)
+        inputs = torch.from_numpy(known).T[..., None, None]
         outputs = self.controllers.act(self._layers, list(inputs))
         speeds = torch.cat([self.controllers.speed(o)[:, 0] for o in outputs], dim=1)
         told = torch.cat([output[:, 0] for output in outputs], dim=1)
-        kept = told.double().numpy() if self.controllers.memory else memory
+        kept = self.controllers.remembered(memory, seen, told.double().numpy())
         return speeds.double().numpy(), kept

@@ -78,16 +78,22 @@ class FakeLightWorld:
 
     name, robot = "fake-light", "khepera3"
 
+    def __init__(self, damages=()):
+        self.damages = damages
+
+    def having(self, damages):
+        return FakeLightWorld(damages)
+
     def run(self, commands, *, trial=0, seeds=()):
         raise NotImplementedError
 
     def drive(self, policy, *, cycles=100, cycle=0.4, trial=0, seeds=(), starts=None):
         poses = np.array([self.start(seed, trial) for seed in seeds])
-        memory = policy.memory(len(poses))
+        memory, gains = policy.memory(len(poses)), self.gains(len(poses))
         path, read, told = [poses], [self.look(poses)], []
         for _ in range(cycles):
             commands, memory = policy.act(read[-1], memory)
-            poses = self.moved(poses, commands * cycle)
+            poses = self.moved(poses, commands * gains * cycle)
             told.append(commands)
             path.append(poses)
             read.append(self.look(poses))
@@ -105,6 +111,14 @@ class FakeLightWorld:
             )
             for values, rows in zip(np.stack(told, 1), seen, strict=True)
         ]
+
+    def gains(self, n):
+        """Of the left and the right wheel of each robot, ``(n, 2)``."""
+        found = np.ones((n, 2))
+        for row, damage in zip(found, self.damages, strict=False):
+            for effect in (event.effect for event in damage.events):
+                row[["left", "right"].index(effect["wheel"])] *= effect["factor"]
+        return found
 
     @staticmethod
     def start(seed, trial):

@@ -35,13 +35,16 @@ PRESETS = {
 }
 THINKING = ("cma", "ite", "neat", "rte", "safe_ite")
 """learners that are tried with a model, too; others are nothing without one"""
+FEW = {"population": 4, "situations": 2, "finalists": 2, "judged": 3}
 CUT = {
+    "domain_randomised": {f"settings.{name}": n for name, n in FEW.items()},
     "neat": {
         "settings.population": 12,
         "settings.generations": 2,
         "settings.add_node": 0.3,
     },
     "pets": {"settings.population": 12, "settings.iterations": 2, "settings.elites": 3},
+    "rma": {f"settings.{name}": n for name, n in {**FEW, "steps": 9}.items()},
     "static_snn": {"settings.commands": 1, "settings.generations": 2},
 }
 """settings of learners that would take longer than the tests have"""
@@ -88,7 +91,10 @@ def small(learner: str, task: str):
     config = config.with_(CUT.get(learner, {}))
     if registry.get(learner).needs_model:
         prior = {"prior.world": MODELS[task][0], "prior.evaluations": 200}
-        config = config.with_({**prior, "settings.first": 20, "settings.each": 40})
+        known = registry.get(learner).Settings.bounds
+        each = {"settings.first": 20, "settings.each": 40}
+        each = each if "each" in known else {}
+        config = config.with_({**prior, **each})
     return replace(config, trials=4, replicates=2, record_replicates=1, threads=1)
 
 
@@ -255,9 +261,10 @@ class TestRefused:
         "name", [name for name in LEARNERS if registry.get(name).needs_model]
     )
     def test_no_model_where_one_is_needed(self, name):
-        config = small(name, "navigation").with_({"prior.world": ""})
+        task = next(task for learner, task in KNOWN if learner == name)
+        config = small(name, task).with_({"prior.world": ""})
         with pytest.raises(BnsError, match=r"give --prior\.world"):
-            made(config, "navigation")
+            made(config, task)
 
     @pytest.mark.parametrize(
         ("name", "task"), [o for o in product(LEARNERS, PRESETS) if o not in KNOWN]
