@@ -121,7 +121,10 @@ def test_what_rests_in_one_trial_is_no_fault_of_a_channel_in_another(
         observed[:, 1] = 0.1
         held.append(trial.replace(observed=observed))
     assert any(notes for _, notes in check.without_stuck(held, model))
+    rests = frozenset({"y"})
     monkeypatch.setattr(
-        type(model), "at_rest", lambda _, trial, __: {"y"} if trial is held[1] else ()
+        type(model),
+        "at_rest",
+        lambda _, trial, __: rests if trial is held[1] else frozenset(),
     )
     assert not any(notes for _, notes in check.without_stuck(held, model))
