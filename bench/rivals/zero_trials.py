@@ -17,8 +17,10 @@ from bns.experiment.config import RunConfig
 from bns.experiment.loading import with_learner
 from bns.experiment.world_factory import make_models, make_world
 from bns.learners import registry
+from bns.learners.domain_randomised import Situations
+from bns.worlds.world import CountedWorld
 
-RUNS, DRIVES, BATCH = 3, 200, 50
+RUNS, DRIVES = 3, 200
 SEED = 1
 """the settings were chosen on seed 0"""
 HOLDS = 0.8
@@ -76,24 +78,26 @@ def driven(name: str, runs: int, *, random: bool) -> Driven:
         models=make_models(config),
     )
     policies, world = learner.propose(0).tried, make_world(config)
-    points = np.random.default_rng(1).random((DRIVES, len(learner.unknowns)))
     nominal = np.tile(learner.unknowns.nominal, (DRIVES, 1))
+    counted = CountedWorld(world, 2 * runs * DRIVES)
+    rng = np.random.default_rng(1)
+    points = rng.random((DRIVES, len(learner.unknowns)))
+    met = Situations(learner.task, learner.unknowns, counted, rng)
     found = Driven(learner, points, [], [], [], [])
+    seeds = np.arange(DRIVES) + 1000
     for policy in policies:
-        for wrong, solved in ((nominal, found.undamaged), (points, found.in_range)):
-            trials: list[Any] = []
-            for first in range(0, DRIVES, BATCH):
-                rows = np.arange(first, first + BATCH)
-                place: Any = world
-                place = place.having(learner.unknowns.damages(wrong[rows]))
-                tried = [policy] * BATCH
-                seeds = (rows + 1000).tolist()
-                trials += learner.task.execute(place, tried, trial=0, seeds=seeds)
-            measured = learner.task.measured(trials)
-            solved.append(round(float(measured["solved"].mean()), 4))
+        undamaged, trials = (
+            met.drive([policy] * DRIVES, wrong, seeds) for wrong in (nominal, points)
+        )
+        found.undamaged.append(_mean(learner, undamaged, "solved"))
+        found.in_range.append(_mean(learner, trials, "solved"))
+        found.cost.append(_mean(learner, trials, "fitness"))
         found.trials.append(trials)
-        found.cost.append(round(float(measured["fitness"].mean()), 2))
     return found
+
+
+def _mean(learner: Any, trials: list[Any], column: str) -> float:
+    return round(float(learner.task.measured(trials)[column].mean()), 4)
 
 
 @bench(
@@ -160,10 +164,11 @@ def _explained(found: Driven, run: int) -> list[float]:
 
     The reading is fitted on four drives of five, and judged cycle by cycle on others.
     """
-    learner, memory = found.learner, found.learner.memories[run]
+    learner = found.learner
     told = learner.patterns(found.trials[run], found.points)
+    module = torch.from_numpy(learner.memories[run].module).float()
     with torch.no_grad():
-        said = learner.says(memory, torch.from_numpy(told.known).float())
+        said = learner.says(module, told.known)
     inputs = np.column_stack([said.double().numpy(), np.ones(len(told.known))])
     reading = np.linalg.lstsq(inputs[~told.held], told.wanted[~told.held])[0]
     right = told.wanted[told.held]

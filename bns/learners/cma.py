@@ -17,6 +17,7 @@ from bns.errors import MissingDependencyError, install
 from bns.experiment.config import LearnerSettings
 from bns.learners.base import Learner, Proposal
 from bns.learners.random import BEST_SEEN
+from bns.tasks.base import Space
 from bns.worlds.trial import Trial
 
 
@@ -36,17 +37,15 @@ class CmaSettings(LearnerSettings):
 
 
 class Search:
-    """One run of CMA-ES in the unit cube; costs alone bring it to where it was.
+    """One run of CMA-ES; costs alone bring it to where it was.
 
     Args:
         settings: of CMA-ES.
-        start: where it begins, ``(D,)``, each from 0 to 1.
+        space: in which it begins in the middle of random controllers.
         rng: of all that it draws.
     """
 
-    def __init__(
-        self, settings: CmaSettings, start: np.ndarray, rng: np.random.Generator
-    ):
+    def __init__(self, settings: CmaSettings, space: Space, rng: np.random.Generator):
         try:
             import cma
         except ImportError:
@@ -61,9 +60,12 @@ class Search:
             "popsize": settings.population or None,
         }
         options = {name: value for name, value in options.items() if value is not None}
+        self._low, self._width = space.low, np.maximum(space.high - space.low, 1e-12)
+        middle = (space.first_low + space.first_high) / 2
+        start = ((middle - space.low) / self._width).clip(0, 1)  # in the unit cube
         self._es = cma.CMAEvolutionStrategy(start, settings.sigma, options)
         self.costs: list[float] = []
-        self.best, self.cost = start, np.inf
+        self._best, self.cost = start, np.inf
         self._ask()
 
     def _ask(self) -> None:
@@ -78,13 +80,19 @@ class Search:
     @property
     def generation(self) -> np.ndarray:
         """Candidates that were not told yet, ``(N, D)``."""
-        return np.stack(self._asked[len(self._heard) :])
+        return self._low + np.stack(self._asked[len(self._heard) :]) * self._width
+
+    @property
+    def best(self) -> np.ndarray:
+        """Candidate of the lowest cost yet, ``(D,)``; at first the middle."""
+        vector: np.ndarray = self._low + self._best * self._width
+        return vector
 
     def tell(self, cost: float) -> None:
         """The cost of the first candidate of `generation`; lower is better."""
         self.costs.append(cost)
         if cost < self.cost:
-            self.best, self.cost = self._asked[len(self._heard)], cost
+            self._best, self.cost = self._asked[len(self._heard)], cost
         self._heard.append(cost)
         if len(self._heard) == len(self._asked):
             self._es.tell(self._asked, self._heard)
@@ -108,26 +116,18 @@ class CmaEs(Learner):
 
     def begin(self) -> None:
         """See `Learner.begin`."""
-        settings = cast(CmaSettings, self.config.settings)
-        space = self.task.space
-        self._space, self._range = space, np.maximum(space.high - space.low, 1e-12)
-        middle = (space.first_low + space.first_high) / 2
-        start = ((middle - space.low) / self._range).clip(0, 1)
+        settings, space = cast(CmaSettings, self.config.settings), self.task.space
         self.searches = [
-            Search(settings, start, seeding.generator(self.config.seed, "cma", run))
+            Search(settings, space, seeding.generator(self.config.seed, "cma", run))
             for run in self.replicates
         ]
-
-    def _controllers(self, units: Sequence[np.ndarray] | np.ndarray) -> list[Any]:
-        vectors = self._space.low + np.asarray(units) * self._range
-        return self._space.controllers(vectors)
 
     def _evolve_in_models(self) -> None:
         """Whole generations in each run's model, as long as there are evaluations."""
         runs = zip(self.replicates, self.searches, self.models, strict=True)
         for replicate, search, model in runs:
             while model.left >= search.size:
-                tried = self._controllers(search.generation)
+                tried = self.task.space.controllers(search.generation)
                 names = ("cma-model", replicate, model.spent)
                 seed = seeding.integer(self.config.seed, *names)
                 seeds = [seed + number for number in range(len(tried))]
@@ -139,11 +139,14 @@ class CmaEs(Learner):
         """See `Learner.propose`; with a prior, the model's best comes first."""
         if trial == 0 and self.models:
             self._evolve_in_models()
-            return Proposal(self._controllers([s.best for s in self.searches]))
-        tried = self._controllers([s.generation[0] for s in self.searches])
-        if trial == 0:
-            return Proposal(tried)
-        return Proposal(tried, self._controllers([s.best for s in self.searches]))
+            return Proposal(self._best())
+        tried = np.stack([search.generation[0] for search in self.searches])
+        controllers = self.task.space.controllers(tried)
+        return Proposal(controllers, self._best() if trial > 0 else None)
+
+    def _best(self) -> list[Any]:
+        bests = np.stack([search.best for search in self.searches])
+        return self.task.space.controllers(bests)
 
     def observe(
         self, trial: int, tried: Sequence[Trial], best: Sequence[Trial] | None

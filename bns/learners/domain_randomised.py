@@ -212,15 +212,13 @@ class DomainRandomised(RememberingLearner):
             situations: of the run.
             most: evaluations that may be spent.
         """
-        rule, space = self.rule, self.space
-        width = np.maximum(space.high - space.low, 1e-12)
-        middle = ((space.first_low + space.first_high) / 2 - space.low) / width
+        rule = self.rule
         settings = CmaSettings(sigma=rule.sigma, population=rule.population)
-        search = Search(settings, middle.clip(0, 1), situations.rng)
+        search = Search(settings, self.space, situations.rng)
         each = rule.population * rule.situations
         bests = []
         for _ in range((most - self._final) // each):
-            vectors = space.low + search.generation * width
+            vectors = search.generation
             costs = self.judge(vectors, situations, rule.situations).mean(1)
             bests.append(vectors[costs.argmin()])
             for cost in costs:

@@ -141,7 +141,7 @@ class RmaControllers(Informed):
         said = layers[4]  # (R, P, 1, latent)
         if self.past:
             known = torch.stack(past, dim=-1).transpose(1, 2)  # (R, P, S, I)
-            said = self.said([part for part in layers[4:]], known)
+            said = self.said(layers[4:], known)
         numbers = said.transpose(1, 2).expand(-1, seen[0].shape[1], -1, -1)
         return self.base.act(layers[:4], [*seen, *numbers.unbind(-1)])
 
@@ -163,12 +163,27 @@ class RmaControllers(Informed):
         return found
 
     def remembered(
-        self, memory: np.ndarray, seen: np.ndarray, told: np.ndarray
+        self,
+        memory: np.ndarray,
+        seen: np.ndarray,
+        told: np.ndarray,
+        speeds: np.ndarray,
     ) -> np.ndarray:
-        """See `Controllers.remembered`."""
-        if not self.past:
-            return memory
-        return np.concatenate([memory[:, CYCLE:], seen, told], axis=1)
+        """See `Controllers.remembered`; of outputs, what they commanded."""
+        del told  # those in the dead band are one and the same
+        return self.pushed(memory, seen, speeds) if self.past else memory
+
+    def pushed(
+        self, memory: np.ndarray, seen: np.ndarray, speeds: np.ndarray
+    ) -> np.ndarray:
+        """What is remembered once a cycle has taken the place of the oldest one.
+
+        Args:
+            memory: before it, ``(n, memory)``.
+            seen: the readings as they were seen, ``(n, 2)``.
+            speeds: that were commanded, ``(n, 2)`` [m/s].
+        """
+        return np.concatenate([memory[:, CYCLE:], seen, self.output(speeds)], axis=1)
 
 
 class Adapted(Trained):
@@ -289,21 +304,16 @@ class Rma(DomainRandomised):
         drives = int(self.rule.adapting * situations.model.left) // self.rule.rounds
         most = situations.model.left - drives * self.rule.rounds
         self.search(known, situations, most)
-        parts = np.split(known.policy, [self.told.base.genes])
-        known.policy, known.encoder = parts
+        whole = known.policy
+        known.policy, known.encoder = np.split(whole, [self.told.base.genes])
         patterns: list[Patterns] = []
         for number in range(self.rule.rounds):
             points, seeds = situations.draw(drives)
-            said = self.encoded(np.tile(known.encoder, (drives, 1)), points)
-            tried = (
-                [self.deployed(known)] * drives
-                if number
-                else self._driving(
-                    self.told,
-                    np.concatenate([np.tile(known.policy, (drives, 1)), said], 1),
-                )
-            )
+            tried = self.candidates(np.tile(whole, (drives, 1)), points)
+            if number > 0:
+                tried = [self.deployed(known)] * drives
             trials = situations.drive(tried, points, seeds)
+            said = self.encoded(np.tile(known.encoder, (drives, 1)), points)
             patterns.append(self.patterns(trials, said))
             self.fit(known, patterns, situations.rng)
 
@@ -317,26 +327,25 @@ class Rma(DomainRandomised):
         kind = self.adapting
         seen = np.stack([kind.see(brightness(readings(t)))[:-1] for t in trials])
         speeds = np.stack([trial.commands.values for trial in trials])
-        middle, half = kind.fastest + kind.slowest, kind.fastest - kind.slowest
-        told = (2 * speeds - middle) / half
-        memory, known = np.zeros((len(trials), kind.memory)), []
+        memory, cycles = np.zeros((len(trials), kind.memory)), []
         for cycle in range(seen.shape[1]):
-            known.append(memory)
-            memory = kind.remembered(memory, seen[:, cycle], told[:, cycle])
-        own = ~lost(trials) & np.isfinite(np.stack(known, 1)).all(2)
+            cycles.append(memory)
+            memory = kind.pushed(memory, seen[:, cycle], speeds[:, cycle])
+        known = np.stack(cycles, 1)
+        own = ~lost(trials) & np.isfinite(known).all(2)
         held = np.arange(len(trials)) % HELD == HELD - 1
         robots = np.nonzero(own)[0]
-        return Patterns(np.stack(known, 1)[own], said[robots], held[robots])
+        return Patterns(known[own], said[robots], held[robots])
 
-    def says(self, memory: Adapted, known: Tensor) -> Tensor:
-        """What a run's module says is wrong, ``(M, latent)``.
+    def says(self, module: Tensor, known: np.ndarray) -> Tensor:
+        """What an adaptation module says is wrong, ``(M, latent)``.
 
         Args:
-            memory: of the run.
+            module: its weights, ``(W,)``.
             known: what was remembered, ``(M, memory)``.
         """
-        theta = torch.from_numpy(memory.module).float()
-        return self.adapting.said(self._module(theta), known)
+        parts = [part.unsqueeze(0) for part in module.split(self.adapting.sizes)]
+        return self.adapting.said(parts, torch.from_numpy(known).float())
 
     def fit(
         self, memory: Adapted, rounds: Sequence[Patterns], rng: np.random.Generator
@@ -357,16 +366,13 @@ class Rma(DomainRandomised):
             scale = np.repeat(np.sqrt([1 / fan[0], 0, 1 / fan[2], 0]), kind.sizes)
             memory.module = scale * rng.standard_normal(len(scale))
         theta = torch.from_numpy(memory.module).float()
-        inputs, targets = (
-            torch.from_numpy(part[~held]).float() for part in (known, wanted)
-        )
+        inputs, targets = known[~held], torch.from_numpy(wanted[~held]).float()
         state, rate = AdamState.fresh(theta), torch.tensor(RATE)
         best, miss = theta, self._miss(theta, known[held], wanted[held])
         for step in range(self.rule.steps):
-            rows = torch.from_numpy(rng.integers(len(inputs), size=PART))
+            rows = rng.integers(len(inputs), size=PART)
             leaf = theta.detach().requires_grad_()
-            said = kind.said(self._module(leaf), inputs[rows])
-            error = (said - targets[rows]).square().mean()
+            error = (self.says(leaf, inputs[rows]) - targets[rows]).square().mean()
             (grad,) = torch.autograd.grad(error, leaf)
             number = torch.tensor(float(step + 1))
             theta, state = adam(theta, grad, state, rate, number)
@@ -381,12 +387,8 @@ class Rma(DomainRandomised):
         if not len(known):
             return float(np.inf)
         with torch.no_grad():
-            past = torch.from_numpy(known).float()
-            made = self.adapting.said(self._module(theta), past).double().numpy()
+            made = self.says(theta, known).double().numpy()
         return float(np.sqrt(((made - wanted) ** 2).mean()))
-
-    def _module(self, weights: Tensor) -> list[Tensor]:
-        return [part.unsqueeze(0) for part in weights.split(self.adapting.sizes)]
 
     def observe(
         self, trial: int, tried: Sequence[Trial], best: Sequence[Trial] | None

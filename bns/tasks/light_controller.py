@@ -136,7 +136,11 @@ class Controllers:
         ]
 
     def remembered(
-        self, memory: np.ndarray, seen: np.ndarray, told: np.ndarray
+        self,
+        memory: np.ndarray,
+        seen: np.ndarray,
+        told: np.ndarray,
+        speeds: np.ndarray,
     ) -> np.ndarray:
         """What n controllers remember after a cycle, ``(n, memory)``.
 
@@ -144,16 +148,26 @@ class Controllers:
             memory: before it, ``(n, memory)``.
             seen: the readings as they were seen, ``(n, 2)``.
             told: the outputs, ``(n, 2)``.
+            speeds: that these command, ``(n, 2)`` [m/s].
         """
-        del seen
+        del seen, speeds
         return told if self.memory else memory
+
+    @property
+    def _range(self) -> tuple[float, float]:
+        """Middle and half of the range of speeds [m/s]."""
+        return (self.fastest + self.slowest) / 2, (self.fastest - self.slowest) / 2
 
     def speed(self, output: Tensor) -> Tensor:
         """A wheel's speed [m/s] from an output."""
-        middle = (self.fastest + self.slowest) / 2
-        half = (self.fastest - self.slowest) / 2
+        middle, half = self._range
         speed = middle + half * output
         return torch.where(speed.abs() < self.dead_band, 0.0, speed)
+
+    def output(self, speed: Numbers) -> Numbers:
+        """The output that commands a wheel's speed [m/s]; one of those that stop it."""
+        middle, half = self._range
+        return (speed - middle) / half
 
 
 def _tanh(total: Tensor) -> Tensor:
@@ -235,7 +249,9 @@ class GenomePolicy:
         known = np.concatenate([seen, memory], axis=1).astype(np.float32)
         inputs = torch.from_numpy(known).T[..., None, None]
         outputs = self.controllers.act(self._layers, list(inputs))
-        speeds = torch.cat([self.controllers.speed(o)[:, 0] for o in outputs], dim=1)
-        told = torch.cat([output[:, 0] for output in outputs], dim=1)
-        kept = self.controllers.remembered(memory, seen, told.double().numpy())
-        return speeds.double().numpy(), kept
+        commands = [self.controllers.speed(output) for output in outputs]
+        told, speeds = (
+            torch.cat([part[:, 0] for part in parts], dim=1).double().numpy()
+            for parts in (outputs, commands)
+        )
+        return speeds, self.controllers.remembered(memory, seen, told, speeds)

@@ -91,10 +91,9 @@ def small(learner: str, task: str):
     config = config.with_(CUT.get(learner, {}))
     if registry.get(learner).needs_model:
         prior = {"prior.world": MODELS[task][0], "prior.evaluations": 200}
-        known = registry.get(learner).Settings.bounds
-        each = {"settings.first": 20, "settings.each": 40}
-        each = each if "each" in known else {}
-        config = config.with_({**prior, **each})
+        if "each" in registry.get(learner).Settings.bounds:
+            prior |= {"settings.first": 20, "settings.each": 40}
+        config = config.with_(prior)
     return replace(config, trials=4, replicates=2, record_replicates=1, threads=1)
 
 

@@ -75,6 +75,15 @@ class TestNetworks:
         np.testing.assert_allclose(kept[:, -4:-2], brightness(seen))
         np.testing.assert_allclose(0.1 * kept[:, -2:], speeds, atol=1e-7)
 
+    def test_outputs_in_the_dead_band_are_remembered_as_the_same(self):
+        kind = replace(PAST, dead_band=0.05)
+        rng = np.random.default_rng(2)
+        rows = torch.from_numpy(0.1 * rng.normal(size=(2, kind.genes))).float()
+        policy = GenomePolicy(kind, rows)
+        speeds, kept = policy.act(rng.uniform(0, 4095, (2, 2)), policy.memory(2))
+        np.testing.assert_array_equal(speeds, 0)
+        np.testing.assert_array_equal(kept[:, -2:], 0)
+
     def test_another_length_is_refused(self):
         with pytest.raises((BnsError, RuntimeError)):
             GenomePolicy(PAST, torch.zeros(1, 7))
