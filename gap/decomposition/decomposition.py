@@ -1,6 +1,7 @@
 """What the joint fit found in a recording."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -46,6 +47,8 @@ class Decomposition:
         strayed: numbers of trials that went another way than their repeats.
         goes: with what the gap goes where its explanations only imitate its cause, in
             words; "" = they do not (`flexible.imitated`).
+        unconfirmed: explanations that one trial alone shows, and its number; they are
+            not in `point`.
     """
 
     problem: Problem
@@ -64,6 +67,7 @@ class Decomposition:
     unstable: tuple[int, ...] = ()
     strayed: tuple[int, ...] = ()
     goes: str = ""
+    unconfirmed: Mapping[str, int] = field(default_factory=dict)
 
     @cached_property
     def closed(self) -> float:
@@ -144,7 +148,8 @@ class Decomposition:
     def foreign(self) -> bool:
         """Whether the library lacks what most of the gap comes from."""
         most = self.lasting and self.unexplained > MOST
-        return most or self.failing or self.strained or bool(self.goes)
+        alone = bool(self.unconfirmed) and not self.point.support
+        return most or alone or self.failing or self.strained or bool(self.goes)
 
     @property
     def kind(self) -> str:
@@ -176,6 +181,9 @@ def decompose(
     late = None
     if found:
         problem, point, late = found
+    unconfirmed = shares.unconfirmed(problem, point)
+    if unconfirmed:
+        point = descent.refitted(problem, point, point.support - unconfirmed.keys())
     support = shares.guarded(problem, point)
     if support != point.support:
         point = descent.refitted(problem, point, support)
@@ -213,6 +221,7 @@ def decompose(
         goes=flexible.imitated(problem, start.rest, point.rest, known, size.inside)
         if point.support
         else "",
+        unconfirmed=unconfirmed,
     )
 
 

@@ -129,13 +129,21 @@ def _ordered(made: Decomposition, support: Support) -> tuple[str, ...]:
 def statements(made: Decomposition) -> list[str]:
     """The three statements: size, explanation, rest."""
     problem, features = made.problem, made.problem.model.features
-    apart = "".join(
-        f" Trial {number} is left out: it may go anywhere within what the model is "
-        "uncertain by."
-        for number in made.unstable
-    ) + "".join(
-        f" Trial {number} went another way than its repeat and does not count."
-        for number in made.strayed
+    apart = (
+        "".join(
+            f" Trial {number} is left out: it may go anywhere within what the model is "
+            "uncertain by."
+            for number in made.unstable
+        )
+        + "".join(
+            f" Trial {number} went another way than its repeat and does not count."
+            for number in made.strayed
+        )
+        + "".join(
+            f" Trial {number} departs as {name} would make it, and no other trial does: "
+            "it is not named."
+            for name, number in made.unconfirmed.items()
+        )
     )
     if made.kind == "no gap":
         return ["No gap beyond what the recording scatters by itself." + apart]

@@ -11,11 +11,13 @@ from bns.gap.decomposition.linear import KAPPA, Linear, Support
 from bns.gap.decomposition.problem import Problem
 
 CHOICE = 4.0  # nats within which the held-out error decides
+FEWEST = 3  # trials of which others may confirm one
 CLEARLY = 0.02  # of the held-out error that a further explanation has to lower
 PIECES = 4  # of a stretch, each left out by itself for the share that is closed
 SLIGHT = 0.15  # of what is left: less may as well come from that,
 TRIFLE = 1e-3  # of the gap, if it is less than this too: a thirtieth of its size
 EXACT = 1e-3  # of the smallest deviation that is believed: no fit is more exact
+ELSEWHERE = 0.05  # of what a level gains in its best trial: no more is nothing
 NINETY = 1.645  # standard deviations of a 90 % interval
 
 
@@ -195,6 +197,25 @@ def guarded(problem: Problem, point: Point) -> Support:
             break
         best = best - {name}
     return best
+
+
+def unconfirmed(problem: Problem, point: Point) -> dict[str, int]:
+    """Levels of a point that gain in one of several trials alone, and its number.
+
+    A level was chosen by that trial, and no other one says that it is right.
+    """
+    levels = {row.term for row in problem.rows if not row.smooth} & point.support
+    if not levels or len(problem.trials) < FEWEST:
+        return {}
+    held, rest, found = HeldOut.of(problem, point), np.nan_to_num(point.rest), {}
+    for name in sorted(levels & held.fixed.keys()):
+        without = rest + held.fixed[name][1]
+        more = (held.weight * (without**2 - rest**2)).sum(axis=1)
+        gains = np.bincount(problem.trial, more)
+        best = int(gains.argmax())
+        if gains.sum() - gains[best] < ELSEWHERE * gains[best]:
+            found[name] = problem.numbers[best]
+    return found
 
 
 def weighty(problem: Problem, point: Point, left: float) -> Support:

@@ -18,6 +18,7 @@ from bns.worlds.trial import Commands
 
 NOISE = "tracker_noise:position_sd=0.001,heading_sd=0.01"
 GAIN = "wheel_gain:wheel=left,factor=0.8"
+LEVELS = ("wheel_gain[left]", "wheel_intermittent[both]", "wheel_diameter[both]")
 KEPT = ("wheel_gain[left]", "motor_lag[both]", "axle_length", "battery_fade")
 
 
@@ -63,6 +64,25 @@ def test_a_trial_that_strays_from_its_repeat_is_named_and_does_not_count(model, 
     found = kept([trials[0], *pushed, *trials[2:]], model)
     assert found.verdict.kind == "no gap"
     assert "Trial 1 went another way than its repeat" in found.verdict.sentence
+
+
+@pytest.mark.parametrize(("stops", "kind"), [(1, "none of the library"), (2, "effect")])
+def test_a_level_that_one_trial_alone_shows_is_not_named(model, told, stops, kind):
+    long = [
+        Commands([[0.1, 0.08]] * 5, [0.6] * 5),
+        Commands([[0.08, 0.1]] * 5, [0.6] * 5),
+    ]
+    short = [Commands(item.values[:4], item.durations[:4]) for item in told[:4]]
+    plain = MujocoWorld(reality=[NOISE], threads=1).run([*long, *short], seeds=range(6))
+    stopping = MujocoWorld(
+        reality=["wheel_intermittent:wheel=both,every=5,speed=0", NOISE], threads=1
+    )
+    stuck = stopping.run(long, seeds=[0, 1])  # an obstacle, at the fifth command
+    trials = [*stuck[:stops], *plain[2:]]
+    found = diagnose(trials, model, rows=LEVELS, full=False)
+    assert found.verdict.kind == kind
+    if stops == 2:
+        assert found.verdict.named == (("wheel_intermittent[both]",),)
 
 
 def test_repeats_are_found_with_tolerance(model):
@@ -116,6 +136,7 @@ def test_what_holds_for_the_fitted_motion_alone_is_no_answer(before, closed, kin
         lasting=False,
         unexplained=0.1,
         goes="",
+        unconfirmed={},
         strained=False,
     )
     made.failing = Decomposition.failing.fget(made)
