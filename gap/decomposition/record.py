@@ -140,7 +140,7 @@ def statements(made: Decomposition) -> list[str]:
             for number in made.strayed
         )
         + "".join(
-            f" Trial {number} departs as {name} would make it, and no other trial does: "
+            f" Trial {number} departs as {name} would have it, and no other does: "
             "it is not named."
             for name, number in made.unconfirmed.items()
         )
