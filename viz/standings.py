@@ -78,6 +78,15 @@ def curves(cells: Sequence[Cell]) -> "Figure":
             axes = panels[kinds.index(kind)][priors.index(prior)]
             axes.set_visible(True)
             _panel(axes, (task, prior, kind), held, looks)
+        lines = {
+            line.get_label(): line for axes in panels.flat for line in axes.get_lines()
+        }
+        figure.legend(
+            [lines[name] for name in names if name in lines],
+            [name for name in names if name in lines],
+            loc="outside lower center",
+            ncols=4,
+        )
     return figure
 
 
@@ -89,21 +98,24 @@ def _panel(
 ) -> None:
     """One task, prior and set of damages: a line a learner."""
     task, prior, kind = group
+    counts = set()
     for name, some in figures.by_rival(cells).items():
         known = figures.comparable(some)
         if not known:
             continue
         over = np.mean([c.deployed.mean(0) / top for c, top in known], axis=0)
         trials = np.arange(1, len(over) + 1)
-        label = f"{name} (n = {min(c.runs for c, _ in known)} x {len(known)})"
-        axes.plot(trials, over, **looks[name], label=label)
+        counts.add((min(c.runs for c, _ in known), len(known)))
+        axes.plot(trials, over, **looks[name], label=name)
     said = "\n".join(textwrap.wrap(f"{prior}: {PRIORS[prior]}", WRAPPED))
     measure = figures.measure(task, kind)
-    axes.set_title(f"{said}\ndamages {kind}", fontsize="small")
+    least = "at least " if len(counts) > 1 else ""
+    runs, damages = min(counts, default=(0, 0))
+    some = f"damages {kind}: {least}{runs} runs of each of {damages}"
+    axes.set_title(f"{said}\n{some}", fontsize="small")
     axes.set_ylabel(f"deployed: {measure}", fontsize="small")
     axes.tick_params(labelbottom=True)
     axes.set_xlabel("trial from the damage on")
     if measure != "distance [m]":
         axes.set_ylim(0, 1.02)
     axes.set_ylim(bottom=0)
-    axes.legend(fontsize="x-small")
