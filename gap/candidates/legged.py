@@ -89,7 +89,11 @@ def unsure(joints: Sequence[str] = JOINTS) -> tuple[Row, ...]:
 def known(rows: Iterable[Row]) -> tuple[Row, ...]:
     """Rows without the slack of what all legs share, where what that slack does to a
     walk is told otherwise (`bns.gap.models.legged.scatter`): not twice."""
-    return tuple(replace(row, slack=min(row.slack, SHARE * row.sd)) for row in rows)
+    return tuple(_told(row) if row.slack > SHARE * row.sd else row for row in rows)
+
+
+def _told(row: Row) -> Row:
+    return replace(row, slack=SHARE * row.sd, unsure=row.slack)
 
 
 def lost(signs: Signs) -> tuple[Row, ...]:

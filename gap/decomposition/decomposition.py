@@ -187,6 +187,12 @@ def decompose(
     support = shares.guarded(problem, point)
     if support != point.support:
         point = descent.refitted(problem, point, support)
+    loose = shares.within_slack(problem, point)
+    if loose is not problem:
+        slack = {
+            row.term for row in loose.rows if row.unsure and row.slack == row.unsure
+        }
+        problem, point = loose, descent.refitted(loose, point, point.support - slack)
     if _worse(problem, start, point, known):
         point = descent.refitted(problem, point, frozenset())
     size = _Sizes.of(problem, start, point, known)

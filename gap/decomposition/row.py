@@ -21,6 +21,8 @@ class Row:
         unit: of the number.
         slack: how far the nominal model may be off without that being a gap (standard
             deviation); 0 = it is exact there.
+        unsure: the same where the model tells otherwise what it does, and `slack` is
+            less for it; what lies within (`shares.WITHIN`) is no gap.
         levels: values to start from where a slope at the nominal does not lead.
         smooth: whether there is a slope at the nominal.
         stepped: whether the motion changes in steps with the value, so that only a
@@ -52,6 +54,7 @@ class Row:
     high: float
     unit: str = "1"
     slack: float = 0.0
+    unsure: float = 0.0
     levels: tuple[float, ...] = ()
     smooth: bool = True
     stepped: bool = False

@@ -11,6 +11,7 @@ from bns.gap.decomposition.linear import KAPPA, Linear, Support
 from bns.gap.decomposition.problem import Problem
 
 CHOICE = 4.0  # nats within which the held-out error decides
+WITHIN = 2.5  # standard deviations of what a model is unsure by: no gap (assumed)
 FEWEST = 3  # trials of which others may confirm one
 CLEARLY = 0.02  # of the held-out error that a further explanation has to lower
 PIECES = 4  # of a stretch, each left out by itself for the share that is closed
@@ -216,6 +217,27 @@ def unconfirmed(problem: Problem, point: Point) -> dict[str, int]:
         if gains.sum() - gains[best] < ELSEWHERE * gains[best]:
             found[name] = problem.numbers[best]
     return found
+
+
+def within_slack(problem: Problem, point: Point) -> Problem:
+    """A problem in which explanations of a point that are no gap are slack.
+
+    The nominal model is unsure of their numbers, and lies hardly off by more.
+    """
+    off = np.abs(point.values - problem.nominal)
+    found = {
+        name
+        for name, numbers in problem.terms.items()
+        if name in point.support
+        and all(off[n] <= WITHIN * problem.rows[n].unsure for n in numbers)
+    }
+    if not found:
+        return problem
+    rows = (
+        replace(row, slack=row.unsure) if row.term in found else row
+        for row in problem.rows
+    )
+    return replace(problem, rows=tuple(rows))
 
 
 def weighty(problem: Problem, point: Point, left: float) -> Support:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from bns.gap.bench.wheeled_cases import commands
-from bns.gap.decomposition import diagnosis, rest
+from bns.gap.candidates import legged
+from bns.gap.decomposition import diagnosis, rest, shares
 from bns.gap.decomposition.decomposition import Decomposition
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
@@ -142,3 +143,24 @@ def test_what_holds_for_the_fitted_motion_alone_is_no_answer(before, closed, kin
     made.failing = Decomposition.failing.fget(made)
     made.foreign = Decomposition.foreign.fget(made)
     assert Decomposition.kind.fget(made) == kind
+
+
+@pytest.mark.parametrize(("value", "slack"), [(1.2, 0.1), (0.76, 0.1), (1.3, 0.004)])
+def test_what_a_model_is_unsure_by_is_slack_and_no_explanation(value, slack):
+    grip = Row("foot_slippery[all]", 1.0, 0.4, 0.1, 2.0, slack=0.004, unsure=0.1)
+    rows = (grip, Row("centre_of_mass.dy", 0.0, 0.015, -0.03, 0.03))
+    none, number = np.zeros((0, 1)), np.zeros(0, dtype=int)
+    problem = Problem(None, (), rows, (), none, number, number, ())
+    names = frozenset(row.name for row in rows)
+    point = SimpleNamespace(support=names, values=np.array([value, 0.02]))
+    found = shares.within_slack(problem, point).rows
+    assert [row.slack for row in found] == [slack, 0.0]
+
+
+def test_walkers_keep_what_their_model_is_unsure_by():
+    told = {
+        row.name: row
+        for row in legged.known(legged.rows(legged.Suspects((), (), True)))
+    }
+    assert told["foot_slippery[all]"].unsure > 10 * told["foot_slippery[all]"].slack
+    assert told["centre_of_mass.dy"].unsure == 0
