@@ -111,8 +111,8 @@ def _panel(
     measure = figures.measure(task, kind)
     least = "at least " if len(counts) > 1 else ""
     runs, damages = min(counts, default=(0, 0))
-    some = f"damages {kind}: {least}{runs} runs of each of {damages}"
-    axes.set_title(f"{said}\n{some}", fontsize="small")
+    held = f"damages {kind}: {least}{runs} runs of each of {damages}"
+    axes.set_title(f"{said}\n{held}", fontsize="small")
     axes.set_ylabel(f"deployed: {measure}", fontsize="small")
     axes.tick_params(labelbottom=True)
     axes.set_xlabel("trial from the damage on")

@@ -181,25 +181,7 @@ def decompose(
     late = None
     if found:
         problem, point, late = found
-    unconfirmed = shares.unconfirmed(problem, point)
-    if unconfirmed:
-        point = descent.refitted(problem, point, point.support - unconfirmed.keys())
-    support = shares.guarded(problem, point)
-    if support != point.support:
-        point = descent.refitted(problem, point, support)
-    loose = shares.within_slack(problem, point)
-    if loose is not problem:
-        slack = {
-            row.term for row in loose.rows if row.unsure and row.slack == row.unsure
-        }
-        problem, point = loose, descent.refitted(loose, point, point.support - slack)
-    if _worse(problem, start, point, known):
-        point = descent.refitted(problem, point, frozenset())
-    size = _Sizes.of(problem, start, point, known)
-    support = shares.weighty(problem, point, size.unexplained)
-    if support != point.support:
-        point = descent.refitted(problem, point, support)
-        size = _Sizes.of(problem, start, point, known)
+    problem, point, size, unconfirmed = _settled(problem, start, point, known)
     if late and late.name not in point.support:
         late = None
     tell("rivals")
@@ -229,6 +211,34 @@ def decompose(
         else "",
         unconfirmed=unconfirmed,
     )
+
+
+def _settled(
+    problem: Problem, start: Point, point: Point, known: rest.Floor
+) -> tuple[Problem, Point, "_Sizes", dict[str, int]]:
+    """A point without explanations that nothing confirms, that make held-out errors
+    worse, that are no gap, or that close hardly any of it; the problem that takes some
+    of these as slack; the sizes; and what one trial alone shows (`unconfirmed`)."""
+    unconfirmed = shares.unconfirmed(problem, point)
+    if unconfirmed:
+        point = descent.refitted(problem, point, point.support - unconfirmed.keys())
+    support = shares.guarded(problem, point)
+    if support != point.support:
+        point = descent.refitted(problem, point, support)
+    loose = shares.within_slack(problem, point)
+    if loose is not problem:
+        slack = {
+            row.term for row in loose.rows if row.unsure and row.slack == row.unsure
+        }
+        problem, point = loose, descent.refitted(loose, point, point.support - slack)
+    if _worse(problem, start, point, known):
+        point = descent.refitted(problem, point, frozenset())
+    size = _Sizes.of(problem, start, point, known)
+    support = shares.weighty(problem, point, size.unexplained)
+    if support != point.support:
+        point = descent.refitted(problem, point, support)
+        size = _Sizes.of(problem, start, point, known)
+    return problem, point, size, unconfirmed
 
 
 def _steady(
