@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bns.gap.decomposition import fit, levels, search
+from bns.gap.decomposition import fit, levels, noise, search
 from bns.gap.decomposition.fit import Noise, Point, linearised, newton, placed
 from bns.gap.decomposition.levels import Level
 from bns.gap.decomposition.linear import Linear, Support
@@ -23,6 +23,7 @@ MARGIN = 1.02  # of the held-out error that an autoregression may cost
 WEAK = 0.05  # of what a set explains: so little may be left to the others
 TRIED = 3  # of these, the weakest first
 SLIGHT = 0.25  # of a plausible departure: next to none
+REWEIGHED = 2  # times that residuals are weighed by what is left of them
 WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
 
 
@@ -121,20 +122,25 @@ def costs(problem: Problem, points: Sequence[Point]) -> list[float]:
 def relinearised(problem: Problem, point: Point, known: Noise) -> Linear:
     """A point's linear model under another noise.
 
+    Residuals weigh by what the set leaves with its slack and all nuisances in place: by
+    what they were before, a gap that scatter may explain would weigh little.
+
     Args:
         problem: the recording.
         point: a fitted set.
         known: the other noise.
     """
-    whole = fit.target(problem, point.values, point.rest, point.slopes)
-    linear = Linear.of(
-        problem,
-        {k: known.innovations(slope) for k, slope in point.slopes.items()},
-        fit.units(problem, point.values),
-        known.innovations(whole),
-        known.weights(point.rest, problem.seen),
+    whole = known.innovations(
+        fit.target(problem, point.values, point.rest, point.slopes)
     )
-    return linear.correlated(known.lam)
+    design = {k: known.innovations(slope) for k, slope in point.slopes.items()}
+    units = fit.units(problem, point.values)
+    weight = known.weights(point.rest, problem.seen)
+    for _ in range(REWEIGHED):
+        made = Linear.of(problem, design, units, whole, weight).correlated(known.lam)
+        left = made.rest(made.solve(point.support))
+        weight = noise.weights(left, known.sd, problem.seen)
+    return Linear.of(problem, design, units, whole, weight).correlated(known.lam)
 
 
 def decompose(tried: Singles) -> Point:

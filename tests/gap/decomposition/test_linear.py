@@ -1,14 +1,17 @@
 """Known answers of the linear fit: what is planted is found, what is not is not."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from bns.gap.decomposition import search, shares
+from bns.gap.decomposition import descent, search, shares
+from bns.gap.decomposition.fit import Noise, Point
 from bns.gap.decomposition.linear import KAPPA, Linear, inflation, tail
 from bns.gap.decomposition.noise import Memory, correlated, scale, weights
 from bns.gap.decomposition.spread import Spread
+from bns.gap.decomposition.starts import Starts
 
 NAMES = ("a", "b", "c", "d", "e", "f")
 BLOCKS, EACH = 8, 60
@@ -222,3 +225,22 @@ def test_a_large_departure_costs_the_log_of_its_size():
     problem.columns[1] = 8 * problem.columns[0]
     linear = problem.linear(planted(rng, problem, b=1.0))
     assert linear.cost({"a"}) == pytest.approx(linear.cost({"b"}), abs=0.2)
+
+
+def test_residuals_that_scatter_explains_weigh_as_what_it_leaves_of_them():
+    rng = np.random.default_rng(4)
+    problem = Rows(rng)
+    problem.rows = (*problem.rows[:5], replace(problem.rows[5], slack=10.0))
+    problem.seen = np.ones((BLOCKS * EACH, 2), dtype=bool)
+    one = np.ones_like(problem.columns[0])
+    known = Noise(
+        one, Starts(one[0], (), 0 * one), Memory.none(problem.block, 2), lam=1.0
+    )
+    costs = []
+    for size in (0.0, 8.0):  # of what the slack of the last row explains
+        rest = planted(np.random.default_rng(5), problem, f=size)
+        linear = problem.linear(rest)
+        slopes = dict(enumerate(problem.columns))
+        at = Point(problem.nominal, frozenset(), rest, linear, slopes, known)
+        costs.append(descent.relinearised(problem, at, known).cost(()))
+    assert costs[1] == pytest.approx(costs[0], abs=1.0)
