@@ -7,7 +7,7 @@ import numpy as np
 from bns.errors import BnsError
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel
-from bns.gap.recordings import trial_labels
+from bns.gap.recordings import trial_conditions
 from bns.gap.records import Diagnosis
 from bns.worlds.trial import Trial
 
@@ -26,8 +26,9 @@ def reproducible(trials: Sequence[Trial], model: GapModel) -> None:
         bad = ~np.isfinite(made).all(axis=1)
         if bad.any():
             raise BnsError(
-                f"The simulation of {trial_labels.of(trial, number)} by the nominal "
-                f"model {model.name!r} diverges at {trial.times[bad.argmax()]:.2f} s; "
+                f"The simulation of {trial_conditions.label(trial, number)} by the "
+                f"nominal model {model.name!r} diverges at "
+                f"{trial.times[bad.argmax()]:.2f} s; "
                 "check its time step, its start and the commands."
             )
     recorded = max(_travel(trial.observed) for trial in trials)

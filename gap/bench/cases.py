@@ -17,6 +17,7 @@ import numpy as np
 
 from bns import seeding
 from bns.errors import BnsError
+from bns.gap.bench.faults import faulty
 from bns.gap.decomposition import descent, fit, levels
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import KAPPA
@@ -24,7 +25,6 @@ from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.singles import Singles
 from bns.gap.models.base import PLANE, GapModel
-from bns.gap.recordings.recording_faults import faulty
 from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Commands, Trial
 

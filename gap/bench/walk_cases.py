@@ -17,8 +17,7 @@ from bns.gap.candidates import legged
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
 from bns.gap.models.legged.model import TRACKER, WalkModel
-from bns.gap.models.legged.signs import Signs
-from bns.gap.models.legged.where import Suspects
+from bns.gap.models.legged.signs import Signs, Suspects
 from bns.models.legs import LEGS, PARTS, joints_of, names, parts
 from bns.models.phantomx import gait
 from bns.worlds.effects import registry

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from bns.gap.decomposition.row import Row
-from bns.gap.models.legged.signs import Signs
-from bns.gap.models.legged.where import Suspects
+from bns.gap.models.legged.signs import Signs, Suspects
 from bns.models.legs import JOINTS, LEGS, names, parts
 from bns.worlds.effects import registry
 

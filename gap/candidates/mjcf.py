@@ -22,6 +22,10 @@ SHARES = (0.02, 0.05, 0.12, 0.3, 1.0)  # of the largest value, beyond the nomina
 LOWER = (0.9, 0.5, 0.2)  # of the nominal value, taken off
 LATE = (0.01, 0.03, 0.08, 0.2, 0.5)  # [s]
 EIGHTH = 0.125  # of a range: a plausible departure where nothing else is known
+WIDER = (
+    10.0  # times the largest value that is looked for first: geared servos have much
+)
+# friction and inertia for the links that they move; assumed
 PLAY = 0.3  # [rad or m] largest play, or offset of an encoder
 EXCITE = {
     "joint_damping": "fast motion of that joint",
@@ -50,17 +54,25 @@ EXCITE = {
     "command_limit": "large commands",
     "command_rate": "large steps",
 }
+_DELAYS = ("command_delay[all]", "reading_delay[all]")
+"""alike where every command and every reading is late"""
 USUAL = (
     "joint_damping",
     "joint_friction",
     "joint_armature",
+    "joint_stiffness",
     "body_mass",
     "actuator_gain",
+    "actuator_kp",
+    "actuator_kd",
+    "actuator_torque_limit",
     "command_delay",
     "command_lag",
     "reading_gain",
+    "reading_offset",
 )
-"""considered where the user does not say which"""
+"""considered where the user does not say which: `actuator_kp` and `actuator_kd` of
+position servos, `actuator_gain` of other actuators, a limit where there is one"""
 
 
 def candidates(config: OwnConfig, model: mujoco.MjModel) -> tuple[Row, ...]:
@@ -102,18 +114,32 @@ def _called(item: Row, given: str) -> Row:
 def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]]:
     joints = tuple(model.joint(j).name for j in range(model.njnt) if _hinged(model, j))
     owned = {int(model.jnt_bodyid[j]) for j in range(model.njnt)}
-    parts = {
-        "joint": tuple(name for name in joints if name),
-        "body": tuple(model.body(b).name for b in sorted(owned) if model.body(b).name),
-        "actuator": tuple(item.actuator for item in config.told),
+    bodies = [model.body(number).name for number in sorted(owned)]
+    seen = tuple(item.channel.name for item in config.seen)
+    told = [model.actuator(item.actuator).id for item in config.told]
+    affine = model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE
+    servos = {n for n in told if affine[n] and model.actuator_biasprm[n][1]}
+    damped = {number for number in servos if model.actuator_biasprm[number][2]}
+    limited = {number for number in told if model.actuator_forcelimited[number]}
+    of = {
+        "actuator_gain": set(told) - servos,
+        "actuator_kp": servos,
+        "actuator_kd": damped,
+        "actuator_torque_limit": limited,
+        "reading_gain": seen,
+        "reading_offset": seen,
     }
     made: dict[str, tuple[str, ...]] = {}
     for name in USUAL:
         kind = effects.OWNERS.get(name)
-        seen = tuple(item.channel.name for item in config.seen)
-        made[name] = (
-            parts[kind] if kind else (seen if name == "reading_gain" else (ALL,))
-        )
+        if kind == "actuator":
+            made[name] = tuple(model.actuator(n).name for n in told if n in of[name])
+        elif kind:
+            made[name] = tuple(
+                part for part in (joints if kind == "joint" else bodies) if part
+            )
+        else:
+            made[name] = tuple(of.get(name, (ALL,)))
     return {name: parts for name, parts in made.items() if parts}
 
 
@@ -132,6 +158,9 @@ def _candidates(
         low, high, unit = _range(name, part, config, model)
         given = config.bounds.get(f"{stem}[{part}]", {})
         low, high = given.get("low", low), given.get("high", high)
+        signed = name.startswith("joint_") and name != "joint_backlash"
+        widest = WIDER * high if signed and "high" not in given else high
+        sd = EIGHTH * (high if signed else high - low)
         nominal = high if name == "command_limit" else about.nominal
         yield Row(
             name=f"{stem}[{part}]",
@@ -140,12 +169,17 @@ def _candidates(
             unit=unit,
             nominal=nominal,
             low=min(low, nominal),
-            high=max(high, nominal),
-            sd=max(EIGHTH * (high - low), 1e-12),
+            high=max(widest, nominal),
+            sd=max(sd, 1e-12),
             levels=_grid(nominal, low, high),
             fixed={"part": part},
             slack=given.get("slack", 0.0),
             excite=EXCITE[name],
+            aliases=tuple(
+                other
+                for other in _DELAYS
+                if f"{stem}[{part}]" in _DELAYS and other != f"{stem}[{part}]"
+            ),
         )
 
 

@@ -10,15 +10,19 @@ from bns.gap.candidates.mjcf import EXCITE
 from bns.gap.decomposition.row import Row
 from bns.gap.models.mjcf import masses
 from bns.gap.models.mjcf.masses import Body
-from bns.gap.recordings import command_moments
+from bns.gap.recordings import trial_conditions
 from bns.worlds.effects.parts import ALL
 from bns.worlds.trial import Trial
 
 LEAD = "step_lead"
 """shift of the simulation in time that no effect is"""
+LAGS = 1.5  # half steps that a simulation may lead by; a robot that is later is late
+STEP = "fine_steps"
+"""share of what finer steps change of the motion: 0 = as by the model's own step"""
 GROUPED = ("joint_damping", "joint_friction", "joint_armature")
 """effects that may be on all joints alike"""
 LATE = ("command_delay", "command_lag", "reading_delay")
+LAG_STEP = 0.01  # [s] for its derivative: a lag has next to none where there is none
 TOLD = (0.05, 0.12, 0.2, 0.3, 0.4, 0.55)  # quantiles of what was told, for dead zones
 EIGHTH = 0.125  # of the largest value: the plausible one
 OFFSET = 0.0625  # of the span of an offset
@@ -46,6 +50,8 @@ def rows(
     trials: Sequence[Trial],
     dt: float,
     bodies: Mapping[str, Body],
+    *,
+    stepped: bool = False,
 ) -> tuple[Row, ...]:
     """All numbers that may be off, with those of all joints alike.
 
@@ -54,9 +60,11 @@ def rows(
         trials: a recording; levels of dead zones lie between what it was told.
         dt: physics step [s].
         bodies: whose mass may be off, by name.
+        stepped: whether finer steps change the motion. Robots know no steps, and what
+            was simulated by the model's own is a recording, too; neither is a gap.
     """
     lead = max(0.002, 0.5 * dt)
-    late = max(lead, command_moments.unknown(trials) / 2)
+    late = max(lead, trial_conditions.moments_unknown(trials) / 2)
     made: list[Row] = []
     for item in candidates:
         if item.effect == "body_mass":
@@ -65,7 +73,11 @@ def rows(
         else:
             made += _of(item, trials, lead)
     edge = max(0.02, late)
-    made.append(Row(LEAD, 0.0, late, -edge, edge, unit="s", nuisance=True, step=0.001))
+    made.append(
+        Row(LEAD, 0.0, late, -LAGS * lead, edge, unit="s", nuisance=True, step=0.001)
+    )
+    if stepped:
+        made.append(Row(STEP, 1.0, 0.5, -1.0, 2.0, nuisance=True, step=0.5))
     return tuple(made)
 
 
@@ -87,6 +99,7 @@ def grouped(candidates: Sequence[Row]) -> list[Row]:
                     name=f"{name}[{ALL}]",
                     low=low,
                     high=high,
+                    sd=min(item.sd for item in parts),
                     levels=grid or (high,),
                     fixed={"part": ALL},
                     slack=0.0,
@@ -108,14 +121,14 @@ def _of(item: Row, trials: Sequence[Trial], lead: float) -> Iterable[Row]:
         yield row(item.name, item.nominal, third, smooth=False, levels=levels)
         return
     sd, slack = _plausible(item)
-    late = item.effect in LATE
+    late, lag = item.effect in LATE, item.effect == "command_lag"
     yield row(
         item.name,
         item.nominal,
         sd,
         slack=item.slack or (lead if late else slack),  # its steps lead by as much
         levels=(0.15, 0.3) if late else (),
-        step=0.01 if late else 0.0,
+        step=LAG_STEP if lag else lead if late else 0.0,
     )
 
 
@@ -123,7 +136,7 @@ def _plausible(item: Row) -> tuple[float, float]:
     """Plausible departure of a number, and how well it is known."""
     sd, slack = PLAUSIBLE.get(item.effect, (0.0, 0.0))
     if item.effect.startswith("joint_"):
-        sd, slack = EIGHTH * item.high, SHARE * EIGHTH * item.high
+        sd, slack = item.sd, SHARE * item.sd
     elif item.effect.endswith("_offset") and not sd:
         sd = OFFSET * (item.high - item.low)
         slack = SHARE * sd

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from bns.gap.decomposition.row import Row
-from bns.gap.recordings import command_moments
+from bns.gap.recordings import trial_conditions
 from bns.worlds.effects import registry
 from bns.worlds.effects.common import TOP_SPEED
 from bns.worlds.effects.parameter import Parameter
@@ -43,8 +43,10 @@ _SMOOTH: tuple[tuple[str, float, float, float, bool, dict[str, Any]], ...] = (
     ("wheel_diameter", 0.04, 0.7, 1.3, True, {"levels": (0.93, 0.96, 1.04, 1.07)}),
     ("axle_length", 0.04, 0.7, 1.3, False, {"slack": 0.004}),
     ("motor_lag", 0.06, 0, 2, True, {"levels": (0.1, 0.25, 0.6), "step": 0.01}),
-    ("command_latency", 0.05, 0, 1, False, {"levels": (0.1, 0.2, 0.4), "step": 0.01}),
-    ("tracker_latency", 0.05, 0, 1, False, {"step": 0.01}),
+    ("command_latency", 0.05, 0, 1, False,
+     {"levels": (0.1, 0.2, 0.4), "step": 0.01, "aliases": ("tracker_latency",)}),
+    ("tracker_latency", 0.05, 0, 1, False,
+     {"step": 0.01, "aliases": ("command_latency",)}),
     ("rolling_drag.torque", 0.004, 0, 0.03, True,
      {"step": 5e-4, "levels": (0.004, 0.01)}),
     ("rolling_drag.breakaway", 0.003, 0, 0.03, True,
@@ -110,7 +112,7 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
             excite=EXCITE["payload"], **given)
         for name, sd, low, high, unit, given in _LOAD
     ]  # fmt: skip
-    lead = max(0.003, command_moments.unknown(trials) / 2)
+    lead = max(0.003, trial_conditions.moments_unknown(trials) / 2)
     made.append(Row(LEAD, 0.0, lead, -0.06, 0.06, unit="s", nuisance=True, step=0.001))
     for name, sd, high, sided, levels in _ROUND:
         for side in SIDES[:2] if sided else ("",):

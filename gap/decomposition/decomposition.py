@@ -1,7 +1,7 @@
 """What the joint fit found in a recording."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,7 +14,7 @@ from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.shares import Part
 from bns.gap.decomposition.singles import Singles
-from bns.gap.recordings import command_moments
+from bns.gap.recordings import trial_conditions
 from bns.progress import Tell, unheard
 
 MOST = 0.5  # share of the gap beyond which what is left is most of it
@@ -120,7 +120,7 @@ class Decomposition:
             return False
         if self.recurring:
             return self.after > FELT
-        if command_moments.unknown(self.problem.trials):
+        if trial_conditions.moments_unknown(self.problem.trials):
             return False  # so do commands that began a little sooner or later
         return self.after > max(LARGE, SCATTER * self.scatter)
 
@@ -185,11 +185,11 @@ def decompose(
     if late and late.name not in point.support:
         late = None
     tell("rivals")
-    return Decomposition(
+    made = Decomposition(
         problem=problem,
         start=start,
         point=point,
-        parts=tuple(shares.parts(problem, point)),
+        parts=(),
         tied=tuple(ties.tied(problem, point, tried)),
         onset=late,
         floor=known,
@@ -211,6 +211,8 @@ def decompose(
         else "",
         unconfirmed=unconfirmed,
     )
+    parts = shares.parts(problem, point, lasting=made.lasting)
+    return replace(made, parts=tuple(parts))
 
 
 def _settled(

@@ -7,10 +7,9 @@ import numpy as np
 
 from bns.gap.decomposition import noise
 from bns.gap.decomposition.linear import Linear, Support, inflation, tail
-from bns.gap.decomposition.noise import Memory
+from bns.gap.decomposition.noise import Memory, Starts
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
-from bns.gap.decomposition.starts import Starts
 
 DAMPING = (0.0, 2.0, 20.0, 200.0)  # added to the curvature, in units of the prior
 LONGEST = 4.0  # prior standard deviations of one step
@@ -83,11 +82,12 @@ class Point:
 
 def smooth(problem: Problem, values: np.ndarray) -> list[int]:
     """Rows that have a column at values ``(R,)``: those with a slope, those set to a
-    level."""
+    level. A nuisance that is at its bound has none: it cannot do more."""
     return [
         number
         for number, row in enumerate(problem.rows)
-        if row.smooth or values[number] != row.nominal
+        if (row.smooth or values[number] != row.nominal)
+        and not (row.nuisance and not row.low < values[number] < row.high)
     ]
 
 

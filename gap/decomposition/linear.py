@@ -24,6 +24,8 @@ explanations of a usual model, so that about one in all is expected"""
 EDGE = 0.1  # of a level's departure, by which a fit may leave its bounds: whole losses
 # are at theirs
 
+AT = 9.0  # squared deviations by which rows may want beyond a bound and still be at it
+
 Support = frozenset[str]
 
 
@@ -239,7 +241,8 @@ class Linear:
         Where a row of it would leave its bounds the set is no better than the one
         without that explanation, and costs more; but where that bound is the nominal
         value and others of its rows stay inside, the row alone is out: a dry friction
-        that does not break away is one.
+        that does not break away is one. Rows that are at a bound within what the data
+        leave open pay for what they are off.
         """
         key = frozenset(support)
         if key not in self._costs:
@@ -259,10 +262,31 @@ class Linear:
             value, found = plain.changed(rows, 1.0 - self.slack[rows] ** 2)
             far = self._beyond(rows, found)
         value += self.paid(key) + tail(found)
+        if far and (off := self._at_bounds(key, rows, found, far)) < AT:
+            value, far = value + 0.5 * off, set()
         if far:
             out = {name for name in key if far & set(self.terms[name])}
             value = max(value, self.cost(key - out) + KAPPA * len(out))
         return float(value)
+
+    def _at_bounds(
+        self, key: Support, rows: list[int], found: np.ndarray, far: set[int]
+    ) -> float:
+        """Squared deviations, by what the data leave open, from where rows want to be
+        to their bounds; infinite where such a bound is the nominal value.
+
+        Args:
+            key: explanations that are in.
+            rows: of these.
+            found: where they want to be, ``(n,)``.
+            far: those beyond a bound.
+        """
+        at = [place for place, row in enumerate(rows) if row in far]
+        out = [rows[place] for place in at]
+        off = found[at] - np.clip(found[at], self.low[out], self.high[out])
+        if np.isclose(found[at], off).any():
+            return np.inf
+        return float(off @ np.linalg.solve(self.covariance(key)[np.ix_(out, out)], off))
 
     def _beyond(self, rows: list[int], found: np.ndarray) -> set[int]:
         """Rows whose most probable values lie beyond their bounds."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, Windows
-from bns.gap.recordings import stretches, trial_labels
+from bns.gap.recordings import segments, trial_conditions
 from bns.worlds.trial import Trial
 
 FAR = 1e3  # residual of a diverged simulation
@@ -44,7 +44,7 @@ class Problem:
     @classmethod
     def of(cls, trials: Sequence[Trial], model: GapModel) -> "Problem":
         """Features of a checked recording, and the model's rows."""
-        kept = stretches.shortened(trials, model.longest, model.before)
+        kept = segments.shortened(trials, model.longest, model.before)
         trials = [trial for trial, _ in kept]
         windows = tuple(model.joint_windows(trial) for trial in trials)
         seen = [
@@ -62,7 +62,7 @@ class Problem:
             np.concatenate(seen),
             np.repeat(np.arange(len(trials)), counts),
             model.blocks(trials, windows),
-            tuple(trial_labels.numbers(trials)),
+            tuple(trial_conditions.numbers(trials)),
         )
 
     @cached_property

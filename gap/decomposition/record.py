@@ -1,7 +1,7 @@
 """A decomposition written down as a diagnosis: verdict, statements, fits."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,8 +12,11 @@ from bns.gap.decomposition import rest, search, shares, words
 from bns.gap.decomposition.decomposition import Decomposition
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.shares import Part
 from bns.gap.records import Diagnosis, Fit, Verdict
+from bns.gap.where import horizons, localised
+from bns.gap.where.compared import Compared
 
 SINGLES = 8  # explanations whose share alone is reported
 
@@ -39,10 +42,8 @@ def recorded(
     where: dict[str, Any] = {}
     closed = _closed(made)
     if full:
-        from bns.gap.decomposition import pictured
-
         began = time.perf_counter()
-        where, plain = pictured.where(made, seed=seed)
+        where, plain = _where(made, seed=seed)
         seconds = {**seconds, "where": round(time.perf_counter() - began, 3)}
         closed["plain"] = plain
     if made.onset:
@@ -114,10 +115,28 @@ def _change(made: Decomposition, kind: str) -> str:
         return "An effect that the library lacks; see where and when the gap sits."
     if kind != "either":
         return ""
+    first, *others = made.tied
     rows = {row.term: row for row in made.problem.rows}
-    names = {name for support in made.tied for name in support}
-    wanted = sorted({rows[name].excite for name in names} - {""})
-    return f"A recording with {' and '.join(wanted)} may separate them."
+    apart: set[str] = set()
+    for other in others:
+        left, right = first - other, other - first
+        if not _alike(left, right, rows):
+            apart |= left | right
+    wanted = sorted({rows[name].excite for name in apart} - {""})
+    if not wanted:
+        return (
+            "They do the same whatever is commanded: observe another quantity, or "
+            "measure one of them."
+        )
+    return f"A recording with {', '.join(wanted)} may separate them."
+
+
+def _alike(left: Support, right: Support, rows: Mapping[str, Row]) -> bool:
+    """Whether two explanations are known to do the same whatever is commanded."""
+    if len(left) != 1 or len(right) != 1:
+        return False
+    (one,), (other,) = left, right
+    return other in rows[one].aliases
 
 
 def _ordered(made: Decomposition, support: Support) -> tuple[str, ...]:
@@ -149,7 +168,7 @@ def statements(made: Decomposition) -> list[str]:
         return ["No gap beyond what the recording scatters by itself." + apart]
     before, beyond = _sizes(made, made.start.rest)
     _, left = _sizes(made, made.point.rest)
-    listed = [words.part(p, *_main(made, p), _beside(made, p)) for p in made.parts]
+    listed = [_said(made, part) for part in made.parts]
     date = ""
     if made.onset:
         date = f"{made.onset.name} sets in at trial {made.onset.trial}."
@@ -186,29 +205,29 @@ def _sizes(made: Decomposition, left: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return np.sqrt(square), np.sqrt(beyond)
 
 
-def _main(made: Decomposition, part: Part) -> tuple[str, str]:
-    """Unit and name of the row that stands for an explanation."""
-    rows = {row.name: row for row in made.problem.rows}
+def _said(made: Decomposition, part: Part) -> str:
+    """An explanation with its magnitude, interval, further numbers and share."""
+    value, (low, high), unit = _magnitude(made.problem, part)
+    return words.part(part, value, low, high, unit, _beside(made.problem, part))
+
+
+def _beside(problem: Problem, part: Part) -> list[str]:
+    """Further numbers of an explanation: what a dry friction takes to break away, where
+    a load sits, which way a floor slopes."""
+    rows = {row.name: row for row in problem.rows}
     if part.name in part.values:
-        return rows[part.name].unit, part.name
-    moved = [n for n in part.values if part.values[n] != rows[n].nominal]
-    name = (moved or [*part.values])[0]
-    alike = [n for n in moved if rows[n].unit == rows[name].unit]
-    if alike:
-        name = max(alike, key=lambda n: abs(part.values[n] - rows[n].nominal))
-    return rows[name].unit, name
-
-
-def _beside(made: Decomposition, part: Part) -> list[str]:
-    """Further numbers of an explanation that is called as its first: what a dry
-    friction takes to break away."""
-    if part.name not in part.values:
+        return [
+            f"{name.partition('[')[0].rpartition('.')[2]} {value:.4g} {rows[name].unit}"
+            for name, value in part.values.items()
+            if name != part.name and value != rows[name].nominal
+        ]
+    effect = problem.model.effect(part.name, part.values)
+    if effect is None or len(part.values) == 1:
         return []
-    rows = {row.name: row for row in made.problem.rows}
     return [
-        f"{name.partition('[')[0].rpartition('.')[2]} {value:.4g} {rows[name].unit}"
-        for name, value in part.values.items()
-        if name != part.name and value != rows[name].nominal
+        f"{about.name} {effect[about.name]:.4g} {about.unit}".removesuffix(" 1")
+        for about in effect.parameters[1:]
+        if effect[about.name] != about.nominal
     ]
 
 
@@ -264,24 +283,29 @@ def shown_effect(
         part: its values and intervals.
 
     Returns:
-        text; magnitude, which for several numbers is that called as the explanation
-        or, without one, the length of the departure of the first two; its interval;
-        unit of the first.
+        text; magnitude, interval and unit as `_magnitude` gives them.
     """
+    return str(problem.model.effect(name, part.values)), *_magnitude(problem, part)
+
+
+def _magnitude(problem: Problem, part: Part) -> tuple[float, tuple[float, float], str]:
+    """Magnitude, interval and unit of an explanation: of the number called as it is, or
+    without one of the first; of a size with a direction, the length."""
     rows = {row.name: row for row in problem.rows}
-    units = rows[next(iter(part.values))].unit
-    made = problem.model.effect(name, part.values)
-    values = np.array(list(part.values.values()))
-    middle = np.array([rows[n].nominal for n in part.values])
-    first = next(iter(part.values))
-    called = name if name in part.values else first
-    if len(values) == 1 or (called == name and part.values[name] != rows[name].nominal):
-        edges = float(part.low[called]), float(part.high[called])
-        return str(made), float(part.values[called]), edges, rows[called].unit
-    length = float(np.hypot(*(values - middle)[:2]))
-    width = np.array(list(part.high.values())) - np.array(list(part.low.values()))
-    half = float(np.abs((values - middle) @ width) / max(length, 1e-12)) / 2
-    return str(made), length, (max(length - half, 0.0), length + half), units
+    names = list(part.values)
+    called = part.name
+    if called not in names or part.values[called] == rows[called].nominal:
+        moved = [n for n in names if part.values[n] != rows[n].nominal] or names
+        called = moved[0]
+    unit = rows[called].unit
+    both = [n for n in names if rows[n].unit == unit][:2]
+    if called == part.name or len(both) == 1:
+        return part.values[called], (part.low[called], part.high[called]), unit
+    away = np.array([part.values[n] - rows[n].nominal for n in both])
+    width = np.array([part.high[n] - part.low[n] for n in both])
+    length = float(np.hypot(*away))
+    half = float(np.abs(away) @ width / max(length, 1e-12)) / 2
+    return length, (max(length - half, 0.0), length + half), unit
 
 
 def _signatures(made: Decomposition) -> dict[str, Any]:
@@ -366,3 +390,21 @@ def _decomposition(made: Decomposition) -> dict[str, Any]:
         if made.onset is None
         else {"name": made.onset.name, "trial": made.onset.trial},
     }
+
+
+def _where(made: Decomposition, *, seed: int) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Localisation of the gap, and its size over a second before and after.
+
+    Args:
+        made: a decomposition.
+        seed: of the bootstraps.
+    """
+    problem = made.problem
+    compared = Compared.of(problem.trials, problem.model, made.floor.sigma)
+    effects = [
+        effect
+        for part in made.parts
+        if (effect := problem.model.effect(part.name, part.values)) is not None
+    ]
+    found = localised.where(compared, effects, seed=seed)
+    return found, horizons.plain_gap(compared, effects)

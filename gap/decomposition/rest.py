@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns import seeding
+from bns.gap.decomposition.noise import Starts
 from bns.gap.decomposition.problem import Problem
-from bns.gap.decomposition.starts import Starts
 
 THIRD = np.sqrt(20.0)  # third differences of noise: 1 + 9 + 9 + 1
 NORMAL = 1.4826

@@ -30,7 +30,8 @@ class Part:
         name: of the explanation.
         values: of its rows, by name.
         low, high: 90 % intervals of these.
-        last: share of the gap that goes when it is added last.
+        last: share of the gap that goes when it is added last. The gap is all that
+            the explanations close, and the rest too where that is more than scatter.
         alone: share that it closes by itself.
         sure: posterior probability that it is in.
     """
@@ -44,13 +45,19 @@ class Part:
     sure: float
 
 
-def parts(problem: Problem, point: Point) -> list[Part]:
-    """Explanations of a point, the largest share first."""
+def parts(problem: Problem, point: Point, *, lasting: bool = True) -> list[Part]:
+    """Explanations of a point, the largest share first.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+        lasting: whether what it leaves is more than scatter, and so a part of the gap.
+    """
     linear, support = point.linear, point.support
     spread = NINETY * np.sqrt(np.diagonal(linear.covariance(support)))
     none, every = linear.squares(()), linear.squares(linear.free)
-    whole = max(none - every, 1e-9)
     left = linear.squares(support)
+    whole = max(none - (every if lasting else left), 1e-9)
     made = []
     for name in support:
         values, low, high = _values(problem, point, name, spread)

@@ -50,18 +50,24 @@ def size(
     )
 
 
-def part(found: Part, unit: str, main: str, beside: Sequence[str] = ()) -> str:
+def part(
+    found: Part,
+    value: float,
+    low: float,
+    high: float,
+    unit: str,
+    beside: Sequence[str] = (),
+) -> str:
     """One explanation with its magnitude and share.
 
     Args:
         found: the explanation.
-        unit: of its main number; "1" = none.
-        main: name of the row that is said.
+        value: its magnitude.
+        low, high: 90 % interval of it.
+        unit: of the magnitude; "1" = none.
         beside: further numbers of it, in words.
     """
-    value = found.values.get(main, 0.0)
     shown = "" if unit == "1" else f" {unit}"
-    low, high = found.low.get(main, value), found.high.get(main, value)
     return (
         f"{found.name} = {value:.4g}{shown} [{low:.4g}, {high:.4g}]"
         f"{''.join(f', {text}' for text in beside)} ({_percent(found.last)} of it)"

@@ -70,7 +70,7 @@ class GapModel(ABC):
         odds: log odds against each explanation, by how many there are: with 3 about one
             of twenty is expected.
         longest: seconds of a recording that are fitted; of a longer one each trial is
-            shortened (`bns.gap.recordings.stretches`).
+            shortened (`bns.gap.recordings.segments`).
         before: seconds after which a simulation begun at rest moves as the robot.
         singly: whether fits are started from single explanations alone: where there
             are more rows than a tangent at the nominal can tell apart.

@@ -6,7 +6,7 @@ import numpy as np
 
 from bns.errors import BnsError, FormatError
 from bns.gap.models.base import GapModel
-from bns.gap.recordings import command_moments, trial_labels
+from bns.gap.recordings import trial_conditions
 from bns.worlds.trial import Trial
 
 TURNS = 1.5  # steps beside it that a spike is larger than; a turn is one; assumed
@@ -45,7 +45,7 @@ def check(
     odd = _odd_clocks(trials) if timed else {}
     sound: list[tuple[int, str, Trial, list[str]]] = []
     for number, trial in enumerate(trials):
-        label = trial_labels.of(trial, number)
+        label = trial_conditions.label(trial, number)
         _channels(trial, model, label)
         if not trial.outcome.usable:
             notes.append(f"{label}: flagged as diverged, left out")
@@ -76,7 +76,8 @@ def check(
 
 def _moments(trials: Sequence[Trial]) -> list[str]:
     """Whether it is known when commands began."""
-    count, step = len(command_moments.sampled(trials)), command_moments.unknown(trials)
+    count = len(trial_conditions.moments_sampled(trials))
+    step = trial_conditions.moments_unknown(trials)
     if not count:
         return []
     return [
@@ -142,9 +143,13 @@ def _repaired(trial: Trial, label: str, timed: bool) -> tuple[Trial, list[str]]:
         observed[spikes] = np.nan
         notes.append(f"{label}: {spikes.sum()} spikes, dropped")
     lost = ~np.isfinite(observed).all(axis=1)
-    if lost.any():
-        observed[lost] = np.nan
-        notes.append(f"{label}: {lost.sum()} of {len(lost)} samples lost, bridged")
+    observed[lost] = np.nan
+    # a reader adds moments without a sample, at which commands began
+    sampled = np.ones(len(lost), dtype=bool)
+    sampled[trial.boundaries[1:-1]] = False
+    if (lost & sampled).any():
+        count = (lost & sampled).sum()
+        notes.append(f"{label}: {count} of {sampled.sum()} samples lost, bridged")
     repeated = np.diff(trial.times, prepend=trial.times[0] - 1) <= 0
     if repeated.any():
         observed[repeated] = np.nan
@@ -175,7 +180,7 @@ def _spikes(observed: np.ndarray, times: np.ndarray) -> np.ndarray:
         kept = values[seen]
         off = kept[1:-1] - (kept[:-2] + kept[2:]) / 2
         apart = np.abs(kept[2:] - kept[:-2]) / 2
-        scale = np.median(np.abs(off)) / 0.6745 + 1e-9
+        scale = max(np.median(np.abs(off)) / 0.6745, _quantum(kept)) + 1e-9
         hit = (np.abs(off) > SPIKE * scale) & (np.abs(off) > 4 * apart)
         # where a motion turns back, going on from either side leads to the sample
         before = 2 * kept[1:-3] - kept[:-4] - kept[2:-2]
@@ -189,6 +194,14 @@ def _spikes(observed: np.ndarray, times: np.ndarray) -> np.ndarray:
         hit[1:-1] &= np.abs(off[1:-1]) > TURNS * beside
         found[seen[1:-1][hit]] = True
     return found
+
+
+def _quantum(values: np.ndarray) -> float:
+    """Step in which a channel counts, of one that rests in most samples: there a single
+    step is no spike."""
+    steps = np.abs(np.diff(values))
+    moved = steps[steps > 0]
+    return float(moved.min()) if 0 < len(moved) <= len(steps) / 2 else 0.0
 
 
 def _noticed(trial: Trial, values: np.ndarray, name: str, label: str) -> list[str]:
@@ -263,6 +276,7 @@ def _unusable(trial: Trial, wanted: Sequence[str]) -> str:
 RUN = 8  # equal samples in a row, at least
 MOVED = 20.0  # times the resolution that the model moves meanwhile, at least
 SAME = 0.05  # share of repeated values from which a channel counts as coarse
+CAUGHT_UP = 0.25  # of the missed way that a stuck channel jumps at least; assumed
 STEPS = 3.0  # times the smallest step of a quantised channel, likewise
 
 
@@ -323,6 +337,8 @@ def _without(
                 continue
             if not _others_move(trial.observed[first : last + 1], column, model):
                 continue  # the robot stands still, which is no fault of a channel
+            if _resumed(trial.observed[:, column], predicted[:, column], first, last):
+                continue  # nor where it goes on from where it rested: it was held
             name, unit = model.channels[column].name, model.channels[column].unit
             observed[first : last + 1] = np.nan
             seconds = trial.times[last] - trial.times[first]
@@ -331,6 +347,23 @@ def _without(
                 f"by {moved:.2g} {unit}; these samples dropped"
             )
     return (trial.replace(observed=observed) if notes else trial), notes
+
+
+def _resumed(seen: np.ndarray, predicted: np.ndarray, first: int, last: int) -> bool:
+    """Whether a channel goes on from the value that it kept: by less than `CAUGHT_UP`
+    of what it should have moved by then. A channel that was stuck jumps; a part in its
+    play, or held by friction, does not.
+
+    Args:
+        seen: recorded, ``(T,)``.
+        predicted: the same by the nominal model.
+        first, last: samples between which it kept one value.
+    """
+    after = last + 1 + np.flatnonzero(np.isfinite(seen[last + 1 :]))
+    if not len(after):
+        return False
+    due = abs(predicted[after[0]] - predicted[first])
+    return bool(abs(seen[after[0]] - seen[last]) < CAUGHT_UP * due)
 
 
 def _others_move(values: np.ndarray, column: int, model: GapModel) -> bool:

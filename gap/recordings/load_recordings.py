@@ -10,7 +10,7 @@ from bns import models
 from bns.errors import BnsError, FormatError, OutOfBoundsError, UnknownNameError
 from bns.gap.importers import tables
 from bns.gap.models.base import GapModel
-from bns.gap.recordings import trial_labels, trial_selection
+from bns.gap.recordings import trial_conditions, trial_selection
 from bns.worlds.trial import Commands, Trial
 
 IMPORTERS: Mapping[str, str] = {
@@ -104,7 +104,7 @@ def trials(
         raise BnsError("Give --importer or --columns, not both.")
     wanted = trial_selection.numbered(numbers)
     found = [
-        trial_labels.labelled(
+        trial_conditions.labelled(
             trial, number, run=run, recording=path if len(paths) > 1 else None
         )
         for path in paths
@@ -266,7 +266,7 @@ def tellable(found: Sequence[Trial], model: GapModel) -> None:
     """
     known = limits(model)
     for place, trial in enumerate(found):
-        label = trial_labels.of(trial, place)
+        label = trial_conditions.label(trial, place)
         if not len(trial.commands):
             raise BnsError(
                 f"The {label} has no commands, so that it can not be simulated; map "

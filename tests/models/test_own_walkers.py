@@ -16,7 +16,7 @@ from bns.gap.bench import cases
 from bns.gap.bench.walk_cases import WalkStand
 from bns.gap.candidates import legged
 from bns.gap.models.legged.model import WalkModel
-from bns.gap.models.legged.where import Suspects
+from bns.gap.models.legged.signs import Suspects
 from bns.models import ax12a, check, legs, servo_numbers
 from bns.models.legs import PARTS
 from bns.worlds import registry

@@ -12,12 +12,11 @@ import numpy as np
 from bns.gap.candidates import legged
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import LibraryModel, Windows
-from bns.gap.models.legged import lost as walk_lost
-from bns.gap.models.legged import scatter, where
+from bns.gap.models.legged import scatter
 from bns.gap.models.legged import signs as walk_signs
 from bns.gap.models.legged.signs import Signs
 from bns.gap.recordings import segments
-from bns.gap.recordings.conditions import as_number
+from bns.gap.recordings.trial_conditions import as_number
 from bns.worlds.active import Stages, as_damage
 from bns.worlds.damage import Damage
 from bns.worlds.effects.base import Effect
@@ -88,11 +87,11 @@ class WalkModel(LibraryModel):
             trial.observed[:, 3:] - path[:, 3:]
             for trial, path in zip(trials, predicted, strict=True)
         ]
-        lost = walk_lost.likely(trials, legged.lost(signs), self.simulate)
+        lost = scatter.likely(trials, legged.lost(signs), self.simulate)
         self._scatter(trials, lost)
         walks = [self._walks[_key(trial)][..., 3:] for trial in trials]
         rests = scatter.without(rests, walks, WOBBLE)
-        found = where.suspects(rests, self.joints, READING)
+        found = walk_signs.suspects(rests, self.joints, READING)
         listed = legged.rows(found, self.joints, signs)
         return self.remembered((*legged.known(listed), *scatter.rows()))
 

@@ -1,6 +1,7 @@
-"""What the servos of a walking robot say of legs that hold, hang or are gone: `Signs`.
+"""What the servos of a walking robot say before anything is fitted.
 
-Each is looked for before anything is fitted; only what is found becomes a candidate.
+`Signs`: legs that hold, hang or are gone; only what is found becomes a candidate.
+`Suspects`: joints and legs whose positions depart most.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,6 +21,8 @@ STRAYING = 2.0  # times what the model foresees, likewise; assumed
 MOST = 2  # joints of a leg that have to; the load may hold the third where it is told
 UNLOADED = 0.3  # of what the model foresees: a leg's servos are off by less; assumed
 LIGHTER = 0.5  # the same for a leg to be a candidate: that is no verdict; assumed
+ALONE, ALIKE = 0.6, 0.3  # share of the worst leg: beyond it alone, below it all alike
+NEARLY = 0.6  # of the worst leg's share: the second is suspected as well
 
 Ends = Mapping[str, np.ndarray]
 """by joint, how far it is from its goal where each command ends [rad]"""
@@ -116,3 +119,56 @@ def _rms(off: np.ndarray) -> float:
     """NaN where nothing was seen: then nothing is said."""
     known = off[np.isfinite(off)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else np.nan
+
+
+@dataclass(frozen=True)
+class Suspects:
+    """Where the servos' positions depart most.
+
+    Attributes:
+        joints: names, the worst first.
+        legs: names of legs, the worst first.
+        all: whether effects on the servos of all legs are suspected as well.
+    """
+
+    joints: tuple[str, ...]
+    legs: tuple[str, ...]
+    all: bool
+
+
+def shares(
+    rests: Sequence[np.ndarray], names: Sequence[str], sigma: float
+) -> dict[str, float]:
+    """Share of each joint in the squared departure beyond the noise.
+
+    Args:
+        rests: recorded minus predicted positions of each trial, ``(T, J)`` [rad].
+        names: of the joints.
+        sigma: of the readings [rad].
+    """
+    square = np.nanmean(np.vstack(rests) ** 2, axis=0) - sigma**2
+    square = np.maximum(square, 0.0) + 1e-3 * sigma**2
+    return dict(zip(names, (square / square.sum()).tolist(), strict=True))
+
+
+def suspects(
+    rests: Sequence[np.ndarray], names: Sequence[str], sigma: float
+) -> Suspects:
+    """Joints and legs to be considered.
+
+    Args:
+        rests: recorded minus predicted positions of each trial, ``(T, J)`` [rad].
+        names: of the joints.
+        sigma: of the readings [rad].
+    """
+    share = shares(rests, names, sigma)
+    by_leg = {
+        leg: sum(value for name, value in share.items() if name.startswith(leg))
+        for leg in legs_of(names)
+    }
+    legs = sorted(by_leg, key=by_leg.__getitem__, reverse=True)
+    worst = by_leg[legs[0]]
+    near = tuple(leg for leg in legs[:2] if by_leg[leg] >= NEARLY * worst)
+    own = [name for name in share if name.startswith(near)]
+    joints = sorted(own, key=share.__getitem__, reverse=True)
+    return Suspects(tuple(joints) if worst > ALIKE else (), near, worst < ALONE)

@@ -13,8 +13,8 @@ from bns.gap.candidates import light
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, LibraryModel, Windows
 from bns.gap.models.light.reader import Reader, Reads, extra
-from bns.gap.recordings import trial_labels
-from bns.gap.recordings.conditions import as_number
+from bns.gap.recordings import trial_conditions
+from bns.gap.recordings.trial_conditions import as_number
 from bns.worlds.effects.base import Effect
 from bns.worlds.light import sensors
 from bns.worlds.light.field import Lamp, LightField
@@ -138,7 +138,8 @@ class SightModel(LibraryModel):
             ready = self.prepared(trial)
             if np.isfinite(ready.observed).all(axis=1).sum() < FEWEST:
                 notes.append(
-                    f"{trial_labels.of(trial, number)}: hardly any reading, left out"
+                    f"{trial_conditions.label(trial, number)}: "
+                    "hardly any reading, left out"
                 )
             else:
                 made.append(ready)

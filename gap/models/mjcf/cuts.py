@@ -21,7 +21,7 @@ import numpy as np
 from bns.gap.models.base import GapModel
 from bns.gap.models.mjcf import start
 from bns.gap.models.mjcf.config import OwnConfig
-from bns.gap.recordings.stretches import piece
+from bns.gap.recordings.segments import piece
 from bns.worlds.trial import Trial
 
 HALF = 0.03  # [s] on each side of a start, of the samples that tell its state

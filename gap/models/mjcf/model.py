@@ -1,6 +1,6 @@
 """Any MJCF model, with a TOML file that maps its channels, as a nominal model."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -93,11 +93,13 @@ class OwnModel(GapModel):
         """
         self._parts = self.physics.needed(trials)
         items = tuple(self._terms.values())
-        return mjcf_rows.rows(items, trials, self.dt, self._bodies)
+        return mjcf_rows.rows(
+            items, trials, self.dt, self._bodies, stepped=self._parts > 1
+        )
 
     def effect(self, term: str, values: Mapping[str, float]) -> Effect | None:
-        """The effect of an explanation; None for the shift in time."""
-        if term == mjcf_rows.LEAD:
+        """The effect of an explanation; None for the shift in time and the step."""
+        if term in (mjcf_rows.LEAD, mjcf_rows.STEP):
             return None
         item = self._terms[term]
         if item.effect == "body_mass":
@@ -128,21 +130,34 @@ class OwnModel(GapModel):
         *,
         fine: bool = True,
     ) -> list[list[np.ndarray]]:
-        """See `GapModel.paths`; the coarse step is that of the model."""
-        pairs, leads = [], []
+        """See `GapModel.paths`; the coarse step is that of the model. What finer steps
+        change is that of the nominal motion."""
+        pairs, leads, shares = [], [], []
         for row in sets:
             for trial, values in zip(trials, row, strict=True):
                 off = {n: v for n, v in values.items() if n.startswith(start.NUMBERS)}
                 begun = start.moved(trial, off, self.config) if off else trial
                 pairs.append((begun, self._changes(values)))
                 leads.append(values.get(mjcf_rows.LEAD, 0.0))
-        seen = self.physics.predicted(pairs, self._parts if fine else 1)
-        moved = [
-            _led(trial, path, lead)
-            for (trial, _), path, lead in zip(pairs, seen, leads, strict=True)
-        ]
+                shares.append(values.get(mjcf_rows.STEP, 1.0) - 1.0)
+        moved = self.physics.predicted(pairs, self._parts if fine else 1, leads)
+        if any(shares):
+            changes = [*self._by_steps(trials)] * len(sets)
+            moved = [
+                path + share * change
+                for path, share, change in zip(moved, shares, changes, strict=True)
+            ]
         count = len(trials)
         return [moved[at * count : (at + 1) * count] for at in range(len(sets))]
+
+    def _by_steps(self, trials: Sequence[Trial]) -> Iterator[np.ndarray]:
+        """What finer steps change of the nominal motion of each trial, ``(T, C)``."""
+        pairs: list[tuple[Trial, tuple[Effect, ...]]] = [
+            (trial, ()) for trial in trials
+        ]
+        fine = self.physics.predicted(pairs, self._parts)
+        for one, other in zip(fine, self.physics.predicted(pairs), strict=True):
+            yield np.nan_to_num(one - other)
 
     def begun(self, trial: Trial) -> Mapping[str, float]:
         """See `GapModel.begun`: joints that began where they were recorded."""
@@ -210,11 +225,3 @@ class OwnModel(GapModel):
         spec.compile()
         files.write_text(path, spec.to_xml())
         return [str(effect) for effect in made if effect.stage != "body"]
-
-
-def _led(trial: Trial, path: np.ndarray, lead: float) -> np.ndarray:
-    """A path so many seconds ahead of itself."""
-    if lead == 0.0:
-        return path
-    at = trial.times - trial.times[trial.boundaries[0]]
-    return np.stack([np.interp(at + lead, at, column) for column in path.T], axis=1)

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from bns.errors import FormatError
-from bns.gap.models.mjcf import prepared, start, view
+from bns.gap.models.mjcf import prepared, start
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.models import mjcf as mjcf_file
 from bns.worlds.effects.base import (
@@ -25,7 +25,7 @@ from bns.worlds.trial import Trial
 LEAD = 1.0  # [s] of rest before a trial, so that what is late has something before it
 KEPT, MODELS = 20_000, 2000  # simulated trials and compiled models kept in memory
 FINE = 0.005  # [s] between kept states; the step if that is longer
-FINEST = 0.0025  # [s] steps beyond which a simulation lags or limits soften visibly
+FINEST = 0.0005  # [s] no step is cut shorter
 EXACT = 0.2  # of the noise: predictions that differ by less are alike
 BY_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
 TRIED = 4  # trials on which steps are compared
@@ -41,7 +41,7 @@ class Simulation:
     Attributes:
         dt: step of the model [s].
         actuators: number of each command channel's actuator.
-        finest: into how many parts a step is cut where a simulation has to be fine.
+        finest: into how many parts a step is cut at most.
 
     Raises:
         FormatError: the MJCF file is missing or MuJoCo refuses it.
@@ -64,12 +64,18 @@ class Simulation:
             prepared.number(
                 model, "key", config.keyframe
             )  # there, before anything runs
-        self.view = view.View.of(config, model)
+        self._views = {model.nq: start.View.of(config, model)}
 
     @property
     def model(self) -> mujoco.MjModel:
         """The nominal model, compiled."""
         return self.compiled(()).model
+
+    def _view(self, model: mujoco.MjModel) -> start.View:
+        """Where the observed channels are in a model: play is a joint more."""
+        if model.nq not in self._views:
+            self._views[model.nq] = start.View.of(self.config, model)
+        return self._views[model.nq]
 
     def spec(self, effects: Sequence[Effect]) -> mujoco.MjSpec:
         """The model with the effects on its parts written into it.
@@ -113,24 +119,36 @@ class Simulation:
         return self._compiled[key]
 
     def needed(self, trials: Sequence[Trial]) -> int:
-        """Into how many parts a step has to be cut for the nominal motion of trials."""
+        """Into how many parts a step has to be cut for the nominal motion of trials: as
+        many as it takes until twice as many change next to nothing."""
         noise = np.array([item.noise for item in self.config.seen])
         few = [(trial, ()) for trial in trials[:: max(len(trials) // TRIED, 1)]]
-        exact = self.predicted(few, self.finest)
-        parts = 1
+        parts, made = 1, self.predicted(few)
         while parts < self.finest:
-            made = self.predicted(few, parts)
-            apart = [np.abs(a - b) for a, b in zip(made, exact, strict=True)]
+            finer = self.predicted(few, min(2 * parts, self.finest))
+            apart = [np.abs(a - b) for a, b in zip(made, finer, strict=True)]
             if (np.concatenate(apart) < EXACT * noise).all():
                 break
-            parts *= 2
-        return min(parts, self.finest)
+            parts, made = min(2 * parts, self.finest), finer
+        return parts
 
     def predicted(
-        self, pairs: Sequence[tuple[Trial, Sequence[Effect]]], parts: int = 1
+        self,
+        pairs: Sequence[tuple[Trial, Sequence[Effect]]],
+        parts: int = 1,
+        ahead: Sequence[float] | None = None,
     ) -> list[np.ndarray]:
-        """Predicted samples of trials, each under effects of its own."""
-        keys = [(parts, *_key(trial, items)) for trial, items in pairs]
+        """Predicted samples of trials, each under effects of its own.
+
+        Args:
+            pairs: trials with their effects.
+            parts: into how many a step is cut.
+            ahead: seconds by which each motion is ahead of the trial's clock.
+        """
+        leads = [0.0] * len(pairs) if ahead is None else ahead
+        keys = [
+            (parts, lead, *_key(*pair)) for pair, lead in zip(pairs, leads, strict=True)
+        ]
         wanted = {
             key: pair
             for key, pair in zip(keys, pairs, strict=True)
@@ -141,7 +159,8 @@ class Simulation:
         fresh = {}
         for (key, (trial, items)), motion in zip(wanted.items(), motions, strict=True):
             states = motion.states[self._lead(self.dt / parts) :]
-            fresh[key] = self._samples(trial, items, states, self.dt / parts)
+            seen = self._samples(trial, items, states, self.dt / parts, key[1])
+            fresh[key] = seen
         made = [fresh[key] if key in fresh else self._kept[key] for key in keys]
         self._kept.update(fresh)
         while len(self._kept) > KEPT:
@@ -154,7 +173,7 @@ class Simulation:
     def _job(self, trial: Trial, effects: Sequence[Effect], parts: int) -> Job:
         scene = self.compiled(effects, parts)
         told = self._told(trial, effects, self.dt / parts)
-        begin = self._start(trial)
+        begin = self._start(trial, scene.model)
         ctrl = np.tile(self._rest(scene.model), (len(told), 1))
         ctrl[:, self.actuators] = told
         return Job(begin, (Segment(scene, ctrl),))
@@ -190,21 +209,24 @@ class Simulation:
                 )
         return signal.values[extra:]
 
-    def _start(self, trial: Trial) -> np.ndarray:
-        """The state that a trial begins in, kept: effects do not change it."""
-        key = (trial.observed[:1].tobytes(), str(trial.conditions.get(start.STATE)))
+    def _start(self, trial: Trial, model: mujoco.MjModel) -> np.ndarray:
+        """The state that a trial begins in, kept: effects do not change it, but for
+        those with a joint or a friction's bristles more, which begin at zero."""
+        size = mujoco.mj_stateSize(model, STATE)
+        state = str(trial.conditions.get(start.STATE))
+        key = (size, trial.observed[:1].tobytes(), state)
         if key not in self._starts:
-            self._starts[key] = self._begun_in(trial)
+            same = size == mujoco.mj_stateSize(self.model, STATE)
+            self._starts[key] = self._begun_in(trial, self.model if same else model)
         return self._starts[key]
 
-    def _begun_in(self, trial: Trial) -> np.ndarray:
-        model = self.model
+    def _begun_in(self, trial: Trial, model: mujoco.MjModel) -> np.ndarray:
         data = mujoco.MjData(model)
         if self.config.keyframe:
             key = prepared.number(model, "key", self.config.keyframe)
             mujoco.mj_resetDataKeyframe(model, data, key)
         if self.config.recorded or start.STATE in trial.conditions:
-            start.place(data, trial, self.view)
+            start.place(data, trial, self._view(model))
         state = np.empty(mujoco.mj_stateSize(model, STATE))
         data.time = 0.0
         mujoco.mj_getState(model, data, state, STATE)
@@ -216,18 +238,19 @@ class Simulation:
         effects: Sequence[Effect],
         states: np.ndarray,
         dt: float,
+        ahead: float,
     ) -> np.ndarray:
         every = max(1, int(FINE / dt + 1e-9))
         grid = np.arange(0, len(states), every)
         times = grid * dt
         scene = self.compiled(effects)
-        read = self.view.read(scene.model, states[grid])
+        read = self._view(scene.model).read(scene.model, states[grid])
         names = tuple(item.channel.name for item in self.config.seen)
         on, rng = np.ones(len(times), bool), np.random.default_rng(0)
         for effect in effects:
             if isinstance(effect, SensorEffect):
                 read = effect.apply(times, read, names, on, rng)
-        at = trial.times - trial.times[trial.boundaries[0]]
+        at = trial.times - trial.times[trial.boundaries[0]] + ahead
         return np.stack([np.interp(at, times, column) for column in read.T], axis=1)
 
 

@@ -13,16 +13,14 @@ import numpy as np
 from bns.errors import BnsError
 from bns.gap.decomposition.row import Row
 from bns.gap.models.servo import curves as servo_curves
-from bns.gap.models.servo import discrepancy as servo_discrepancy
 from bns.gap.models.servo import nominal as servo_nominal
 from bns.gap.models.servo import score
 from bns.gap.models.servo.candidates import candidates as all_candidates
-from bns.gap.models.servo.discrepancy import Discrepancy
 from bns.gap.models.servo.model import ServoModel, seen
 from bns.gap.models.servo.nominal import Nominal
 from bns.gap.models.servo.repeats import sound
 from bns.gap.models.servo.runs import Runs, cells, merged, runs
-from bns.gap.models.servo.score import Scores
+from bns.gap.models.servo.score import Discrepancy, Scores
 from bns.gap.models.servo.verdict import Null, verdict
 from bns.gap.records import Diagnosis, Fit, Verdict
 from bns.worlds.trial import Trial
@@ -72,9 +70,7 @@ def learn(
             "bns.gap.models.servo.model, which assumes it."
         )
     residuals = servo_curves.residuals(runs, nominal)
-    discrepancy = servo_discrepancy.learn(
-        residuals, names, kinds, step=servo_curves.STEP
-    )
+    discrepancy = score.learn(residuals, names, kinds, step=servo_curves.STEP)
     curves = servo_curves.curves(runs, nominal, chosen)
     scores = {}
     for cell in discrepancy.cells:

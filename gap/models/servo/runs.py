@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bns.errors import BnsError
-from bns.gap.recordings.conditions import as_number
+from bns.gap.recordings.trial_conditions import as_number
 from bns.worlds.physics.servo_law import NUMBERS
 from bns.worlds.physics.servo_rollout import DT, Drive
 from bns.worlds.trial import Trial

@@ -10,7 +10,7 @@ import numpy as np
 from bns import models
 from bns.gap.candidates.wheeled_rows import LEAD
 from bns.gap.models.wheeled.changes import Changes
-from bns.gap.recordings import trial_labels
+from bns.gap.recordings import trial_conditions
 from bns.gap.recordings.segments import moved
 from bns.worlds.effects.base import CommandEffect, ControlSignal, Effect, ModelEdit
 from bns.worlds.physics import compile, observe
@@ -75,7 +75,7 @@ class Drives:
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
         """See `GapModel.simulate`: poses, each ``(T, 3)`` [m, m, rad]."""
-        numbers = trial_labels.numbers(trials)
+        numbers = trial_conditions.numbers(trials)
         changes = [
             [Changes.by_effects(items, number) for number in numbers]
             for items in effects

@@ -9,9 +9,8 @@ import pytest
 from bns.gap.decomposition import descent, search, shares
 from bns.gap.decomposition.fit import Noise, Point
 from bns.gap.decomposition.linear import KAPPA, Linear, inflation, tail
-from bns.gap.decomposition.noise import Memory, correlated, scale, weights
+from bns.gap.decomposition.noise import Memory, Starts, correlated, scale, weights
 from bns.gap.decomposition.spread import Spread
-from bns.gap.decomposition.starts import Starts
 
 NAMES = ("a", "b", "c", "d", "e", "f")
 BLOCKS, EACH = 8, 60

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.gap.decomposition.starts import Starts
+from bns.gap.decomposition.noise import Starts
 
 TRIALS, LENGTH, SD = 3, 20, np.array([0.5, 2.0])
 

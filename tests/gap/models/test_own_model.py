@@ -1,5 +1,6 @@
 """A stranger's robot: planted effects are named; what is wrong with a file is said."""
 
+import re
 from dataclasses import replace
 
 import mujoco
@@ -195,6 +196,53 @@ def test_every_effect_can_be_a_candidate(arm, name):
         assert item.low <= item.nominal <= item.high and item.excite
         for magnitude in (item.low, *item.levels, item.high):
             assert item.make(magnitude)["part"] == part
+
+
+UNFELT = {"geom_friction", "actuator_torque_limit"}  # no contact, no limit to scale
+
+
+@pytest.mark.parametrize("name", sorted(set(CLASSES) - UNFELT))
+def test_every_effect_changes_the_motion_of_its_candidates(arm, told, name):
+    trials = mjcf_cases.record(arm, told[:1], [])
+    channel = "elbow" if name.startswith("reading") else "elbow_goal"
+    part = PARTS.get(OWNERS.get(name, ""), channel)
+    config = replace(OwnConfig.read(ARM), effects={name: (part,)}, bounds={})
+    most = 0.0
+    for item in mjcf.candidates(config, arm.physics.model):
+        magnitude = item.levels[0] if item.nominal == item.high else item.levels[-1]
+        (plain,), (changed,) = arm.simulate(trials, [(), (item.make(magnitude),)])
+        assert np.isfinite(changed).all()
+        most = max(most, np.abs(changed - plain).max())
+    assert most > 1e-3  # a plane arm does not feel all ways to shift a mass
+
+
+def test_play_behind_a_joint_is_found(arm, told):
+    config = replace(
+        OwnConfig.read(ARM),
+        effects={"joint_backlash": ("elbow",), "joint_friction": ("elbow",)},
+        bounds={},
+    )
+    model = OwnModel(config, threads=1)
+    play = model.parse("joint_backlash:part=elbow,play=0.08")
+    found = diagnose(mjcf_cases.record(model, told, [play], seed=1), model, full=False)
+    assert found.verdict.named == (("joint_backlash[elbow]",),)
+    assert found.best.magnitudes[0] == pytest.approx(0.08, rel=0.1)
+
+
+def test_steps_of_a_simulation_are_no_gap(arm, told, tmp_path):
+    """A model of 8 ms steps, and recordings by steps of 0.5 ms: no effect does that."""
+    scene = ARM.with_name("arm.xml").read_text(encoding="utf-8")
+    assert 'timestep="' in scene
+    coarse = re.sub(r'timestep="[^"]*"', 'timestep="0.008"', scene)
+    (tmp_path / "arm.xml").write_text(coarse, encoding="utf-8")
+    config = replace(OwnConfig.read(ARM), model=tmp_path / "arm.xml")
+    model = OwnModel(config, threads=1)
+    model.rows(mjcf_cases.record(model, told, []))
+    assert model._parts > 1
+    for parts in (1, 16):
+        model._parts = parts
+        trials = mjcf_cases.record(model, told, [], seed=3)
+        assert diagnose(trials, model, rows=KEPT, full=False).verdict.kind == "no gap"
 
 
 def test_former_names_in_a_description_are_read(arm):

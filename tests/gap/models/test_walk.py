@@ -9,10 +9,9 @@ from bns.gap.candidates import legged
 from bns.gap.decomposition import descent, diagnosis, fit, levels
 from bns.gap.decomposition.problem import Problem
 from bns.gap.diagnose import diagnose
-from bns.gap.models.legged import lost, scatter, where
+from bns.gap.models.legged import scatter, signs
 from bns.gap.models.legged.model import READING, WalkModel
-from bns.gap.models.legged.signs import Signs
-from bns.gap.models.legged.where import Suspects
+from bns.gap.models.legged.signs import Signs, Suspects
 from bns.gap.recordings import check
 from bns.models.legs import LEGS
 from bns.worlds.active import Stages
@@ -60,16 +59,16 @@ def test_the_leg_is_found_before_anything_is_fitted(model, told):
     rests = [
         t.observed[:, 3:] - p[:, 3:] for t, p in zip(trials, predicted, strict=True)
     ]
-    found = where.suspects(rests, model.joints, READING)
+    found = signs.suspects(rests, model.joints, READING)
     assert found.legs == ("right_front",)
-    share = where.shares(rests, model.joints, READING)
+    share = signs.shares(rests, model.joints, READING)
     assert sum(share.values()) == pytest.approx(1.0)
 
 
 def test_one_leg_alone_leaves_out_effects_on_all():
     names = ("left_front_coxa", "right_front_coxa")
     rests = [np.column_stack([np.full(50, 0.1), np.zeros(50)])]
-    found = where.suspects(rests, names, READING)
+    found = signs.suspects(rests, names, READING)
     assert found == Suspects(("left_front_coxa",), ("left_front",), False)
     listed = [row.name for row in legged.rows(found)]
     assert "servo_delay[all]" not in listed
@@ -80,7 +79,7 @@ def test_one_leg_alone_leaves_out_effects_on_all():
 def test_candidates_are_on_legs_that_the_robot_has():
     model = WalkModel(str(ROOT / "examples" / "quad"))
     rests = [np.full((50, len(model.joints)), 0.1)]
-    found = where.suspects(rests, model.joints, READING)
+    found = signs.suspects(rests, model.joints, READING)
     names = [row.name for row in legged.rows(found, model.joints)]
     assert "foot_slippery[right_rear]" in names and "link_length[tibia,all]" in names
     assert not any("middle" in name for name in (*names, *found.legs))
@@ -125,7 +124,7 @@ def test_walks_of_unequal_length_are_compared(model):
 def test_two_legs_that_depart_alike_are_both_suspected():
     names = ("left_front_coxa", "right_front_coxa", "left_rear_coxa")
     rests = [np.column_stack([np.full(50, v) for v in (0.1, 0.09, 0.01)])]
-    found = where.suspects(rests, names, READING)
+    found = signs.suspects(rests, names, READING)
     assert found.legs == ("left_front", "right_front")
 
 
@@ -226,13 +225,13 @@ def test_blind_cases_are_made_of_walkers_of_ones_own():
 def test_nothing_is_lost_where_no_loss_explains_much(model, told):
     trials = walk_cases.record(told, [], 1)
     every = legged.lost(Signs({}, (), LEGS, LEGS))
-    assert lost.likely(trials, every, model.simulate) == ()
-    assert lost.likely(trials, (), model.simulate) == ()
+    assert scatter.likely(trials, every, model.simulate) == ()
+    assert scatter.likely(trials, (), model.simulate) == ()
 
 
 def test_two_legs_are_lost_one_after_the_other(model, told):
     limp = registry.make("leg_limp", legs="1,5", loss=1.0)
     trials = walk_cases.record(told, [limp], 1)
     every = legged.lost(Signs({}, (), LEGS, ()))
-    found = lost.likely(trials, every, model.simulate)
+    found = scatter.likely(trials, every, model.simulate)
     assert {effect["legs"] for effect in found} == {"1", "5"}

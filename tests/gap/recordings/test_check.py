@@ -5,7 +5,7 @@ import pytest
 
 from bns.errors import FormatError
 from bns.gap.recordings import check, segments
-from bns.gap.recordings.conditions import as_number
+from bns.gap.recordings.trial_conditions import as_number
 from bns.worlds.physics.wheeled_world import MujocoWorld
 from bns.worlds.trial import Commands
 

@@ -1,4 +1,4 @@
-"""Faults put into recordings, for the withheld-effect bench and tests of `check`."""
+"""Faults put into recordings of withheld cases."""
 
 from collections.abc import Sequence
 

@@ -1,0 +1,79 @@
+"""What the conditions of recorded trials say: numbers, what a trial is called, and
+when its commands began. A file may hold anything there."""
+
+from collections.abc import Mapping, Sequence
+from typing import SupportsFloat
+
+import numpy as np
+
+from bns.errors import FormatError
+from bns.worlds.data.importing import MOMENTS
+from bns.worlds.trial import Trial
+
+NUMBER, RUN, RECORDING = "number", "run", "recording"
+"""conditions that say which trial it was; `bns.gap.recordings.load_recordings` writes
+them"""
+
+
+def as_number(
+    conditions: Mapping[str, object], name: str, default: float = 0.0
+) -> float:
+    """A condition that is a number.
+
+    Args:
+        conditions: of a trial, by name.
+        name: of the condition.
+        default: where the trial has no such condition.
+
+    Raises:
+        FormatError: it is no number.
+    """
+    value = conditions.get(name, default)
+    if isinstance(value, str | SupportsFloat):
+        try:
+            return float(value)
+        except ValueError:
+            pass
+    raise FormatError(f"Condition {name!r} of a trial is {value!r}; give a number.")
+
+
+def labelled(trial: Trial, number: int, **others: object) -> Trial:
+    """A trial that knows its number, and its run and recording where told."""
+    known = {key: value for key, value in others.items() if value is not None}
+    return trial.replace(conditions={**trial.conditions, NUMBER: number, **known})
+
+
+def label(trial: Trial, place: int) -> str:
+    """Such as "trial 16 of run 1".
+
+    Args:
+        trial: of a recording.
+        place: its place among all, which is its number if it has none.
+    """
+    known = trial.conditions
+    parts = [f"trial {known.get(NUMBER, place)}"]
+    parts += [f"run {known[RUN]}"] if RUN in known else []
+    parts += [str(known[RECORDING])] if RECORDING in known else []
+    return " of ".join(parts)
+
+
+def numbers(trials: Sequence[Trial]) -> list[int]:
+    """The number of each, or the places where they have none or share one."""
+    own = [trial.conditions.get(NUMBER) for trial in trials]
+    known = [number for number in own if isinstance(number, int)]
+    if len(known) == len(own) and len(set(known)) > 1:
+        return known
+    return list(range(len(trials)))
+
+
+def moments_sampled(trials: Sequence[Trial]) -> list[Trial]:
+    """Trials of which it is known to a sample only when commands began."""
+    return [trial for trial in trials if trial.conditions.get(MOMENTS) == "sampled"]
+
+
+def moments_unknown(trials: Sequence[Trial]) -> float:
+    """Seconds within which it is not known when commands began; 0 = it is known."""
+    found = moments_sampled(trials)
+    if not found:
+        return 0.0
+    return float(np.median(np.concatenate([np.diff(trial.times) for trial in found])))
