@@ -81,7 +81,7 @@ def _made() -> Iterator[Reader]:
     from bns.hardware.dynamixel import joints
     from bns.hardware.tracking.camera import Camera
     from bns.storage import reading
-    from bns.worlds.static_snn.nets import StaticNets
+    from bns.worlds.static_snn import StaticNets
 
     yield Reader(
         "part.parquet", "part.parquet",

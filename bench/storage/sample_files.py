@@ -156,7 +156,7 @@ def _parts(home: Path) -> None:
     from bns.campaign.store import CampaignStore
     from bns.gap.planning import command_file
     from bns.storage import files
-    from bns.worlds.static_snn.nets import kinematic_nets
+    from bns.worlds.static_snn import kinematic_nets
     from bns.worlds.trial import Commands
 
     store = CampaignStore.open(home / "store")

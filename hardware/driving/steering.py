@@ -18,7 +18,7 @@ from bns.worlds.light.sensing import LEAD, Changes
 from bns.worlds.light.sensors import LightSensors
 from bns.worlds.light.supervisor import Call, Supervisor
 from bns.worlds.physics import control
-from bns.worlds.physics.loop_control import LoopSignal
+from bns.worlds.physics.session import LoopSignal
 from bns.worlds.trial import Channel, Commands
 from bns.worlds.world import Policy, checked_commands
 

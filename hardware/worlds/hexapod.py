@@ -20,7 +20,7 @@ from bns.worlds.active import Stages
 from bns.worlds.damage import Damage
 from bns.worlds.effects.base import ServoEffect
 from bns.worlds.physics import control
-from bns.worlds.physics.legged_goals import planned
+from bns.worlds.physics.control import planned
 from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Trial
 
 GRID = 0.02  # s; effects are computed on it

@@ -26,7 +26,7 @@ from bns.worlds.light import world as light_starts
 from bns.worlds.light.field import Lamp, LightField
 from bns.worlds.light.sensing import Changes
 from bns.worlds.light.supervisor import Supervisor
-from bns.worlds.physics.loop_control import LoopSignal
+from bns.worlds.physics.session import LoopSignal
 from bns.worlds.trial import POSE_CHANNELS, Commands, Trial
 from bns.worlds.world import CYCLE, CYCLES, Policy
 

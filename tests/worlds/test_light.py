@@ -11,7 +11,7 @@ from bns.errors import BnsError, UnknownNameError
 from bns.models import render
 from bns.worlds import registry
 from bns.worlds.light import law as light_law
-from bns.worlds.light import sensors, sight
+from bns.worlds.light import sensors
 from bns.worlds.light.field import Lamp, LightField
 from bns.worlds.objects import Post, RayScreen
 from bns.worlds.stepwise import look
@@ -106,13 +106,13 @@ def test_flicker_is_a_wave_in_time():
 
 @pytest.fixture(scope="module")
 def rays():
-    return sight.Rays("khepera3")
+    return sensors.Rays("khepera3")
 
 
 def test_the_kept_sight_is_what_rays_find(rays):
     """In random directions; they may differ within the table's steps of an edge."""
     rng, wrong = np.random.default_rng(3), 0
-    kept = sight.kept("khepera3", SENSORS.names)
+    kept = sensors.kept("khepera3", SENSORS.names)
     count = 150
     azimuth = rng.uniform(-np.pi, np.pi, (count, 9))
     height = rng.uniform(0, np.radians(60), (count, 9))
@@ -130,11 +130,11 @@ def test_the_kept_sight_is_what_rays_find(rays):
 
 
 def test_the_kept_sight_is_of_this_model(rays):
-    known = json.loads((models.path("khepera3") / sight.FILE).read_text())
+    known = json.loads((models.path("khepera3") / sensors.FILE).read_text())
     middle, half = known["ir_left_45"][0]
     azimuths = np.radians([middle - half - 2, middle - half + 2, middle, middle + 170])
     free = [rays.free("ir_left_45", azimuth, 0.0) for azimuth in azimuths]
-    assert free == [False, True, True, False], "run python -m bns.worlds.light.sight"
+    assert free == [False, True, True, False], "run python -m bns.worlds.light.sensors"
 
 
 def test_a_bent_sensor_looks_into_the_robots_own_body():

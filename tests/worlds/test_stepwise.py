@@ -6,8 +6,7 @@ import pytest
 from bns.errors import BnsError, OutOfBoundsError, UnknownNameError
 from bns.worlds import registry
 from bns.worlds.stepwise.core import Stepwise
-from bns.worlds.stepwise.episode import Episode
-from bns.worlds.stepwise.rewards import StayByLight
+from bns.worlds.stepwise.episode import Episode, StayByLight
 from bns.worlds.trial import Channel, Commands
 
 RNG = np.random.default_rng(0)
@@ -80,7 +79,7 @@ def test_a_stopped_robot_ends_the_episode():
 
 
 def test_waypoints_are_reached_one_by_one():
-    from bns.worlds.stepwise.rewards import Waypoints
+    from bns.worlds.stepwise.episode import Waypoints
 
     episode = Episode("mujoco", reward=Waypoints([(0.1, 0.0), (0.4, 0.0)]))
     seen = rolled(episode, [[1.0, 1.0]] * 6)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError, FormatError, OutOfBoundsError
-from bns.worlds.static_snn.nets import StaticNets, kinematic_nets
-from bns.worlds.static_snn.world import StaticSnnWorld
+from bns.worlds.static_snn import StaticNets, StaticSnnWorld, kinematic_nets
 from bns.worlds.trial import Commands, body_displacements
 
 

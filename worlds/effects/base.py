@@ -291,13 +291,13 @@ class ServoEffect(Effect):
 
     def edit(self, spec: Any) -> None:
         """Write the effect into the chosen servos of a walking robot's `MjSpec`."""
-        from bns.worlds.physics import servo_joint
+        from bns.worlds.physics import servo_law
 
         if self.is_nominal:
             return
         for actuator in chosen(spec, self["servo"]):
-            law, powered = servo_joint.read(actuator)
-            servo_joint.write(spec, actuator, self.change(law), powered)
+            law, powered = servo_law.read(actuator)
+            servo_law.write(spec, actuator, self.change(law), powered)
 
 
 ModelEdit: TypeAlias = BodyEffect | ServoEffect

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from bns.models.legs import LEGS, PARTS, parts
-from bns.worlds.effects import bodies
+from bns.models import legs
+from bns.models.legs import LEGS, PARTS
 from bns.worlds.effects.base import (
     BodyEffect,
     Choice,
@@ -16,8 +16,8 @@ from bns.worlds.effects.base import (
 )
 from bns.worlds.effects.leg_sets import JOINT, LEG_SET, LEGS_OR_ALL, chosen, read, shins
 from bns.worlds.effects.leg_sets import bodies as leg_bodies
-from bns.worlds.effects.parts import loosen
-from bns.worlds.physics import servo_joint
+from bns.worlds.effects.parts import contact_geoms, loosen
+from bns.worlds.physics import servo_law
 
 
 class JointWeak(BodyEffect):
@@ -31,9 +31,9 @@ class JointWeak(BodyEffect):
 
     def _write(self, spec: Any) -> None:
         for actuator in chosen(spec, self["joint"]):
-            law, powered = servo_joint.read(actuator)
+            law, powered = servo_law.read(actuator)
             weak = {name: law[name] * self["factor"] for name in ("gain", "duty_limit")}
-            servo_joint.write(spec, actuator, {**law, **weak}, powered)
+            servo_law.write(spec, actuator, {**law, **weak}, powered)
 
 
 SLACK = 1e-4  # [rad] by which the stops stay apart, as MuJoCo needs
@@ -135,7 +135,7 @@ class FootSlippery(BodyEffect):
 
     def _write(self, spec: Any) -> None:
         for body in shins(spec, self["legs"]):
-            for geom in bodies.contact_geoms(body):
+            for geom in contact_geoms(body):
                 geom.friction[0] *= self["factor"]
 
 
@@ -162,7 +162,7 @@ class LegMissing(BodyEffect):
             for body in leg_bodies(spec, self["legs"], part):
                 body.mass *= LEFT
                 body.inertia = [LEFT * value for value in body.inertia]
-                for geom in bodies.contact_geoms(body):
+                for geom in contact_geoms(body):
                     geom.contype, geom.conaffinity = 0, 0
                     gone.add(geom.name)
         for pair in list(spec.pairs):
@@ -190,9 +190,9 @@ class LegLimp(BodyEffect):
     def _write(self, spec: Any) -> None:
         for leg in read(self["legs"]):
             for actuator in chosen(spec, LEGS[leg - 1]):
-                law, powered = servo_joint.read(actuator)
+                law, powered = servo_law.read(actuator)
                 powered *= 1.0 - self["loss"]
-                servo_joint.write(spec, actuator, law, powered)
+                servo_law.write(spec, actuator, law, powered)
 
     def lost(self) -> frozenset[int]:
         """See `Effect.lost`."""
@@ -222,7 +222,7 @@ class LegRaised(CommandEffect):
     def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
         values = signal.values
         for leg in read(self["legs"]):
-            for part in parts(signal.channels):
+            for part in legs.parts(signal.channels):
                 column = signal.column(f"{LEGS[leg - 1]}_{part}")
                 told = values[active, column]
                 values[active, column] += self["blend"] * (RAISED[part] - told)

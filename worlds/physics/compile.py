@@ -10,7 +10,7 @@ from bns import models
 from bns.models import mjcf
 from bns.worlds.active import Placed
 from bns.worlds.effects.base import ModelEdit
-from bns.worlds.physics import control, servo_joint
+from bns.worlds.physics import control, servo_law
 from bns.worlds.physics.rollout import STATE, Compiled, Job, Segment, run
 
 ARENA = 2**22
@@ -34,7 +34,7 @@ def compiled(
     spec = models.spec(robot, visuals=False)
     if step:
         spec.option.timestep = step
-    servo_joint.fit(spec, models.robot(robot))
+    servo_law.fit(spec, models.robot(robot))
     own = len(spec.actuators)
     for effect in effects:
         effect.edit(spec)

@@ -11,10 +11,10 @@ from bns.models.ax12a import SPEED_UNIT
 from bns.worlds.active import Stages
 from bns.worlds.checks import bounded, of_kind
 from bns.worlds.damage import Damage
-from bns.worlds.physics import control, legged_flags, legged_plan, observe
-from bns.worlds.physics.legged_goals import in_units
+from bns.worlds.physics import control, legged_plan, observe
+from bns.worlds.physics.control import in_units
 from bns.worlds.physics.legged_plan import Servos
-from bns.worlds.physics.legged_rollout import Walk, WalkJob, walk
+from bns.worlds.physics.rollout import Walk, WalkJob, walk
 from bns.worlds.physics.world import PhysicsWorld, Settings
 from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Trial
 
@@ -134,7 +134,7 @@ class HexapodWorld(PhysicsWorld[Plan]):
         readings = states[np.ix_(sampled, servos.angles)] + servos.laws["offset"]
         readings = in_units(readings, servos.laws["quantisation"])
         some = slice(None, -1, LOADS_EVERY)
-        outcome = legged_flags.outcome(
+        outcome = observe.legged_outcome(
             free,
             states[some, servos.angles],
             states[some, servos.speeds],

@@ -9,7 +9,7 @@ import pytest
 from bns import models
 from bns.errors import BnsError, UnknownNameError
 from bns.worlds.damage import Event
-from bns.worlds.effects import bodies, registry
+from bns.worlds.effects import parts, registry
 from bns.worlds.effects.base import ControlSignal, PoseSignal
 
 ROVER = (Path(__file__).parent / "rover.xml").read_text()
@@ -349,11 +349,11 @@ class TestBodies:
         spec = mujoco.MjSpec()
         spec.modelname = "stone"
         with pytest.raises(BnsError, match="'stone' has no body 'left_wheel'"):
-            bodies.wheel(spec, "left")
+            parts.wheel(spec, "left")
 
     def test_a_motor_without_a_force_range_is_refused(self):
         spec = mujoco.MjSpec.from_string(ROVER)
-        bodies.actuator(spec, "left").forcerange = [0, 0]
+        parts.actuator(spec, "left").forcerange = [0, 0]
         with pytest.raises(BnsError, match="'left_wheel' has no force range"):
             registry.make("torque_limit", factor=0.5).edit(spec)
 

@@ -11,11 +11,11 @@ from bns.worlds import registry as worlds
 from bns.worlds.damage import Damage
 from bns.worlds.effects import leg_sets as legs
 from bns.worlds.effects import registry
-from bns.worlds.physics import servo_joint
+from bns.worlds.physics import servo_law
 from bns.worlds.trial import Channel, Commands
 
 LEGS = tuple(Channel(*item) for item in models.robot("phantomx").channels)
-NOMINAL = servo_joint.joint_numbers(ax12a.law())
+NOMINAL = servo_law.joint_numbers(ax12a.law())
 
 
 def edited(*texts: str) -> mujoco.MjModel:
@@ -92,7 +92,7 @@ def test_a_limp_leg_has_friction_alone():
     assert stiffness(model, "left_rear_femur") == 0
     assert model.joint("left_rear_femur").damping[0] == ax12a.law()["viscous"]
     assert stiffness(model, "left_front_femur") > 8
-    laws = servo_joint.laws(model)
+    laws = servo_law.laws(model)
     assert (
         laws["powered"].reshape(6, 3).tolist()
         == [[1] * 3, [1] * 3, [0] * 3] + [[1] * 3] * 3

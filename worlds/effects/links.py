@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 
 from bns.errors import BnsError
-from bns.worlds.effects import bodies, parts
+from bns.worlds.effects import parts
 from bns.worlds.effects.base import BodyEffect, Parameter, factor, strength
-from bns.worlds.effects.bodies import Inertial
-from bns.worlds.effects.parts import ANY, WIDE
+from bns.worlds.effects.parts import ANY, WIDE, Inertial
 
 
 def _shift(axis: str, *, scales: bool = True) -> Parameter:
@@ -178,9 +177,9 @@ class Payload(BodyEffect):
     )
 
     def _write(self, spec: Any) -> None:
-        body = bodies.base(spec)
+        body = parts.base(spec)
         position = np.array([self["x"], self["y"], self["z"]])
-        inertial = bodies.Inertial.of(spec, body).plus_point(self["mass"], position)
+        inertial = parts.Inertial.of(spec, body).plus_point(self["mass"], position)
         inertial.write(body)
 
 
@@ -200,8 +199,8 @@ class CentreOfMass(BodyEffect):
     )
 
     def _write(self, spec: Any) -> None:
-        body = bodies.base(spec)
-        inertial = bodies.Inertial.of(spec, body)
+        body = parts.base(spec)
+        inertial = parts.Inertial.of(spec, body)
         centre = inertial.centre + np.array([self["dx"], self["dy"], 0.0])
         replace(inertial, centre=centre).write(body)
 
@@ -226,8 +225,8 @@ class FloorFriction(BodyEffect):
     )
 
     def _write(self, spec: Any) -> None:
-        for body in (*bodies.grounded(spec), spec.worldbody):
-            for geom in bodies.contact_geoms(body):
+        for body in (*parts.grounded(spec), spec.worldbody):
+            for geom in parts.contact_geoms(body):
                 geom.friction[0] *= self["factor"]
 
 
@@ -275,5 +274,5 @@ class FloorCompliance(BodyEffect):
 
     def _write(self, spec: Any) -> None:
         for body in spec.bodies:
-            for geom in bodies.contact_geoms(body):
+            for geom in parts.contact_geoms(body):
                 geom.solref[0] *= self["factor"]
