@@ -193,10 +193,10 @@ def _rehearsed(effects: Sequence[str], count: int):
     from bns.gap.diagnose import diagnose
     from bns.gap.models.wheeled.model import WheeledModel
     from bns.hardware.driving.excitation import START, commands
-    from bns.hardware.emulators import virtual
+    from bns.hardware.emulators import run
     from bns.hardware.worlds.wheeled import HardwareWorld
 
-    rig = virtual.rig(effects, rate=RATE, seed=2)
+    rig = run.rig(effects, rate=RATE, seed=2)
     world = HardwareWorld(rig=rig, sample_dt=0.05, start=START, recording=True)
     trials = []
     for number in range(count):

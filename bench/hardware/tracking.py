@@ -8,9 +8,8 @@ import numpy as np
 from bench.result import Result, bench
 from bns.hardware.emulators.camera import PLATE
 from bns.hardware.tracking import marker as tags
-from bns.hardware.tracking.camera import Camera
+from bns.hardware.tracking.camera import Camera, cv2
 from bns.hardware.tracking.marker import CELLS, Floor, Marker
-from bns.hardware.tracking.opencv import cv2
 from bns.models.render import photograph
 
 BARS = {720: (1.0, 1.0), 1080: (0.3, 0.3)}  # mm, deg

@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.learning import experiments, forking, solving
+from bench.learning import experiments, forking
 from bench.result import Result, bench
 from bns import presets, stats
 from bns.experiment.config import RunConfig, WorldConfig
@@ -142,8 +142,8 @@ def solve_light(quick: bool) -> Result:
     """30 runs of the preset `khepera-light`, 15 trials each."""
     config = undamaged()
     record = experiments.records([config], quick=quick)[config.preset]
-    waits = solving.waits(stats.trials_to_solve(record))
-    median, within = waits["median"], solving.solved_within(record, LIMIT)
+    waits = experiments.waits(stats.trials_to_solve(record))
+    median, within = waits["median"], experiments.solved_within(record, LIMIT)
     good = median is not None and median <= MEDIAN and within >= FEWEST
     last = record["solved"][:, -5:].mean()
     return Result(
@@ -221,7 +221,7 @@ def _row(record: RunRecord) -> dict[str, object]:
         "solved in the onset trial": _share(solved[:, onset]),
         "solved trials, last five": _share(solved[:, -5:]),
         **_circling(record),
-        **solving.waits(stats.trials_to_recover(record)),
+        **experiments.waits(stats.trials_to_recover(record)),
     }
 
 

@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 import torch
 
-from bench.learning import experiments, forking, solving
+from bench.learning import experiments, forking
 from bns import presets
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig
@@ -214,7 +214,7 @@ def trials_to_regain(record: RunRecord) -> np.ndarray:
     """
     onset = int(record.damage_onset[0])
     enough = SHARE * before(record)
-    return solving.first(record["distance"][:, onset:] >= enough[:, None])
+    return experiments.first(record["distance"][:, onset:] >= enough[:, None])
 
 
 def before(record: RunRecord) -> np.ndarray:

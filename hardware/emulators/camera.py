@@ -18,11 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from bns.errors import BnsError
-from bns.hardware.emulators.live_body import LiveBody
+from bns.hardware.emulators.device import LiveBody
 from bns.hardware.tracking import marker as tags
-from bns.hardware.tracking.camera import Camera, plane_points
+from bns.hardware.tracking.camera import Camera, cv2, plane_points
 from bns.hardware.tracking.marker import CELLS, MARKERS, Floor, Marker
-from bns.hardware.tracking.opencv import cv2
 from bns.hardware.tracking.tracker import Frame
 
 BOARD, BODY = 205, 70  # grey values (assumed)

@@ -18,8 +18,7 @@ from bns.errors import BnsError
 from bns.hardware.dynamixel import joints as tables
 from bns.hardware.dynamixel import packets
 from bns.hardware.dynamixel.joints import Joint
-from bns.hardware.emulators.device import Reply
-from bns.hardware.emulators.live_body import LiveBody
+from bns.hardware.emulators.device import LiveBody, Reply
 from bns.models import servo_numbers
 from bns.models.ax12a import NO_LOAD_SPEED
 from bns.worlds.effects.base import Effect

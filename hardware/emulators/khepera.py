@@ -10,8 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bns.hardware.emulators.device import Reply
-from bns.hardware.emulators.live_body import LiveBody
+from bns.hardware.emulators.device import LiveBody, Reply
 from bns.hardware.khepera import protocol
 from bns.models.arena import SIZE
 from bns.models.khepera3.units import firmware

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.learning import solving
+from bench.learning import experiments
 from bench.walking import ceiling, gait
-from bench.walking import recover as recover_hexapod
+from bench.walking import gait as recover_hexapod
 from bench.walking import runs as hexapod_runs
 from bns import presets
 from bns.experiment.record import RunRecord
@@ -39,7 +39,7 @@ def test_a_walk_that_takes_twice_as_long_counts_half_and_a_short_one_as_it_is():
 
 def test_the_first_trial_that_did_it_is_counted_from_one():
     hit = np.array([[True, False], [False, True], [False, False]])
-    assert solving.first(hit).tolist() == [1.0, 2.0, np.inf]
+    assert experiments.first(hit).tolist() == [1.0, 2.0, np.inf]
 
 
 def test_regained_is_nine_tenths_of_the_median_before_the_damage():

@@ -9,7 +9,7 @@ import pytest
 
 from bns.hardware.emulators.camera import EmulatedCamera, painter
 from bns.hardware.emulators.khepera import KheperaBody
-from bns.hardware.emulators.mishaps import WORDS
+from bns.hardware.emulators.pty_host import WORDS
 from bns.hardware.emulators.run import khepera3
 from bns.hardware.tracking.camera import Camera
 

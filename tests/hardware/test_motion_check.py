@@ -10,7 +10,7 @@ from bns.worlds.trial import Commands
 
 pytest.importorskip("cv2")
 
-from bns.hardware.emulators import virtual
+from bns.hardware.emulators import run
 from bns.hardware.faults import SafetyStop, Void
 from bns.hardware.worlds.wheeled import HardwareWorld
 
@@ -78,7 +78,7 @@ def test_what_need_not_move_is_left_alone():
 
 
 def test_a_picture_that_comes_again_is_marked():
-    rig = virtual.rig()
+    rig = run.rig()
     image = rig.eyes.source.paint_at(0.1)
     tracker = Tracker(rig.eyes.tracker.camera, rig.eyes.tracker.marker)
     first, again = (tracker.see(Frame(at, image, 0)) for at in (0.1, 0.2))
@@ -120,7 +120,7 @@ def hanging(rig, way):
 def test_a_camera_that_hangs_stops_the_robot_in_time(way, monkeypatch):
     if way == "frozen":  # a repeated picture is no sighting, whatever it shows
         monkeypatch.setattr(MotionCheck, "stands", lambda *words: False)
-    rig = virtual.rig(rate=30.0)
+    rig = run.rig(rate=30.0)
     broken, world = hanging(rig, way), HardwareWorld(rig=rig)
     with pytest.raises(Void):
         world._once(rig, ROUND, world._stages(4.0, 0, ())[0], 0, 0)
@@ -138,7 +138,7 @@ def test_a_picture_that_stays_stuck_ends_the_session_and_each_try_begins_at_rest
     monkeypatch,
 ):
     """A standing robot looks the same: that it is stuck shows only once it drives."""
-    rig = virtual.rig(rate=30.0)
+    rig = run.rig(rate=30.0)
     speeds, drive = [], rig.robot.drive
 
     def driven(left, right, **words):
@@ -157,7 +157,7 @@ def test_a_picture_that_stays_stuck_ends_the_session_and_each_try_begins_at_rest
 
 def test_a_robot_that_is_held_is_no_hanging_camera():
     dead = ["wheel_gain:wheel=left,factor=0", "wheel_gain:wheel=right,factor=0"]
-    rig = virtual.rig(dead)
+    rig = run.rig(dead)
     (trial,) = HardwareWorld(rig=rig).run([Commands([[0.1, 0.1]], [1.5])])
     assert np.ptp(trial.poses_world[:, 0]) < 0.002
     assert rig.faults.counts["stands"] >= 1
