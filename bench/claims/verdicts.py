@@ -1,10 +1,11 @@
 """Claims in each world: those settled, findings that are stale, and what they cost.
 
 All of them are planned, and the rates of the plan measured: processor times of a trial
-of a run in the claims, by learner. A batch of ten on one thread, as `bns claims run` makes them. Trials before evolution
-starts give what world and training take, those after it what evolution takes, and a
-late trial of navigation without a window what its patterns take. Compiled code is used
-where the claims use it; the time to compile is left out.
+of a run in the claims, by learner. A batch of ten on one thread, as `bns claims run`
+makes them. Trials before evolution starts give what world and training take, those
+after it what evolution takes, and a late trial of navigation without a window what its
+patterns take. Compiled code is used where the claims use it; the time to compile is
+left out.
 """
 
 import time

@@ -1,4 +1,4 @@
-"""What learners cost: one trial, a batch, and robot time inside the SNN."""
+"""What learners cost: a trial, a batch, a run that walks, robot time inside the SNN."""
 
 import time
 from dataclasses import replace
@@ -8,6 +8,7 @@ from typing import Any
 import torch
 
 from bench.result import Result, bench
+from bench.walking import runs
 from bns.experiment.config import RunConfig
 
 LIMIT = 1.5
@@ -217,3 +218,72 @@ def _world(evaluator: Any, population: Any) -> tuple[Any, list]:
 
     first = population.pick(torch.zeros(PHYSICS, dtype=torch.long))
     return registry.make("mujoco", threads=1), evaluator.encoding.commands(first)
+
+
+RUN_LIMIT = 10.0
+TRIALS, WALKERS, SOME = 200, 6, 10
+
+
+@bench(
+    "processor time of one hexapod run of 200 trials, window 300",
+    bar="<= 10 min on 2 cores",
+)
+def hexapod_run_cost(quick: bool) -> Result:
+    """The preset, one run of 200 trials on two threads; quick: 12 small trials.
+
+    Processor time, because it is the same on a busy machine: on a quiet one the run
+    takes no longer than that. Beside it what a trial of a run costs alone and in a
+    batch of six, over the first ten trials.
+    """
+    config = runs.damaged("1,5")
+    config = replace(config, trials=TRIALS, replicates=1, threads=2)
+    if quick:
+        config = runs.small(config)
+    whole = processor_times(config)
+    details: dict[str, object] = {"one run": whole}
+    if not quick:
+        some = replace(config, trials=SOME, world=replace(config.world, damage=()))
+        alone, many = (
+            processor_times(some),
+            processor_times(replace(some, replicates=WALKERS)),
+        )
+        details[f"one run, {SOME} trials"] = alone
+        details[f"{WALKERS} runs, {SOME} trials"] = many
+        details["share of a run's cost in a batch"] = round(
+            many["processor [s]"] / WALKERS / alone["processor [s]"], 3
+        )
+    minutes = whole["processor [s]"] / 60
+    return Result(
+        figure=round(minutes, 3),
+        unit="min",
+        holds=None if quick else minutes <= RUN_LIMIT,
+        n=config.trials,
+        details=details,
+    )
+
+
+def processor_times(config: RunConfig) -> dict[str, float]:
+    """Seconds of evolution, world and training, start-up included in the total."""
+    from bns.experiment.batch import Batch, resolve
+    from bns.experiment.world_factory import make_world
+
+    begun, wall = time.process_time(), time.perf_counter()
+    config, mode = resolve(config)
+    batch = Batch([config], [make_world(config)])
+    learner, kind = batch.learner, {"evolution": 0.0, "world": 0.0, "training": 0.0}
+    for trial in range(config.trials):
+        marks = [time.process_time()]
+        proposal = learner.propose(trial)
+        marks.append(time.process_time())
+        seen = batch._execute(proposal.tried, trial, "world")
+        marks.append(time.process_time())
+        learner.observe(trial, seen, None)
+        marks.append(time.process_time())
+        for name, a, b in zip(kind, marks, marks[1:], strict=False):
+            kind[name] += b - a
+    return {
+        **{f"{name} [s]": round(seconds, 2) for name, seconds in kind.items()},
+        "processor [s]": round(time.process_time() - begun, 2),
+        "wall [s]": round(time.perf_counter() - wall, 2),
+        "compiled": mode == "compiled",
+    }
