@@ -26,7 +26,7 @@ from bench.hardware.drives import (
     Log,
     Scene,
 )
-from bench.hardware.emulated import emulator, folder, resumed
+from bench.hardware.runs import emulator, folder, resumed
 from bench.result import Result, bench
 from bns.hardware.emulators.device import LiveBody
 from bns.hardware.emulators.hexapod import HexapodBody

@@ -4,7 +4,7 @@ from collections import Counter
 
 import numpy as np
 
-from bench.hardware.emulated import resumed
+from bench.hardware.runs import resumed
 from bench.result import Result, bench
 
 CASES = 3000

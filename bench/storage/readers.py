@@ -150,7 +150,7 @@ def _given() -> Iterator[Reader]:
     from bns.storage import journal
     from bns.worlds import corrected
     from bns.worlds.data import importing
-    from bns.worlds.data.column_map import ColumnMap
+    from bns.worlds.data.importing import ColumnMap
 
     def own(home: Path) -> Any:
         arm = OwnConfig.read(ROOT / "examples" / "arm" / "arm.toml")

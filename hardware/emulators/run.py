@@ -27,7 +27,7 @@ from bns.hardware.tracking.camera import Camera
 from bns.hardware.tracking.eyes import VirtualEyes
 from bns.hardware.tracking.marker import Marker
 from bns.hardware.tracking.tracker import Tracker
-from bns.worlds.light.field import Lamp
+from bns.worlds.light.law import Lamp
 
 SLOW = 0.005  # m/s; slower, a wheel stands
 

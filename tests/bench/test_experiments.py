@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.learning import experiments, forking
+from bench.learning import experiments
 from bns.errors import BnsError
 from bns.experiment.config import WorldConfig
 from bns.experiment.run import train
@@ -34,7 +34,7 @@ def trunk(tmp_path, monkeypatch):
 def test_a_branch_has_the_bytes_of_a_run_from_the_start(trunk, tmp_path):
     branch = damaged(trunk)
     train(trunk, experiments.directory(trunk))
-    forking.begin(trunk, branch)
+    experiments.begin(trunk, branch)
     place = experiments.directory(branch)
     assert len(list((place / "steps").iterdir())) == ONSET, "it goes on, not anew"
     train(branch, place, resume=True)
@@ -52,15 +52,15 @@ def test_a_branch_has_the_bytes_of_a_run_from_the_start(trunk, tmp_path):
 )
 def test_a_branch_that_differs_earlier_is_refused(trunk, changes):
     with pytest.raises(BnsError, match="branch is no continuation of trunk"):
-        forking.begin(trunk, damaged(trunk, **changes))
+        experiments.begin(trunk, damaged(trunk, **changes))
 
 
 def test_a_section_that_did_nothing_in_the_trunk_may_differ(trunk):
     branch = damaged(trunk, watch=replace(trunk.watch, forget=True))
     train(trunk, experiments.directory(trunk))
     with pytest.raises(BnsError, match="no continuation"):
-        forking.begin(trunk, branch)
-    forking.begin(trunk, branch, idle=("watch",))
+        experiments.begin(trunk, branch)
+    experiments.begin(trunk, branch, idle=("watch",))
     place = experiments.directory(branch)
     assert len(list((place / "steps").iterdir())) == ONSET
     assert RunStore.open(place).config.watch.forget
@@ -73,15 +73,15 @@ def side(damage="wheel_gain:wheel=left,factor=0.5@2", **settings):
     world = WorldConfig(name="light", damage=(damage,))
     settings = {"adaptation": AdaptationConfig(population_reset=True)} | settings
     config = replace(config, preset="side", trials=4, world=world, **settings)
-    return replace(config, record_replicates=0, seed=forking.seed(config))
+    return replace(config, record_replicates=0, seed=experiments.seed(config))
 
 
 @pytest.mark.parametrize("watch", [WatchConfig(), WatchConfig(detect=True, warmup=2)])
 def test_it_has_the_same_bytes(tmp_path, monkeypatch, watch):
     monkeypatch.setattr(experiments, "RUNS", tmp_path)
     config = side(watch=watch)
-    forking.grow(config)
-    forking.branch(config)
+    experiments.grow(config)
+    experiments.branch(config)
     train(config, tmp_path / "straight")
     forked = contents(experiments.directory(config))
     straight = contents(tmp_path / "straight")
@@ -90,10 +90,10 @@ def test_it_has_the_same_bytes(tmp_path, monkeypatch, watch):
 
 def test_sides_of_a_trunk_differ_from_the_damage_on_only():
     one, other = side(), side("sensor_noise:factor=2@2", adaptation=AdaptationConfig())
-    assert forking.trunk(one) == forking.trunk(other)
+    assert experiments.trunk(one) == experiments.trunk(other)
     windowed = side(adaptation=AdaptationConfig(window=30))
-    assert forking.trunk(windowed) != forking.trunk(one)
-    assert forking.seed(windowed) != forking.seed(one)
+    assert experiments.trunk(windowed) != experiments.trunk(one)
+    assert experiments.seed(windowed) != experiments.seed(one)
 
 
 def test_what_a_false_alarm_sets_off_belongs_to_the_trunk():
@@ -102,7 +102,7 @@ def test_what_a_false_alarm_sets_off_belongs_to_the_trunk():
         side(watch=watched),
         side(watch=watched, adaptation=AdaptationConfig()),
     )
-    assert forking.trunk(reset) != forking.trunk(none)
+    assert experiments.trunk(reset) != experiments.trunk(none)
 
 
 def test_waiting_times_say_how_many_came():

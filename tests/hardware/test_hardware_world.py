@@ -17,7 +17,7 @@ from bns.hardware.faults import SafetyStop
 from bns.hardware.worlds.real_robot import TRIES
 from bns.hardware.worlds.wheeled import HardwareLight, HardwareWorld
 from bns.worlds.light import sensors as light_sensors
-from bns.worlds.light.field import Lamp
+from bns.worlds.light.law import Lamp
 from bns.worlds.trial import Commands
 from bns.worlds.world import clear, ring
 
@@ -318,6 +318,6 @@ def test_the_learner_drives_it(tmp_path):
 
 
 def _field():
-    from bns.worlds.light.field import LightField
+    from bns.worlds.light.law import LightField
 
     return LightField((LAMP,))

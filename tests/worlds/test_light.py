@@ -12,7 +12,7 @@ from bns.models import render
 from bns.worlds import registry
 from bns.worlds.light import law as light_law
 from bns.worlds.light import sensors
-from bns.worlds.light.field import Lamp, LightField
+from bns.worlds.light.law import Lamp, LightField
 from bns.worlds.objects import Post, RayScreen
 from bns.worlds.stepwise import look
 
@@ -286,7 +286,7 @@ def test_bulbs_are_in_the_picture(spec, opengl):
 
 
 def test_no_boundary_where_nobody_watches():
-    from bns.worlds.light.supervisor import Supervisor
+    from bns.worlds.light.closed_loop import Supervisor
 
     world = registry.make("light", supervisor=Supervisor(safety=0))
     names = [geom.name for geom in look.spec(world).geoms]

@@ -14,7 +14,7 @@ from bns.gap.models.wheeled.model import WheeledModel
 from bns.models import check, new
 from bns.worlds import registry
 from bns.worlds.light import sensors as light_sensors
-from bns.worlds.light.field import LightField
+from bns.worlds.light.law import LightField
 from tests.worlds.test_closed_loop import Seek
 
 

@@ -25,8 +25,7 @@ from bns.storage.reading import Finite
 from bns.worlds.damage import Damage
 from bns.worlds.effects.sensors import columns
 from bns.worlds.light import law as light_law
-from bns.worlds.light.field import LightField
-from bns.worlds.light.law import Screen, Sight
+from bns.worlds.light.law import LightField, Screen, Sight
 from bns.worlds.trial import Channel
 
 FILE = "sight.json"

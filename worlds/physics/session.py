@@ -12,8 +12,7 @@ from bns.errors import BnsError
 from bns.worlds.active import Placed, Stages
 from bns.worlds.checks import bounded
 from bns.worlds.effects.base import ControlSignal
-from bns.worlds.light.sensing import LEAD, Sensing
-from bns.worlds.light.supervisor import PERIOD, Call, Supervisor
+from bns.worlds.light.closed_loop import LEAD, PERIOD, Call, Sensing, Supervisor
 from bns.worlds.physics import compile, observe
 from bns.worlds.physics.rollout import Compiled, Job, Motion, Pool, Segment
 from bns.worlds.trial import Channel

@@ -10,8 +10,7 @@ from bns.errors import BnsError
 from bns.worlds.active import Stages
 from bns.worlds.checks import bounded, checked_start, of_kind, shared
 from bns.worlds.damage import Damage
-from bns.worlds.light.sensing import Sensing
-from bns.worlds.light.supervisor import Supervisor
+from bns.worlds.light.closed_loop import Sensing, Supervisor
 from bns.worlds.physics import compile, control, observe
 from bns.worlds.physics.rollout import Job, Motion, Pool
 from bns.worlds.physics.session import Session, Setting

@@ -11,7 +11,7 @@ from bns.worlds.effects.base import ControlSignal
 from bns.worlds.effects.command import TWIST
 from bns.worlds.effects.parts import Part
 from bns.worlds.light import sensors
-from bns.worlds.light.field import Lamp, LightField
+from bns.worlds.light.law import Lamp, LightField
 
 ROVER = (Path(__file__).parent / "rover.xml").read_text()
 ARM = (Path(__file__).parent / "arm.xml").read_text()

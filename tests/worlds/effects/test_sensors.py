@@ -9,7 +9,7 @@ from bns.worlds.effects import registry
 from bns.worlds.effects.base import CommandEffect, OpticsEffect, SensorEffect
 from bns.worlds.light import law as light_law
 from bns.worlds.light import sensors as light_sensors
-from bns.worlds.light.field import LightField
+from bns.worlds.light.law import LightField
 from tests.worlds.effects import subjects
 from tests.worlds.effects.subjects import DT, at_example, light, read
 
