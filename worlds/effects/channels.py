@@ -17,7 +17,7 @@ from bns.worlds.effects.base import (
     factor,
     strength,
 )
-from bns.worlds.effects.common import lagged
+from bns.worlds.effects.command import lagged
 from bns.worlds.effects.parts import ANY, WIDE
 
 

@@ -13,7 +13,7 @@ from bns.worlds.effects.base import (
     factor,
     strength,
 )
-from bns.worlds.effects.common import rarer, spans
+from bns.worlds.effects.command import rarer, spans
 
 # [count] 12 bits; the dissertation writes 4200, the maker's test program scales by 4096
 FULL_SCALE = 4095.0

@@ -14,7 +14,7 @@ from bns.worlds.effects.base import (
     factor,
     strength,
 )
-from bns.worlds.effects.common import WHEEL, columns, lagged, spans
+from bns.worlds.effects.command import WHEEL, columns, lagged, spans
 
 
 class AxleLength(BodyEffect):
