@@ -90,8 +90,9 @@ class PoseSignal:
 class Effect(ABC):
     """One departure from the nominal model, with its parameter values.
 
-    Subclasses say what they are in class variables; they add no `__init__`. The first
-    line of a subclass's docstring is its `doc`, unless it gives another.
+    Subclasses say what they are in class variables; they add no `__init__`. One with a
+    single parameter gives it as `parameter`, others give `parameters`. The first line
+    of a subclass's docstring is its `doc`, unless it gives another.
 
     Args:
         values: parameter and choice values by name; missing ones take the
@@ -105,6 +106,7 @@ class Effect(ABC):
     name: ClassVar[str]
     stage: ClassVar[str]
     doc: ClassVar[str]  # one line: what departs from nominal
+    parameter: ClassVar[Parameter]  # the only one, where there is one
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     choices: ClassVar[tuple[Choice, ...]] = ()
     robots: ClassVar[tuple[str, ...]] = ("wheeled",)  # kinds it makes sense for
@@ -113,6 +115,8 @@ class Effect(ABC):
 
     def __init_subclass__(cls, **words: Any) -> None:
         super().__init_subclass__(**words)
+        if "parameter" in cls.__dict__:
+            cls.parameters = (cls.parameter,)
         if "doc" not in cls.__dict__ and cls.__doc__:
             first = cls.__doc__.partition("\n")[0]
             cls.doc = first[:1].lower() + first[1:].removesuffix(".")
@@ -284,9 +288,9 @@ class ServoEffect(Effect):
 
     def change(self, law: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """The law after the effect: every number by name, arrays of any shape."""
-        (parameter,) = self.parameters
-        before, strength = law[self.number], self[parameter.name]
-        after = before * strength if parameter.nominal == 1 else before + strength
+        before, strength = law[self.number], self[self.parameter.name]
+        scaled = self.parameter.nominal == 1
+        after = before * strength if scaled else before + strength
         return {**law, self.number: clipped(self.number, after)}
 
     def edit(self, spec: Any) -> None:

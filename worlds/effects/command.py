@@ -96,10 +96,8 @@ class WheelGain(_EachCommand):
 
     name = "wheel_gain"
     source = "thesis 4.2.3 and 6.2.1: a wheel slowed to a share of its intended speed"
-    parameters = (
-        factor(
-            (0.0, 2.0), "speed reached over speed told; bounds assumed", example=0.8
-        ),
+    parameter = factor(
+        (0.0, 2.0), "speed reached over speed told; bounds assumed", example=0.8
     )
 
     def _turned(self, told: np.ndarray) -> np.ndarray:
@@ -111,14 +109,12 @@ class DeadBand(_EachCommand):
 
     name = "dead_band"
     source = "regulated minimum 2,000 units (13.9 mm/s): Khepera III manual 2.2 p. 14"
-    parameters = (
-        strength(
-            "speed",
-            "m/s",
-            (0.0, 0.2),
-            "smallest magnitude that still moves the wheel; bounds assumed",
-            example=0.08,
-        ),
+    parameter = strength(
+        "speed",
+        "m/s",
+        (0.0, 0.2),
+        "smallest magnitude that still moves the wheel; bounds assumed",
+        example=0.08,
     )
 
     def _turned(self, told: np.ndarray) -> np.ndarray:
@@ -130,14 +126,12 @@ class DeadZone(_EachCommand):
 
     name = "dead_zone"
     source = "the dead zone of control engineering; bounds assumed"
-    parameters = (
-        strength(
-            "speed",
-            "m/s",
-            (0.0, 0.2),
-            "taken off every speed; bounds assumed",
-            example=0.02,
-        ),
+    parameter = strength(
+        "speed",
+        "m/s",
+        (0.0, 0.2),
+        "taken off every speed; bounds assumed",
+        example=0.02,
     )
 
     def _turned(self, told: np.ndarray) -> np.ndarray:
@@ -149,16 +143,14 @@ class SpeedSaturation(_EachCommand):
 
     name = "speed_saturation"
     source = "limits of 48,000 and 43,000 units: Khepera III manual 2.2 p. 14"
-    parameters = (
-        Parameter(
-            "limit",
-            unit="m/s",
-            nominal=TOP_SPEED,
-            low=0.0,
-            high=TOP_SPEED,
-            doc="largest magnitude; the nominal is the limit of the drive",
-            example=0.06,
-        ),
+    parameter = Parameter(
+        "limit",
+        unit="m/s",
+        nominal=TOP_SPEED,
+        low=0.0,
+        high=TOP_SPEED,
+        doc="largest magnitude; the nominal is the limit of the drive",
+        example=0.06,
     )
 
     def _turned(self, told: np.ndarray) -> np.ndarray:
@@ -173,13 +165,11 @@ class WheelIntermittent(CommandEffect):
     memoryless = True
     choices = (WHEEL,)
     parameters = (
-        Parameter(
+        strength(
             "every",
-            unit="1",
-            nominal=0,
-            low=0,
-            high=1000,
-            doc="m: commands m, 2m, ... of a trial are hit; 0 = never; bounds assumed",
+            "1",
+            (0, 1000),
+            "m: commands m, 2m, ... of a trial are hit; 0 = never; bounds assumed",
             example=3,
             integer=True,
         ),
@@ -289,8 +279,8 @@ class CommandLatency(CommandEffect):
     name = "command_latency"
     source = "0.2 s fits the MRCLAM 6 robots best; bounds assumed"
     robots = ("wheeled", "legged")
-    parameters = (
-        strength("delay", "s", (0.0, 2.0), "time from command to motor", example=0.2),
+    parameter = strength(
+        "delay", "s", (0.0, 2.0), "time from command to motor", example=0.2
     )
 
     def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
@@ -324,14 +314,12 @@ class TurningLoss(CommandEffect):
     source = "seen of iRobot Creates (MRCLAM data sets); bounds assumed"
     robots = ("own",)
     memoryless = True
-    parameters = (
-        strength(
-            "loss",
-            "m",
-            (0.0, 0.5),
-            "forward speed lost over turning rate told",
-            example=0.05,
-        ),
+    parameter = strength(
+        "loss",
+        "m",
+        (0.0, 0.5),
+        "forward speed lost over turning rate told",
+        example=0.05,
     )
 
     def _change(self, signal: ControlSignal, active: np.ndarray) -> None:

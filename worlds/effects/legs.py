@@ -27,7 +27,7 @@ class JointWeak(BodyEffect):
     source = "worn motor or gears; bounds assumed"
     robots = ("legged",)
     choices = (JOINT,)
-    parameters = (factor((0.02, 1.0), "torque left over torque before", example=0.4),)
+    parameter = factor((0.02, 1.0), "torque left over torque before", example=0.4)
 
     def _write(self, spec: Any) -> None:
         for actuator in chosen(spec, self["joint"]):
@@ -92,7 +92,7 @@ class LooseHorn(BodyEffect):
     robots = ("legged",)
     choices = (JOINT,)
     resizes = True
-    parameters = (strength("angle", "rad", (0.0, 0.6), "full play", example=0.15),)
+    parameter = strength("angle", "rad", (0.0, 0.6), "full play", example=0.15)
 
     def _write(self, spec: Any) -> None:
         joint = spec.joint(self["joint"])
@@ -109,7 +109,7 @@ class LinkLength(BodyEffect):
     source = "sources give tibias of 130 to 140 mm (numbers.toml); bounds assumed"
     robots = ("legged",)
     choices = (PART, LEGS_OR_ALL)
-    parameters = (factor((0.8, 1.25), "length over the model's", example=1.08),)
+    parameter = factor((0.8, 1.25), "length over the model's", example=1.08)
 
     def _write(self, spec: Any) -> None:
         factor = self["factor"]
@@ -129,8 +129,8 @@ class FootSlippery(BodyEffect):
     source = "a worn or lost rubber tip; bounds assumed"
     robots = ("legged",)
     choices = (LEGS_OR_ALL,)
-    parameters = (
-        factor((0.02, 2.0), "friction coefficient over the model's", example=0.2),
+    parameter = factor(
+        (0.02, 2.0), "friction coefficient over the model's", example=0.2
     )
 
     def _write(self, spec: Any) -> None:
@@ -150,10 +150,8 @@ class LegMissing(BodyEffect):
     robots = ("legged",)
     choices = (LEG_SET,)
     resizes = True  # its pairs of geoms go
-    parameters = (
-        strength(
-            "loss", "1", (0.0, 1.0), "whether it is off", example=1.0, integer=True
-        ),
+    parameter = strength(
+        "loss", "1", (0.0, 1.0), "whether it is off", example=1.0, integer=True
     )
 
     def _write(self, spec: Any) -> None:
@@ -181,10 +179,8 @@ class LegLimp(BodyEffect):
     source = "an unpowered bridge is open; friction of the gears stays"
     robots = ("legged",)
     choices = (LEG_SET,)
-    parameters = (
-        strength(
-            "loss", "1", (0.0, 1.0), "share of the motor that is off", example=1.0
-        ),
+    parameter = strength(
+        "loss", "1", (0.0, 1.0), "share of the motor that is off", example=1.0
     )
 
     def _write(self, spec: Any) -> None:
@@ -209,14 +205,12 @@ class LegRaised(CommandEffect):
     source = "thesis 7.2.2: commands altered to raise the leg; the pose is assumed"
     robots = ("legged",)
     choices = (LEG_SET,)
-    parameters = (
-        strength(
-            "blend",
-            "1",
-            (0.0, 1.0),
-            "from the pose told (0) to the raised pose (1)",
-            example=1.0,
-        ),
+    parameter = strength(
+        "blend",
+        "1",
+        (0.0, 1.0),
+        "from the pose told (0) to the raised pose (1)",
+        example=1.0,
     )
 
     def _change(self, signal: ControlSignal, active: np.ndarray) -> None:

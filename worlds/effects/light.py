@@ -1,11 +1,10 @@
 """The light law: lamps, the light of the room, and sensors dead, bent or noisy."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from bns.worlds.effects.base import OpticsEffect, Parameter, factor, strength
 from bns.worlds.effects.sensors import SENSOR, columns
+from bns.worlds.light.law import Law
 
 
 class LightAmbient(OpticsEffect):
@@ -13,19 +12,11 @@ class LightAmbient(OpticsEffect):
 
     name = "light_ambient"
     source = "assumed: a window or the room's lamps"
-    parameters = (
-        strength(
-            "added",
-            "W/m2",
-            (0.0, 100.0),
-            "irradiance added; bounds assumed",
-            example=0.3,
-        ),
+    parameter = strength(
+        "added", "W/m2", (0.0, 100.0), "irradiance added; bounds assumed", example=0.3
     )
 
-    def change(
-        self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
+    def change(self, law: Law, sensors: tuple[str, ...]) -> dict[str, np.ndarray]:
         """See `OpticsEffect.change`."""
         return {**law, "ambient": law["ambient"] + self["added"]}
 
@@ -35,15 +26,11 @@ class LightDimmed(OpticsEffect):
 
     name = "light_dimmed"
     source = "assumed: a lamp that ages or a low supply"
-    parameters = (
-        factor(
-            (0.0, 10.0), "power after over power before; bounds assumed", example=0.5
-        ),
+    parameter = factor(
+        (0.0, 10.0), "power after over power before; bounds assumed", example=0.5
     )
 
-    def change(
-        self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
+    def change(self, law: Law, sensors: tuple[str, ...]) -> dict[str, np.ndarray]:
         """See `OpticsEffect.change`."""
         return {**law, "lamp_power": law["lamp_power"] * self["factor"]}
 
@@ -58,9 +45,7 @@ class LightDisplaced(OpticsEffect):
         strength("y", "m", (-3.0, 3.0), "shift along y; bounds assumed", example=-0.1),
     )
 
-    def change(
-        self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
+    def change(self, law: Law, sensors: tuple[str, ...]) -> dict[str, np.ndarray]:
         """See `OpticsEffect.change`."""
         shift = np.array([self["x"], self["y"], 0.0])
         return {**law, "lamp_position": law["lamp_position"] + shift}
@@ -85,9 +70,7 @@ class LightFlicker(OpticsEffect):
         ),
     )
 
-    def change(
-        self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
+    def change(self, law: Law, sensors: tuple[str, ...]) -> dict[str, np.ndarray]:
         """See `OpticsEffect.change`."""
         lamps = np.ones_like(law["lamp_power"])
         if self.is_nominal:
@@ -128,9 +111,7 @@ class LightShadow(OpticsEffect):
         ),
     )
 
-    def change(
-        self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
+    def change(self, law: Law, sensors: tuple[str, ...]) -> dict[str, np.ndarray]:
         """See `OpticsEffect.change`."""
         if self.is_nominal:
             return dict(law)
@@ -148,19 +129,15 @@ class SensorDead(OpticsEffect):
     name = "sensor_dead"
     source = "assumed: a covered, dirty or broken phototransistor"
     choices = (SENSOR,)
-    parameters = (
-        strength(
-            "loss",
-            "1",
-            (0.0, 1.0),
-            "share of its light that is lost; 1 = dead",
-            example=1.0,
-        ),
+    parameter = strength(
+        "loss",
+        "1",
+        (0.0, 1.0),
+        "share of its light that is lost; 1 = dead",
+        example=1.0,
     )
 
-    def change(
-        self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
+    def change(self, law: Law, sensors: tuple[str, ...]) -> dict[str, np.ndarray]:
         """See `OpticsEffect.change`."""
         gain = law["sensitivity"].copy()
         gain[columns(self, sensors)] *= 1 - self["loss"]
@@ -173,19 +150,15 @@ class SensorMisaligned(OpticsEffect):
     name = "sensor_misaligned"
     source = "assumed: a bent sensor"
     choices = (SENSOR,)
-    parameters = (
-        strength(
-            "angle",
-            "rad",
-            (-3.2, 3.2),
-            "added to its heading, counter-clockwise; half a turn",
-            example=0.5,
-        ),
+    parameter = strength(
+        "angle",
+        "rad",
+        (-3.2, 3.2),
+        "added to its heading, counter-clockwise; half a turn",
+        example=0.5,
     )
 
-    def change(
-        self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
+    def change(self, law: Law, sensors: tuple[str, ...]) -> dict[str, np.ndarray]:
         """See `OpticsEffect.change`."""
         heading = law["heading"].copy()
         heading[columns(self, sensors)] += self["angle"]
@@ -198,15 +171,11 @@ class SensorNoise(OpticsEffect):
     name = "sensor_noise"
     source = "thesis 6.2.1, 6.3.1: the noise found is doubled; what was found is silent"
     choices = (SENSOR,)
-    parameters = (
-        factor(
-            (0.0, 20.0), "noise after over noise before; bounds assumed", example=2.0
-        ),
+    parameter = factor(
+        (0.0, 20.0), "noise after over noise before; bounds assumed", example=2.0
     )
 
-    def change(
-        self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
+    def change(self, law: Law, sensors: tuple[str, ...]) -> dict[str, np.ndarray]:
         """See `OpticsEffect.change`."""
         noise = law["noise"].copy()
         noise[columns(self, sensors)] *= self["factor"]

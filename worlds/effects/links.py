@@ -12,13 +12,11 @@ from bns.worlds.effects.parts import ANY, WIDE, Inertial
 
 
 def _shift(axis: str, *, scales: bool = True) -> Parameter:
-    return Parameter(
+    return strength(
         f"d{axis}",
-        unit="m",
-        nominal=0.0,
-        low=-10.0,
-        high=10.0,
-        doc=f"away from the model's centre of mass along the body's own {axis} axis; "
+        "m",
+        (-10.0, 10.0),
+        f"away from the model's centre of mass along the body's own {axis} axis; "
         "bounds assumed",
         example=0.02 if scales else 0.0,
         scales=scales,
@@ -79,7 +77,7 @@ class BodyLength(BodyEffect):
     source = "inertia of a mass that is stretched evenly; bounds assumed"
     robots = ANY
     choices = parts.part("body")
-    parameters = (factor((0.1, 10.0), "length over the model's", example=1.1),)
+    parameter = factor((0.1, 10.0), "length over the model's", example=1.1)
 
     def _write(self, spec: Any) -> None:
         for body in parts.bodies(spec, self["part"]):
@@ -133,9 +131,7 @@ class GeomFriction(BodyEffect):
     source = "MuJoCo's contact model: the sliding coefficient is scaled"
     robots = ANY
     choices = parts.part("geom")
-    parameters = (
-        factor((0.0, WIDE), "sliding friction over the model's", example=0.5),
-    )
+    parameter = factor((0.0, WIDE), "sliding friction over the model's", example=0.5)
 
     def _write(self, spec: Any) -> None:
         for geom in parts.geoms(spec, self["part"]):
@@ -216,12 +212,10 @@ class FloorFriction(BodyEffect):
     name = "floor_friction"
     source = "contact rule: MuJoCo documentation, Computation, Contact; bounds assumed"
     robots = ("wheeled", "legged")
-    parameters = (
-        factor(
-            (0.01, 3.0),
-            "true friction coefficient over the model's; bounds assumed",
-            example=0.1,
-        ),
+    parameter = factor(
+        (0.01, 3.0),
+        "true friction coefficient over the model's; bounds assumed",
+        example=0.1,
     )
 
     def _write(self, spec: Any) -> None:
@@ -270,7 +264,7 @@ class FloorCompliance(BodyEffect):
     name = "floor_compliance"
     source = "MuJoCo documentation, Modeling, Solver parameters; bounds assumed"
     robots = ("legged",)
-    parameters = (factor((1.0, 5.0), "time constant over the model's", example=2.5),)
+    parameter = factor((1.0, 5.0), "time constant over the model's", example=2.5)
 
     def _write(self, spec: Any) -> None:
         for body in spec.bodies:

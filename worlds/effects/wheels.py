@@ -10,7 +10,6 @@ from bns.worlds.effects.base import (
     ActuatorEffect,
     BodyEffect,
     ControlSignal,
-    Parameter,
     factor,
     strength,
 )
@@ -22,12 +21,10 @@ class AxleLength(BodyEffect):
 
     name = "axle_length"
     source = "published lengths run from 87.4 to 91.6 mm (5 %)"
-    parameters = (
-        factor(
-            (0.7, 1.3),
-            "true distance of the wheels over the model's; bounds assumed",
-            example=1.1,
-        ),
+    parameter = factor(
+        (0.7, 1.3),
+        "true distance of the wheels over the model's; bounds assumed",
+        example=1.1,
     )
 
     def _write(self, spec: Any) -> None:
@@ -49,10 +46,8 @@ class WheelDiameter(BodyEffect):
     name = "wheel_diameter"
     source = "published diameters are 41, 42 and 42.4 mm (3 %); level attitude assumed"
     choices = (WHEEL,)
-    parameters = (
-        factor(
-            (0.7, 1.3), "true diameter over the model's; bounds assumed", example=0.95
-        ),
+    parameter = factor(
+        (0.7, 1.3), "true diameter over the model's; bounds assumed", example=0.95
     )
 
     def _write(self, spec: Any) -> None:
@@ -123,7 +118,7 @@ class TorqueLimit(BodyEffect):
     name = "torque_limit"
     source = "nominal 0.057 N m: Webots Khepera3; bounds assumed"
     choices = (WHEEL,)
-    parameters = (factor((0.0, 1.0), "largest torque over the model's", example=0.02),)
+    parameter = factor((0.0, 1.0), "largest torque over the model's", example=0.02)
 
     def _write(self, spec: Any) -> None:
         """See `BodyEffect.edit`.
@@ -186,14 +181,12 @@ class CasterDrag(BodyEffect):
 
     name = "caster_drag"
     source = "dry friction; the nominal casters have none; bounds assumed"
-    parameters = (
-        strength(
-            "friction",
-            "1",
-            (0.0, 1.0),
-            "friction coefficient added; bounds assumed",
-            example=0.2,
-        ),
+    parameter = strength(
+        "friction",
+        "1",
+        (0.0, 1.0),
+        "friction coefficient added; bounds assumed",
+        example=0.2,
     )
 
     def _write(self, spec: Any) -> None:
@@ -221,14 +214,12 @@ class MotorLag(ActuatorEffect):
     name = "motor_lag"
     source = "first-order model assumed; the lab's robot loses 0.07-0.14 s from rest"
     choices = (WHEEL,)
-    parameters = (
-        strength(
-            "time_constant",
-            "s",
-            (0.0, 2.0),
-            "time to 63 % of a step; bounds assumed",
-            example=0.2,
-        ),
+    parameter = strength(
+        "time_constant",
+        "s",
+        (0.0, 2.0),
+        "time to 63 % of a step; bounds assumed",
+        example=0.2,
     )
 
     def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
@@ -251,14 +242,12 @@ class WheelBacklash(ActuatorEffect):
     name = "wheel_backlash"
     source = "play operator (Nordin and Gutman, Automatica 38, 2002); bounds assumed"
     choices = (WHEEL,)
-    parameters = (
-        strength(
-            "play",
-            "m",
-            (0.0, 0.05),
-            "full play at the wheel's rim, angle times radius; bounds assumed",
-            example=0.005,
-        ),
+    parameter = strength(
+        "play",
+        "m",
+        (0.0, 0.05),
+        "full play at the wheel's rim, angle times radius; bounds assumed",
+        example=0.005,
     )
 
     def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
@@ -330,13 +319,11 @@ class BatteryFade(ActuatorEffect):
             "share of the speed lost with each trial; bounds assumed",
             example=0.02,
         ),
-        Parameter(
+        strength(
             "trials",
-            unit="1",
-            nominal=0,
-            low=0,
-            high=1_000_000,
-            doc="driven since the battery was full, before the first one",
+            "1",
+            (0, 1_000_000),
+            "driven since the battery was full, before the first one",
             example=10,
             integer=True,
             scales=False,
