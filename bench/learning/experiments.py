@@ -159,17 +159,29 @@ def pool_of_workers() -> ProcessPoolExecutor:
     return ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn"))
 
 
-def shortened(config: RunConfig) -> RunConfig:
-    """A configuration with few replicates and trials."""
-    onset = QUICK["trials"] // 2
+def shortened(
+    config: RunConfig,
+    sizes: Mapping[str, int] = QUICK,
+    *,
+    epochs: int = 100,
+    **evolution: int,
+) -> RunConfig:
+    """A configuration with few replicates and trials.
+
+    Args:
+        config: whose damage sets in half-way.
+        sizes: fields of the configuration: trials and replicates.
+        epochs: of training, at most.
+        evolution: settings of the section `evolution`.
+    """
+    onset = sizes["trials"] // 2
     damage = tuple(f"{text.rpartition('@')[0]}@{onset}" for text in config.world.damage)
-    generations = min(config.evolution.generations, 30)
-    evolution = replace(config.evolution, population=50, generations=generations)
+    few = {"population": 50, "generations": min(config.evolution.generations, 30)}
     return replace(
         config,
-        **QUICK,
-        evolution=evolution,
-        snn=replace(config.snn, epochs=min(config.snn.epochs, 100)),
+        **sizes,
+        evolution=replace(config.evolution, **few | evolution),
+        snn=replace(config.snn, epochs=min(config.snn.epochs, epochs)),
         world=replace(config.world, damage=damage),
         compiled="no",
     )

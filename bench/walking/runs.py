@@ -193,17 +193,8 @@ def joined(parts: list[RunRecord]) -> RunRecord:
 
 def small(config: RunConfig) -> RunConfig:
     """One run of few trials with a small population and short training."""
-    onset = QUICK["trials"] // 2
-    damage = tuple(f"{text.rpartition('@')[0]}@{onset}" for text in config.world.damage)
-    evolution = replace(config.evolution, population=60, generations=10, tournament=6)
-    return replace(
-        config,
-        **QUICK,
-        evolution=evolution,
-        snn=replace(config.snn, epochs=60),
-        world=replace(config.world, damage=damage),
-        compiled="no",
-    )
+    few = {"population": 60, "generations": 10, "tournament": 6}
+    return experiments.shortened(config, QUICK, epochs=60, **few)
 
 
 def trials_to_regain(record: RunRecord) -> np.ndarray:

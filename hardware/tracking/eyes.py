@@ -136,6 +136,7 @@ def _grey(picture: Any) -> Any:
 
 WAIT = 0.2  # s for a picture before the loop looks whether it should end
 KEPT = 100_000  # sightings, an hour
+LATENCY = 0.04  # s from a virtual picture being taken to its being there
 
 
 class Eyes(Protocol):
@@ -227,7 +228,6 @@ class VirtualEyes:
         tracker: looks at it.
         clock: virtual.
         rate: pictures a second.
-        latency: from a picture being taken to its being there [s].
     """
 
     def __init__(
@@ -237,10 +237,8 @@ class VirtualEyes:
         clock: VirtualClock,
         *,
         rate: float = 15.0,
-        latency: float = 0.04,
     ):
-        self.source, self.tracker, self.clock = source, tracker, clock
-        self.rate, self.latency = rate, latency
+        self.source, self.tracker, self.clock, self.rate = source, tracker, clock, rate
         self._count = 0
         self._frame: Frame | None = None
         self.blind = False
@@ -248,7 +246,7 @@ class VirtualEyes:
     def poll(self) -> list[Sighting]:
         """Sightings since the last call, see `Eyes.poll`."""
         seen = []
-        while (at := self._count / self.rate) + self.latency <= self.clock.now():
+        while (at := self._count / self.rate) + LATENCY <= self.clock.now():
             self._count += 1
             if self.blind:
                 self.tracker.missed()

@@ -25,7 +25,7 @@ from bns.worlds.light import sensors as light_sensors
 from bns.worlds.light.law import Lamp, LightField
 from bns.worlds.objects import Post, RayScreen
 from bns.worlds.stepwise import look
-from tests.worlds.test_closed_loop import Seek
+from tests.worlds.test_closed_loop import Ahead, Replay, Seek
 
 SENSORS = sensors.of("khepera3")
 BACK = SENSORS.names.index("ir_back")
@@ -184,19 +184,13 @@ def test_objects_cast_shadows_as_single_rays_say():
     assert 0.02 < 1 - seen.mean() < 0.5
 
 
-class Ahead:
-    def memory(self, n):
-        return np.zeros((n, 0))
-
-    def act(self, readings, memory):
-        return np.full((len(readings), 2), 0.1), memory
-
-
 def test_a_post_shades_the_robot_and_stops_it():
     start = [[-1.1, 0.0, 0.0]]
     post = {"x": -0.7, "y": 0.0, "radius": 0.05}
     free, shaded = (
-        registry.make("light", posts=posts).drive(Ahead(), cycles=15, starts=start)[0]
+        registry.make("light", posts=posts).drive(Ahead(0.1), cycles=15, starts=start)[
+            0
+        ]
         for posts in ((), (post,))
     )
     assert free.observed[0, 3:].max() < 3500
@@ -214,14 +208,7 @@ def test_open_loop_trials_have_the_readings_as_well():
     speeds = np.array([[0.05, 0.08], [0.1, 0.02], [0.0, 0.0]])
     trial = world.run([Commands(speeds, np.full(3, 0.4))], seeds=[4])[0]
 
-    class Replay(Ahead):
-        def memory(self, n):
-            return np.zeros((n, 1))
-
-        def act(self, readings, memory):
-            return speeds[[int(memory[0, 0])]], memory + 1
-
-    loop = world.drive(Replay(), cycles=3, seeds=[4], starts=[world.start])[0]
+    loop = world.drive(Replay(speeds), cycles=3, seeds=[4], starts=[world.start])[0]
     assert trial.observed.tobytes() == loop.observed.tobytes()
     assert trial.channels == loop.channels
 
@@ -244,7 +231,7 @@ BAD = {
     ),
     "post in the robot": (
         lambda: registry.make("light", posts=[Post(0.8, 0.0)]).drive(
-            Ahead(), starts=[[0.75, 0.0, 0.0]]
+            Ahead(0.1), starts=[[0.75, 0.0, 0.0]]
         ),
         BnsError,
         "stands on start 0",

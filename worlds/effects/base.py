@@ -23,7 +23,7 @@ from numpy.random import Generator
 
 from bns.errors import BnsError, UnknownNameError
 from bns.worlds.effects.leg_sets import SERVO, chosen
-from bns.worlds.effects.parameter import Choice, Parameter, factor, strength
+from bns.worlds.effects.parameter import Choice, Parameter, factor, place, strength
 from bns.worlds.physics.servo_law import clipped
 
 __all__ = [
@@ -41,6 +41,7 @@ __all__ = [
     "ServoEffect",
     "TrackingEffect",
     "factor",
+    "place",
     "strength",
 ]
 

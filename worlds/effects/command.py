@@ -16,6 +16,7 @@ from bns.worlds.effects.base import (
     Effect,
     Parameter,
     factor,
+    place,
     strength,
 )
 
@@ -213,16 +214,7 @@ BLEND = strength(
 
 def stuck_speed(nominal: float, doc: str) -> Parameter:
     """The parameter for the speed at which a wheel is stuck [m/s]."""
-    return Parameter(
-        "speed",
-        unit="m/s",
-        nominal=nominal,
-        low=0.0,
-        high=TOP_SPEED,
-        doc=doc,
-        example=nominal,
-        scales=False,
-    )
+    return place("speed", "m/s", nominal, (0.0, TOP_SPEED), doc)
 
 
 class StuckWheel(CommandEffect):

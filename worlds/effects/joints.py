@@ -6,7 +6,7 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.worlds.effects import parts
-from bns.worlds.effects.base import BodyEffect, Parameter, factor, strength
+from bns.worlds.effects.base import BodyEffect, Parameter, factor, place, strength
 from bns.worlds.effects.parts import ALL, ANY, UNSERVOED, WIDE
 
 
@@ -73,15 +73,12 @@ class JointStribeck(BodyEffect):
         strength(
             "torque", "N m or N", (0.0, WIDE), "friction at standstill", example=0.5
         ),
-        Parameter(
+        place(
             "speed",
-            unit="rad/s or m/s",
-            nominal=0.1,
-            low=1e-4,
-            high=WIDE,
-            doc="at which it has faded to 37 %; nominal assumed",
-            example=0.1,
-            scales=False,
+            "rad/s or m/s",
+            0.1,
+            (1e-4, WIDE),
+            "at which it has faded to 37 %; nominal assumed",
         ),
     )
 

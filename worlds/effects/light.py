@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bns.worlds.effects.base import OpticsEffect, Parameter, factor, strength
+from bns.worlds.effects.base import OpticsEffect, factor, place, strength
 from bns.worlds.effects.sensors import SENSOR, columns
 from bns.worlds.light.law import Law
 
@@ -58,15 +58,8 @@ class LightFlicker(OpticsEffect):
     source = "assumed: a lamp on mains, or a loose contact"
     parameters = (
         strength("depth", "1", (0.0, 1.0), "share of the power that goes", example=0.5),
-        Parameter(
-            "frequency",
-            unit="Hz",
-            nominal=1.3,
-            low=0.001,
-            high=1000.0,
-            doc="of the flicker; bounds assumed",
-            example=1.3,
-            scales=False,
+        place(
+            "frequency", "Hz", 1.3, (0.001, 1000.0), "of the flicker; bounds assumed"
         ),
     )
 
@@ -99,16 +92,7 @@ class LightShadow(OpticsEffect):
             example=0.0,
             scales=False,
         ),
-        Parameter(
-            "width",
-            unit="rad",
-            nominal=1.0,
-            low=0.001,
-            high=6.2832,
-            doc="of the sector; up to a full turn",
-            example=1.0,
-            scales=False,
-        ),
+        place("width", "rad", 1.0, (0.001, 6.2832), "of the sector; up to a full turn"),
     )
 
     def change(self, law: Law, sensors: tuple[str, ...]) -> dict[str, np.ndarray]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.worlds.effects import parts
-from bns.worlds.effects.base import BodyEffect, Parameter, factor, strength
+from bns.worlds.effects.base import BodyEffect, Parameter, factor, place, strength
 from bns.worlds.effects.parts import ANY, WIDE, Inertial
 
 
@@ -140,17 +140,7 @@ class GeomFriction(BodyEffect):
             geom.friction = friction
 
 
-def _place(name: str, nominal: float, low: float, high: float, doc: str) -> Parameter:
-    return Parameter(
-        name,
-        unit="m",
-        nominal=nominal,
-        low=low,
-        high=high,
-        doc=doc,
-        example=nominal,
-        scales=False,
-    )
+ROUND = (-0.065, 0.065)  # m; the Khepera III's body
 
 
 class Payload(BodyEffect):
@@ -167,9 +157,15 @@ class Payload(BodyEffect):
             "mass carried (the Khepera III itself: 0.69 kg); bounds assumed",
             example=0.5,
         ),
-        _place("x", 0.0, -0.065, 0.065, "ahead of the axle; bounds: the body's radius"),
-        _place("y", 0.0, -0.065, 0.065, "to the left; bounds: the body's radius"),
-        _place("z", 0.07, 0.0, 0.3, "above the floor; nominal: the top plate (69 mm)"),
+        place("x", "m", 0.0, ROUND, "ahead of the axle; bounds: the body's radius"),
+        place("y", "m", 0.0, ROUND, "to the left; bounds: the body's radius"),
+        place(
+            "z",
+            "m",
+            0.07,
+            (0.0, 0.3),
+            "above the floor; nominal: the top plate (69 mm)",
+        ),
     )
 
     def _write(self, spec: Any) -> None:

@@ -12,6 +12,7 @@ from bns.worlds.effects.base import (
     Parameter,
     SensorEffect,
     factor,
+    place,
     strength,
 )
 from bns.worlds.effects.command import rarer, spans
@@ -155,16 +156,7 @@ def _stuck(extreme: str, reading: float) -> tuple[Parameter, ...]:
             f"from the reading (0) to the {extreme} (1)",
             example=1.0,
         ),
-        Parameter(
-            "reading",
-            unit="count",
-            nominal=reading,
-            low=0.0,
-            high=FULL_SCALE,
-            doc=f"the {extreme}",
-            example=reading,
-            scales=False,
-        ),
+        place("reading", "count", reading, (0.0, FULL_SCALE), f"the {extreme}"),
     )
 
 

@@ -15,13 +15,10 @@ from bns.worlds.effects.base import ControlSignal
 from bns.worlds.effects.leg_sets import joints_named, named
 from bns.worlds.physics import compile, control, observe, servo_law
 from bns.worlds.physics.rollout import (
-    STATE,
     Compiled,
-    Job,
     Piece,
     Segment,
     WalkJob,
-    run,
 )
 from bns.worlds.trial import Commands
 
@@ -247,22 +244,9 @@ def stand(
         goals: of the servos [rad], the bytes of an array of shape ``(C,)``.
     """
     model = scene.model
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
-    place = compile.free_joint(model)
-    data.qpos[place] = compile.posed(data.qpos[place], start)
+    data = compile.put_down(model, start)
     hinges = np.flatnonzero(model.jnt_limited)
     at = model.jnt_qposadr[hinges]
     data.qpos[at] = np.clip(data.qpos[at], *model.jnt_range[hinges].T)
-    state = np.empty(mujoco.mj_stateSize(model, STATE))
-    mujoco.mj_getState(model, data, state, STATE)
     rest = np.tile(np.frombuffer(goals), (round(STAND / model.opt.timestep), 1))
-    motion = run(Job(state, (Segment(scene, rest),)))
-    if motion.diverged < 0:
-        mujoco.mj_setState(model, data, motion.states[-1], STATE)
-        data.time = 0.0
-        data.qvel[:] = 0.0
-        data.qpos[place] = compile.posed(data.qpos[place], start)
-        mujoco.mj_getState(model, data, state, STATE)
-    state.setflags(write=False)
-    return state
+    return compile.at_rest(scene, data, start, rest)
