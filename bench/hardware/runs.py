@@ -95,15 +95,6 @@ def learned(words: list[str], path: Path) -> str:
     return said
 
 
-def alive(pid: int) -> bool:
-    """Whether a process is there."""
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    return True
-
-
 TRIALS, ONSET, WINDOW = 64, 20, 75
 QUICK = {"trials": 4, "onset": 2}
 

@@ -120,16 +120,8 @@ class HexapodWorld(PhysicsWorld[Plan]):
     def _observe(self, plan: Plan, done: Walk, trial: int) -> Trial:
         servos, states = plan.servos, done.states
         free = states[:, 1:8]
-        every = max(self.sample_dt / self.dt, 1.0)
-        sampled, boundaries = observe.sample_steps(done.counts, every)
-        poses = observe.planar(free, self.start[2])
-        times, seen = observe.watched(
-            poses,
-            sampled,
-            dt=self.dt,
-            effects=plan.stages.tracking,
-            seed=plan.seed,
-            trial=trial,
+        sampled, boundaries, times, seen = self._watched(
+            free, done.counts, plan.stages, plan.seed, trial
         )
         readings = states[np.ix_(sampled, servos.angles)] + servos.laws["offset"]
         readings = in_units(readings, servos.laws["quantisation"])

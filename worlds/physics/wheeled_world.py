@@ -92,16 +92,8 @@ class MujocoWorld(PhysicsWorld[Plan]):
         scene = plan.job.segments[0].compiled.model
         place = compile.free_joint(scene)
         free = motion.states[:, 1 + place.start : 1 + place.stop]
-        every = max(self.sample_dt / self.dt, 1.0)
-        sampled, boundaries = observe.sample_steps(plan.counts, every)
-        poses = observe.planar(free, self.start[2])
-        times, seen = observe.watched(
-            poses,
-            sampled,
-            dt=self.dt,
-            effects=plan.stages.tracking,
-            seed=plan.seed,
-            trial=trial,
+        sampled, boundaries, times, seen = self._watched(
+            free, plan.counts, plan.stages, plan.seed, trial
         )
         return Trial(
             commands=plan.commands,
