@@ -57,14 +57,19 @@ def _ratios(damage: list, repeats: int, *, ragged: bool = False) -> list[float]:
     bare = _bare(world, commands)
     world.run(commands)
     bare()
-    ratios = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        bare()
-        middle = time.perf_counter()
-        world.run(commands)
-        ratios.append((time.perf_counter() - middle) / (middle - begin))
-    return ratios
+    seconds = _interleaved(bare, lambda: world.run(commands), repeats)
+    return (seconds[:, 1, 0] / seconds[:, 0, 0]).tolist()
+
+
+def _interleaved(bare: Any, call: Any, repeats: int) -> np.ndarray:
+    """Wall and processor time [s] of a bare call and of another, ``(R, 2, 2)``."""
+    seconds = np.zeros((repeats, 2, 2))
+    for repeat in seconds:
+        for row, each in zip(repeat, (bare, call), strict=True):
+            row -= time.perf_counter(), time.process_time()
+            each()
+            row += time.perf_counter(), time.process_time()
+    return seconds
 
 
 def _commands(ragged: bool) -> list:
@@ -169,27 +174,18 @@ def closed_loop_overhead(quick: bool) -> Result:
     )
 
 
-def _loop_ratios(damage: list, repeats: int) -> list[tuple[float, float]]:
-    """Closed loop over bare call: wall clock and processor time, of each repeat."""
+def _loop_ratios(damage: list, repeats: int) -> np.ndarray:
+    """Closed loop over bare call: wall clock and processor time, ``(R, 2)``."""
     from bns.worlds import registry
 
     world: Any = registry.make("light", damage=damage, threads=THREADS)
     policy, seeds = Networks(), range(ROBOTS)
     bare = _bare_loop(world, policy, seeds)
     bare()
-    ratios = []
-    for _ in range(repeats):
-        begin = _clocks()
-        bare()
-        middle = _clocks()
-        world.drive(policy, cycles=CYCLES, seeds=seeds)
-        wall, processor = (_clocks() - middle) / (middle - begin)
-        ratios.append((wall, processor))
-    return ratios
-
-
-def _clocks() -> np.ndarray:
-    return np.array([time.perf_counter(), time.process_time()])
+    seconds = _interleaved(
+        bare, lambda: world.drive(policy, cycles=CYCLES, seeds=seeds), repeats
+    )
+    return seconds[:, 1] / seconds[:, 0]
 
 
 def _bare_loop(world: Any, policy: Networks, seeds: range) -> Any:
@@ -275,25 +271,16 @@ def _measured(damage: list, repeats: int) -> dict[str, float]:
     plans = world.plan(commands)
     walks = world.motions(plans)
     bare = _bare_walks(plans, walks)
-    seen: dict[str, list[float]] = {"wall": [], "processor": [], "rate": []}
     steps = sum(len(walk.control) for walk in walks)
-    for _ in range(repeats + 1):
-        plain, used = _timed(bare), _timed(lambda: world.run(commands))
-        seen["wall"].append(used[0] / plain[0])
-        seen["processor"].append(used[1] / plain[1])
-        seen["rate"].append(steps / used[1])
+    seconds = _interleaved(bare, lambda: world.run(commands), repeats + 1)[1:]
+    wall, processor = np.median(seconds[:, 1] / seconds[:, 0], axis=0).tolist()
     return {
-        **{name: median(values[1:]) for name, values in seen.items()},
+        "wall": wall,
+        "processor": processor,
+        "rate": float(np.median(steps / seconds[:, 1, 1])),
         "calls": sum(walk.calls for walk in walks) / (HEXAPODS * STEPS),
         "trial": steps * world.dt / HEXAPODS,
     }
-
-
-def _timed(call: Any) -> tuple[float, float]:
-    """Wall and processor time [s]."""
-    wall, used = time.perf_counter(), time.process_time()
-    call()
-    return time.perf_counter() - wall, time.process_time() - used
 
 
 def _walks(world: Any) -> list:
