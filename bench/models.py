@@ -79,7 +79,7 @@ def _ends(lists: np.ndarray, step: float, cone: str, impratio: float) -> Any:
     from mujoco.rollout import Rollout
 
     from bns import models
-    from bns.worlds.physics import legged_goals, legged_plan
+    from bns.worlds.physics import control, legged_plan
     from bns.worlds.physics.legged_world import SPEED
     from bns.worlds.physics.rollout import Compiled
 
@@ -89,7 +89,7 @@ def _ends(lists: np.ndarray, step: float, cone: str, impratio: float) -> Any:
     scene = Compiled(spec.compile())
     held = round(HOLD / step)
     goals = [
-        legged_goals.ramps(np.repeat(item, held, axis=0), np.zeros(18), SPEED * step)
+        control.ramps(np.repeat(item, held, axis=0), np.zeros(18), SPEED * step)
         for item in lists
     ]
     start = legged_plan.stand(scene, (0.0, 0.0, 0.0), np.zeros(18).tobytes())

@@ -21,31 +21,25 @@ class LooseWheel(CommandEffect):
 
     name = "loose_wheel"
     source = "assumed"
-    parameters = (
-        strength(
-            "slip",
-            "s",
-            (0.0, 2.0),
-            "time constant of the slip; bounds assumed",
-            example=0.3,
-        ),
+    parameter = strength(
+        "slip",
+        "s",
+        (0.0, 2.0),
+        "time constant of the slip; bounds assumed",
+        example=0.3,
     )
 
-    def apply(
-        self, signal: ControlSignal, active: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        """Let the speed of the left wheel come up slowly in each command."""
-        values = signal.values.copy()
-        if self["slip"] == 0.0:  # nominal: change nothing, bit for bit
-            return values
+    def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
+        """Let the speed of the left wheel come up slowly in each command.
+
+        It is asked only where the slip is not nominal, and changes a copy.
+        """
         _, first, which = np.unique(
             signal.command, return_index=True, return_inverse=True
         )
         since = signal.times - signal.times[first][which]
-        left = signal.column("left_speed")
         share = 1.0 - np.exp(-since / self["slip"])
-        values[active, left] *= share[active]
-        return values
+        signal.values[active, signal.column("left_speed")] *= share[active]
 
 
 parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])

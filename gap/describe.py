@@ -31,7 +31,7 @@ from bns.gap.models.mjcf.channels import (
 from bns.gap.models.mjcf.config import WINDOW
 from bns.gap.models.mjcf.effects import OWNERS
 from bns.gap.models.mjcf.log import split
-from bns.worlds.data.column_map import FACTORS
+from bns.worlds.data.importing import FACTORS
 
 
 @dataclass(frozen=True)

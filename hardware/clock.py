@@ -33,14 +33,10 @@ class RealClock:
 
 
 class VirtualClock:
-    """Time that passes only when something waits: exact, and faster than real.
+    """Time that passes only when something waits: exact, and faster than real."""
 
-    Args:
-        start: time at the beginning [s].
-    """
-
-    def __init__(self, start: float = 0.0):
-        self._now = start
+    def __init__(self) -> None:
+        self._now = 0.0  # s
 
     def now(self) -> float:
         """Virtual time [s]."""

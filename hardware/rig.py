@@ -153,9 +153,8 @@ def look(port: str, camera: str, calibration: str, robot: str = "khepera3") -> E
         BnsError: no such camera, or it is not calibrated.
     """
     from bns.hardware.tracking.camera import Camera
-    from bns.hardware.tracking.eyes import ThreadedEyes
+    from bns.hardware.tracking.eyes import DeviceCamera, Source, ThreadedEyes, VideoFile
     from bns.hardware.tracking.marker import MARKERS
-    from bns.hardware.tracking.sources import DeviceCamera, Source, VideoFile
     from bns.hardware.tracking.tracker import CROOKED, LEANING, Tracker
 
     if not camera:

@@ -21,11 +21,9 @@ from bns.errors import BnsError
 from bns.hardware import rig as rigs
 from bns.hardware.clock import RealClock
 from bns.hardware.tracking import calibrate
-from bns.hardware.tracking.camera import Camera
-from bns.hardware.tracking.eyes import ThreadedEyes
+from bns.hardware.tracking.camera import Camera, cv2
+from bns.hardware.tracking.eyes import DeviceCamera, Source, ThreadedEyes, VideoFile
 from bns.hardware.tracking.marker import MARKERS, Floor
-from bns.hardware.tracking.opencv import cv2
-from bns.hardware.tracking.sources import DeviceCamera, Source, VideoFile
 from bns.hardware.tracking.tracker import Tracker
 from bns.storage import files, reading
 

@@ -81,7 +81,7 @@ def _log_lamps(stream: "RecordingStream", shown: Picture) -> None:
     """Log the lamps, and the safety boundary around each on the floor."""
     import rerun as rr
 
-    from bns.worlds.light.field import Lamp
+    from bns.worlds.light.law import Lamp
 
     places = np.array([Lamp(**fields).position for fields in shown.lamps])
     count, colour = len(places), (*style.rgb(style.YELLOW), 255)

@@ -28,7 +28,7 @@ _BUILT_IN = {
     "hexapod": "bns.worlds.physics.legged_world:HexapodWorld",
     "mujoco": "bns.worlds.physics.wheeled_world:MujocoWorld",
     "light": "bns.worlds.light.world:LightWorld",
-    "static-snn": "bns.worlds.static_snn.world:StaticSnnWorld",
+    "static-snn": "bns.worlds.static_snn:StaticSnnWorld",
 }
 _registered: dict[str, Callable[..., World]] = {}
 

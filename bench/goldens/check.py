@@ -21,8 +21,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-from bench.goldens import content, logs
+from bench.goldens import content
 from bench.result import Result, bench
+from bench.storage import sample_files
 from bench.versions import ROOT
 
 KEPT = Path(__file__).resolve().parent / "goldens.json"
@@ -221,8 +222,8 @@ def _diagnoses(
     place: Path, runs: Mapping[str, list[str]]
 ) -> Iterator[tuple[str, list[str], dict[str, list[str]]]]:
     """One diagnosis a family of models."""
-    changed, unchanged = logs.servo(place / "logs" / "servo")
-    driven = logs.odometry(place / "logs" / "odometry")
+    changed, unchanged = sample_files.servo(place / "logs" / "servo")
+    driven = sample_files.odometry(place / "logs" / "odometry")
     made = {name.replace(" ", "-"): words for name, words, _ in _made(place)}
     of_arm = ["--model", str(ROOT / "examples/arm/arm.toml")]
     beside = ["--importer", "xl330", "--reference", str(unchanged)]

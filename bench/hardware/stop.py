@@ -14,13 +14,23 @@ from statistics import median
 
 import numpy as np
 
-from bench.hardware.drives import DRIVES, SPEEDS, Drive, Driver, Log
-from bench.hardware.emulated import emulator, folder, resumed
-from bench.hardware.ways import CLOCK, QUICK, WAYS, WHEELED, Scene
+from bench.hardware.drives import (
+    CLOCK,
+    DRIVES,
+    QUICK,
+    SPEEDS,
+    WAYS,
+    WHEELED,
+    Drive,
+    Driver,
+    Log,
+    Scene,
+)
+from bench.hardware.runs import emulator, folder, resumed
 from bench.result import Result, bench
+from bns.hardware.emulators.device import LiveBody
 from bns.hardware.emulators.hexapod import HexapodBody
 from bns.hardware.emulators.khepera import KheperaBody
-from bns.hardware.emulators.live_body import LiveBody
 from bns.hardware.emulators.run import SLOW
 
 LIMIT, STAND = 0.2, 0.35  # s

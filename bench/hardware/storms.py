@@ -4,7 +4,7 @@ from collections import Counter
 
 import numpy as np
 
-from bench.hardware.emulated import resumed
+from bench.hardware.runs import resumed
 from bench.result import Result, bench
 
 CASES = 3000
@@ -55,7 +55,7 @@ def protocol_fuzz(quick: bool) -> Result:
     from bns.errors import BnsError
     from bns.hardware.clock import VirtualClock
     from bns.hardware.emulators.device import VirtualLine
-    from bns.hardware.emulators.virtual import NoDog
+    from bns.hardware.emulators.run import NoDog
     from bns.hardware.khepera.driver import Khepera3
     from bns.models.khepera3.units import firmware
 
@@ -167,10 +167,10 @@ def hardware_fault_storm(quick: bool) -> Result:
 def _part(number: int, minutes: float) -> dict:
     """A session of some virtual minutes."""
     from bns.hardware.driving.excitation import commands
-    from bns.hardware.emulators import virtual
+    from bns.hardware.emulators import run
     from bns.hardware.worlds.wheeled import HardwareWorld
 
-    rig = virtual.rig(lost=LOST, corrupted=CORRUPTED, mute=MUTE, seed=11 + number)
+    rig = run.rig(lost=LOST, corrupted=CORRUPTED, mute=MUTE, seed=11 + number)
     world = HardwareWorld(rig=rig)
     wrong, trials, late = [], 0, 0.0
     while rig.clock.now() < 60 * minutes:

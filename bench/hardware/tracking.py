@@ -8,9 +8,8 @@ import numpy as np
 from bench.result import Result, bench
 from bns.hardware.emulators.camera import PLATE
 from bns.hardware.tracking import marker as tags
-from bns.hardware.tracking.camera import Camera
+from bns.hardware.tracking.camera import Camera, cv2
 from bns.hardware.tracking.marker import CELLS, Floor, Marker
-from bns.hardware.tracking.opencv import cv2
 from bns.models.render import photograph
 
 BARS = {720: (1.0, 1.0), 1080: (0.3, 0.3)}  # mm, deg
@@ -109,6 +108,11 @@ def _heights(pairs, camera, marker, image, floor) -> dict:
 
 
 LIFT = 0.0001  # m; a floor tag above the board, so that it shows
+SAMPLES = 8  # of each pixel (multisampling)
+NOISE = 2.0  # standard deviation of grey values
+BLUR = 0.7
+"""px; standard deviation of the lens: without any, edges fall on whole pixels and no
+corner can be found between them"""
 
 
 class Studio:
@@ -116,40 +120,25 @@ class Studio:
 
     Args:
         size: of the pictures [px].
-        marker: on the robot.
-        floor: tags on the board.
-        noise: standard deviation of grey values.
-        blur: of the lens, standard deviation [px]; without any, edges fall on whole
-            pixels and no corner can be found between them.
-        samples: of each pixel (multisampling).
         rng: for the noise.
 
     `paint` raises `MissingDependencyError` where the machine can not render.
     """
 
     def __init__(
-        self,
-        size: tuple[int, int],
-        *,
-        marker: Marker | None = None,
-        floor: Floor | None = None,
-        noise: float = 2.0,
-        blur: float = 0.7,
-        samples: int = 8,
-        rng: np.random.Generator | None = None,
+        self, size: tuple[int, int], *, rng: np.random.Generator | None = None
     ):
         import mujoco
 
         from bns import models
 
-        self.camera, self.noise, self.blur = Camera.overhead(size), noise, blur
-        self.marker = marker or Marker()
+        self.camera, self.marker = Camera.overhead(size), Marker()
         self.rng = rng or np.random.default_rng(0)
         spec = models.scene_spec("khepera3")
-        spec.visual.quality.offsamples = samples
+        spec.visual.quality.offsamples = SAMPLES
         spec.visual.global_.offwidth, spec.visual.global_.offheight = size
         self._carry(spec)
-        floor = floor or Floor()
+        floor = Floor()
         half = floor.side / 2 * (CELLS + 2) / CELLS
         for number, (x, y, yaw) in floor.places.items():
             plate = self._plate(spec, spec.worldbody, number, half, 1.0)
@@ -216,6 +205,6 @@ class Studio:
         )
         colours = pixels.astype(np.float32)
         grey = colours @ np.array([0.299, 0.587, 0.114], np.float32)
-        grey = cv2().GaussianBlur(grey, (0, 0), self.blur)
-        grey += self.rng.normal(0, self.noise, grey.shape)
+        grey = cv2().GaussianBlur(grey, (0, 0), BLUR)
+        grey += self.rng.normal(0, NOISE, grey.shape)
         return np.rint(grey.clip(0, 255)).astype(np.uint8)

@@ -1,7 +1,13 @@
 """The experiments that several benches share: each is run once, resumable, and kept.
 
 Runs lie in `runs/bench/<name>-<key>/`, the key being that of the configuration, so a
-changed default makes a new run. Two workers with one thread each train them.
+changed default makes a new run. Two workers with one thread each train them. What the
+benches of solving and recovering print of a record stands here as well.
+
+Runs that differ only from the damage on share the trials before it: these are trained
+once, undamaged (the *trunk*); each side goes on from a copy. It is, to the byte, what
+the side would be had it been trained from its first trial on, since all sides of a
+trunk have its seed.
 """
 
 import json
@@ -10,12 +16,18 @@ from collections.abc import Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, replace
 from hashlib import sha256
+from itertools import count
 from multiprocessing import get_context
 from pathlib import Path
+from shutil import copytree, rmtree
 from typing import Any
 
+import numpy as np
+
 from bench.versions import ROOT
-from bns import presets
+from bns import presets, stats
+from bns.campaign.trunk import ON_DAMAGE
+from bns.errors import BnsError
 from bns.experiment.config import RunConfig, WorldConfig
 from bns.experiment.record import RunRecord
 from bns.learners.bns.config import AdaptationConfig
@@ -147,17 +159,29 @@ def pool_of_workers() -> ProcessPoolExecutor:
     return ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn"))
 
 
-def shortened(config: RunConfig) -> RunConfig:
-    """A configuration with few replicates and trials."""
-    onset = QUICK["trials"] // 2
+def shortened(
+    config: RunConfig,
+    sizes: Mapping[str, int] = QUICK,
+    *,
+    epochs: int = 100,
+    **evolution: int,
+) -> RunConfig:
+    """A configuration with few replicates and trials.
+
+    Args:
+        config: whose damage sets in half-way.
+        sizes: fields of the configuration: trials and replicates.
+        epochs: of training, at most.
+        evolution: settings of the section `evolution`.
+    """
+    onset = sizes["trials"] // 2
     damage = tuple(f"{text.rpartition('@')[0]}@{onset}" for text in config.world.damage)
-    generations = min(config.evolution.generations, 30)
-    evolution = replace(config.evolution, population=50, generations=generations)
+    few = {"population": 50, "generations": min(config.evolution.generations, 30)}
     return replace(
         config,
-        **QUICK,
-        evolution=evolution,
-        snn=replace(config.snn, epochs=min(config.snn.epochs, 100)),
+        **sizes,
+        evolution=replace(config.evolution, **few | evolution),
+        snn=replace(config.snn, epochs=min(config.snn.epochs, epochs)),
         world=replace(config.world, damage=damage),
         compiled="no",
     )
@@ -168,3 +192,235 @@ def _train(config: RunConfig) -> None:
     from bns.experiment.run import train
 
     train(config, directory(config), resume=True)
+
+
+def waits(values: np.ndarray) -> dict[str, object]:
+    """Waiting times as figures: how many came, median, interval, longest.
+
+    Args:
+        values: trials, ``(R,)``; inf = never.
+    """
+    middle = stats.median_interval(values)
+    come = np.isfinite(values)
+    return {
+        "came": int(come.sum()),
+        "of": len(values),
+        "median": plain(middle.value),
+        "interval": [plain(middle.low), plain(middle.high)],
+        "longest": plain(values[come].max()) if come.any() else None,
+    }
+
+
+def first(hit: np.ndarray) -> np.ndarray:
+    """Number of the first trial that did it, counted from 1; inf = none, ``(R,)``."""
+    return np.where(hit.any(1), hit.argmax(1) + 1.0, np.inf)
+
+
+def solved_within(record: RunRecord, limit: int) -> int:
+    """Runs that reached all objectives within `limit` trials."""
+    return int((stats.trials_to_solve(record) <= limit).sum())
+
+
+def recovered_within(record: RunRecord, limit: int) -> int:
+    """Runs that reached all objectives within `limit` trials from the damage on."""
+    return int((stats.trials_to_recover(record) <= limit).sum())
+
+
+def versus(a: RunRecord, b: RunRecord) -> dict[str, object]:
+    """O (eq 3.1: sum of the best controller's cost after damage) of two sides.
+
+    Lower is better, so `better` is the share of pairs in which `a` is the lower one
+    (1 - A12), with its interval.
+    """
+    first, second = stats.observation_after(a), stats.observation_after(b)
+    share = stats.a12(second, first)
+    return {
+        "p": float(stats.mann_whitney(first, second)),
+        "better": round(share.value, 4),
+        "interval": [round(share.low, 4), round(share.high, 4)],
+        "medians": [float(np.median(first)), float(np.median(second))],
+    }
+
+
+def ratio(first: np.ndarray, second: np.ndarray) -> dict[str, object]:
+    """Median of one side over that of another, with its 95 % bootstrap interval.
+
+    Args:
+        first, second: values of two sides whose runs belong together, each ``(R,)``:
+            pairs are drawn.
+    """
+    from scipy.stats import bootstrap
+
+    def medians(one: np.ndarray, other: np.ndarray, axis: int = -1) -> np.ndarray:
+        return np.median(one, axis=axis) / np.median(other, axis=axis)
+
+    drawn = bootstrap((first, second), medians, paired=True, method="percentile", rng=0)
+    ends = drawn.confidence_interval
+    return {
+        "ratio": round(float(medians(first, second)), 4),
+        "ratio interval": [round(float(ends.low), 4), round(float(ends.high), 4)],
+    }
+
+
+def plain(value: float) -> float | None:
+    """A number for JSON; None for never."""
+    return float(value) if np.isfinite(value) else None
+
+
+def trunk(config: RunConfig) -> RunConfig:
+    """What a side is before its damage."""
+    plain = AdaptationConfig()
+    told = {name: getattr(plain, name) for name in ON_DAMAGE}
+    adaptation = config.adaptation
+    if not config.watch.detect:  # a false alarm sets them off as well
+        adaptation = replace(adaptation, **told)
+    return replace(
+        config,
+        preset="light-trunk",
+        trials=onset(config) + 1,
+        adaptation=adaptation,
+        world=replace(config.world, damage=()),
+    )
+
+
+def seed(config: RunConfig) -> int:
+    """The seed of all sides of a trunk."""
+    settings = known(replace(trunk(config), seed=0, replicates=0))
+    return int.from_bytes(sha256(repr(settings).encode()).digest()[:4], "little")
+
+
+def onset(config: RunConfig) -> int:
+    """First damaged trial of a side."""
+    from bns.worlds.damage import Damage
+
+    return Damage.parse(config.world.damage).first_trial
+
+
+def forked(
+    configs: Iterable[RunConfig], *, quick: bool = False
+) -> Mapping[str, RunRecord]:
+    """Records by configuration name, training what is missing; all with a damage.
+
+    Args:
+        configs: made by `bench.learning.light.damaged`.
+        quick: few replicates and trials, for a look that takes seconds.
+    """
+    wanted = [shortened(c) if quick else c for c in configs]
+    missing = [c for c in wanted if not (_place(c) / "run.json").exists()]
+    trunks = {_place(trunk(config)): config for config in missing}
+    RUNS.mkdir(parents=True, exist_ok=True)
+    with pool_of_workers() as pool:
+        list(pool.map(grow, trunks.values()))
+        list(pool.map(branch, wanted))
+    from bns.storage.store import load
+
+    return {config.preset: load(_place(config)) for config in wanted}
+
+
+def grow(config: RunConfig) -> None:
+    """Train the trunk of a side as far as its damage."""
+    from bns.experiment.run import train
+    from bns.storage.store import RunStore
+
+    base = trunk(config)
+    place = _place(base)
+    done = RunStore.open(place).read_state()[0] if place.exists() else 0
+    asked = count(done)
+    train(base, place, resume=True, stop=lambda: next(asked) >= onset(config))
+
+
+def branch(config: RunConfig) -> None:
+    """Train a side from its damage on."""
+    from bns.experiment.run import train
+
+    place = _place(config)
+    if not (place / "run.json").exists():
+        _copy(config, place)
+    train(config, place, resume=True)
+
+
+def _copy(config: RunConfig, place: Path) -> None:
+    """The trunk as the beginning of a side; the damage is known or is not."""
+    from bns.experiment.run import facts
+    from bns.storage.store import RunStore
+
+    source = RunStore.open(_place(trunk(config)))
+    known = facts(config, source.mode)
+    done, state = source.read_state()
+    state["onsets"][:] = -1 if config.watch.detect else known["damage_onset"]
+    part = place.with_name(f"{place.name}.part")
+    rmtree(part, ignore_errors=True)
+    store = RunStore(part, config, source.mode, source.versions, **_named(known))
+    store.create()
+    copytree(source.directory / "steps", part / "steps")
+    store.write_state(done, state)
+    store.close()
+    part.rename(place)
+
+
+def _named(known: Mapping[str, object]) -> dict[str, object]:
+    return {name: known[name] for name in ("conditions", "damage_onset")}
+
+
+def _place(config: RunConfig) -> Path:
+    return directory(config)
+
+
+def begin(trunk: RunConfig, branch: RunConfig, *, idle: tuple[str, ...] = ()) -> None:
+    """Give a run, unless it has begun, the trials and the learner's state of another.
+
+    A run and its bytes depend on its seed, its settings and, trial by trial, on its
+    world; so where only the damage differs, and sets in after the trunk's last trial,
+    the branch is what it would have been had it been run from the start.
+
+    Args:
+        trunk: of a finished run that `experiments` keeps.
+        branch: of the run to begin, which goes on for longer.
+        idle: sections in which the two may differ since, up to there, what they ask
+            for does nothing; that is the caller's to see.
+
+    Raises:
+        BnsError: the two differ before the trunk's end.
+    """
+    from bns.experiment.run import facts
+    from bns.experiment.step import Step
+    from bns.storage.store import RunStore
+    from bns.worlds.damage import Damage
+
+    shared = replace(branch, **{name: getattr(trunk, name) for name in idle})
+    refuse_unlike(trunk, shared, Damage.parse(branch.world.damage).first_trial)
+    place = directory(branch)
+    if (place / "run.json").exists():
+        return
+    kept = RunStore.open(directory(trunk))
+    record, (done, state) = kept.record(), kept.read_state()
+    known = facts(branch, kept.mode)
+    begun = RunStore(place, branch, kept.mode, kept.versions, **known).create()
+    arrays = {n: getattr(record, n) for n in ("sent", "poses", "predicted")}
+    arrays |= record.extra
+    for trial in range(done):
+        columns = {name: column[:, trial] for name, column in record.columns.items()}
+        if branch.watch.forget:  # a trunk that was not asked to forgot nothing
+            columns.setdefault("forgotten", np.zeros(trunk.replicates))
+        rows = {name: array[:, trial] for name, array in arrays.items()}
+        begun.write_step(trial, Step(columns, rows))
+    begun.write_state(done, state)
+    begun.close()
+
+
+def refuse_unlike(trunk: RunConfig, branch: RunConfig, onset: int) -> None:
+    """Stop where a branch would not have been as its trunk.
+
+    Raises:
+        BnsError: settings differ beside damage and number of trials, or the damage
+            sets in too early.
+    """
+    world = replace(branch.world, damage=trunk.world.damage)
+    alike = replace(branch, preset=trunk.preset, trials=trunk.trials, world=world)
+    if alike != trunk or trunk.world.damage or 0 <= onset < trunk.trials:
+        raise BnsError(
+            f"{branch.preset} is no continuation of {trunk.preset}: give the same "
+            f"settings and seed, and damage from trial {trunk.trials} on."
+        )
+    if trunk.record_replicates:
+        raise BnsError("A branch has no samples: set record_replicates = 0.")

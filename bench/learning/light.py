@@ -2,7 +2,7 @@
 
 Settings that the dissertation lists are those of its tables 5.19 and 6.7; what it
 leaves silent is that of the preset `khepera-light`. Runs that differ only from the
-damage on share the trials before it, see `bench.learning.forking`.
+damage on share the trials before it, see `bench.learning.experiments`.
 
 What counts as circling is `bns.tasks.light.LightTask.solved`; the trial is one, from a
 random start, as the dissertation judged its robot runs. Beside it stands the count for
@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.learning import experiments, forking, solving
+from bench.learning import experiments
 from bench.result import Result, bench
 from bns import presets, stats
 from bns.experiment.config import RunConfig, WorldConfig
@@ -112,7 +112,7 @@ def damaged(
     words += ["ensemble"] if ensemble else []
     config = experiments.named(config, "-".join(["light", damage or "whole", *words]))
     config = replace(config, replicates=runs)
-    return replace(config, seed=forking.seed(config)) if damage else config
+    return replace(config, seed=experiments.seed(config)) if damage else config
 
 
 def recovering(damage: str, *, runs: int = experiments.REPLICATES) -> RunConfig:
@@ -127,7 +127,7 @@ def recovering(damage: str, *, runs: int = experiments.REPLICATES) -> RunConfig:
     config = replace(config, trials=ONSET + AFTER, world=world)
     config = experiments.named(config, f"light-recover-{damage}")
     config = replace(config, replicates=runs)
-    return replace(config, seed=forking.seed(config))
+    return replace(config, seed=experiments.seed(config))
 
 
 MEDIAN, FEWEST, LIMIT = 6, 27, 15
@@ -142,8 +142,8 @@ def solve_light(quick: bool) -> Result:
     """30 runs of the preset `khepera-light`, 15 trials each."""
     config = undamaged()
     record = experiments.records([config], quick=quick)[config.preset]
-    waits = solving.waits(stats.trials_to_solve(record))
-    median, within = waits["median"], solving.solved_within(record, LIMIT)
+    waits = experiments.waits(stats.trials_to_solve(record))
+    median, within = waits["median"], experiments.solved_within(record, LIMIT)
     good = median is not None and median <= MEDIAN and within >= FEWEST
     last = record["solved"][:, -5:].mean()
     return Result(
@@ -189,7 +189,7 @@ def recover_light(quick: bool) -> Result:
     silent = {damage: damaged(damage, light=SILENT, runs=RUNS) for damage in DAMAGES}
     ours = {damage: recovering(damage, runs=RUNS) for damage in DAMAGES}
     wanted = [*configs.values(), *silent.values(), *ours.values()]
-    records = forking.records(wanted, quick=quick)
+    records = experiments.forked(wanted, quick=quick)
     found: dict[str, dict[str, object]] = {}
     holds, worst = True, 0.0
     for damage, config in configs.items():
@@ -221,7 +221,7 @@ def _row(record: RunRecord) -> dict[str, object]:
         "solved in the onset trial": _share(solved[:, onset]),
         "solved trials, last five": _share(solved[:, -5:]),
         **_circling(record),
-        **solving.waits(stats.trials_to_recover(record)),
+        **experiments.waits(stats.trials_to_recover(record)),
     }
 
 

@@ -1,11 +1,14 @@
-"""What learners cost: one trial, and a batch."""
+"""What learners cost: a trial, a batch, a run that walks, robot time inside the SNN."""
 
 import time
 from dataclasses import replace
 from statistics import median
 from typing import Any
 
+import torch
+
 from bench.result import Result, bench
+from bench.walking import runs
 from bns.experiment.config import RunConfig
 
 LIMIT = 1.5
@@ -146,3 +149,141 @@ def _trial(batch: Any, world: Any, trial: int) -> float:
     ran = time.perf_counter()
     batch.learner.observe(trial, seen, None)
     return proposed - begin + time.perf_counter() - ran
+
+
+POPULATION, PHYSICS = 3000, 30  # controllers a call: 30 runs of 100, one of each run
+
+
+@bench(
+    "robot time per second of the SNN's rollouts against that of the physics",
+    bar="none: printed",
+)
+def rollouts(quick: bool) -> Result:
+    """The same random controllers in both, one thread each, interleaved."""
+    repeats = 3 if quick else 15
+    evaluator, population, theta = _population()
+    compiled = torch.compile(evaluator.judge, dynamic=False)
+    world, commands = _world(evaluator, population)
+    durations = population.genes[..., 2].sum().item()
+    physics_durations = sum(item.duration for item in commands)
+    inputs = evaluator.inputs(population)
+    calls = {
+        "SNN": lambda: evaluator.judge(theta, inputs, population.lengths),
+        "SNN, compiled": lambda: compiled(
+            theta, inputs, population.lengths, fused=True
+        ),
+        "physics": lambda: world.run(commands),
+    }
+    seconds: dict[str, list[float]] = {name: [] for name in calls}
+    for repeat in range(repeats + 1):
+        for name, call in calls.items():
+            begin = time.perf_counter()
+            call()
+            if repeat:  # the first warms up, and compiles
+                seconds[name].append(time.perf_counter() - begin)
+    rate = {
+        name: (physics_durations if name == "physics" else durations) / median(values)
+        for name, values in seconds.items()
+    }
+    return Result(
+        figure=round(rate["SNN, compiled"] / rate["physics"], 1),
+        unit="x",
+        holds=None,
+        n=repeats,
+        details={
+            f"{name} [s of robot time per s]": round(r) for name, r in rate.items()
+        },
+    )
+
+
+def _population() -> tuple[Any, Any, Any]:
+    from bns.draws import Draws
+    from bns.evolution.chromosome import Encoding
+    from bns.experiment.config import RunConfig
+    from bns.learners.bns.navigation import Evaluator
+    from bns.snn.network import Shape
+    from bns.snn.scaling import Scaling
+    from bns.tasks.navigation import Route
+
+    torch.set_num_threads(1)
+    config, draws = RunConfig(), Draws(0)
+    encoding, shape = Encoding.of(config.controller), Shape.of(config.snn)
+    evaluator = Evaluator(encoding, Scaling.of(encoding), shape, Route.of(config.task))
+    population = encoding.random(PHYSICS, POPULATION // PHYSICS, draws)
+    return evaluator, population, shape.random(PHYSICS, draws)
+
+
+def _world(evaluator: Any, population: Any) -> tuple[Any, list]:
+    from bns.worlds import registry
+
+    first = population.pick(torch.zeros(PHYSICS, dtype=torch.long))
+    return registry.make("mujoco", threads=1), evaluator.encoding.commands(first)
+
+
+RUN_LIMIT = 10.0
+TRIALS, WALKERS, SOME = 200, 6, 10
+
+
+@bench(
+    "processor time of one hexapod run of 200 trials, window 300",
+    bar="<= 10 min on 2 cores",
+)
+def hexapod_run_cost(quick: bool) -> Result:
+    """The preset, one run of 200 trials on two threads; quick: 12 small trials.
+
+    Processor time, because it is the same on a busy machine: on a quiet one the run
+    takes no longer than that. Beside it what a trial of a run costs alone and in a
+    batch of six, over the first ten trials.
+    """
+    config = runs.damaged("1,5")
+    config = replace(config, trials=TRIALS, replicates=1, threads=2)
+    if quick:
+        config = runs.small(config)
+    whole = processor_times(config)
+    details: dict[str, object] = {"one run": whole}
+    if not quick:
+        some = replace(config, trials=SOME, world=replace(config.world, damage=()))
+        alone, many = (
+            processor_times(some),
+            processor_times(replace(some, replicates=WALKERS)),
+        )
+        details[f"one run, {SOME} trials"] = alone
+        details[f"{WALKERS} runs, {SOME} trials"] = many
+        details["share of a run's cost in a batch"] = round(
+            many["processor [s]"] / WALKERS / alone["processor [s]"], 3
+        )
+    minutes = whole["processor [s]"] / 60
+    return Result(
+        figure=round(minutes, 3),
+        unit="min",
+        holds=None if quick else minutes <= RUN_LIMIT,
+        n=config.trials,
+        details=details,
+    )
+
+
+def processor_times(config: RunConfig) -> dict[str, float]:
+    """Seconds of evolution, world and training, start-up included in the total."""
+    from bns.experiment.batch import Batch, resolve
+    from bns.experiment.world_factory import make_world
+
+    begun, wall = time.process_time(), time.perf_counter()
+    config, mode = resolve(config)
+    batch = Batch([config], [make_world(config)])
+    learner, kind = batch.learner, {"evolution": 0.0, "world": 0.0, "training": 0.0}
+    for trial in range(config.trials):
+        marks = [time.process_time()]
+        proposal = learner.propose(trial)
+        marks.append(time.process_time())
+        seen = batch._execute(proposal.tried, trial, "world")
+        marks.append(time.process_time())
+        learner.observe(trial, seen, None)
+        marks.append(time.process_time())
+        for name, a, b in zip(kind, marks, marks[1:], strict=False):
+            kind[name] += b - a
+    return {
+        **{f"{name} [s]": round(seconds, 2) for name, seconds in kind.items()},
+        "processor [s]": round(time.process_time() - begun, 2),
+        "wall [s]": round(time.perf_counter() - wall, 2),
+        "compiled": mode == "compiled",
+    }

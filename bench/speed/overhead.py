@@ -1,7 +1,8 @@
-"""What worlds cost beside their physics."""
+"""What worlds cost beside their physics: on wheels, in closed loops, on legs."""
 
 import os
 import time
+from concurrent.futures import ThreadPoolExecutor
 from statistics import median
 from typing import Any
 
@@ -56,14 +57,19 @@ def _ratios(damage: list, repeats: int, *, ragged: bool = False) -> list[float]:
     bare = _bare(world, commands)
     world.run(commands)
     bare()
-    ratios = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        bare()
-        middle = time.perf_counter()
-        world.run(commands)
-        ratios.append((time.perf_counter() - middle) / (middle - begin))
-    return ratios
+    seconds = _interleaved(bare, lambda: world.run(commands), repeats)
+    return (seconds[:, 1, 0] / seconds[:, 0, 0]).tolist()
+
+
+def _interleaved(bare: Any, call: Any, repeats: int) -> np.ndarray:
+    """Wall and processor time [s] of a bare call and of another, ``(R, 2, 2)``."""
+    seconds = np.zeros((repeats, 2, 2))
+    for repeat in seconds:
+        for row, each in zip(repeat, (bare, call), strict=True):
+            row -= time.perf_counter(), time.process_time()
+            each()
+            row += time.perf_counter(), time.process_time()
+    return seconds
 
 
 def _commands(ragged: bool) -> list:
@@ -168,27 +174,18 @@ def closed_loop_overhead(quick: bool) -> Result:
     )
 
 
-def _loop_ratios(damage: list, repeats: int) -> list[tuple[float, float]]:
-    """Closed loop over bare call: wall clock and processor time, of each repeat."""
+def _loop_ratios(damage: list, repeats: int) -> np.ndarray:
+    """Closed loop over bare call: wall clock and processor time, ``(R, 2)``."""
     from bns.worlds import registry
 
     world: Any = registry.make("light", damage=damage, threads=THREADS)
     policy, seeds = Networks(), range(ROBOTS)
     bare = _bare_loop(world, policy, seeds)
     bare()
-    ratios = []
-    for _ in range(repeats):
-        begin = _clocks()
-        bare()
-        middle = _clocks()
-        world.drive(policy, cycles=CYCLES, seeds=seeds)
-        wall, processor = (_clocks() - middle) / (middle - begin)
-        ratios.append((wall, processor))
-    return ratios
-
-
-def _clocks() -> np.ndarray:
-    return np.array([time.perf_counter(), time.process_time()])
+    seconds = _interleaved(
+        bare, lambda: world.drive(policy, cycles=CYCLES, seeds=seeds), repeats
+    )
+    return seconds[:, 1] / seconds[:, 0]
 
 
 def _bare_loop(world: Any, policy: Networks, seeds: range) -> Any:
@@ -216,3 +213,100 @@ def _bare_loop(world: Any, policy: Networks, seeds: range) -> Any:
             kept.append(moved)
 
     return loop
+
+
+HEXAPODS, STEPS = 12, 11  # robots, commands
+REACH = 0.5  # [rad] goals around half-way, in which nothing falls
+
+
+@bench(
+    "World.run of 12 hexapods against bare mujoco.rollout, same models and controls",
+    bar="<= 1.10 x",
+)
+def hexapod_overhead(quick: bool) -> Result:
+    """Median of interleaved ratios of processor time, in one process.
+
+    Processor time, because it is the same on a busy machine; ratios of wall time are
+    among the details.
+
+    The bare side makes one call per robot, without padding, on as many threads, with
+    the goals in force that the world found; it knows nothing of arrival and rest.
+    Three worlds: undamaged, every robot with a raised leg of its own, and every robot
+    with its own payload (a model of its own). The figure is the worst.
+    """
+    repeats = 2 if quick else 9
+    cases = {
+        "undamaged": [()] * HEXAPODS,
+        "leg_raised each": [
+            (f"leg_raised:legs={1 + i % 6},blend=1",) for i in range(HEXAPODS)
+        ],
+        "payload each": [(f"payload:mass={0.01 * (i + 1)}",) for i in range(HEXAPODS)],
+    }
+    found = {name: _measured(damage, repeats) for name, damage in cases.items()}
+    worst = max(item["processor"] for item in found.values())
+    sound = found["undamaged"]
+    return Result(
+        figure=round(worst, 4),
+        unit="x",
+        holds=worst <= LIMIT,
+        n=repeats,
+        details={
+            **{name: round(item["processor"], 4) for name, item in found.items()},
+            "wall time": {name: round(item["wall"], 4) for name, item in found.items()},
+            "thousand steps per second of processor time": round(
+                sound["rate"] / 1e3, 2
+            ),
+            "calls of the physics per command": round(sound["calls"], 2),
+            "seconds of a trial": round(sound["trial"], 2),
+        },
+    )
+
+
+def _measured(damage: list, repeats: int) -> dict[str, float]:
+    """Medians of one case."""
+    from bns.worlds import registry
+
+    world: Any = registry.make("hexapod", damage=damage, threads=THREADS)
+    commands = _walks(world)
+    plans = world.plan(commands)
+    walks = world.motions(plans)
+    bare = _bare_walks(plans, walks)
+    steps = sum(len(walk.control) for walk in walks)
+    seconds = _interleaved(bare, lambda: world.run(commands), repeats + 1)[1:]
+    wall, processor = np.median(seconds[:, 1] / seconds[:, 0], axis=0).tolist()
+    return {
+        "wall": wall,
+        "processor": processor,
+        "rate": float(np.median(steps / seconds[:, 1, 1])),
+        "calls": sum(walk.calls for walk in walks) / (HEXAPODS * STEPS),
+        "trial": steps * world.dt / HEXAPODS,
+    }
+
+
+def _walks(world: Any) -> list:
+    from bns.worlds.trial import Channel, Commands
+
+    rng = np.random.default_rng(0)
+    channels = tuple(Channel(*item) for item in world.model.channels)
+    goals = rng.uniform(-REACH, REACH, (HEXAPODS, STEPS, len(channels)))
+    limits = np.full(STEPS, 1.5)  # [s]
+    return [Commands(values, limits, channels) for values in goals]
+
+
+def _bare_walks(plans: list, walks: list) -> Any:
+    """One plain call per robot: its model, its start, its goals in force."""
+    import mujoco
+    from mujoco.rollout import Rollout
+
+    jobs = [
+        (plan.job.pieces[0].compiled.model, plan.job.start[None], walk.control[None])
+        for plan, walk in zip(plans, walks, strict=True)
+    ]
+    spare = [mujoco.MjData(model) for model, _, _ in jobs]
+    pool = ThreadPoolExecutor(THREADS)
+
+    def call(item: tuple) -> None:
+        (model, start, control), data = item
+        Rollout().rollout([model], [data], start, control)
+
+    return lambda: list(pool.map(call, zip(jobs, spare, strict=True)))

@@ -1,7 +1,7 @@
 """What benches share: campaigns of small batches of real runs, drives, kept rows."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Container
 from pathlib import Path
 
 import tomli_w
@@ -38,12 +38,17 @@ def text(members: int, *, trials: int, replicates: int) -> str:
     return tomli_w.dumps({"name": "tiny", **made})
 
 
-def held(directory: Path) -> Mapping[str, bytes]:
-    """Bytes of a store, without what tells of wall times."""
+def held(directory: Path, without: Container[str] = ("log.jsonl",)) -> dict[str, bytes]:
+    """Bytes of all files by path, without what tells of wall times.
+
+    Args:
+        directory: of a store or a run.
+        without: names of files that are left out.
+    """
     return {
         str(path.relative_to(directory)): path.read_bytes()
         for path in sorted(directory.rglob("*"))
-        if path.is_file() and path.name != "log.jsonl"
+        if path.is_file() and path.name not in without
     }
 
 

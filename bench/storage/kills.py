@@ -102,11 +102,8 @@ def _contents(directory: Path) -> dict[str, bytes]:
     """Bytes of every file, the commit's name left out: it may change meanwhile."""
     head = json.loads((directory / "run.json").read_bytes())
     commit = head["versions"]["commit"].encode()
-    return {
-        str(path.relative_to(directory)): path.read_bytes().replace(commit, b"commit")
-        for path in sorted(directory.rglob("*"))
-        if path.is_file() and path.name not in MAY_DIFFER
-    }
+    files = held(directory, without=MAY_DIFFER)
+    return {name: data.replace(commit, b"commit") for name, data in files.items()}
 
 
 def _differing(one: dict[str, bytes], other: dict[str, bytes]) -> list[str]:

@@ -81,41 +81,27 @@ def _made() -> Iterator[Reader]:
     from bns.hardware.dynamixel import joints
     from bns.hardware.tracking.camera import Camera
     from bns.storage import reading
-    from bns.worlds.static_snn.nets import StaticNets
+    from bns.worlds.static_snn import StaticNets
 
-    yield Reader(
-        "part.parquet", "part.parquet",
-        lambda h: decode(
-            reading.read_bytes(h / "part.parquet", most=reading.DATA), "part"
-        ), stored=True,
-    )  # fmt: skip
-    yield Reader(
-        "failed.json", "loose/failed/00ff.json",
-        lambda h: CampaignStore.open(h / "loose").failures(), stored=True,
-    )  # fmt: skip
-    yield Reader(
-        "diagnosis.json", "gap/diagnosis.json", lambda h: gap_store.load(h / "gap"),
-        stored=True,
-    )  # fmt: skip
-    yield Reader(
-        "answers.json", "answers.json", lambda h: read_answers(h / "answers.json"),
-        stored=True,
-    )  # fmt: skip
-    yield Reader(
-        "nets.npz", "nets.npz", lambda h: StaticNets.load(h / "nets.npz"), finite, True
-    )
-    yield Reader(
-        "camera.json", "camera.json", lambda h: Camera.read(h / "camera.json"),
-        camera, True,
-    )  # fmt: skip
-    yield Reader(
-        "wheels.json", "wheels.json", lambda h: Wheels.read(h / "wheels.json"),
-        wheels, True,
-    )  # fmt: skip
-    yield Reader(
-        "servos.toml", "servos.toml", lambda h: joints.read(h / "servos.toml"),
-        servos, True,
-    )  # fmt: skip
+    listed = [
+        ("part.parquet", "part.parquet", lambda h: decode(
+            reading.read_bytes(h / "part.parquet", most=reading.DATA), "part"), _fine),
+        ("failed.json", "loose/failed/00ff.json",
+         lambda h: CampaignStore.open(h / "loose").failures(), _fine),
+        ("diagnosis.json", "gap/diagnosis.json", lambda h: gap_store.load(h / "gap"),
+         _fine),
+        ("answers.json", "answers.json", lambda h: read_answers(h / "answers.json"),
+         _fine),
+        ("nets.npz", "nets.npz", lambda h: StaticNets.load(h / "nets.npz"), finite),
+        ("camera.json", "camera.json", lambda h: Camera.read(h / "camera.json"),
+         camera),
+        ("wheels.json", "wheels.json", lambda h: Wheels.read(h / "wheels.json"),
+         wheels),
+        ("servos.toml", "servos.toml", lambda h: joints.read(h / "servos.toml"),
+         servos),
+    ]  # fmt: skip
+    for row in listed:
+        yield Reader(*row, stored=True)
 
 
 def _state(directory: Path) -> dict[str, np.ndarray]:
@@ -150,7 +136,7 @@ def _given() -> Iterator[Reader]:
     from bns.storage import journal
     from bns.worlds import corrected
     from bns.worlds.data import importing
-    from bns.worlds.data.column_map import ColumnMap
+    from bns.worlds.data.importing import ColumnMap
 
     def own(home: Path) -> Any:
         arm = OwnConfig.read(ROOT / "examples" / "arm" / "arm.toml")
@@ -187,8 +173,8 @@ def _given() -> Iterator[Reader]:
         ("commands.csv", "commands.csv",
          lambda h: command_file.read(h / "commands.csv"), finite),
     ]  # fmt: skip
-    for name, file, read, sane in listed:
-        yield Reader(name, file, read, sane)
+    for row in listed:
+        yield Reader(*row)
 
 
 def _recorded() -> Iterator[Reader]:
@@ -209,8 +195,8 @@ def _recorded() -> Iterator[Reader]:
         ("Odometry.dat.gz", "mrclam/Robot2_Odometry.dat.gz",
          lambda h: mrclam6.read(h / "mrclam", 2, seconds=2.0), trials),
     ]  # fmt: skip
-    for name, file, read, sane in listed:
-        yield Reader(name, file, read, sane)
+    for row in listed:
+        yield Reader(*row)
 
 
 def _tabled() -> Iterator[Reader]:

@@ -1,11 +1,15 @@
-"""Gaits: what the robot stands on, and tripods."""
+"""Gaits: what the robot stands on, tripods, and walks learned and regained.
+
+They are regained after legs were raised, with a sliding window of 300 patterns.
+"""
 
 from collections.abc import Sequence
 from itertools import product
+from typing import get_args
 
 import numpy as np
 
-from bench.learning import solving
+from bench.learning import experiments
 from bench.result import Result, bench
 from bench.walking import ceiling, runs
 from bench.walking.runs import spread
@@ -76,9 +80,9 @@ def hexapod_gait(quick: bool) -> Result:
     """
     record = runs.walking(quick=quick)
     hand = runs.by_hand()
-    timed = solving.first(runs.adequate(record, hand))
-    told = solving.first(record["distance"] >= hand.distance)
-    waits = solving.waits(timed)
+    timed = experiments.first(runs.adequate(record, hand))
+    told = experiments.first(record["distance"] >= hand.distance)
+    waits = experiments.waits(timed)
     median = waits["median"]
     return Result(
         figure=median if median is not None else 10.0 * runs.ONSET,
@@ -89,7 +93,7 @@ def hexapod_gait(quick: bool) -> Result:
             "tripod by hand": dict(hand._asdict()),
             "trials to its distance in its time": waits,
             "within the stretch": int((timed <= STRETCH).sum()),
-            "trials to its distance in as many commands": solving.waits(told),
+            "trials to its distance in as many commands": experiments.waits(told),
             "at the end": at_the_end(record),
             runs.OWN: _of(runs.walking("nominal", quick=quick), hand),
         },
@@ -97,9 +101,9 @@ def hexapod_gait(quick: bool) -> Result:
 
 
 def _of(record: RunRecord, hand: runs.Hand) -> dict[str, object]:
-    timed = solving.first(runs.adequate(record, hand))
+    timed = experiments.first(runs.adequate(record, hand))
     return {
-        "trials to its distance in its time": solving.waits(timed),
+        "trials to its distance in its time": experiments.waits(timed),
         "at the end": at_the_end(record),
     }
 
@@ -188,3 +192,91 @@ def _walked(gaits: list) -> dict:
         done.append(item)
         lists.append(Commands(goals, np.full(COMMANDS, LONGEST), channels))
     return dict(zip(done, world.run(lists), strict=True))
+
+
+BARS = (0.5, 0.75, 0.9)  # of the damage's ceiling, whatever the robot did before
+MILD, LIMIT_MILD, LIMIT_SEVERE = ("type0", "type1", "type3"), 30, 46
+
+
+@bench(
+    "worst median of trials until a damaged hexapod walks 90 % as far as before",
+    bar="median <= 30 trials for types 0, 1, 3 and <= 46 for types 2, 5; window 300",
+)
+def recover_hexapod(quick: bool) -> Result:
+    """Damage from trial 100 of 150; quick: one run of 12 trials.
+
+    The runs of all types are those of `hexapod-gait` up to the damage. The figure is
+    that of the window, ten runs a type; beside it, from the same undamaged runs on,
+    what forgetting by evidence comes to (`watch.forget`), and the presets
+    `hexapod-recover`, thirty runs a type, and `hexapod-nominal`, from runs of its own.
+    """
+    records, others, *ours = (
+        runs.recovering(kind, quick=quick) for kind in get_args(runs.Kind)
+    )
+    hand = runs.by_hand()
+    found: dict[str, object] = {}
+    medians, holds = [], True
+    for legs, record in records.items():
+        row = found[legs] = _recovery(legs, record, hand)
+        row["with watch.forget"] = {
+            **_recovery(legs, others[legs], hand),
+            "trials until it forgot": experiments.waits(_forgot(others[legs])),
+        }
+        for preset, found_by in zip(("hexapod-recover", runs.OWN), ours, strict=True):
+            row[preset] = _recovery(legs, found_by[legs], hand)
+        median = row["median"]
+        limit = LIMIT_MILD if legs in MILD else LIMIT_SEVERE
+        holds = holds and median is not None and median <= limit
+        medians.append(10.0 * record.trials if median is None else median)
+    return Result(
+        figure=max(medians),
+        unit="trials",
+        holds=None if quick else holds,
+        n=min(record.replicates for record in records.values()),
+        details=found,
+    )
+
+
+def _forgot(record: RunRecord) -> np.ndarray:
+    """Trials with the damage until old patterns were dropped, ``(R,)``; inf = never."""
+    onset = int(record.damage_onset[0])
+    dropped = np.diff(record["patterns"][:, onset - 1 :], axis=1) < 0
+    return np.where(dropped.any(1), dropped.argmax(1) + 1.0, np.inf)
+
+
+def _recovery(legs: str, record: RunRecord, hand: runs.Hand) -> dict[str, object]:
+    onset, ways = int(record.damage_onset[0]), record["distance"]
+    late = np.median(ways[:, -runs.BEFORE :], axis=1)
+    enough = runs.SHARE * runs.before(record)
+    adequate = runs.adequate(record, hand)
+    return {
+        **experiments.waits(runs.trials_to_regain(record)),
+        "until adequate again": experiments.waits(
+            experiments.first(adequate[:, onset:])
+        ),
+        "as far undamaged, from the start": experiments.waits(
+            experiments.first(ways[:, :onset] >= enough[:, None])
+        ),
+        "before [m]": spread(runs.before(record)),
+        "first damaged trial [m]": spread(ways[:, onset]),
+        "last ten trials [m]": spread(late),
+        "ceiling [m]": ceiling.ceilings(legs),
+        "share of the ceiling": ceiling.shares(late, legs),
+        "until a share of the ceiling": until(ways[:, onset:], legs),
+    }
+
+
+def until(ways: np.ndarray, legs: str) -> dict[str, dict[str, object]]:
+    """Trials until robots got to `BARS` of each ceiling of a damage that is known.
+
+    Args:
+        ways: of the trials with the damage, ``(R, T)`` [m].
+        legs: the damage.
+    """
+    return {
+        name: {
+            f"{bar:.0%}": experiments.waits(experiments.first(ways >= bar * most))
+            for bar in BARS
+        }
+        for name, most in ceiling.ceilings(legs).items()
+    }

@@ -1,7 +1,7 @@
 """The walking experiments that several benches share (investigation D).
 
 Undamaged runs come in groups of ten; the runs of each damage begin as copies of such a
-group after its last trial, since up to there nothing differs (`forking`).
+group after its last trial, since up to there nothing differs (`experiments.forked`).
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 import torch
 
-from bench.learning import experiments, forking, solving
+from bench.learning import experiments
 from bns import presets
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig
@@ -153,7 +153,7 @@ def recovering(kind: Kind, *, quick: bool = False) -> Mapping[str, RunRecord]:
         if told and any(forgets(trunk).any() for trunk in trunks.values()):
             raise BnsError("Run the undamaged runs with watch.forget, too.")
         for (_, group), config in configs.items():
-            forking.begin(_trunk(kind, group), config, idle=("watch", "walk"))
+            experiments.begin(_trunk(kind, group), config, idle=("watch", "walk"))
     found = records(configs.values(), quick=quick)
     return {
         legs: joined([found[configs[legs, group].preset] for group in groups])
@@ -193,17 +193,8 @@ def joined(parts: list[RunRecord]) -> RunRecord:
 
 def small(config: RunConfig) -> RunConfig:
     """One run of few trials with a small population and short training."""
-    onset = QUICK["trials"] // 2
-    damage = tuple(f"{text.rpartition('@')[0]}@{onset}" for text in config.world.damage)
-    evolution = replace(config.evolution, population=60, generations=10, tournament=6)
-    return replace(
-        config,
-        **QUICK,
-        evolution=evolution,
-        snn=replace(config.snn, epochs=60),
-        world=replace(config.world, damage=damage),
-        compiled="no",
-    )
+    few = {"population": 60, "generations": 10, "tournament": 6}
+    return experiments.shortened(config, QUICK, epochs=60, **few)
 
 
 def trials_to_regain(record: RunRecord) -> np.ndarray:
@@ -214,7 +205,7 @@ def trials_to_regain(record: RunRecord) -> np.ndarray:
     """
     onset = int(record.damage_onset[0])
     enough = SHARE * before(record)
-    return solving.first(record["distance"][:, onset:] >= enough[:, None])
+    return experiments.first(record["distance"][:, onset:] >= enough[:, None])
 
 
 def before(record: RunRecord) -> np.ndarray:

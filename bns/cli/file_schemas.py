@@ -159,12 +159,12 @@ def _start() -> Schema:
 
 def columns() -> Schema:
     """Schema of the map of a log's columns, for `--columns`."""
-    from bns.worlds.data import column_map
+    from bns.worlds.data import importing
     from bns.worlds.trial import POSE
 
     known = {
-        name: _source(tuple(column_map.FACTORS[unit]))
-        for name, unit in column_map.UNITS.items()
+        name: _source(tuple(importing.FACTORS[unit]))
+        for name, unit in importing.UNITS.items()
     }
     table = {
         "type": "object",

@@ -107,10 +107,10 @@ def check(given: Check) -> int:
     """
     from bns import models
     from bns.models import check as points
-    from bns.worlds.physics import servo_joint
+    from bns.worlds.physics import servo_law
 
     robot = models.robot(given.robot)
-    servo_joint.law_of(robot)
+    servo_law.law_of(robot)
     done = points.check(robot)
     for point in done:
         print(f"  {'fault' if point.faults else 'ok   '}  {point.says}")
@@ -143,10 +143,10 @@ def new_legged(given: NewLegged) -> int:
             robot that does not stand; servos that the world cannot have.
         FormatError: a file of servos that is not as it should be.
     """
-    from bns.worlds.physics import servo_joint
+    from bns.worlds.physics import servo_law
 
     place = given.directory
-    servo_joint.own(legged_files.law(given.robot))
+    servo_law.own(legged_files.law(given.robot))
     legged_files.write(Path(place), given.robot)
     run = f"hexapod-walk --world.robot {place} --damage leg_raised:legs=2@100"
     return _told(place, run, "a PhantomX")

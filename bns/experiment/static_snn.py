@@ -22,7 +22,7 @@ from bns.snn import training
 from bns.snn.network import Shape, predict
 from bns.snn.scaling import Scaling
 from bns.tasks import registry as tasks
-from bns.worlds.static_snn.nets import StaticNets
+from bns.worlds.static_snn import StaticNets
 from bns.worlds.world import World
 
 LISTS, PER_LIST = 200, 25  # 5000 commands

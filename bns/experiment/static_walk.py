@@ -22,7 +22,7 @@ from bns.snn.fitting import Patterns
 from bns.snn.network import Shape, forward
 from bns.snn.scaling import OUTPUTS
 from bns.worlds.effects.legs import RAISED
-from bns.worlds.static_snn.nets import StaticNets
+from bns.worlds.static_snn import StaticNets
 from bns.worlds.trial import Commands
 from bns.worlds.world import World
 

@@ -66,7 +66,7 @@ class LightConfig:
     """Closed-loop light following: lamp, task, controllers, adaptations B1 to B4."""
 
     lamps: tuple[str, ...] = ("x=0,y=0",)
-    """lamps by the fields of `bns.worlds.light.field.Lamp`; the first is the goal"""
+    """lamps by the fields of `bns.worlds.light.law.Lamp`; the first is the goal"""
     ambient: float = 0.02
     """light that is everywhere [W/m2]"""
     goal: float = 0.40

@@ -85,7 +85,7 @@ def make_models(config: RunConfig) -> list[CountedWorld]:
 
 def _nets(config: RunConfig, directory: Path | None) -> Any:
     """Nets of the static SNN world, from the run's directory if they are there."""
-    from bns.worlds.static_snn.nets import StaticNets
+    from bns.worlds.static_snn import StaticNets
 
     path = directory / "static_snn.npz" if directory else None
     if path and path.exists():

@@ -9,7 +9,7 @@ import numpy as np
 from bns.gap.decomposition.row import Row
 from bns.gap.recordings import trial_conditions
 from bns.worlds.effects import registry
-from bns.worlds.effects.common import TOP_SPEED
+from bns.worlds.effects.command import TOP_SPEED
 from bns.worlds.effects.parameter import Parameter
 from bns.worlds.trial import Trial
 

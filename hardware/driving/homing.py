@@ -68,13 +68,12 @@ def go(
     return seen
 
 
-def face(mover: Mover, heading: float, *, turned: float = FACED) -> Sighting:
+def face(mover: Mover, heading: float) -> Sighting:
     """Turn on the spot to a heading [rad] and stop there.
 
     Args:
         mover: of the robot.
         heading: in the world frame [rad].
-        turned: off the heading that will do [rad].
 
     Raises:
         SafetyStop: it was stopped.
@@ -82,7 +81,7 @@ def face(mover: Mover, heading: float, *, turned: float = FACED) -> Sighting:
     """
     begin = mover.clock.now()
     seen = settled(mover)
-    while abs(off := _wrapped(heading - seen.pose[2])) > turned:
+    while abs(off := _wrapped(heading - seen.pose[2])) > FACED:
         if mover.clock.now() - begin > TIME:
             raise BnsError(
                 "The robot does not turn: see that nothing is in its way, or turn it "

@@ -14,11 +14,10 @@ from bns.hardware.driving import homing
 from bns.hardware.driving.motion import Mover, Performed, Point
 from bns.hardware.tracking.tracker import Sighting
 from bns.worlds.active import Stages
-from bns.worlds.light.sensing import LEAD, Changes
+from bns.worlds.light.closed_loop import LEAD, Call, Changes, Supervisor
 from bns.worlds.light.sensors import LightSensors
-from bns.worlds.light.supervisor import Call, Supervisor
 from bns.worlds.physics import control
-from bns.worlds.physics.loop_control import LoopSignal
+from bns.worlds.physics.session import LoopSignal
 from bns.worlds.trial import Channel, Commands
 from bns.worlds.world import Policy, checked_commands
 

@@ -21,7 +21,7 @@ from bns.hardware.khepera.driver import Guard
 from bns.hardware.line import Openers, check_port, claim
 from bns.hardware.safety.stop_order import insist, phantomx
 from bns.hardware.safety.watchdog import receive, send
-from bns.worlds.physics.legged_flags import OVERLOAD_TIME, SATURATED, STALLED
+from bns.worlds.physics.observe import OVERLOAD_TIME, SATURATED, STALLED
 
 TRIES = 4
 HOT, EMPTY = 65, 9.9  # C, V: beyond it the robot rests

@@ -13,8 +13,8 @@ PING, READ, WRITE, SYNC_WRITE = 1, 2, 3, 0x83
 MODEL = 12  # of the AX-12A
 LONGEST = 143  # bytes after LEN
 
-TORQUE, GOAL, SPEED, LIMIT, PRESENT = 24, 30, 32, 34, 36
-"""addresses: torque enable, goal position, moving speed, torque limit, present state"""
+TORQUE, GOAL, SPEED, PRESENT = 24, 30, 32, 36
+"""addresses: torque enable, goal position, moving speed, present state"""
 
 UNITS = 195.3786  # position units per radian: 1023 over 300 deg
 SPEED_UNIT = 0.111 * 2 * 3.141592653589793 / 60  # rad/s (e-manual)

@@ -18,11 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from bns.errors import BnsError
-from bns.hardware.emulators.live_body import LiveBody
+from bns.hardware.emulators.device import LiveBody
 from bns.hardware.tracking import marker as tags
-from bns.hardware.tracking.camera import Camera, plane_points
+from bns.hardware.tracking.camera import Camera, cv2, plane_points
 from bns.hardware.tracking.marker import CELLS, MARKERS, Floor, Marker
-from bns.hardware.tracking.opencv import cv2
 from bns.hardware.tracking.tracker import Frame
 
 BOARD, BODY = 205, 70  # grey values (assumed)
@@ -31,6 +30,7 @@ FINE = 4  # subpixels a side
 CELL = 20  # px of a cell of the texture
 RADIUS = 0.064  # m; of the Khepera III's body
 TRUNK, HIPS = 0.12, 0.0918  # m; the hexapod's body and its height (its `home` pose)
+BLUR = 0.6  # px; standard deviation of the lens's blur
 SPARE = 64  # px by which the stored noise is larger than a picture
 
 
@@ -40,9 +40,7 @@ class Painter:
     Args:
         camera: where from.
         marker: on the robot.
-        floor: tags on the board.
         noise: standard deviation of grey values.
-        blur: standard deviation of the lens's blur [px].
         shake: standard deviation of where the camera's tremble puts the robot [px].
         rng: for the noise.
         radius: of the robot's body [m].
@@ -55,15 +53,13 @@ class Painter:
         camera: Camera,
         marker: Marker,
         *,
-        floor: Floor | None = None,
         noise: float = 2.0,
-        blur: float = 0.6,
         shake: float = 0.0,
         rng: np.random.Generator | None = None,
         radius: float = RADIUS,
         base: float | None = None,
     ):
-        self.camera, self.marker, self.blur = camera, marker, blur
+        self.camera, self.marker = camera, marker
         self.radius, self.base, self.shake = radius, base, shake
         self._moved = np.zeros(2)
         rng = rng or np.random.default_rng(0)
@@ -72,7 +68,7 @@ class Painter:
         self._tag = tags.picture(
             marker.number, cell=CELL, border=(PLATE - 1) / 2 * CELLS
         )
-        floor = floor or Floor()
+        floor = Floor()
         half = floor.side / 2 * (CELLS + 2) / CELLS  # with a border of a cell
         for number, (x, y, yaw) in floor.places.items():
             square = Marker(number, 2 * half, 0.0, x, y, yaw).corners()
@@ -160,9 +156,7 @@ class Painter:
             small = module.resize(
                 warped, (width, tall), interpolation=module.INTER_AREA
             )
-            if not self.blur:
-                return small
-            return module.GaussianBlur(small, (0, 0), self.blur)
+            return module.GaussianBlur(small, (0, 0), BLUR)
 
         part = image[low[1] : high[1], low[0] : high[0]]
         share = seen(np.ones_like(texture))
@@ -187,6 +181,7 @@ def _grains(
 
 MESSAGE = struct.Struct("<dq8d")  # time, number, x, y, yaw, height, quaternion
 SUFFIX = ".camera"
+LATENCY = 0.03  # s from a picture being taken to its being told
 
 
 class PoseServer:
@@ -196,18 +191,10 @@ class PoseServer:
         body: the robot's.
         port: path of its port; the socket lies beside it.
         rate: pictures a second.
-        latency: from a picture being taken to its being told [s].
     """
 
-    def __init__(
-        self,
-        body: LiveBody,
-        port: Path | str,
-        *,
-        rate: float = 30.0,
-        latency: float = 0.03,
-    ):
-        self.body, self.rate, self.latency = body, rate, latency
+    def __init__(self, body: LiveBody, port: Path | str, *, rate: float = 30.0):
+        self.body, self.rate = body, rate
         self.path = Path(str(port) + SUFFIX)
         with contextlib.suppress(OSError):
             self.path.unlink()
@@ -236,7 +223,7 @@ class PoseServer:
             self._last = self._picture(now)
             at, number, pose = self._last
             message = MESSAGE.pack(at, number, *pose)
-            self._waiting.append((now + self.latency, message))
+            self._waiting.append((now + LATENCY, message))
         while self._waiting and self._waiting[0][0] <= now:
             message = self._waiting.popleft()[1]
             if self.mode != "covered":

@@ -18,13 +18,12 @@ from bns.errors import BnsError
 from bns.hardware.dynamixel import joints as tables
 from bns.hardware.dynamixel import packets
 from bns.hardware.dynamixel.joints import Joint
-from bns.hardware.emulators.device import Reply
-from bns.hardware.emulators.live_body import LiveBody
+from bns.hardware.emulators.device import LiveBody, Reply
 from bns.models import servo_numbers
 from bns.models.ax12a import NO_LOAD_SPEED
 from bns.worlds.effects.base import Effect
-from bns.worlds.physics import legged_plan, servo_joint
-from bns.worlds.physics.legged_goals import in_units
+from bns.worlds.physics import legged_plan, servo_law
+from bns.worlds.physics.control import in_units
 from bns.worlds.physics.rollout import Compiled
 
 LIFTED = 0.01  # m; how far the stand lifts it off the board
@@ -70,7 +69,7 @@ class HexapodBody(LiveBody):
         given = tables.read() if joints is None else joints
         self.joints = {joint.id: joint for joint in given}
         self._column = {joint.id: names.index(joint.name) for joint in given}
-        self._laws = servo_joint.laws(self.model)
+        self._laws = servo_law.laws(self.model)
         if self._laws["delay"].any() or self._laws["lag"].any():
             raise BnsError(
                 "An emulated hexapod cannot have late or lagging servos: take another "

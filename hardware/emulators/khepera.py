@@ -10,14 +10,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bns.hardware.emulators.device import Reply
-from bns.hardware.emulators.live_body import LiveBody
+from bns.hardware.emulators.device import LiveBody, Reply
 from bns.hardware.khepera import protocol
 from bns.models.arena import SIZE
 from bns.models.khepera3.units import firmware
 from bns.worlds.effects.base import Effect
 from bns.worlds.light import sensors
-from bns.worlds.light.field import Lamp, LightField
+from bns.worlds.light.law import Lamp, LightField
 
 HISTORY = 3.0  # s of set points that effects see again; longer memories fade out
 

@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bns.errors import BnsError
-from bns.hardware.tracking.camera import Camera
+from bns.hardware.tracking.camera import Camera, cv2
 from bns.hardware.tracking.marker import Finder, Floor, Marker, dictionary
-from bns.hardware.tracking.opencv import cv2
 from bns.hardware.tracking.tracker import Sighting
 
 LEAST_VIEWS = 8  # of the board of squares; 15 to 20 are better

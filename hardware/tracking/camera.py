@@ -3,15 +3,35 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import msgspec
 import numpy as np
 
-from bns.errors import FormatError
-from bns.hardware.tracking.opencv import cv2
+from bns.errors import FormatError, MissingDependencyError, install
 from bns.models.arena import CAMERA_HEIGHT, SIZE
 from bns.storage import files, reading, seal
+
+
+def cv2() -> Any:
+    """The module `cv2`.
+
+    Raises:
+        MissingDependencyError: it is not installed, or it has no ArUco.
+    """
+    try:
+        import cv2 as module
+    except ImportError as error:
+        raise MissingDependencyError(
+            "tracking", "opencv-python-headless", install("hardware")
+        ) from error
+    if not hasattr(module, "aruco"):
+        raise MissingDependencyError("tracking", "ArUco in OpenCV", install("hardware"))
+    logging = module if hasattr(module, "setLogLevel") else module.utils.logging
+    logging.setLogLevel(0)  # silent; OpenCV 4 has it at the top, 5 below
+    module.setNumThreads(1)  # its threads would not share this one's precedence
+    return module
+
 
 MARGIN = 1.06  # of the board's height that the overhead camera sees
 DOWN = np.diag([1.0, -1.0, -1.0])  # a camera that looks straight down, x to the right

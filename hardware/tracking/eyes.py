@@ -1,18 +1,142 @@
-"""The tracker at work: pictures turned into sightings, beside whatever else goes on."""
+"""The tracker at work: pictures of a camera or a video file turned into sightings.
+
+It works beside whatever else goes on.
+"""
 
 import threading
+import time
 from collections import deque
-from typing import Protocol
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 
 from bns.errors import BnsError
 from bns.hardware.clock import VirtualClock, urgent
-from bns.hardware.tracking.sources import Source
+from bns.hardware.tracking.camera import cv2
 from bns.hardware.tracking.tracker import Frame, Sighting, Tracker
+
+
+class Source(Protocol):
+    """Something that gives pictures.
+
+    Attributes:
+        size: width and height [px].
+    """
+
+    size: tuple[int, int]
+
+    def read(self, timeout: float) -> Frame | None:
+        """The next picture, None where none came within the time [s].
+
+        Raises:
+            BnsError: there will be no more.
+        """
+        ...
+
+    def close(self) -> None:
+        """Give the camera back."""
+        ...
+
+
+class DeviceCamera:
+    """A camera of this machine.
+
+    Args:
+        number: of the device, 0 being the first.
+        size: wanted [px].
+
+    Raises:
+        BnsError: no such camera, it is in use, or it cannot give that size.
+    """
+
+    def __init__(self, number: int, size: tuple[int, int] = (1920, 1080)):
+        module = cv2()
+        self._capture = module.VideoCapture(number)
+        self._capture.set(module.CAP_PROP_FRAME_WIDTH, size[0])
+        self._capture.set(module.CAP_PROP_FRAME_HEIGHT, size[1])
+        good, picture = self._capture.read()
+        if not good:
+            self._capture.release()
+            raise BnsError(
+                f"Camera {number} gives no picture: check that it is plugged in and "
+                "not in use, or give another --camera."
+            )
+        self.size, self._count = (picture.shape[1], picture.shape[0]), 0
+        if self.size != size:
+            self._capture.release()
+            raise BnsError(
+                f"Camera {number} gives {self.size[0]} x {self.size[1]} pictures, the "
+                f"calibration is of {size[0]} x {size[1]}: calibrate it again."
+            )
+
+    def read(self, timeout: float) -> Frame | None:
+        """The next picture, see `Source.read`; waits as long as the driver does.
+
+        Raises:
+            BnsError: the camera gives no more pictures.
+        """
+        del timeout
+        good, picture = self._capture.read()
+        if not good:
+            raise BnsError("The camera gives no more pictures: check its cable.")
+        self._count += 1
+        return Frame(time.monotonic(), _grey(picture), self._count)
+
+    def close(self) -> None:
+        """Give the camera back."""
+        self._capture.release()
+
+
+class VideoFile:
+    """A recorded video; its pictures have the times of the recording.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        BnsError: it cannot be read.
+    """
+
+    def __init__(self, path: Path | str):
+        module = cv2()
+        self._capture = module.VideoCapture(str(path))
+        if not self._capture.isOpened():
+            raise BnsError(f"{path} is no video that OpenCV can read.")
+        self._rate = self._capture.get(module.CAP_PROP_FPS) or 25.0
+        self.size = (
+            int(self._capture.get(module.CAP_PROP_FRAME_WIDTH)),
+            int(self._capture.get(module.CAP_PROP_FRAME_HEIGHT)),
+        )
+        self._count = 0
+
+    def read(self, timeout: float) -> Frame | None:
+        """The next picture, see `Source.read`.
+
+        Raises:
+            BnsError: the video is at its end.
+        """
+        del timeout
+        good, picture = self._capture.read()
+        if not good:
+            raise BnsError("The video is at its end.")
+        at = self._count / self._rate
+        self._count += 1
+        return Frame(at, _grey(picture), self._count - 1)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._capture.release()
+
+
+def _grey(picture: Any) -> Any:
+    module = cv2()
+    return module.cvtColor(picture, module.COLOR_BGR2GRAY)
+
 
 WAIT = 0.2  # s for a picture before the loop looks whether it should end
 KEPT = 100_000  # sightings, an hour
+LATENCY = 0.04  # s from a virtual picture being taken to its being there
 
 
 class Eyes(Protocol):
@@ -104,7 +228,6 @@ class VirtualEyes:
         tracker: looks at it.
         clock: virtual.
         rate: pictures a second.
-        latency: from a picture being taken to its being there [s].
     """
 
     def __init__(
@@ -114,10 +237,8 @@ class VirtualEyes:
         clock: VirtualClock,
         *,
         rate: float = 15.0,
-        latency: float = 0.04,
     ):
-        self.source, self.tracker, self.clock = source, tracker, clock
-        self.rate, self.latency = rate, latency
+        self.source, self.tracker, self.clock, self.rate = source, tracker, clock, rate
         self._count = 0
         self._frame: Frame | None = None
         self.blind = False
@@ -125,7 +246,7 @@ class VirtualEyes:
     def poll(self) -> list[Sighting]:
         """Sightings since the last call, see `Eyes.poll`."""
         seen = []
-        while (at := self._count / self.rate) + self.latency <= self.clock.now():
+        while (at := self._count / self.rate) + LATENCY <= self.clock.now():
             self._count += 1
             if self.blind:
                 self.tracker.missed()

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from bns.hardware.tracking.opencv import cv2
+from bns.hardware.tracking.camera import cv2
 
 DICTIONARY = "DICT_4X4_50"
 CELLS = 6  # a side of a 4 x 4 tag, with its black border

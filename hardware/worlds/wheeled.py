@@ -23,10 +23,9 @@ from bns.worlds.damage import Damage
 from bns.worlds.effects.base import OpticsEffect
 from bns.worlds.light import sensors
 from bns.worlds.light import world as light_starts
-from bns.worlds.light.field import Lamp, LightField
-from bns.worlds.light.sensing import Changes
-from bns.worlds.light.supervisor import Supervisor
-from bns.worlds.physics.loop_control import LoopSignal
+from bns.worlds.light.closed_loop import Changes, Supervisor
+from bns.worlds.light.law import Lamp, LightField
+from bns.worlds.physics.session import LoopSignal
 from bns.worlds.trial import POSE_CHANNELS, Commands, Trial
 from bns.worlds.world import CYCLE, CYCLES, Policy
 

@@ -12,12 +12,12 @@ import pytest
 
 from bns.errors import BnsError
 from bns.hardware.driving import homing
-from bns.hardware.emulators import virtual
+from bns.hardware.emulators import run
 from bns.hardware.faults import SafetyStop
 from bns.hardware.worlds.real_robot import TRIES
 from bns.hardware.worlds.wheeled import HardwareLight, HardwareWorld
 from bns.worlds.light import sensors as light_sensors
-from bns.worlds.light.field import Lamp
+from bns.worlds.light.law import Lamp
 from bns.worlds.trial import Commands
 from bns.worlds.world import clear, ring
 
@@ -30,7 +30,7 @@ AHEAD = Commands([[0.1, 0.1], [0.06, -0.06]], [1.0, 0.8])
 @pytest.fixture(scope="module")
 def trial():
     """A trial, and the rig it was run on."""
-    rig = virtual.rig(start=(0.02, 0.01, 0.1))
+    rig = run.rig(start=(0.02, 0.01, 0.1))
     world = HardwareWorld(rig=rig, damage=["wheel_gain:wheel=left,factor=0.5@1"])
     return world.run([AHEAD])[0], rig, world
 
@@ -91,7 +91,7 @@ def test_what_cannot_be_is_refused_before_anything_moves():
 
 
 def test_a_low_battery_is_refused():
-    rig = virtual.rig()
+    rig = run.rig()
     rig.device.battery = 6.1
     with pytest.raises(BnsError, match=r"6\.1 V, less than 7 V"):
         HardwareWorld(rig=rig).run([AHEAD])
@@ -129,7 +129,7 @@ def spoilt(rig, told, instead, times):
 
 
 def test_a_set_point_that_was_spoilt_is_sent_again_and_the_trial_is_void():
-    rig = spoilt(virtual.rig(), 0.12, 0.02, 2)
+    rig = spoilt(run.rig(), 0.12, 0.02, 2)
     (trial,) = HardwareWorld(rig=rig).run([LONG])
     assert rig.faults.counts["wheels not as told"] >= 1
     assert (
@@ -152,7 +152,7 @@ class Unanswered(Spoilt):
 
 
 def test_a_first_set_point_that_may_have_held_before_makes_the_trial_void():
-    rig = virtual.rig()
+    rig = run.rig()
     world = HardwareWorld(rig=rig)
     world.run([LONG])  # from then on it is known how soon answers come
     units = round(rig.robot.units.units(0.12))
@@ -168,7 +168,7 @@ def test_a_first_set_point_that_may_have_held_before_makes_the_trial_void():
 
 @pytest.mark.parametrize("suspected", [False, True])
 def test_a_damaged_wheel_is_learned_and_not_taken_for_the_line(suspected):
-    rig = virtual.rig(["wheel_gain:wheel=left,factor=0.6"])
+    rig = run.rig(["wheel_gain:wheel=left,factor=0.6"])
     for _ in range(10 * suspected):
         rig.faults.note("garbled answer")
     world = HardwareWorld(rig=rig)
@@ -201,7 +201,7 @@ class Fixed:
 
 
 def drive(policy, start, *, cycles=12, **settings):
-    rig = virtual.rig(lights=(LAMP,), start=(start[0], start[1], start[2] + 0.3))
+    rig = run.rig(lights=(LAMP,), start=(start[0], start[1], start[2] + 0.3))
     world = HardwareLight(rig=rig, lights=[LAMP], **settings)
     (trial,) = world.drive(policy, cycles=cycles, starts=np.array([start]))
     return trial, rig
@@ -264,7 +264,7 @@ def test_ways_lead_round_lamps():
 
 
 def test_a_robot_behind_the_lamp_gets_to_its_start_round_it():
-    rig = virtual.rig(lights=(LAMP,), start=(0.7, 0.0, 0.0))
+    rig = run.rig(lights=(LAMP,), start=(0.7, 0.0, 0.0))
     world = HardwareLight(rig=rig, lights=[LAMP])
     near = []
     look = rig.eyes.poll
@@ -311,13 +311,13 @@ def test_the_learner_drives_it(tmp_path):
         snn=replace(config.snn, epochs=2),
         light=replace(config.light, cycles=5, islands=1, circle_cycles=2),
     )
-    rig = virtual.rig(lights=(LAMP,), start=(-0.8, 0.0, 0.0))
+    rig = run.rig(lights=(LAMP,), start=(-0.8, 0.0, 0.0))
     record = train(config, tmp_path / "run", world=HardwareLight(rig=rig))
     assert record.trials == 2 and record["patterns"][0, -1] >= 5
     assert np.isfinite(record["fitness"]).all()
 
 
 def _field():
-    from bns.worlds.light.field import LightField
+    from bns.worlds.light.law import LightField
 
     return LightField((LAMP,))

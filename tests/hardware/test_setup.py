@@ -156,7 +156,7 @@ def test_a_rehearsal_ends_with_a_diagnosis(tmp_path, monkeypatch, capsys):
     from bns.cli.gap import diagnose as gap_diagnose
     from bns.cli.hardware import setup as hardware_setup
     from bns.hardware import rig
-    from bns.hardware.emulators import virtual
+    from bns.hardware.emulators import run
     from bns.hardware.worlds import wheeled as world
 
     told = []
@@ -167,7 +167,7 @@ def test_a_rehearsal_ends_with_a_diagnosis(tmp_path, monkeypatch, capsys):
         yield "port"
 
     def connect(*_, **__):
-        return virtual.rig(told[0][1])
+        return run.rig(told[0][1])
 
     monkeypatch.setattr(hardware_setup, "emulated", emulated)
     monkeypatch.setattr(rig, "connect", connect)

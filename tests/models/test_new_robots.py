@@ -15,7 +15,7 @@ from bns.models.new_legged import Legged
 from bns.models.phantomx import gait
 from bns.worlds import registry
 from bns.worlds.light import sensors as light_sensors
-from bns.worlds.physics import servo_joint
+from bns.worlds.physics import servo_law
 from bns.worlds.trial import Commands
 from tests.sources import ROOT
 
@@ -147,7 +147,7 @@ def test_servos_of_ones_own_are_in_the_model(tmp_path):
     place = made(tmp_path / "mine", **QUAD, servo=str(file))
     assert (place / "law.toml").read_text() == file.read_text()
     assert models.robot(str(place)).servo == "law.toml"
-    expected = servo_joint.joint_numbers({**ax12a.law(), "voltage": 16.0})
+    expected = servo_law.joint_numbers({**ax12a.law(), "voltage": 16.0})
     actuator = models.spec(str(place)).compile().actuator("left_rear_femur")
     assert actuator.forcerange[1] == pytest.approx(expected.torque_limit, rel=1e-4)
     assert not any(point.faults for point in check.check(models.robot(str(place))))

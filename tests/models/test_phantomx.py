@@ -8,7 +8,7 @@ from bns import models
 from bns.errors import BnsError, OutOfBoundsError
 from bns.models import ax12a, legs, servo_pendulum
 from bns.models.phantomx import gait, kinematics, servos
-from bns.worlds.physics import servo_joint, servo_law
+from bns.worlds.physics import servo_law
 
 # What one robot of the maker held as its neutral pose (NUKE, ik_neutral), by identity.
 NEUTRAL = (
@@ -88,7 +88,7 @@ def test_masses_add_up(model):
 def test_the_joints_hold_the_servo_law(model):
     law = ax12a.law()
     servo_law.law(law)  # every number, inside its bounds
-    numbers = servo_joint.joint_numbers(law)
+    numbers = servo_law.joint_numbers(law)
     assert numbers.torque_limit == pytest.approx(1.5 * 11.1 / 12, rel=1e-3)
     joint, actuator = model.joint("left_rear_femur"), model.actuator("left_rear_femur")
     assert actuator.gainprm[0] == pytest.approx(numbers.stiffness, rel=1e-4)
@@ -100,7 +100,7 @@ def test_the_joints_hold_the_servo_law(model):
 
 
 def test_no_load_speed_and_stall_are_the_data_sheets():
-    numbers = servo_joint.joint_numbers({**ax12a.law(), "voltage": 12.0})
+    numbers = servo_law.joint_numbers({**ax12a.law(), "voltage": 12.0})
     assert numbers.torque_limit == pytest.approx(1.5, rel=1e-3)
     free = (numbers.torque_limit - numbers.friction) / numbers.damping
     assert free == pytest.approx(ax12a.NO_LOAD_SPEED, rel=0.01)

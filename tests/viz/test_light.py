@@ -8,7 +8,7 @@ from bns.tasks import registry as tasks
 from bns.viz import figures, recording, report, scene
 from bns.viz.figures.light import moving_mean, roamed
 from bns.worlds.light import sensors
-from bns.worlds.light.field import LightField
+from bns.worlds.light.law import LightField
 from tests.bns.robots import FakeLightWorld, small_light
 
 SENSORS, FIELD = sensors.of("khepera3"), LightField()

@@ -8,7 +8,7 @@ from bns.worlds import registry
 from bns.worlds.damage import Damage, Event
 from bns.worlds.data import dataset, dataset_checks
 from bns.worlds.effects.base import BodyEffect, Parameter
-from bns.worlds.light.supervisor import Supervisor
+from bns.worlds.light.closed_loop import Supervisor
 from bns.worlds.trial import Commands, Trial
 from tests.sources import ROOT
 

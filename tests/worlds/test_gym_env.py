@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.worlds.stepwise import rewards
+from bns.worlds.stepwise import episode
 
 gymnasium = pytest.importorskip("gymnasium")
 checker = pytest.importorskip("gymnasium.utils.env_checker")
@@ -113,7 +113,7 @@ def test_a_batch_gives_what_single_environments_give(name):
 
 def test_robots_of_a_batch_end_at_different_times():
     settings = {"num_envs": 3, "cycles": 4, "damage": [GAIN + "@3"]}
-    goals = {"reward": rewards.Waypoints([(0.05, 0.0), (0.12, 0.0)])}
+    goals = {"reward": episode.Waypoints([(0.05, 0.0), (0.12, 0.0)])}
     native = gymnasium.make_vec(f"{MODULE}:bns/Navigation-v0", **settings, **goals)
     native.reset(seed=1, options={"trial": 3})
     ahead = np.array([[1, 1], [-1, -1], [0, 0]], np.float32)

@@ -1,6 +1,12 @@
-"""Light: inverse square, angles, bodies in the way, noise; all without a trial."""
+"""Light, on the board and on a robot of the user's.
+
+Inverse square, angles, bodies in the way, noise: all without a trial. The robot with
+light sensors is read, driven, damaged, diagnosed.
+"""
 
 import json
+import re
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -8,13 +14,18 @@ import pytest
 
 from bns import models
 from bns.errors import BnsError, UnknownNameError
-from bns.models import render
+from bns.gap import diagnose
+from bns.gap.bench.light_cases import Wanderer
+from bns.gap.models.wheeled.model import WheeledModel
+from bns.models import check, new, render
 from bns.worlds import registry
 from bns.worlds.light import law as light_law
-from bns.worlds.light import sensors, sight
-from bns.worlds.light.field import Lamp, LightField
+from bns.worlds.light import sensors
+from bns.worlds.light import sensors as light_sensors
+from bns.worlds.light.law import Lamp, LightField
 from bns.worlds.objects import Post, RayScreen
 from bns.worlds.stepwise import look
+from tests.worlds.test_closed_loop import Ahead, Replay, Seek
 
 SENSORS = sensors.of("khepera3")
 BACK = SENSORS.names.index("ir_back")
@@ -106,13 +117,13 @@ def test_flicker_is_a_wave_in_time():
 
 @pytest.fixture(scope="module")
 def rays():
-    return sight.Rays("khepera3")
+    return sensors.Rays("khepera3")
 
 
 def test_the_kept_sight_is_what_rays_find(rays):
     """In random directions; they may differ within the table's steps of an edge."""
     rng, wrong = np.random.default_rng(3), 0
-    kept = sight.kept("khepera3", SENSORS.names)
+    kept = sensors.kept("khepera3", SENSORS.names)
     count = 150
     azimuth = rng.uniform(-np.pi, np.pi, (count, 9))
     height = rng.uniform(0, np.radians(60), (count, 9))
@@ -130,11 +141,11 @@ def test_the_kept_sight_is_what_rays_find(rays):
 
 
 def test_the_kept_sight_is_of_this_model(rays):
-    known = json.loads((models.path("khepera3") / sight.FILE).read_text())
+    known = json.loads((models.path("khepera3") / sensors.FILE).read_text())
     middle, half = known["ir_left_45"][0]
     azimuths = np.radians([middle - half - 2, middle - half + 2, middle, middle + 170])
     free = [rays.free("ir_left_45", azimuth, 0.0) for azimuth in azimuths]
-    assert free == [False, True, True, False], "run python -m bns.worlds.light.sight"
+    assert free == [False, True, True, False], "run python -m bns.worlds.light.sensors"
 
 
 def test_a_bent_sensor_looks_into_the_robots_own_body():
@@ -173,19 +184,13 @@ def test_objects_cast_shadows_as_single_rays_say():
     assert 0.02 < 1 - seen.mean() < 0.5
 
 
-class Ahead:
-    def memory(self, n):
-        return np.zeros((n, 0))
-
-    def act(self, readings, memory):
-        return np.full((len(readings), 2), 0.1), memory
-
-
 def test_a_post_shades_the_robot_and_stops_it():
     start = [[-1.1, 0.0, 0.0]]
     post = {"x": -0.7, "y": 0.0, "radius": 0.05}
     free, shaded = (
-        registry.make("light", posts=posts).drive(Ahead(), cycles=15, starts=start)[0]
+        registry.make("light", posts=posts).drive(Ahead(0.1), cycles=15, starts=start)[
+            0
+        ]
         for posts in ((), (post,))
     )
     assert free.observed[0, 3:].max() < 3500
@@ -203,14 +208,7 @@ def test_open_loop_trials_have_the_readings_as_well():
     speeds = np.array([[0.05, 0.08], [0.1, 0.02], [0.0, 0.0]])
     trial = world.run([Commands(speeds, np.full(3, 0.4))], seeds=[4])[0]
 
-    class Replay(Ahead):
-        def memory(self, n):
-            return np.zeros((n, 1))
-
-        def act(self, readings, memory):
-            return speeds[[int(memory[0, 0])]], memory + 1
-
-    loop = world.drive(Replay(), cycles=3, seeds=[4], starts=[world.start])[0]
+    loop = world.drive(Replay(speeds), cycles=3, seeds=[4], starts=[world.start])[0]
     assert trial.observed.tobytes() == loop.observed.tobytes()
     assert trial.channels == loop.channels
 
@@ -233,7 +231,7 @@ BAD = {
     ),
     "post in the robot": (
         lambda: registry.make("light", posts=[Post(0.8, 0.0)]).drive(
-            Ahead(), starts=[[0.75, 0.0, 0.0]]
+            Ahead(0.1), starts=[[0.75, 0.0, 0.0]]
         ),
         BnsError,
         "stands on start 0",
@@ -286,9 +284,135 @@ def test_bulbs_are_in_the_picture(spec, opengl):
 
 
 def test_no_boundary_where_nobody_watches():
-    from bns.worlds.light.supervisor import Supervisor
+    from bns.worlds.light.closed_loop import Supervisor
 
     world = registry.make("light", supervisor=Supervisor(safety=0))
     names = [geom.name for geom in look.spec(world).geoms]
     assert "bulb_0" in names
     assert not any(name.startswith("boundary") for name in names)
+
+
+@pytest.fixture(scope="module")
+def burger(tmp_path_factory):
+    """A robot with eight light sensors."""
+    return made(tmp_path_factory.mktemp("eight"))
+
+
+@pytest.fixture(scope="module")
+def braitenberg(tmp_path_factory):
+    """The same with two of them."""
+    place = made(tmp_path_factory.mktemp("two"))
+    listed = [f'    "{name}",\n' for name in new.HEADINGS if name[-2:] != "45"]
+    for text in listed:
+        spoil(place, text, "")
+    return place
+
+
+def made(parent: Path) -> str:
+    known = new.Wheeled(
+        wheel_radius=0.033, axle_length=0.16, mass=1, top_speed=0.2, light_sensors=True
+    )
+    new.write(parent / "bug", known)
+    return str(parent / "bug")
+
+
+def spoil(place: str, old: str, instead: str) -> None:
+    file = Path(place) / "robot.toml"
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, instead))
+
+
+def test_two_sensors_are_the_virtual_two(braitenberg):
+    sensors = light_sensors.of(braitenberg)
+    assert sensors.names == ("ir_left_45", "ir_right_45")
+    counts = sensors.counts(LightField(), np.array([[0.8, 0.1, 2.0], [0.4, -0.3, 1.0]]))
+    assert (sensors.virtual(counts) == counts).all()
+    assert len(np.unique(counts)) > 2
+
+
+@pytest.mark.parametrize("robot", ["burger", "braitenberg"])
+def test_it_finds_the_lamp(robot, request):
+    world = registry.make("light", robot=request.getfixturevalue(robot))
+    starts = [[0.9, 0.5, 1.0], [-0.8, 0.4, -2.0]]
+    for trial in world.drive(Seek(), cycles=70, seeds=[1, 2], starts=starts):
+        ways = np.hypot(*trial.poses_world[:, :2].T)
+        assert ways[0] > 0.8
+        assert ways.min() < 0.25
+
+
+def test_numbers_of_its_own_count(burger, tmp_path):
+    place = made(tmp_path)
+    spoil(place, "full_light = 0.86", "full_light = 0.43")
+    spoil(place, "exponent = 4.0", "exponent = 2.0")
+    usual, own = light_sensors.of(burger), light_sensors.of(place)
+    assert (own.full_light, own.exponent, own.count_noise) == (0.43, 2.0, 30.0)
+    assert (usual.full_light, usual.exponent) == (0.86, 4.0)
+
+
+def test_effects_take_the_sensors_that_are_there(braitenberg):
+    told = {"cycles": 3, "seeds": [1], "starts": [[0.8, 0.2, 2.5]]}
+    gain = "sensor_gain:sensor={},factor=0.5"
+    plain, left, single = (
+        registry.make("light", robot=braitenberg, damage=damage).drive(Seek(), **told)
+        for damage in ((), [gain.format("left")], [gain.format("left_45")])
+    )
+    seen = [trial[0].channel("light_left")[0] for trial in (plain, left, single)]
+    assert seen[1] == seen[2] == round(seen[0] / 2)
+    with pytest.raises(BnsError, match="no sensor 'back'; it has left_45, right_45"):
+        registry.make("light", robot=braitenberg, damage=[gain.format("back")])
+
+
+@pytest.mark.parametrize(
+    "old, instead, expected",
+    [
+        ('"ir_left_45",', '"tracker",', "'tracker' is none of"),
+        ('    "ir_left_45",\n', "", "sensor 'ir_right_45' has no twin 'ir_left_45'"),
+        (
+            "full_light = 0.86",
+            "full_light = -1",
+            "full_light = -1.0 is no number above",
+        ),
+        ("exponent = 4.0", "exponents = 4.0", "exponents is none of exponent"),
+        ("[light]", '[light]\nheadings = "thesis"', "headings"),
+    ],
+)
+def test_what_is_wrong_is_said(tmp_path, old, instead, expected):
+    place = made(tmp_path)
+    spoil(place, old, instead)
+    if "headings" not in expected:
+        points = check.check(models.robot(place))
+        found = [text for point in points for text in point.faults]
+        assert any(expected in text for text in found), found
+    with pytest.raises(BnsError, match=expected):
+        registry.make("light", robot=place)
+
+
+def test_a_sensor_that_looks_up_is_refused(tmp_path):
+    place = made(tmp_path)
+    file = Path(place) / "bug.xml"
+    site = r'(<site name="ir_left_45" .* zaxis=)"[^"]*"'
+    text, count = re.subn(site, r'\1"0.7 0.7 0.5"', file.read_text())
+    assert count == 1
+    file.write_text(text)
+    with pytest.raises(BnsError, match="'ir_left_45' looks up or down"):
+        light_sensors.of(place)
+
+
+@pytest.mark.parametrize("robot", ["burger", "braitenberg"])
+def test_a_weak_sensor_is_named(robot, request):
+    place = request.getfixturevalue(robot)
+    world = registry.make(
+        "light",
+        robot=place,
+        reality=[
+            "sensor_gain:sensor=left,factor=0.7",
+            "tracker_noise:position_sd=0.001",
+        ],
+    )
+    roams = Wanderer(np.random.default_rng(3), 3)
+    trials = world.drive(roams, cycles=40, seeds=[1, 2, 3])
+    names = ("wheel_gain[left]", "sensor_gain[left]", "sensor_gain[right]")
+    model = WheeledModel(place)
+    found = diagnose.diagnose(trials, model, rows=names, full=False).verdict
+    assert found.named == (("sensor_gain[left]",),)

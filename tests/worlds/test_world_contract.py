@@ -47,22 +47,23 @@ def of(world: str) -> Kind:
     return KINDS[models.robot(registry.make(world).robot).kind]
 
 
-def _wheel_lists(count: int, seed: int = 0) -> list[Commands]:
-    rng = np.random.default_rng(seed)
-    lengths = rng.integers(1, 7, count)
-    return [
-        Commands(rng.uniform(-0.12, 0.12, (k, 2)), rng.uniform(0.2, 1.5, k))
-        for k in lengths
-    ]
+def _lists(
+    channels: tuple[Channel, ...], most: float, longest: int
+) -> Callable[..., list[Commands]]:
+    """Draws lists of at most so many commands, each up to so large."""
 
+    def drawn(count: int, seed: int = 0) -> list[Commands]:
+        rng = np.random.default_rng(seed)
+        return [
+            Commands(
+                rng.uniform(-most, most, (k, len(channels))),
+                rng.uniform(0.2, 1.5, k),
+                channels,
+            )
+            for k in rng.integers(1, longest + 1, count)
+        ]
 
-def _leg_lists(count: int, seed: int = 0) -> list[Commands]:
-    rng = np.random.default_rng(seed)
-    lengths = rng.integers(1, 5, count)
-    return [
-        Commands(rng.uniform(-0.4, 0.4, (k, 18)), rng.uniform(0.2, 1.5, k), LEGS)
-        for k in lengths
-    ]
+    return drawn
 
 
 def _steps(way: int) -> Commands:
@@ -78,7 +79,7 @@ LEGS = tuple(Channel(*item) for item in models.robot("phantomx").channels)
 KINDS = {
     "wheeled": Kind(
         channels=WHEEL_CHANNELS,
-        lists=_wheel_lists,
+        lists=_lists(WHEEL_CHANNELS, 0.12, 6),
         ahead=lambda way: Commands([[0.1 * way, 0.1 * way]], [1.5]),
         damage="wheel_gain:wheel=left,factor=0.8",
         sides=(
@@ -93,7 +94,7 @@ KINDS = {
     ),
     "legged": Kind(
         channels=LEGS,
-        lists=_leg_lists,
+        lists=_lists(LEGS, 0.4, 4),
         ahead=_steps,
         damage="leg_raised:legs=5,blend=1",
         sides=("leg_raised:legs=5,blend=1", "leg_raised:legs=6,blend=1"),

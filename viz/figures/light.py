@@ -9,7 +9,7 @@ from bns.tasks.base import BOARD
 from bns.viz import scene, style
 from bns.viz.choices import choose, typical
 from bns.viz.paths import listed
-from bns.worlds.light.field import LightField
+from bns.worlds.light.law import LightField
 from bns.worlds.light.sensors import LightSensors
 
 if TYPE_CHECKING:

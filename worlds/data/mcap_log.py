@@ -38,7 +38,7 @@ def samples(
         for name, text in columns.items()
         if text not in STAMPS or name == clock
     }
-    logs = _messages(path, {topic for topic, _ in places.values()})
+    logs = messages(path, {topic for topic, _ in places.values()})
     moments = np.array([stamps[0] for stamps, _ in logs[places[clock][0]]], float)
     arrays = {}
     for name, text in columns.items():
@@ -74,23 +74,21 @@ def _place(name: str, text: str) -> tuple[str, tuple[str, ...]]:
     return topic, tuple(field.split("."))
 
 
-def _messages(path: Path, topics: set[str]) -> dict[str, list]:
-    """Per topic, in order of log time: ((log time, publish time) [ns], message)."""
-    try:
-        from mcap.exceptions import McapError
-        from mcap.reader import make_reader
-    except ImportError:
-        raise MissingDependencyError(
-            "Reading MCAP logs", "the package mcap", install("mcap")
-        ) from None
-    found: dict[str, list] = {topic: [] for topic in topics}
+def messages(path: Path, wanted: set[str]) -> dict[str, list]:
+    """Per topic, in order of log time: ((log time, publish time) [ns], message).
+
+    Raises:
+        MissingDependencyError: the package `mcap`, or what decodes its messages.
+        FormatError: no such file, no MCAP, or a topic without messages.
+    """
+    make_reader, broken = _mcap()
+    found: dict[str, list] = {topic: [] for topic in wanted}
     decoders: dict[int, Callable[[bytes], Any]] = {}
-    broken: tuple[type[Exception], ...] = (*_broken(), McapError)
     try:
         with reading.regular(path) as file:
             reader = make_reader(file, validate_crcs=True)
             _small(reader.get_summary(), path)
-            log = reader.iter_messages(topics=sorted(topics))
+            log = reader.iter_messages(topics=sorted(wanted))
             for schema, channel, message in log:
                 if channel.id not in decoders:
                     decoders[channel.id] = _decoder(schema, channel)
@@ -101,20 +99,31 @@ def _messages(path: Path, topics: set[str]) -> dict[str, list]:
         raise
     except broken as error:
         raise FormatError(f"{path} cannot be read as MCAP: {error}.") from error
-    for topic, messages in found.items():
-        if not messages:
+    for topic, heard in found.items():
+        if not heard:
             raise FormatError(f"{path} has no message on the topic {topic!r}.")
     return found
 
 
-def _broken() -> tuple[type[Exception], ...]:
-    """What damaged records, and chunks in their compressions, raise."""
-    broken = (*reading.UNREADABLE, struct.error)
+def _mcap() -> tuple[Callable[..., Any], tuple[type[Exception], ...]]:
+    """What reads a log; what damaged records, and chunks in their compressions, raise.
+
+    Raises:
+        MissingDependencyError: the package `mcap`.
+    """
+    try:
+        from mcap.exceptions import McapError
+        from mcap.reader import make_reader
+    except ImportError:
+        raise MissingDependencyError(
+            "Reading MCAP logs", "the package mcap", install("mcap")
+        ) from None
+    broken = (*reading.UNREADABLE, struct.error, McapError)
     try:
         from zstandard import ZstdError
     except ImportError:
-        return broken
-    return (*broken, ZstdError)
+        return make_reader, broken
+    return make_reader, (*broken, ZstdError)
 
 
 def _small(summary: Any, path: Path) -> None:
@@ -180,14 +189,7 @@ def topics(path: Path) -> dict[str, str]:
         MissingDependencyError: the package `mcap`.
         FormatError: no such file, or no MCAP.
     """
-    try:
-        from mcap.exceptions import McapError
-        from mcap.reader import make_reader
-    except ImportError:
-        raise MissingDependencyError(
-            "Reading MCAP logs", "the package mcap", install("mcap")
-        ) from None
-    broken: tuple[type[Exception], ...] = (*_broken(), McapError)
+    make_reader, broken = _mcap()
     try:
         with reading.regular(path) as file:
             found = make_reader(file, validate_crcs=True).get_summary()
@@ -199,13 +201,3 @@ def topics(path: Path) -> dict[str, str]:
         raise FormatError(f"{path} has no summary: mend it with `mcap recover`.")
     names = {number: schema.name for number, schema in found.schemas.items()}
     return {c.topic: names.get(c.schema_id, "") for c in found.channels.values()}
-
-
-def messages(path: Path, wanted: set[str]) -> dict[str, list]:
-    """Per topic, in order of log time: ((log time, publish time) [ns], message).
-
-    Raises:
-        MissingDependencyError: the package `mcap`, or what decodes its messages.
-        FormatError: no such file, no MCAP, or a topic without messages.
-    """
-    return _messages(path, wanted)

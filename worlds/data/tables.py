@@ -41,12 +41,10 @@ def of_samples(
         replicates: number of the replicate of each.
         numbers: number of each trial in its replicate.
     """
-    counts = [len(trial.times) for trial in trials]
     observed = np.concatenate([trial.observed for trial in trials])
     names = [channel.name for channel in trials[0].channels]
     return {
-        "replicate": np.repeat(np.asarray(replicates, np.int64), counts),
-        "trial": np.repeat(np.asarray(numbers, np.int64), counts),
+        **_keys(replicates, numbers, [len(trial.times) for trial in trials]),
         "time": np.concatenate([trial.times for trial in trials]),
         **{name: observed[:, index] for index, name in enumerate(names)},
     }
@@ -62,16 +60,24 @@ def of_commands(
         replicates: number of the replicate of each.
         numbers: number of each trial in its replicate.
     """
-    counts = [len(trial.commands) for trial in trials]
     values = np.concatenate([trial.commands.values for trial in trials])
     names = [channel.name for channel in trials[0].commands.channels]
     return {
-        "replicate": np.repeat(np.asarray(replicates, np.int64), counts),
-        "trial": np.repeat(np.asarray(numbers, np.int64), counts),
+        **_keys(replicates, numbers, [len(trial.commands) for trial in trials]),
         "first": np.concatenate([trial.boundaries[:-1] for trial in trials]),
         "last": np.concatenate([trial.boundaries[1:] for trial in trials]),
         "duration": np.concatenate([trial.commands.durations for trial in trials]),
         **{name: values[:, index] for index, name in enumerate(names)},
+    }
+
+
+def _keys(
+    replicates: Sequence[int], numbers: Sequence[int], counts: Sequence[int]
+) -> Table:
+    """Replicate and trial of each row, of which each trial has so many."""
+    return {
+        "replicate": np.repeat(np.asarray(replicates, np.int64), counts),
+        "trial": np.repeat(np.asarray(numbers, np.int64), counts),
     }
 
 

@@ -23,7 +23,7 @@ from numpy.random import Generator
 
 from bns.errors import BnsError, UnknownNameError
 from bns.worlds.effects.leg_sets import SERVO, chosen
-from bns.worlds.effects.parameter import Choice, Parameter, factor, strength
+from bns.worlds.effects.parameter import Choice, Parameter, factor, place, strength
 from bns.worlds.physics.servo_law import clipped
 
 __all__ = [
@@ -41,6 +41,7 @@ __all__ = [
     "ServoEffect",
     "TrackingEffect",
     "factor",
+    "place",
     "strength",
 ]
 
@@ -90,8 +91,9 @@ class PoseSignal:
 class Effect(ABC):
     """One departure from the nominal model, with its parameter values.
 
-    Subclasses say what they are in class variables; they add no `__init__`. The first
-    line of a subclass's docstring is its `doc`, unless it gives another.
+    Subclasses say what they are in class variables; they add no `__init__`. One with a
+    single parameter gives it as `parameter`, others give `parameters`. The first line
+    of a subclass's docstring is its `doc`, unless it gives another.
 
     Args:
         values: parameter and choice values by name; missing ones take the
@@ -105,6 +107,7 @@ class Effect(ABC):
     name: ClassVar[str]
     stage: ClassVar[str]
     doc: ClassVar[str]  # one line: what departs from nominal
+    parameter: ClassVar[Parameter]  # the only one, where there is one
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     choices: ClassVar[tuple[Choice, ...]] = ()
     robots: ClassVar[tuple[str, ...]] = ("wheeled",)  # kinds it makes sense for
@@ -113,6 +116,8 @@ class Effect(ABC):
 
     def __init_subclass__(cls, **words: Any) -> None:
         super().__init_subclass__(**words)
+        if "parameter" in cls.__dict__:
+            cls.parameters = (cls.parameter,)
         if "doc" not in cls.__dict__ and cls.__doc__:
             first = cls.__doc__.partition("\n")[0]
             cls.doc = first[:1].lower() + first[1:].removesuffix(".")
@@ -284,20 +289,20 @@ class ServoEffect(Effect):
 
     def change(self, law: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """The law after the effect: every number by name, arrays of any shape."""
-        (parameter,) = self.parameters
-        before, strength = law[self.number], self[parameter.name]
-        after = before * strength if parameter.nominal == 1 else before + strength
+        before, strength = law[self.number], self[self.parameter.name]
+        scaled = self.parameter.nominal == 1
+        after = before * strength if scaled else before + strength
         return {**law, self.number: clipped(self.number, after)}
 
     def edit(self, spec: Any) -> None:
         """Write the effect into the chosen servos of a walking robot's `MjSpec`."""
-        from bns.worlds.physics import servo_joint
+        from bns.worlds.physics import servo_law
 
         if self.is_nominal:
             return
         for actuator in chosen(spec, self["servo"]):
-            law, powered = servo_joint.read(actuator)
-            servo_joint.write(spec, actuator, self.change(law), powered)
+            law, powered = servo_law.read(actuator)
+            servo_law.write(spec, actuator, self.change(law), powered)
 
 
 ModelEdit: TypeAlias = BodyEffect | ServoEffect

@@ -17,23 +17,21 @@ from bns.worlds.effects.base import (
     factor,
     strength,
 )
-from bns.worlds.effects.common import lagged
+from bns.worlds.effects.command import lagged
 from bns.worlds.effects.parts import ANY, WIDE
 
 
 def _number(
     name: str, unit: str, nominal: float, doc: str, example: float, low: float = 0.0
-) -> tuple[Parameter, ...]:
-    return (
-        Parameter(
-            name,
-            unit=unit,
-            nominal=nominal,
-            low=low,
-            high=WIDE,
-            doc=doc,
-            example=example,
-        ),
+) -> Parameter:
+    return Parameter(
+        name,
+        unit=unit,
+        nominal=nominal,
+        low=low,
+        high=WIDE,
+        doc=doc,
+        example=example,
     )
 
 
@@ -59,7 +57,7 @@ class CommandDelay(_Command):
     """Commands reach the actuators late."""
 
     name = "command_delay"
-    parameters = _number(
+    parameter = _number(
         "delay", "s", 0.0, "from command to actuator; negative: early", 0.2, -WIDE
     )
 
@@ -73,7 +71,7 @@ class CommandLag(_Command):
     """Commands are followed gradually."""
 
     name = "command_lag"
-    parameters = _number("time_constant", "s", 0.0, "of a first-order lag", 0.2)
+    parameter = _number("time_constant", "s", 0.0, "of a first-order lag", 0.2)
 
     def change(self, told: np.ndarray, dt: float) -> np.ndarray:
         """The signal through a first-order filter, ``(S,)``."""
@@ -85,7 +83,7 @@ class CommandGain(_Command):
 
     name = "command_gain"
     memoryless = True
-    parameters = _number("factor", "1", 1.0, "what arrives over what was told", 0.8)
+    parameter = _number("factor", "1", 1.0, "what arrives over what was told", 0.8)
 
     def change(self, told: np.ndarray, dt: float) -> np.ndarray:
         """The signal scaled, ``(S,)``."""
@@ -97,7 +95,7 @@ class CommandOffset(_Command):
 
     name = "command_offset"
     memoryless = True
-    parameters = _number(
+    parameter = _number(
         "added", "unit of the command", 0.0, "added to the command", 0.05, -WIDE
     )
 
@@ -111,7 +109,7 @@ class CommandDeadZone(_Command):
 
     name = "command_dead_zone"
     memoryless = True
-    parameters = _number(
+    parameter = _number(
         "size", "unit of the command", 0.0, "largest magnitude of no effect", 0.05
     )
 
@@ -125,7 +123,7 @@ class CommandLimit(_Command):
 
     name = "command_limit"
     memoryless = True
-    parameters = _number(
+    parameter = _number(
         "limit", "unit of the command", WIDE, "largest magnitude; 1e9 is none", 0.06
     )
 
@@ -144,7 +142,7 @@ class CommandRate(_Command):
     """A command changes no faster than a limit: a servo's speed limit."""
 
     name = "command_rate"
-    parameters = _number(
+    parameter = _number(
         "time_per_unit",
         "s per unit of the command",
         0.0,
@@ -195,7 +193,7 @@ class ReadingGain(_Reading):
     """The readings of any sensor are scaled."""
 
     name = "reading_gain"
-    parameters = (factor((0.0, WIDE), "reading over the true value", example=0.8),)
+    parameter = factor((0.0, WIDE), "reading over the true value", example=0.8)
 
     def change(self, times: np.ndarray, readings: np.ndarray) -> np.ndarray:
         """The readings scaled, ``(T,)``."""
@@ -206,14 +204,12 @@ class ReadingOffset(_Reading):
     """The readings of any sensor are shifted by a constant."""
 
     name = "reading_offset"
-    parameters = (
-        strength(
-            "added",
-            "unit of the reading",
-            (-WIDE, WIDE),
-            "added to the reading",
-            example=0.1,
-        ),
+    parameter = strength(
+        "added",
+        "unit of the reading",
+        (-WIDE, WIDE),
+        "added to the reading",
+        example=0.1,
     )
 
     def change(self, times: np.ndarray, readings: np.ndarray) -> np.ndarray:
@@ -225,9 +221,7 @@ class ReadingDelay(_Reading):
     """The readings of any sensor are older than their time stamps."""
 
     name = "reading_delay"
-    parameters = (
-        strength("delay", "s", (-WIDE, WIDE), "age of a reading", example=0.5),
-    )
+    parameter = strength("delay", "s", (-WIDE, WIDE), "age of a reading", example=0.5)
 
     def change(self, times: np.ndarray, readings: np.ndarray) -> np.ndarray:
         """The readings shifted in time, ``(T,)``."""

@@ -1,6 +1,10 @@
-"""What wheels are told: gains, dead bands, limits, and wheels that are stuck."""
+"""What wheels are told: gains, dead bands, limits, and wheels that are stuck.
+
+What effects on signals share is here too: wheel columns, spans of time, lags.
+"""
 
 from abc import abstractmethod
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -9,18 +13,67 @@ from bns.worlds.effects.base import (
     Choice,
     CommandEffect,
     ControlSignal,
+    Effect,
     Parameter,
     factor,
+    place,
     strength,
 )
-from bns.worlds.effects.common import (
-    MAXIMUM_SPEED,
-    MINIMUM_SPEED,
-    TOP_SPEED,
-    WHEEL,
-    columns,
-    rarer,
-)
+
+# [m/s per speed unit] Khepera III manual 2.2, p. 14 (firmware < 3): 144.01 units
+# to the mm/s.
+SPEED_UNIT = 1e-3 / 144.01
+# [m/s] Same page: largest speed in open loop, 48,000 units.
+TOP_SPEED = 0.3334  # 48,000 units are 0.33331 m/s
+# [m/s] Smallest speed that the lab's controllers use, 8,000 units; below it a speed
+# gene means stop.
+MINIMUM_SPEED = round(8000 * SPEED_UNIT, 6)
+# [m/s] Largest speed that the lab's controllers use, 17,500 units.
+MAXIMUM_SPEED = round(17500 * SPEED_UNIT, 6)
+
+WHEEL = Choice("wheel", ("left", "right", "both"), "both", "which wheel is affected")
+
+
+def columns(effect: Effect, signal: ControlSignal) -> list[int]:
+    """Columns of the signal that the effect's choice `wheel` names."""
+    return [signal.column(f"{wheel}_speed") for wheel in effect.wheels()]
+
+
+def spans(active: np.ndarray) -> Iterator[slice]:
+    """Contiguous stretches where `active`, ``(T,)``, is true, as slices in order."""
+    edges = np.flatnonzero(np.diff(active.astype(np.int8), prepend=0, append=0))
+    for start, stop in edges.reshape(-1, 2):
+        yield slice(int(start), int(stop))
+
+
+def rarer(effect: Effect, severity: float) -> int:
+    """The parameter `every` at a severity: half of it hits half as often; 0 = never."""
+    every = int(effect["every"])
+    if severity <= 0 or every <= 0:
+        return 0
+    every = round(every / severity)
+    return every if every <= effect.parameters[0].high else 0
+
+
+def lagged(
+    told: np.ndarray, before: float, time_constant: float, dt: float
+) -> np.ndarray:
+    """What follows a signal as a first-order lag, its mean over each step, ``(S,)``.
+
+    Solved exactly for values that are constant over a step. The mean is late by the
+    time constant at any step; the value at a step's end would be early by half a step.
+
+    Args:
+        told: values, ``(S,)``.
+        before: value that was followed until then.
+        time_constant: [s], positive.
+        dt: step [s].
+    """
+    from scipy.signal import lfilter
+
+    keep = np.exp(-dt / time_constant)
+    begun = lfilter([0.0, 1 - keep], [1.0, -keep], told, zi=[before])[0]
+    return told + (begun - told) * (1 - keep) * time_constant / dt
 
 
 class _EachCommand(CommandEffect):
@@ -44,10 +97,8 @@ class WheelGain(_EachCommand):
 
     name = "wheel_gain"
     source = "thesis 4.2.3 and 6.2.1: a wheel slowed to a share of its intended speed"
-    parameters = (
-        factor(
-            (0.0, 2.0), "speed reached over speed told; bounds assumed", example=0.8
-        ),
+    parameter = factor(
+        (0.0, 2.0), "speed reached over speed told; bounds assumed", example=0.8
     )
 
     def _turned(self, told: np.ndarray) -> np.ndarray:
@@ -59,14 +110,12 @@ class DeadBand(_EachCommand):
 
     name = "dead_band"
     source = "regulated minimum 2,000 units (13.9 mm/s): Khepera III manual 2.2 p. 14"
-    parameters = (
-        strength(
-            "speed",
-            "m/s",
-            (0.0, 0.2),
-            "smallest magnitude that still moves the wheel; bounds assumed",
-            example=0.08,
-        ),
+    parameter = strength(
+        "speed",
+        "m/s",
+        (0.0, 0.2),
+        "smallest magnitude that still moves the wheel; bounds assumed",
+        example=0.08,
     )
 
     def _turned(self, told: np.ndarray) -> np.ndarray:
@@ -78,14 +127,12 @@ class DeadZone(_EachCommand):
 
     name = "dead_zone"
     source = "the dead zone of control engineering; bounds assumed"
-    parameters = (
-        strength(
-            "speed",
-            "m/s",
-            (0.0, 0.2),
-            "taken off every speed; bounds assumed",
-            example=0.02,
-        ),
+    parameter = strength(
+        "speed",
+        "m/s",
+        (0.0, 0.2),
+        "taken off every speed; bounds assumed",
+        example=0.02,
     )
 
     def _turned(self, told: np.ndarray) -> np.ndarray:
@@ -97,16 +144,14 @@ class SpeedSaturation(_EachCommand):
 
     name = "speed_saturation"
     source = "limits of 48,000 and 43,000 units: Khepera III manual 2.2 p. 14"
-    parameters = (
-        Parameter(
-            "limit",
-            unit="m/s",
-            nominal=TOP_SPEED,
-            low=0.0,
-            high=TOP_SPEED,
-            doc="largest magnitude; the nominal is the limit of the drive",
-            example=0.06,
-        ),
+    parameter = Parameter(
+        "limit",
+        unit="m/s",
+        nominal=TOP_SPEED,
+        low=0.0,
+        high=TOP_SPEED,
+        doc="largest magnitude; the nominal is the limit of the drive",
+        example=0.06,
     )
 
     def _turned(self, told: np.ndarray) -> np.ndarray:
@@ -121,13 +166,11 @@ class WheelIntermittent(CommandEffect):
     memoryless = True
     choices = (WHEEL,)
     parameters = (
-        Parameter(
+        strength(
             "every",
-            unit="1",
-            nominal=0,
-            low=0,
-            high=1000,
-            doc="m: commands m, 2m, ... of a trial are hit; 0 = never; bounds assumed",
+            "1",
+            (0, 1000),
+            "m: commands m, 2m, ... of a trial are hit; 0 = never; bounds assumed",
             example=3,
             integer=True,
         ),
@@ -171,16 +214,7 @@ BLEND = strength(
 
 def stuck_speed(nominal: float, doc: str) -> Parameter:
     """The parameter for the speed at which a wheel is stuck [m/s]."""
-    return Parameter(
-        "speed",
-        unit="m/s",
-        nominal=nominal,
-        low=0.0,
-        high=TOP_SPEED,
-        doc=doc,
-        example=nominal,
-        scales=False,
-    )
+    return place("speed", "m/s", nominal, (0.0, TOP_SPEED), doc)
 
 
 class StuckWheel(CommandEffect):
@@ -237,8 +271,8 @@ class CommandLatency(CommandEffect):
     name = "command_latency"
     source = "0.2 s fits the MRCLAM 6 robots best; bounds assumed"
     robots = ("wheeled", "legged")
-    parameters = (
-        strength("delay", "s", (0.0, 2.0), "time from command to motor", example=0.2),
+    parameter = strength(
+        "delay", "s", (0.0, 2.0), "time from command to motor", example=0.2
     )
 
     def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
@@ -272,14 +306,12 @@ class TurningLoss(CommandEffect):
     source = "seen of iRobot Creates (MRCLAM data sets); bounds assumed"
     robots = ("own",)
     memoryless = True
-    parameters = (
-        strength(
-            "loss",
-            "m",
-            (0.0, 0.5),
-            "forward speed lost over turning rate told",
-            example=0.05,
-        ),
+    parameter = strength(
+        "loss",
+        "m",
+        (0.0, 0.5),
+        "forward speed lost over turning rate told",
+        example=0.05,
     )
 
     def _change(self, signal: ControlSignal, active: np.ndarray) -> None:

@@ -66,11 +66,6 @@ def subsets(fewest: int = 1, most: int = 4) -> tuple[tuple[int, ...], ...]:
     return tuple(found)
 
 
-def name(legs: Iterable[int]) -> str:
-    """A set of legs by name, ``left_front+left_middle``."""
-    return "+".join(LEGS[leg - 1] for leg in sorted(set(legs)))
-
-
 def read(given: str) -> tuple[int, ...]:
     """A set of legs from text, in order; "all" are all of them.
 

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from bns.models.legs import LEGS, PARTS, parts
-from bns.worlds.effects import bodies
+from bns.models import legs
+from bns.models.legs import LEGS, PARTS
 from bns.worlds.effects.base import (
     BodyEffect,
     Choice,
@@ -16,8 +16,8 @@ from bns.worlds.effects.base import (
 )
 from bns.worlds.effects.leg_sets import JOINT, LEG_SET, LEGS_OR_ALL, chosen, read, shins
 from bns.worlds.effects.leg_sets import bodies as leg_bodies
-from bns.worlds.effects.parts import loosen
-from bns.worlds.physics import servo_joint
+from bns.worlds.effects.parts import contact_geoms, loosen
+from bns.worlds.physics import servo_law
 
 
 class JointWeak(BodyEffect):
@@ -27,13 +27,13 @@ class JointWeak(BodyEffect):
     source = "worn motor or gears; bounds assumed"
     robots = ("legged",)
     choices = (JOINT,)
-    parameters = (factor((0.02, 1.0), "torque left over torque before", example=0.4),)
+    parameter = factor((0.02, 1.0), "torque left over torque before", example=0.4)
 
     def _write(self, spec: Any) -> None:
         for actuator in chosen(spec, self["joint"]):
-            law, powered = servo_joint.read(actuator)
+            law, powered = servo_law.read(actuator)
             weak = {name: law[name] * self["factor"] for name in ("gain", "duty_limit")}
-            servo_joint.write(spec, actuator, {**law, **weak}, powered)
+            servo_law.write(spec, actuator, {**law, **weak}, powered)
 
 
 SLACK = 1e-4  # [rad] by which the stops stay apart, as MuJoCo needs
@@ -92,7 +92,7 @@ class LooseHorn(BodyEffect):
     robots = ("legged",)
     choices = (JOINT,)
     resizes = True
-    parameters = (strength("angle", "rad", (0.0, 0.6), "full play", example=0.15),)
+    parameter = strength("angle", "rad", (0.0, 0.6), "full play", example=0.15)
 
     def _write(self, spec: Any) -> None:
         joint = spec.joint(self["joint"])
@@ -109,7 +109,7 @@ class LinkLength(BodyEffect):
     source = "sources give tibias of 130 to 140 mm (numbers.toml); bounds assumed"
     robots = ("legged",)
     choices = (PART, LEGS_OR_ALL)
-    parameters = (factor((0.8, 1.25), "length over the model's", example=1.08),)
+    parameter = factor((0.8, 1.25), "length over the model's", example=1.08)
 
     def _write(self, spec: Any) -> None:
         factor = self["factor"]
@@ -129,13 +129,13 @@ class FootSlippery(BodyEffect):
     source = "a worn or lost rubber tip; bounds assumed"
     robots = ("legged",)
     choices = (LEGS_OR_ALL,)
-    parameters = (
-        factor((0.02, 2.0), "friction coefficient over the model's", example=0.2),
+    parameter = factor(
+        (0.02, 2.0), "friction coefficient over the model's", example=0.2
     )
 
     def _write(self, spec: Any) -> None:
         for body in shins(spec, self["legs"]):
-            for geom in bodies.contact_geoms(body):
+            for geom in contact_geoms(body):
                 geom.friction[0] *= self["factor"]
 
 
@@ -150,10 +150,8 @@ class LegMissing(BodyEffect):
     robots = ("legged",)
     choices = (LEG_SET,)
     resizes = True  # its pairs of geoms go
-    parameters = (
-        strength(
-            "loss", "1", (0.0, 1.0), "whether it is off", example=1.0, integer=True
-        ),
+    parameter = strength(
+        "loss", "1", (0.0, 1.0), "whether it is off", example=1.0, integer=True
     )
 
     def _write(self, spec: Any) -> None:
@@ -162,7 +160,7 @@ class LegMissing(BodyEffect):
             for body in leg_bodies(spec, self["legs"], part):
                 body.mass *= LEFT
                 body.inertia = [LEFT * value for value in body.inertia]
-                for geom in bodies.contact_geoms(body):
+                for geom in contact_geoms(body):
                     geom.contype, geom.conaffinity = 0, 0
                     gone.add(geom.name)
         for pair in list(spec.pairs):
@@ -181,18 +179,16 @@ class LegLimp(BodyEffect):
     source = "an unpowered bridge is open; friction of the gears stays"
     robots = ("legged",)
     choices = (LEG_SET,)
-    parameters = (
-        strength(
-            "loss", "1", (0.0, 1.0), "share of the motor that is off", example=1.0
-        ),
+    parameter = strength(
+        "loss", "1", (0.0, 1.0), "share of the motor that is off", example=1.0
     )
 
     def _write(self, spec: Any) -> None:
         for leg in read(self["legs"]):
             for actuator in chosen(spec, LEGS[leg - 1]):
-                law, powered = servo_joint.read(actuator)
+                law, powered = servo_law.read(actuator)
                 powered *= 1.0 - self["loss"]
-                servo_joint.write(spec, actuator, law, powered)
+                servo_law.write(spec, actuator, law, powered)
 
     def lost(self) -> frozenset[int]:
         """See `Effect.lost`."""
@@ -209,20 +205,18 @@ class LegRaised(CommandEffect):
     source = "thesis 7.2.2: commands altered to raise the leg; the pose is assumed"
     robots = ("legged",)
     choices = (LEG_SET,)
-    parameters = (
-        strength(
-            "blend",
-            "1",
-            (0.0, 1.0),
-            "from the pose told (0) to the raised pose (1)",
-            example=1.0,
-        ),
+    parameter = strength(
+        "blend",
+        "1",
+        (0.0, 1.0),
+        "from the pose told (0) to the raised pose (1)",
+        example=1.0,
     )
 
     def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
         values = signal.values
         for leg in read(self["legs"]):
-            for part in parts(signal.channels):
+            for part in legs.parts(signal.channels):
                 column = signal.column(f"{LEGS[leg - 1]}_{part}")
                 told = values[active, column]
                 values[active, column] += self["blend"] * (RAISED[part] - told)

@@ -1,11 +1,10 @@
 """The light law: lamps, the light of the room, and sensors dead, bent or noisy."""
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from bns.worlds.effects.base import OpticsEffect, Parameter, factor, strength
+from bns.worlds.effects.base import OpticsEffect, factor, place, strength
 from bns.worlds.effects.sensors import SENSOR, columns
+from bns.worlds.light.law import Law
 
 
 class LightAmbient(OpticsEffect):
@@ -13,19 +12,11 @@ class LightAmbient(OpticsEffect):
 
     name = "light_ambient"
     source = "assumed: a window or the room's lamps"
-    parameters = (
-        strength(
-            "added",
-            "W/m2",
-            (0.0, 100.0),
-            "irradiance added; bounds assumed",
-            example=0.3,
-        ),
+    parameter = strength(
+        "added", "W/m2", (0.0, 100.0), "irradiance added; bounds assumed", example=0.3
     )
 
-    def change(
-        self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
+    def change(self, law: Law, sensors: tuple[str, ...]) -> dict[str, np.ndarray]:
         """See `OpticsEffect.change`."""
         return {**law, "ambient": law["ambient"] + self["added"]}
 
@@ -35,15 +26,11 @@ class LightDimmed(OpticsEffect):
 
     name = "light_dimmed"
     source = "assumed: a lamp that ages or a low supply"
-    parameters = (
-        factor(
-            (0.0, 10.0), "power after over power before; bounds assumed", example=0.5
-        ),
+    parameter = factor(
+        (0.0, 10.0), "power after over power before; bounds assumed", example=0.5
     )
 
-    def change(
-        self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
+    def change(self, law: Law, sensors: tuple[str, ...]) -> dict[str, np.ndarray]:
         """See `OpticsEffect.change`."""
         return {**law, "lamp_power": law["lamp_power"] * self["factor"]}
 
@@ -58,9 +45,7 @@ class LightDisplaced(OpticsEffect):
         strength("y", "m", (-3.0, 3.0), "shift along y; bounds assumed", example=-0.1),
     )
 
-    def change(
-        self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
+    def change(self, law: Law, sensors: tuple[str, ...]) -> dict[str, np.ndarray]:
         """See `OpticsEffect.change`."""
         shift = np.array([self["x"], self["y"], 0.0])
         return {**law, "lamp_position": law["lamp_position"] + shift}
@@ -73,21 +58,12 @@ class LightFlicker(OpticsEffect):
     source = "assumed: a lamp on mains, or a loose contact"
     parameters = (
         strength("depth", "1", (0.0, 1.0), "share of the power that goes", example=0.5),
-        Parameter(
-            "frequency",
-            unit="Hz",
-            nominal=1.3,
-            low=0.001,
-            high=1000.0,
-            doc="of the flicker; bounds assumed",
-            example=1.3,
-            scales=False,
+        place(
+            "frequency", "Hz", 1.3, (0.001, 1000.0), "of the flicker; bounds assumed"
         ),
     )
 
-    def change(
-        self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
+    def change(self, law: Law, sensors: tuple[str, ...]) -> dict[str, np.ndarray]:
         """See `OpticsEffect.change`."""
         lamps = np.ones_like(law["lamp_power"])
         if self.is_nominal:
@@ -116,21 +92,10 @@ class LightShadow(OpticsEffect):
             example=0.0,
             scales=False,
         ),
-        Parameter(
-            "width",
-            unit="rad",
-            nominal=1.0,
-            low=0.001,
-            high=6.2832,
-            doc="of the sector; up to a full turn",
-            example=1.0,
-            scales=False,
-        ),
+        place("width", "rad", 1.0, (0.001, 6.2832), "of the sector; up to a full turn"),
     )
 
-    def change(
-        self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
+    def change(self, law: Law, sensors: tuple[str, ...]) -> dict[str, np.ndarray]:
         """See `OpticsEffect.change`."""
         if self.is_nominal:
             return dict(law)
@@ -148,19 +113,15 @@ class SensorDead(OpticsEffect):
     name = "sensor_dead"
     source = "assumed: a covered, dirty or broken phototransistor"
     choices = (SENSOR,)
-    parameters = (
-        strength(
-            "loss",
-            "1",
-            (0.0, 1.0),
-            "share of its light that is lost; 1 = dead",
-            example=1.0,
-        ),
+    parameter = strength(
+        "loss",
+        "1",
+        (0.0, 1.0),
+        "share of its light that is lost; 1 = dead",
+        example=1.0,
     )
 
-    def change(
-        self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
+    def change(self, law: Law, sensors: tuple[str, ...]) -> dict[str, np.ndarray]:
         """See `OpticsEffect.change`."""
         gain = law["sensitivity"].copy()
         gain[columns(self, sensors)] *= 1 - self["loss"]
@@ -173,19 +134,15 @@ class SensorMisaligned(OpticsEffect):
     name = "sensor_misaligned"
     source = "assumed: a bent sensor"
     choices = (SENSOR,)
-    parameters = (
-        strength(
-            "angle",
-            "rad",
-            (-3.2, 3.2),
-            "added to its heading, counter-clockwise; half a turn",
-            example=0.5,
-        ),
+    parameter = strength(
+        "angle",
+        "rad",
+        (-3.2, 3.2),
+        "added to its heading, counter-clockwise; half a turn",
+        example=0.5,
     )
 
-    def change(
-        self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
+    def change(self, law: Law, sensors: tuple[str, ...]) -> dict[str, np.ndarray]:
         """See `OpticsEffect.change`."""
         heading = law["heading"].copy()
         heading[columns(self, sensors)] += self["angle"]
@@ -198,15 +155,11 @@ class SensorNoise(OpticsEffect):
     name = "sensor_noise"
     source = "thesis 6.2.1, 6.3.1: the noise found is doubled; what was found is silent"
     choices = (SENSOR,)
-    parameters = (
-        factor(
-            (0.0, 20.0), "noise after over noise before; bounds assumed", example=2.0
-        ),
+    parameter = factor(
+        (0.0, 20.0), "noise after over noise before; bounds assumed", example=2.0
     )
 
-    def change(
-        self, law: Mapping[str, np.ndarray], sensors: tuple[str, ...]
-    ) -> dict[str, np.ndarray]:
+    def change(self, law: Law, sensors: tuple[str, ...]) -> dict[str, np.ndarray]:
         """See `OpticsEffect.change`."""
         noise = law["noise"].copy()
         noise[columns(self, sensors)] *= self["factor"]

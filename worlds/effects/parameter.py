@@ -85,6 +85,18 @@ def strength(
     return Parameter(name, unit, 0.0, *bounds, doc, example, integer, scales)
 
 
+def place(
+    name: str, unit: str, nominal: float, bounds: tuple[float, float], doc: str
+) -> Parameter:
+    """A number that says where or how and not how strongly: no severity scales it.
+
+    Args:
+        bounds: inclusive.
+        name, unit, nominal, doc: see `Parameter`.
+    """
+    return Parameter(name, unit, nominal, *bounds, doc, nominal, scales=False)
+
+
 @dataclass(frozen=True)
 class Choice:
     """A setting with named alternatives (`wheel` = left, right, both).

@@ -1,6 +1,7 @@
 """Readings of light sensors: changed one by one, or by those before."""
 
 from abc import abstractmethod
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,9 +12,10 @@ from bns.worlds.effects.base import (
     Parameter,
     SensorEffect,
     factor,
+    place,
     strength,
 )
-from bns.worlds.effects.common import rarer, spans
+from bns.worlds.effects.command import rarer, spans
 
 # [count] 12 bits; the dissertation writes 4200, the maker's test program scales by 4096
 FULL_SCALE = 4095.0
@@ -44,6 +46,32 @@ def limited(readings: np.ndarray) -> np.ndarray:
     return np.clip(readings, 0.0, FULL_SCALE)
 
 
+class Stretch(NamedTuple):
+    """Readings, and the stretch of time in which an effect is on.
+
+    Attributes:
+        times: of all readings [s], ``(T,)``.
+        readings: of all sensors, ``(T, S)`` [counts].
+        span: the stretch.
+        which: columns of the chosen sensors.
+    """
+
+    times: np.ndarray
+    readings: np.ndarray
+    span: slice
+    which: list[int]
+
+    @property
+    def chosen(self) -> np.ndarray:
+        """What the chosen sensors read in it, ``(P, W)`` [counts]."""
+        return self.readings[self.span, self.which]
+
+    @property
+    def before(self) -> int:
+        """The last reading before it, or the first of all."""
+        return max(self.span.start - 1, 0)
+
+
 class ReadingEffect(SensorEffect):
     """What the chosen sensors read is computed from readings, without chance."""
 
@@ -62,21 +90,13 @@ class ReadingEffect(SensorEffect):
         if not self.is_nominal:
             which = columns(self, channels)
             for span in spans(active):
-                changed[span, which] = self._read(times, readings, span, which)
+                seen = Stretch(times, readings, span, which)
+                changed[span, which] = self._read(seen)
         return changed
 
     @abstractmethod
-    def _read(
-        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
-    ) -> np.ndarray:
-        """What is read instead of ``readings[span, which]``.
-
-        Args:
-            times: of all readings [s], ``(T,)``.
-            readings: of all sensors, ``(T, S)`` [counts].
-            span: a stretch of time in which the effect is on.
-            which: columns of the chosen sensors.
-        """
+    def _read(self, seen: Stretch) -> np.ndarray:
+        """What is read instead of `seen.chosen`, of the same shape."""
 
 
 class SensorGain(ReadingEffect):
@@ -84,16 +104,12 @@ class SensorGain(ReadingEffect):
 
     name = "sensor_gain"
     source = "assumed: a supply or amplifier that has changed"
-    parameters = (
-        factor(
-            (0.0, 4.0), "reading after over reading before; bounds assumed", example=0.8
-        ),
+    parameter = factor(
+        (0.0, 4.0), "reading after over reading before; bounds assumed", example=0.8
     )
 
-    def _read(
-        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
-    ) -> np.ndarray:
-        return limited(readings[span, which] * self["factor"])
+    def _read(self, seen: Stretch) -> np.ndarray:
+        return limited(seen.chosen * self["factor"])
 
 
 class SensorOffset(ReadingEffect):
@@ -101,20 +117,16 @@ class SensorOffset(ReadingEffect):
 
     name = "sensor_offset"
     source = "assumed: a dirty or heated sensor"
-    parameters = (
-        strength(
-            "counts",
-            "count",
-            (-4095.0, 4095.0),
-            "added to each reading; the whole range",
-            example=-500.0,
-        ),
+    parameter = strength(
+        "counts",
+        "count",
+        (-4095.0, 4095.0),
+        "added to each reading; the whole range",
+        example=-500.0,
     )
 
-    def _read(
-        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
-    ) -> np.ndarray:
-        return limited(readings[span, which] + self["counts"])
+    def _read(self, seen: Stretch) -> np.ndarray:
+        return limited(seen.chosen + self["counts"])
 
 
 class SensorSaturation(ReadingEffect):
@@ -122,20 +134,16 @@ class SensorSaturation(ReadingEffect):
 
     name = "sensor_saturation"
     source = "assumed: a load resistor or supply that has changed"
-    parameters = (
-        strength(
-            "level",
-            "count",
-            (0.0, FULL_SCALE),
-            "smallest reading; 0 = down to full light",
-            example=1500.0,
-        ),
+    parameter = strength(
+        "level",
+        "count",
+        (0.0, FULL_SCALE),
+        "smallest reading; 0 = down to full light",
+        example=1500.0,
     )
 
-    def _read(
-        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
-    ) -> np.ndarray:
-        return np.maximum(readings[span, which], self["level"])
+    def _read(self, seen: Stretch) -> np.ndarray:
+        return np.maximum(seen.chosen, self["level"])
 
 
 def _stuck(extreme: str, reading: float) -> tuple[Parameter, ...]:
@@ -148,24 +156,13 @@ def _stuck(extreme: str, reading: float) -> tuple[Parameter, ...]:
             f"from the reading (0) to the {extreme} (1)",
             example=1.0,
         ),
-        Parameter(
-            "reading",
-            unit="count",
-            nominal=reading,
-            low=0.0,
-            high=FULL_SCALE,
-            doc=f"the {extreme}",
-            example=reading,
-            scales=False,
-        ),
+        place("reading", "count", reading, (0.0, FULL_SCALE), f"the {extreme}"),
     )
 
 
 class _StuckSensor(ReadingEffect):
-    def _read(
-        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
-    ) -> np.ndarray:
-        before = readings[span, which]
+    def _read(self, seen: Stretch) -> np.ndarray:
+        before = seen.chosen
         return before + self["blend"] * (self["reading"] - before)
 
 
@@ -190,22 +187,20 @@ class SensorCrosstalk(ReadingEffect):
 
     name = "sensor_crosstalk"
     source = "assumed: one multiplexer serves all sensors"
-    parameters = (
-        strength(
-            "share",
-            "1",
-            (0.0, 0.5),
-            "of the reading that is the neighbours' mean; bounds assumed",
-            example=0.2,
-        ),
+    parameter = strength(
+        "share",
+        "1",
+        (0.0, 0.5),
+        "of the reading that is the neighbours' mean; bounds assumed",
+        example=0.2,
     )
 
-    def _read(
-        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
-    ) -> np.ndarray:
-        beside = (np.roll(readings, 1, axis=1) + np.roll(readings, -1, axis=1)) / 2
-        before = readings[span, which]
-        return before + self["share"] * (beside[span, which] - before)
+    def _read(self, seen: Stretch) -> np.ndarray:
+        beside = (
+            np.roll(seen.readings, 1, axis=1) + np.roll(seen.readings, -1, axis=1)
+        ) / 2
+        before = seen.chosen
+        return before + self["share"] * (beside[seen.span, seen.which] - before)
 
 
 class SensorIntermittent(ReadingEffect):
@@ -214,13 +209,11 @@ class SensorIntermittent(ReadingEffect):
     name = "sensor_intermittent"
     source = "thesis 6.2.1 and 6.3.1: once every m readings; m is silent"
     parameters = (
-        Parameter(
+        strength(
             "every",
-            unit="1",
-            nominal=0,
-            low=0,
-            high=1000,
-            doc="m: readings m, 2m, ... of a trial are hit; 0 = never; assumed",
+            "1",
+            (0, 1000),
+            "m: readings m, 2m, ... of a trial are hit; 0 = never; assumed",
             example=3,
             integer=True,
         ),
@@ -234,12 +227,10 @@ class SensorIntermittent(ReadingEffect):
         ),
     )
 
-    def _read(
-        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
-    ) -> np.ndarray:
-        number = np.arange(span.start + 1, span.stop + 1)
+    def _read(self, seen: Stretch) -> np.ndarray:
+        number = np.arange(seen.span.start + 1, seen.span.stop + 1)
         hit = number % int(self["every"]) == 0
-        return np.where(hit[:, None], self["reading"], readings[span, which])
+        return np.where(hit[:, None], self["reading"], seen.chosen)
 
     def scaled(self, severity: float) -> "SensorIntermittent":
         """Milder means rarer: half the severity hits half as many readings."""
@@ -252,14 +243,12 @@ class SensorSwapped(SensorEffect):
 
     name = "sensor_swapped"
     source = "assumed: a plug in the wrong socket"
-    parameters = (
-        strength(
-            "blend",
-            "1",
-            (0.0, 1.0),
-            "from their own reading (0) to that of their twin (1)",
-            example=1.0,
-        ),
+    parameter = strength(
+        "blend",
+        "1",
+        (0.0, 1.0),
+        "from their own reading (0) to that of their twin (1)",
+        example=1.0,
     )
 
     def apply(
@@ -286,21 +275,17 @@ class SensorDrift(ReadingEffect):
 
     name = "sensor_drift"
     source = "assumed: a sensor that warms up"
-    parameters = (
-        strength(
-            "rate",
-            "count/s",
-            (-1000.0, 1000.0),
-            "added for each second that it lasts; bounds assumed",
-            example=-40.0,
-        ),
+    parameter = strength(
+        "rate",
+        "count/s",
+        (-1000.0, 1000.0),
+        "added for each second that it lasts; bounds assumed",
+        example=-40.0,
     )
 
-    def _read(
-        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
-    ) -> np.ndarray:
-        since = (times[span] - times[max(span.start - 1, 0)])[:, None]
-        return limited(readings[span, which] + self["rate"] * since)
+    def _read(self, seen: Stretch) -> np.ndarray:
+        since = (seen.times[seen.span] - seen.times[seen.before])[:, None]
+        return limited(seen.chosen + self["rate"] * since)
 
 
 class SensorFrozen(ReadingEffect):
@@ -308,20 +293,16 @@ class SensorFrozen(ReadingEffect):
 
     name = "sensor_frozen"
     source = "assumed: a converter that no longer updates"
-    parameters = (
-        strength(
-            "blend",
-            "1",
-            (0.0, 1.0),
-            "from the reading (0) to the frozen one (1)",
-            example=1.0,
-        ),
+    parameter = strength(
+        "blend",
+        "1",
+        (0.0, 1.0),
+        "from the reading (0) to the frozen one (1)",
+        example=1.0,
     )
 
-    def _read(
-        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
-    ) -> np.ndarray:
-        kept, before = readings[max(span.start - 1, 0), which], readings[span, which]
+    def _read(self, seen: Stretch) -> np.ndarray:
+        kept, before = seen.readings[seen.before, seen.which], seen.chosen
         return before + self["blend"] * (kept - before)
 
 
@@ -330,22 +311,20 @@ class SensorResponseTime(ReadingEffect):
 
     name = "sensor_response_time"
     source = "thesis 5.2.2 gives 50 ms for an answer; a lag beyond that is assumed"
-    parameters = (
-        strength(
-            "time_constant",
-            "s",
-            (0.0, 10.0),
-            "of the filter; 0 = none; bounds assumed",
-            example=0.5,
-        ),
+    parameter = strength(
+        "time_constant",
+        "s",
+        (0.0, 10.0),
+        "of the filter; 0 = none; bounds assumed",
+        example=0.5,
     )
 
-    def _read(
-        self, times: np.ndarray, readings: np.ndarray, span: slice, which: list[int]
-    ) -> np.ndarray:
-        keep = np.exp(-np.diff(times, prepend=times[0]) / self["time_constant"])
-        read = readings[span, which]
-        last = readings[max(span.start - 1, 0), which]
-        for at, share in enumerate(keep[span]):
+    def _read(self, seen: Stretch) -> np.ndarray:
+        keep = np.exp(
+            -np.diff(seen.times, prepend=seen.times[0]) / self["time_constant"]
+        )
+        read = seen.chosen
+        last = seen.readings[seen.before, seen.which]
+        for at, share in enumerate(keep[seen.span]):
             read[at] = last = read[at] + share * (last - read[at])
         return read

@@ -16,14 +16,12 @@ class ServoDelay(ServoEffect):
     number = "delay"
     source = "time on the bus and in the firmware; bounds assumed"
     robots = ("servo", "legged")
-    parameters = (
-        strength(
-            "delay",
-            "s",
-            (-0.1, 0.5),
-            "time added, negative takes away; never below none",
-            example=0.05,
-        ),
+    parameter = strength(
+        "delay",
+        "s",
+        (-0.1, 0.5),
+        "time added, negative takes away; never below none",
+        example=0.05,
     )
 
 
@@ -35,14 +33,8 @@ class ServoLag(ServoEffect):
     number = "lag"
     source = "first-order model assumed; bounds assumed"
     robots = ("servo", "legged")
-    parameters = (
-        strength(
-            "time_constant",
-            "s",
-            (-0.2, 1.0),
-            "time to 63 % of a step, added",
-            example=0.05,
-        ),
+    parameter = strength(
+        "time_constant", "s", (-0.2, 1.0), "time to 63 % of a step, added", example=0.05
     )
 
 
@@ -54,9 +46,7 @@ class ServoGain(ServoEffect):
     number = "gain"
     source = "the gain is a register of the servo that is easily misread"
     robots = ("servo", "legged")
-    parameters = (
-        factor((0.05, 20.0), "gain over gain told; bounds assumed", example=0.7),
-    )
+    parameter = factor((0.05, 20.0), "gain over gain told; bounds assumed", example=0.7)
 
 
 class ServoDeadZone(ServoEffect):
@@ -66,14 +56,8 @@ class ServoDeadZone(ServoEffect):
     stage = "actuator"
     number = "dead_zone"
     source = "compliance margin or dead zone register of servo firmware; bounds assumed"
-    parameters = (
-        strength(
-            "angle",
-            "rad",
-            (0.0, 0.3),
-            "error up to which it rests, added",
-            example=0.02,
-        ),
+    parameter = strength(
+        "angle", "rad", (0.0, 0.3), "error up to which it rests, added", example=0.02
     )
 
 
@@ -85,8 +69,8 @@ class ServoDutyLimit(ServoEffect):
     number = "duty_limit"
     source = "overload protection and torque limits of servo firmware act on the duty"
     robots = ("servo", "legged")
-    parameters = (
-        factor((0.02, 1.0), "largest duty over nominal; bounds assumed", example=0.3),
+    parameter = factor(
+        (0.02, 1.0), "largest duty over nominal; bounds assumed", example=0.3
     )
 
 
@@ -96,16 +80,14 @@ class ServoCurrentLimit(ServoEffect):
     name = "servo_current_limit"
     stage = "actuator"
     source = "current limits of servo firmware; bounds assumed"
-    parameters = (
-        Parameter(
-            "current",
-            unit="A",
-            nominal=NO_CURRENT_LIMIT,
-            low=0.01,
-            high=NO_CURRENT_LIMIT,
-            doc="largest current; 1000 is none; bounds assumed",
-            example=0.2,
-        ),
+    parameter = Parameter(
+        "current",
+        unit="A",
+        nominal=NO_CURRENT_LIMIT,
+        low=0.01,
+        high=NO_CURRENT_LIMIT,
+        doc="largest current; 1000 is none; bounds assumed",
+        example=0.2,
     )
 
     def change(self, law: Mapping[str, np.ndarray]) -> Law:
@@ -122,8 +104,8 @@ class ServoVoltage(ServoEffect):
     number = "voltage"
     source = "duty times voltage drives the motor"
     robots = ("servo", "legged")
-    parameters = (
-        factor((0.3, 3.0), "voltage over voltage told; bounds assumed", example=0.8),
+    parameter = factor(
+        (0.3, 3.0), "voltage over voltage told; bounds assumed", example=0.8
     )
 
 
@@ -135,8 +117,8 @@ class ServoTorqueConstant(ServoEffect):
     number = "torque_constant"
     source = "motor equation: torque kt i, back-EMF kt w"
     robots = ("servo", "legged")
-    parameters = (
-        factor((0.3, 3.0), "torque constant over nominal; bounds assumed", example=0.8),
+    parameter = factor(
+        (0.3, 3.0), "torque constant over nominal; bounds assumed", example=0.8
     )
 
 
@@ -148,14 +130,12 @@ class ServoArmature(ServoEffect):
     number = "armature"
     source = "rotor inertia times gear ratio squared; bounds assumed"
     robots = ("servo", "legged")
-    parameters = (
-        strength(
-            "inertia",
-            "kg m2",
-            (-0.1, 0.5),
-            "inertia added, negative takes away",
-            example=0.02,
-        ),
+    parameter = strength(
+        "inertia",
+        "kg m2",
+        (-0.1, 0.5),
+        "inertia added, negative takes away",
+        example=0.02,
     )
 
 
@@ -166,9 +146,7 @@ class ServoBacklash(ServoEffect):
     stage = "body"
     number = "backlash"
     source = "two inertias that meet without a bounce; bounds assumed"
-    parameters = (
-        strength("angle", "rad", (0.0, 0.3), "full play added", example=0.02),
-    )
+    parameter = strength("angle", "rad", (0.0, 0.3), "full play added", example=0.02)
 
 
 class ServoCoulomb(ServoEffect):
@@ -179,14 +157,12 @@ class ServoCoulomb(ServoEffect):
     number = "coulomb"
     source = "BAM (Duclusaud et al., ICRA 2025); bounds assumed"
     robots = ("servo", "legged")
-    parameters = (
-        strength(
-            "torque",
-            "N m",
-            (-0.5, 1.0),
-            "dry friction added, negative takes away",
-            example=0.1,
-        ),
+    parameter = strength(
+        "torque",
+        "N m",
+        (-0.5, 1.0),
+        "dry friction added, negative takes away",
+        example=0.1,
     )
 
 
@@ -198,14 +174,12 @@ class ServoViscous(ServoEffect):
     number = "viscous"
     source = "BAM (Duclusaud et al., ICRA 2025); bounds assumed"
     robots = ("servo", "legged")
-    parameters = (
-        strength(
-            "coefficient",
-            "N m s/rad",
-            (-0.5, 2.0),
-            "viscous friction added, negative takes away",
-            example=0.1,
-        ),
+    parameter = strength(
+        "coefficient",
+        "N m s/rad",
+        (-0.5, 2.0),
+        "viscous friction added, negative takes away",
+        example=0.1,
     )
 
 
@@ -216,14 +190,12 @@ class ServoStribeck(ServoEffect):
     stage = "body"
     number = "stribeck"
     source = "BAM (Duclusaud et al., ICRA 2025); bounds assumed"
-    parameters = (
-        strength(
-            "torque",
-            "N m",
-            (-0.5, 1.0),
-            "friction added at speed 0, negative takes away",
-            example=0.1,
-        ),
+    parameter = strength(
+        "torque",
+        "N m",
+        (-0.5, 1.0),
+        "friction added at speed 0, negative takes away",
+        example=0.1,
     )
 
 
@@ -235,14 +207,12 @@ class ServoLoadFriction(ServoEffect):
     number = "load_friction"
     source = "BAM (Duclusaud et al., ICRA 2025); bounds assumed"
     robots = ("servo", "legged")
-    parameters = (
-        strength(
-            "coefficient",
-            "1",
-            (-0.5, 0.8),
-            "friction per torque added, negative takes away",
-            example=0.1,
-        ),
+    parameter = strength(
+        "coefficient",
+        "1",
+        (-0.5, 0.8),
+        "friction per torque added, negative takes away",
+        example=0.1,
     )
 
 
@@ -253,8 +223,8 @@ class ServoLever(ServoEffect):
     stage = "body"
     number = "lever"
     source = "the whole lever is scaled, its mass stays"
-    parameters = (
-        factor((0.25, 4.0), "length over length told; bounds assumed", example=1.2),
+    parameter = factor(
+        (0.25, 4.0), "length over length told; bounds assumed", example=1.2
     )
 
 
@@ -265,14 +235,12 @@ class ServoPayload(ServoEffect):
     stage = "body"
     number = "mass"
     source = "a point mass at the end of the lever"
-    parameters = (
-        strength(
-            "mass",
-            "kg",
-            (-2.0, 5.0),
-            "mass added, negative takes away; bounds assumed",
-            example=0.2,
-        ),
+    parameter = strength(
+        "mass",
+        "kg",
+        (-2.0, 5.0),
+        "mass added, negative takes away; bounds assumed",
+        example=0.2,
     )
 
 
@@ -284,10 +252,8 @@ class ServoOffset(ServoEffect):
     number = "offset"
     source = "mounting of the horn on its splines; bounds assumed"
     robots = ("servo", "legged")
-    parameters = (
-        strength(
-            "angle", "rad", (-0.5, 0.5), "reading minus angle, added", example=0.05
-        ),
+    parameter = strength(
+        "angle", "rad", (-0.5, 0.5), "reading minus angle, added", example=0.05
     )
 
 
@@ -299,8 +265,6 @@ class ServoQuantisation(ServoEffect):
     number = "quantisation"
     source = "12-bit encoders have steps of 1.53 mrad; bounds assumed"
     robots = ("servo", "legged")
-    parameters = (
-        strength(
-            "step", "rad", (0.0, 0.1), "step added to the nominal one", example=0.01
-        ),
+    parameter = strength(
+        "step", "rad", (0.0, 0.1), "step added to the nominal one", example=0.01
     )

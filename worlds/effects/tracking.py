@@ -18,14 +18,12 @@ class TrackerRotation(TrackingEffect):
     name = "tracker_rotation"
     source = "assumed: a camera mounted askew"
     robots = ("wheeled", "legged")
-    parameters = (
-        strength(
-            "angle",
-            "rad",
-            (-0.8, 0.8),
-            "turn of the reported poses, counter-clockwise; bounds assumed",
-            example=0.1,
-        ),
+    parameter = strength(
+        "angle",
+        "rad",
+        (-0.8, 0.8),
+        "turn of the reported poses, counter-clockwise; bounds assumed",
+        example=0.1,
     )
 
     def _change(self, signal: PoseSignal, active: np.ndarray, rng: Generator) -> None:
@@ -42,12 +40,8 @@ class TrackerScale(TrackingEffect):
     name = "tracker_scale"
     source = "assumed: wrong camera height or tag height"
     robots = ("wheeled", "legged")
-    parameters = (
-        factor(
-            (0.8, 1.25),
-            "length reported over true length; bounds assumed",
-            example=1.05,
-        ),
+    parameter = factor(
+        (0.8, 1.25), "length reported over true length; bounds assumed", example=1.05
     )
 
     def _change(self, signal: PoseSignal, active: np.ndarray, rng: Generator) -> None:
@@ -55,15 +49,8 @@ class TrackerScale(TrackingEffect):
 
 
 def _off(name: str, unit: str, high: float, doc: str, example: float) -> Parameter:
-    return Parameter(
-        name,
-        unit=unit,
-        nominal=0.0,
-        low=-high,
-        high=high,
-        doc=f"{doc}; bounds assumed",
-        example=example,
-    )
+    doc = f"{doc}; bounds assumed"
+    return strength(name, unit, (-high, high), doc, example=example)
 
 
 class TrackerShift(TrackingEffect):
@@ -180,14 +167,8 @@ class TrackerLatency(TrackingEffect):
     name = "tracker_latency"
     source = "assumed: exposure, transfer and image processing of an overhead camera"
     robots = ("wheeled", "legged")
-    parameters = (
-        strength(
-            "delay",
-            "s",
-            (0.0, 2.0),
-            "age of a reported pose; bounds assumed",
-            example=0.2,
-        ),
+    parameter = strength(
+        "delay", "s", (0.0, 2.0), "age of a reported pose; bounds assumed", example=0.2
     )
 
     def _change(self, signal: PoseSignal, active: np.ndarray, rng: Generator) -> None:
@@ -208,14 +189,12 @@ class ClockDrift(TrackingEffect):
     name = "clock_drift"
     source = "assumed: a constant rate; crystals reach 1e-4, the rest is software"
     robots = ("wheeled", "legged")
-    parameters = (
-        strength(
-            "rate",
-            "1",
-            (-0.1, 0.1),
-            "seconds gained per second; bounds assumed",
-            example=0.02,
-        ),
+    parameter = strength(
+        "rate",
+        "1",
+        (-0.1, 0.1),
+        "seconds gained per second; bounds assumed",
+        example=0.02,
     )
 
     def _change(self, signal: PoseSignal, active: np.ndarray, rng: Generator) -> None:

@@ -14,9 +14,8 @@ from bns.worlds import checks, objects
 from bns.worlds.active import Placed, Stages
 from bns.worlds.damage import Damage
 from bns.worlds.light import sensors as light_sensors
-from bns.worlds.light.field import Lamp, LightField
-from bns.worlds.light.sensing import LEAD, Sensing
-from bns.worlds.light.supervisor import Supervisor
+from bns.worlds.light.closed_loop import LEAD, Sensing, Supervisor
+from bns.worlds.light.law import Lamp, LightField
 from bns.worlds.objects import Objects, Post, RayScreen
 from bns.worlds.physics import observe
 from bns.worlds.physics.rollout import Motion

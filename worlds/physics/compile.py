@@ -2,6 +2,7 @@
 
 from functools import lru_cache
 from itertools import pairwise
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -10,7 +11,7 @@ from bns import models
 from bns.models import mjcf
 from bns.worlds.active import Placed
 from bns.worlds.effects.base import ModelEdit
-from bns.worlds.physics import control, servo_joint
+from bns.worlds.physics import control, servo_law
 from bns.worlds.physics.rollout import STATE, Compiled, Job, Segment, run
 
 ARENA = 2**22
@@ -34,7 +35,7 @@ def compiled(
     spec = models.spec(robot, visuals=False)
     if step:
         spec.option.timestep = step
-    servo_joint.fit(spec, models.robot(robot))
+    servo_law.fit(spec, models.robot(robot))
     own = len(spec.actuators)
     for effect in effects:
         effect.edit(spec)
@@ -55,22 +56,45 @@ def start_state(scene: Compiled, start: tuple[float, float, float]) -> np.ndarra
         scene: the compiled model.
         start: pose (x, y, yaw) in the world frame [m, m, rad].
     """
-    model = scene.model
+    data = put_down(scene.model, start)
+    steps = round(SETTLE / scene.model.opt.timestep)
+    rest = np.tile(data.ctrl[: scene.model.nu - scene.hidden], (steps, 1))
+    return at_rest(scene, data, start, rest)
+
+
+def put_down(model: mujoco.MjModel, start: tuple[float, float, float]) -> Any:
+    """`mujoco.MjData` of a robot in its `home` pose, moved to a planar pose."""
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
     place = free_joint(model)
     data.qpos[place] = posed(data.qpos[place], start)
+    return data
+
+
+def at_rest(
+    scene: Compiled, data: Any, start: tuple[float, float, float], rest: np.ndarray
+) -> np.ndarray:
+    """Full physics state, shape ``(n,)``, of a robot that was left alone.
+
+    What it drifts is undone. Where the physics diverges it is the state given.
+
+    Args:
+        scene: the compiled model.
+        data: its `mujoco.MjData` as it was put down; changed.
+        start: pose (x, y, yaw) in the world frame [m, m, rad].
+        rest: controls meanwhile, shape ``(S, C)``.
+    """
+    model = scene.model
     state = np.empty(mujoco.mj_stateSize(model, STATE))
     mujoco.mj_getState(model, data, state, STATE)
     kept = len(state) - scene.hidden
-    rest = np.zeros((round(SETTLE / model.opt.timestep), model.nu - scene.hidden))
-    rest[:] = data.ctrl[: rest.shape[1]]
     motion = run(Job(state[:kept], (Segment(scene, rest),)))
     if motion.diverged < 0:
         state[:kept] = motion.states[-1]
         mujoco.mj_setState(model, data, state, STATE)
         data.time = 0.0
         data.qvel[:] = 0.0
+        place = free_joint(model)
         data.qpos[place] = posed(data.qpos[place], start)
         mujoco.mj_getState(model, data, state, STATE)
     state = state[:kept]

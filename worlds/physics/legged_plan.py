@@ -13,16 +13,13 @@ from bns.worlds.active import Stages
 from bns.worlds.damage import Damage
 from bns.worlds.effects.base import ControlSignal
 from bns.worlds.effects.leg_sets import joints_named, named
-from bns.worlds.physics import (
-    compile,
-    control,
-    legged_flags,
-    legged_goals,
-    observe,
-    servo_joint,
+from bns.worlds.physics import compile, control, observe, servo_law
+from bns.worlds.physics.rollout import (
+    Compiled,
+    Piece,
+    Segment,
+    WalkJob,
 )
-from bns.worlds.physics.legged_rollout import Piece, WalkJob
-from bns.worlds.physics.rollout import STATE, Compiled, Job, Segment, run
 from bns.worlds.trial import Commands
 
 STAND = 1.0  # [s] at rest before a trial, so that it starts without a bounce; assumed
@@ -37,12 +34,12 @@ class Servos:
     Attributes:
         laws: numbers of the servo law, each of shape ``(C,)``.
         angles, speeds: columns of full physics states, shape ``(C,)``.
-        carried: points of the base that legs carry, see `legged_flags.lies`.
+        carried: points of the base that legs carry, see `observe.lies`.
     """
 
     def __init__(self, model: mujoco.MjModel):
         joints = model.actuator_trnid[:, 0]
-        self.laws = servo_joint.laws(model)
+        self.laws = servo_law.laws(model)
         self.angles = 1 + model.jnt_qposadr[joints]
         self.speeds = 1 + model.nq + model.jnt_dofadr[joints]
         self.carried = _carried(model)
@@ -133,7 +130,7 @@ def refuse_fallen(
     made, parts = job(robot, still, stages, start=start, speed=1.0, seed=0, trial=0)
     free = made.start[None, 1:8]
     upright = 1 - 2 * (free[0, 4] ** 2 + free[0, 5] ** 2)
-    if not upright >= np.cos(observe.FALLEN) or legged_flags.lies(free, parts.carried):
+    if not upright >= np.cos(observe.FALLEN) or observe.lies(free, parts.carried):
         raise BnsError(
             f"With {', '.join(stages.texts['reality'])} the robot starts fallen; leave "
             "it legs to stand on, or take a gentler effect."
@@ -169,8 +166,8 @@ def job(
         BnsError: an effect that changes the joints sets in within the trial.
     """
     dt = step or timestep(robot)
-    limits = legged_goals.limits(commands, dt) if counts is None else counts
-    counts = legged_goals.planned(commands, speed, dt) if counts is None else counts
+    limits = control.limits(commands, dt) if counts is None else counts
+    counts = control.planned(commands, speed, dt) if counts is None else counts
     values, home = np.repeat(commands.values, counts, axis=0), commands.values[0] * 0
     if stages.control:
         told = control.signal(commands, counts, dt)
@@ -180,12 +177,12 @@ def job(
     first = segments[0].compiled
     _refuse_other_sizes(segments)
     laws, before, goals = servos(first).laws, home, []
-    home = legged_goals.shaped(home[None], laws, home, dt)[0]
+    home = control.shaped(home[None], laws, home, dt)[0]
     for compiled, stretch in segments:
         laws = servos(compiled).laws
-        goals.append(legged_goals.shaped(stretch, laws, before, dt))
+        goals.append(control.shaped(stretch, laws, before, dt))
         before = stretch[-1]
-    ramps = legged_goals.ramps(np.concatenate(goals), home, speed * dt)
+    ramps = control.ramps(np.concatenate(goals), home, speed * dt)
     cuts = np.cumsum([len(stretch) for _, stretch in segments])
     pieces = _pieces(segments, cuts, ramps, counts, limits)
     begin = stand(first, start, (home + 0.0).tobytes())  # -0 stands as 0 does
@@ -247,22 +244,9 @@ def stand(
         goals: of the servos [rad], the bytes of an array of shape ``(C,)``.
     """
     model = scene.model
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
-    place = compile.free_joint(model)
-    data.qpos[place] = compile.posed(data.qpos[place], start)
+    data = compile.put_down(model, start)
     hinges = np.flatnonzero(model.jnt_limited)
     at = model.jnt_qposadr[hinges]
     data.qpos[at] = np.clip(data.qpos[at], *model.jnt_range[hinges].T)
-    state = np.empty(mujoco.mj_stateSize(model, STATE))
-    mujoco.mj_getState(model, data, state, STATE)
     rest = np.tile(np.frombuffer(goals), (round(STAND / model.opt.timestep), 1))
-    motion = run(Job(state, (Segment(scene, rest),)))
-    if motion.diverged < 0:
-        mujoco.mj_setState(model, data, motion.states[-1], STATE)
-        data.time = 0.0
-        data.qvel[:] = 0.0
-        data.qpos[place] = compile.posed(data.qpos[place], start)
-        mujoco.mj_getState(model, data, state, STATE)
-    state.setflags(write=False)
-    return state
+    return compile.at_rest(scene, data, start, rest)

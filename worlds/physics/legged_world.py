@@ -11,10 +11,10 @@ from bns.models.ax12a import SPEED_UNIT
 from bns.worlds.active import Stages
 from bns.worlds.checks import bounded, of_kind
 from bns.worlds.damage import Damage
-from bns.worlds.physics import control, legged_flags, legged_plan, observe
-from bns.worlds.physics.legged_goals import in_units
+from bns.worlds.physics import control, legged_plan, observe
+from bns.worlds.physics.control import in_units
 from bns.worlds.physics.legged_plan import Servos
-from bns.worlds.physics.legged_rollout import Walk, WalkJob, walk
+from bns.worlds.physics.rollout import Walk, WalkJob, walk
 from bns.worlds.physics.world import PhysicsWorld, Settings
 from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Trial
 
@@ -120,21 +120,13 @@ class HexapodWorld(PhysicsWorld[Plan]):
     def _observe(self, plan: Plan, done: Walk, trial: int) -> Trial:
         servos, states = plan.servos, done.states
         free = states[:, 1:8]
-        every = max(self.sample_dt / self.dt, 1.0)
-        sampled, boundaries = observe.sample_steps(done.counts, every)
-        poses = observe.planar(free, self.start[2])
-        times, seen = observe.watched(
-            poses,
-            sampled,
-            dt=self.dt,
-            effects=plan.stages.tracking,
-            seed=plan.seed,
-            trial=trial,
+        sampled, boundaries, times, seen = self._watched(
+            free, done.counts, plan.stages, plan.seed, trial
         )
         readings = states[np.ix_(sampled, servos.angles)] + servos.laws["offset"]
         readings = in_units(readings, servos.laws["quantisation"])
         some = slice(None, -1, LOADS_EVERY)
-        outcome = legged_flags.outcome(
+        outcome = observe.legged_outcome(
             free,
             states[some, servos.angles],
             states[some, servos.speeds],

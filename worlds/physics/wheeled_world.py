@@ -10,8 +10,7 @@ from bns.errors import BnsError
 from bns.worlds.active import Stages
 from bns.worlds.checks import bounded, checked_start, of_kind, shared
 from bns.worlds.damage import Damage
-from bns.worlds.light.sensing import Sensing
-from bns.worlds.light.supervisor import Supervisor
+from bns.worlds.light.closed_loop import Sensing, Supervisor
 from bns.worlds.physics import compile, control, observe
 from bns.worlds.physics.rollout import Job, Motion, Pool
 from bns.worlds.physics.session import Session, Setting
@@ -93,16 +92,8 @@ class MujocoWorld(PhysicsWorld[Plan]):
         scene = plan.job.segments[0].compiled.model
         place = compile.free_joint(scene)
         free = motion.states[:, 1 + place.start : 1 + place.stop]
-        every = max(self.sample_dt / self.dt, 1.0)
-        sampled, boundaries = observe.sample_steps(plan.counts, every)
-        poses = observe.planar(free, self.start[2])
-        times, seen = observe.watched(
-            poses,
-            sampled,
-            dt=self.dt,
-            effects=plan.stages.tracking,
-            seed=plan.seed,
-            trial=trial,
+        sampled, boundaries, times, seen = self._watched(
+            free, plan.counts, plan.stages, plan.seed, trial
         )
         return Trial(
             commands=plan.commands,

@@ -5,11 +5,14 @@ from collections.abc import Sequence
 from typing import Any, ClassVar, Generic, Self, TypedDict, TypeVar
 
 import mujoco
+import numpy as np
 
 from bns.models.robot_model import RobotModel
 from bns.worlds import active
+from bns.worlds.active import Stages
 from bns.worlds.checks import bounded, checked_start, shared
 from bns.worlds.damage import Damage
+from bns.worlds.physics import observe
 from bns.worlds.trial import Channel, Commands, Trial
 
 PlanT = TypeVar("PlanT")
@@ -92,6 +95,32 @@ class PhysicsWorld(ABC, Generic[PlanT]):
     @abstractmethod
     def dt(self) -> float:
         """Physics step [s]."""
+
+    def _watched(
+        self,
+        free: np.ndarray,
+        counts: np.ndarray,
+        stages: Stages,
+        seed: int,
+        trial: int,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """What the tracker reports of a robot's base, ``(S + 1, 7)``.
+
+        Returns:
+            steps that are samples ``(T,)``, those at commands' ends ``(K + 1,)``, time
+            stamps ``(T,)`` [s] and poses ``(T, 3)``.
+        """
+        every = max(self.sample_dt / self.dt, 1.0)
+        sampled, boundaries = observe.sample_steps(counts, every)
+        times, seen = observe.watched(
+            observe.planar(free, self.start[2]),
+            sampled,
+            dt=self.dt,
+            effects=stages.tracking,
+            seed=seed,
+            trial=trial,
+        )
+        return sampled, boundaries, times, seen
 
     def run(
         self, commands: Sequence[Commands], *, trial: int = 0, seeds: Sequence[int] = ()

@@ -21,8 +21,7 @@ from bns.errors import BnsError, MissingDependencyError, install
 from bns.worlds import registry
 from bns.worlds.checks import bounded
 from bns.worlds.stepwise.core import reset_all, step_all
-from bns.worlds.stepwise.episode import Episode, Seen
-from bns.worlds.stepwise.rewards import Reward
+from bns.worlds.stepwise.episode import Episode, Reward, Seen
 
 try:
     import gymnasium

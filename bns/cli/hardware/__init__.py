@@ -10,7 +10,7 @@ from bns.cli.parse import dispatch
 from bns.errors import BnsError
 
 if TYPE_CHECKING:
-    from bns.worlds.light.field import Lamp
+    from bns.worlds.light.law import Lamp
 
 MANUAL = """usage: bns hardware {rehearse,setup,find-port,...} [...]
 
@@ -265,7 +265,7 @@ def _lamps(given: Emulate) -> "tuple[Lamp, ...]":
             f"--lamp has {len(given.lamp)} numbers: give x, y, and if you like height "
             "[m] and power [W], such as --lamp 0 0."
         )
-    from bns.worlds.light.field import Lamp
+    from bns.worlds.light.law import Lamp
 
     names = ("x", "y", "height", "power")
     return (Lamp(**dict(zip(names, given.lamp, strict=False))),)

@@ -21,8 +21,8 @@ from bns.worlds.active import Stages, as_damage
 from bns.worlds.damage import Damage
 from bns.worlds.effects.base import Effect
 from bns.worlds.physics import legged_plan, observe
-from bns.worlds.physics.legged_rollout import walk
 from bns.worlds.physics.legged_world import SPEED, HexapodWorld
+from bns.worlds.physics.rollout import walk
 from bns.worlds.trial import Channel, Trial, body_displacement
 
 WINDOW = 0.12  # [s] over which the body's motion is compared

@@ -17,8 +17,8 @@ from bns.gap.recordings import trial_conditions
 from bns.gap.recordings.trial_conditions import as_number
 from bns.worlds.effects.base import Effect
 from bns.worlds.light import sensors
-from bns.worlds.light.field import Lamp, LightField
-from bns.worlds.light.sensing import LEAD
+from bns.worlds.light.closed_loop import LEAD
+from bns.worlds.light.law import Lamp, LightField
 from bns.worlds.light.sensors import VIRTUAL
 from bns.worlds.objects import Post, RayScreen
 from bns.worlds.trial import POSE_CHANNELS, Channel, Trial

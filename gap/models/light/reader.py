@@ -16,8 +16,7 @@ from scipy.stats import norm
 from bns import seeding
 from bns.worlds.effects.base import Effect, OpticsEffect, SensorEffect
 from bns.worlds.light import law as light_law
-from bns.worlds.light.field import LightField
-from bns.worlds.light.law import Law, Screen
+from bns.worlds.light.law import Law, LightField, Screen
 from bns.worlds.light.sensors import LightSensors
 
 DRAWS = 16  # of each reading's noise

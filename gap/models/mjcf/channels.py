@@ -13,7 +13,7 @@ from bns.gap.importers.tables import Column, Table
 from bns.gap.models.mjcf import guesses, matching, prepared, rehearsal
 from bns.gap.models.mjcf.config import OwnConfig, Told
 from bns.gap.models.mjcf.rehearsal import Fit, Part
-from bns.worlds.data.column_map import FACTORS
+from bns.worlds.data.importing import FACTORS
 from bns.worlds.trial import Channel
 
 REHEARSED = 5.0  # [s] of the first trial that the nominal model moves along

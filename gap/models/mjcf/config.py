@@ -10,7 +10,7 @@ import numpy as np
 from bns.errors import BnsError, FormatError, UnknownNameError
 from bns.storage import reading
 from bns.storage.reading import BEYOND
-from bns.worlds.data.column_map import FACTORS, Source
+from bns.worlds.data.importing import FACTORS, Source
 from bns.worlds.trial import Channel
 
 KEYS = (

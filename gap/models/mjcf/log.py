@@ -10,7 +10,7 @@ from bns.gap.importers.tables import SENT, TIME, TRIAL, Column, Table
 from bns.gap.models.mjcf import cuts
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.worlds.data import dataset_checks as checks
-from bns.worlds.data.column_map import FACTORS
+from bns.worlds.data.importing import FACTORS
 from bns.worlds.trial import Commands, Trial
 
 

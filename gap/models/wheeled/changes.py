@@ -8,8 +8,9 @@ import numpy as np
 
 from bns import models
 from bns.gap.candidates.wheeled_rows import LEAD, PLANES, STICKS, parameter, term
-from bns.worlds.effects import bodies, registry
+from bns.worlds.effects import registry
 from bns.worlds.effects.base import CommandEffect, Effect, ModelEdit
+from bns.worlds.effects.parts import Inertial, base
 
 TRACKING = ("marker_mount", "tracker_latency", "tracker_scale", "clock_drift", LEAD)
 LATENCY = "command_latency"  # comes before all others, at any fraction of a step
@@ -172,4 +173,4 @@ def load(values: Mapping[str, float], robot: str) -> list[Effect]:
 def base_mass(robot: str) -> float:
     """Mass of the body that carries the wheels [kg]."""
     spec = models.spec(robot, visuals=False)
-    return bodies.Inertial.of(spec, bodies.base(spec)).mass
+    return Inertial.of(spec, base(spec)).mass

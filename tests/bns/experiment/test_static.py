@@ -12,7 +12,7 @@ from bns.experiment import static_walk as static
 from bns.experiment.config import RunConfig
 from bns.worlds import registry
 from bns.worlds.effects.legs import RAISED
-from bns.worlds.static_snn.nets import StaticNets, kinematic_nets
+from bns.worlds.static_snn import StaticNets, kinematic_nets
 from bns.worlds.trial import Commands
 from tests.bns.robots import Slider, small
 

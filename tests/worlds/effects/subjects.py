@@ -7,11 +7,12 @@ import mujoco
 import numpy as np
 
 from bns import models
+from bns.worlds.effects import registry
 from bns.worlds.effects.base import ControlSignal
 from bns.worlds.effects.command import TWIST
 from bns.worlds.effects.parts import Part
 from bns.worlds.light import sensors
-from bns.worlds.light.field import Lamp, LightField
+from bns.worlds.light.law import Lamp, LightField
 
 ROVER = (Path(__file__).parent / "rover.xml").read_text()
 ARM = (Path(__file__).parent / "arm.xml").read_text()
@@ -95,10 +96,15 @@ def on_part(kind) -> bool:
     return any(isinstance(item, Part) for item in kind.choices)
 
 
-def compiled(effect) -> mujoco.MjModel:
-    spec = _spec(effect)
-    effect.edit(spec)
+def edited(spec, *effects) -> mujoco.MjModel:
+    """A model compiled after effects, given as text or as objects."""
+    for effect in effects:
+        (registry.parse(effect) if isinstance(effect, str) else effect).edit(spec)
     return spec.compile()
+
+
+def compiled(effect) -> mujoco.MjModel:
+    return edited(_spec(effect), effect)
 
 
 def as_bytes(model) -> bytes:

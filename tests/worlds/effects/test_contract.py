@@ -49,8 +49,8 @@ LASTING = {"clock_drift"}  # what a clock has gained stays when the drift ends
 SAMPLES = 31
 FILES = {  # in which the effects of a stage stand
     "command": ("command", "channels", "legs", "servo"),
-    "actuator": ("actuator", "servo"),
-    "body": ("body", "legs", "servo"),
+    "actuator": ("wheels", "servo"),
+    "body": ("joints", "links", "wheels", "legs", "servo"),
     "sensor": ("sensors", "channels", "light", "servo"),
     "tracking": ("tracking",),
 }

@@ -1,7 +1,5 @@
 """Effects against answers that are known beforehand."""
 
-from pathlib import Path
-
 import mujoco
 import numpy as np
 import pytest
@@ -9,11 +7,10 @@ import pytest
 from bns import models
 from bns.errors import BnsError, UnknownNameError
 from bns.worlds.damage import Event
-from bns.worlds.effects import bodies, registry
+from bns.worlds.effects import parts, registry
 from bns.worlds.effects.base import ControlSignal, PoseSignal
+from tests.worlds.effects.subjects import DT, ROVER, edited
 
-ROVER = (Path(__file__).parent / "rover.xml").read_text()
-DT = 0.005
 RADIUS = 0.0205  # [m] wheel of the rover
 KV = 0.00112  # [N m s/rad] gain of its motors
 
@@ -44,10 +41,7 @@ def apply(text, signal, active=None, seed=0):
 
 
 def compiled(*texts) -> mujoco.MjModel:
-    spec = mujoco.MjSpec.from_string(ROVER)
-    for text in texts:
-        registry.parse(text).edit(spec)
-    return spec.compile()
+    return edited(mujoco.MjSpec.from_string(ROVER), *texts)
 
 
 def driven(model, wheel_speed=4.0, seconds=4.0) -> mujoco.MjData:
@@ -349,11 +343,11 @@ class TestBodies:
         spec = mujoco.MjSpec()
         spec.modelname = "stone"
         with pytest.raises(BnsError, match="'stone' has no body 'left_wheel'"):
-            bodies.wheel(spec, "left")
+            parts.wheel(spec, "left")
 
     def test_a_motor_without_a_force_range_is_refused(self):
         spec = mujoco.MjSpec.from_string(ROVER)
-        bodies.actuator(spec, "left").forcerange = [0, 0]
+        parts.actuator(spec, "left").forcerange = [0, 0]
         with pytest.raises(BnsError, match="'left_wheel' has no force range"):
             registry.make("torque_limit", factor=0.5).edit(spec)
 

@@ -11,18 +11,16 @@ from bns.worlds import registry as worlds
 from bns.worlds.damage import Damage
 from bns.worlds.effects import leg_sets as legs
 from bns.worlds.effects import registry
-from bns.worlds.physics import servo_joint
+from bns.worlds.physics import servo_law
 from bns.worlds.trial import Channel, Commands
+from tests.worlds.effects.subjects import edited
 
 LEGS = tuple(Channel(*item) for item in models.robot("phantomx").channels)
-NOMINAL = servo_joint.joint_numbers(ax12a.law())
+NOMINAL = servo_law.joint_numbers(ax12a.law())
 
 
-def edited(*texts: str) -> mujoco.MjModel:
-    spec = models.spec("phantomx", visuals=False)
-    for text in texts:
-        registry.parse(text).edit(spec)
-    return spec.compile()
+def phantomx(*texts: str) -> mujoco.MjModel:
+    return edited(models.spec("phantomx", visuals=False), *texts)
 
 
 def stiffness(model, joint: str) -> float:
@@ -58,7 +56,6 @@ def test_legs_are_named_in_three_ways():
     ways = ("legs=1,5", "legs=5,1", "legs=left_front+left_middle", "legs=type4")
     made = {str(registry.parse(f"leg_raised:{way},blend=1")) for way in ways}
     assert made == {"leg_raised:legs=1,5,blend=1"}
-    assert legs.name((1, 5)) == "left_front+left_middle"
     (event,) = Damage.parse("leg_raised:legs=1,5,blend=1@100").events
     assert str(event) == "leg_raised:legs=1,5,blend=1@100"
     with pytest.raises(BnsError, match="all legs are too many"):
@@ -81,18 +78,18 @@ def test_a_raised_leg_is_up_from_the_start_and_a_missing_one_weighs_nothing():
     assert not any(trial.outcome.fell for trial in (raised, missing, limp))
     hangs = limp.channel("right_front_femur_position")[-1]
     assert abs(hangs - sound.channel("right_front_femur_position")[-1]) > 0.02
-    light, whole = edited("leg_missing:legs=2,loss=1"), edited()
+    light, whole = phantomx("leg_missing:legs=2,loss=1"), phantomx()
     gone = whole.body_mass.sum() - light.body_mass.sum()
     assert gone == pytest.approx(0.209, abs=1e-3)
     assert light.nq == whole.nq and light.npair == whole.npair - 9
 
 
 def test_a_limp_leg_has_friction_alone():
-    model = edited("leg_limp:legs=3,loss=1")
+    model = phantomx("leg_limp:legs=3,loss=1")
     assert stiffness(model, "left_rear_femur") == 0
     assert model.joint("left_rear_femur").damping[0] == ax12a.law()["viscous"]
     assert stiffness(model, "left_front_femur") > 8
-    laws = servo_joint.laws(model)
+    laws = servo_law.laws(model)
     assert (
         laws["powered"].reshape(6, 3).tolist()
         == [[1] * 3, [1] * 3, [0] * 3] + [[1] * 3] * 3
@@ -106,23 +103,23 @@ def test_a_locked_joint_stays_and_a_partly_locked_one_has_less_range():
     (held,) = ran(f"{locked},loss=1,angle=0.3", goals=told)
     assert np.abs(held.channel(f"{joint}_position") - 0.3).max() < 0.03
     low, high = models.robot("phantomx").ranges[1]
-    half = edited(f"{locked},loss=0.5,angle=0").joint(joint).range
+    half = phantomx(f"{locked},loss=0.5,angle=0").joint(joint).range
     np.testing.assert_allclose(half, [low / 2, high / 2], atol=1e-3)
 
 
 def test_servo_effects_reach_the_chosen_servos_and_compose():
-    model = edited("servo_gain:servo=femur,factor=0.5", "servo_voltage:factor=0.8")
+    model = phantomx("servo_gain:servo=femur,factor=0.5", "servo_voltage:factor=0.8")
     both, one = (
         stiffness(model, "right_rear_femur"),
         stiffness(model, "right_rear_coxa"),
     )
     assert both == pytest.approx(0.4 * NOMINAL.stiffness)
     assert one == pytest.approx(0.8 * NOMINAL.stiffness)
-    weak = edited("joint_weak:joint=left_rear_tibia,factor=0.4")
+    weak = phantomx("joint_weak:joint=left_rear_tibia,factor=0.4")
     assert stiffness(weak, "left_rear_tibia") == pytest.approx(0.4 * NOMINAL.stiffness)
     limit = weak.actuator("left_rear_tibia").forcerange[1]
     assert limit == pytest.approx(0.4 * NOMINAL.torque_limit)
-    dry = edited("servo_coulomb:servo=left_rear,torque=0.03")
+    dry = phantomx("servo_coulomb:servo=left_rear,torque=0.03")
     assert dry.joint("left_rear_coxa").frictionloss[0] == pytest.approx(0.08)
     assert dry.joint("left_front_coxa").frictionloss[0] == pytest.approx(0.05)
 
@@ -162,33 +159,33 @@ def test_a_loose_horn_hangs_in_its_play():
     told = np.zeros((1, 18))
     told[0, 1] = 1.0  # in the air
     (loose,) = ran("loose_horn:joint=left_front_femur,angle=0.2", goals=told)
-    model = edited("loose_horn:joint=left_front_femur,angle=0.2")
+    model = phantomx("loose_horn:joint=left_front_femur,angle=0.2")
     at = model.jnt_qposadr[model.joint("left_front_femur_play").id]
     play = loose.truth["qpos"][-1, at]
     assert play == pytest.approx(-0.1, abs=0.02)  # the leg's weight pulls it down
     shaft = loose.channel("left_front_femur_position")[-1]
     assert shaft == pytest.approx(1.0, abs=0.06)
     assert model.joint("left_front_femur_play").range.tolist() == [-0.1, 0.1]
-    wider = edited(*["loose_horn:joint=left_front_femur,angle=0.2"] * 2)
+    wider = phantomx(*["loose_horn:joint=left_front_femur,angle=0.2"] * 2)
     assert wider.joint("left_front_femur_play").range.tolist() == [-0.2, 0.2]
 
 
 def test_floor_feet_links_and_loads():
-    model, bare = edited("foot_slippery:legs=2,factor=0.25"), edited()
+    model, bare = phantomx("foot_slippery:legs=2,factor=0.25"), phantomx()
     assert model.geom("right_front_foot").friction[0] == pytest.approx(0.2)
     assert model.geom("left_front_foot").friction[0] == 0.8
-    every = edited("floor_friction:factor=0.5")
+    every = phantomx("floor_friction:factor=0.5")
     assert every.geom("right_rear_foot").friction[0] == pytest.approx(0.4)
-    soft = edited("floor_compliance:factor=3")
+    soft = phantomx("floor_compliance:factor=3")
     assert soft.geom("left_rear_foot").solref[0] == pytest.approx(0.03)
-    long = edited("link_length:legs=1,factor=1.1")
+    long = phantomx("link_length:legs=1,factor=1.1")
     assert long.site("left_front_foot").pos[0] == pytest.approx(0.133 * 1.1)
     assert long.geom("left_front_foot").pos[0] == pytest.approx(0.126 * 1.1)
     assert long.site("right_front_foot").pos[0] == pytest.approx(0.133)
-    thigh = edited("link_length:part=femur,factor=0.9")
+    thigh = phantomx("link_length:part=femur,factor=0.9")
     assert thigh.body("left_rear_tibia").pos[0] == pytest.approx(0.066 * 0.9)
     assert thigh.geom("left_rear_femur").size[1] == pytest.approx(0.033 * 0.9)
-    heavy = edited("payload:mass=0.5,x=0.05")
+    heavy = phantomx("payload:mass=0.5,x=0.05")
     assert heavy.body_mass.sum() == pytest.approx(bare.body_mass.sum() + 0.5)
     sound, loaded = ran("", "payload:mass=0.5")
     sinks = sound.truth["qpos"][0, 2] - loaded.truth["qpos"][0, 2]

@@ -6,7 +6,7 @@ import pytest
 
 from bns.errors import BnsError, UnknownNameError
 from bns.worlds.effects import registry
-from tests.worlds.effects.subjects import ARM, told
+from tests.worlds.effects.subjects import ARM, edited, told
 
 G = 9.81  # [m/s2]
 ROD = """
@@ -24,9 +24,7 @@ def compiled(*texts, xml=ARM, gravity=True) -> mujoco.MjModel:
     spec = mujoco.MjSpec.from_string(xml)
     if not gravity:
         spec.option.gravity = [0, 0, 0]
-    for text in texts:
-        registry.parse(text).edit(spec)
-    return spec.compile()
+    return edited(spec, *texts)
 
 
 def at_rest(model, ctrl=(0.5, 0.3), seconds=4.0) -> mujoco.MjData:

@@ -9,9 +9,10 @@ from bns.worlds.effects import registry
 from bns.worlds.effects.base import CommandEffect, OpticsEffect, SensorEffect
 from bns.worlds.light import law as light_law
 from bns.worlds.light import sensors as light_sensors
-from bns.worlds.light.field import LightField
+from bns.worlds.light.law import LightField
 from tests.worlds.effects import subjects
 from tests.worlds.effects.subjects import DT, at_example, light, read
+from tests.worlds.test_closed_loop import Replay
 
 EVERY = [registry.get(name) for name in registry.names()]
 EVERY = [kind for kind in EVERY if "wheeled" in kind.robots]
@@ -26,6 +27,7 @@ OF_SENSORS = [
     if any(choice.name == "sensor" for choice in kind.choices)
 ]
 NAMES = read().channels
+SPIN = np.tile([-0.04, 0.04], (14, 1))  # on the spot
 LEFT = [NAMES.index(f"ir_{name}") for name in ("left_90", "left_45", "front_left")]
 
 
@@ -188,23 +190,13 @@ def test_doubled_noise_doubles_the_scatter_and_leaves_saturation():
     assert scatter[1][front] == scatter[2][front] == 0
 
 
-class Spin:
-    """Turns on the spot."""
-
-    def memory(self, n):
-        return np.zeros((n, 0))
-
-    def act(self, readings, memory):
-        return np.tile([-0.04, 0.04], (len(readings), 1)), memory
-
-
 @pytest.mark.parametrize("name", ON_READINGS + ON_LIGHT)
 def test_in_the_loop_it_acts_within_its_time_and_not_before(name):
     text = f"{example(name)}@0:1.9s..0:4.1s"
     starts = np.array([[0.8, 0.1, 0.0]])
     runs = [
         worlds.make("light", damage=damage, singles=True).drive(
-            Spin(), cycles=14, seeds=[3], starts=starts
+            Replay(SPIN), cycles=14, seeds=[3], starts=starts
         )[0]
         for damage in ((), (text,))
     ]

@@ -6,20 +6,17 @@ from typing import Any
 import numpy as np
 
 from bns.errors import BnsError
-from bns.worlds.effects import bodies, parts
-from bns.worlds.effects.base import BodyEffect, Parameter, factor, strength
-from bns.worlds.effects.bodies import Inertial
-from bns.worlds.effects.parts import ANY, WIDE
+from bns.worlds.effects import parts
+from bns.worlds.effects.base import BodyEffect, Parameter, factor, place, strength
+from bns.worlds.effects.parts import ANY, WIDE, Inertial
 
 
 def _shift(axis: str, *, scales: bool = True) -> Parameter:
-    return Parameter(
+    return strength(
         f"d{axis}",
-        unit="m",
-        nominal=0.0,
-        low=-10.0,
-        high=10.0,
-        doc=f"away from the model's centre of mass along the body's own {axis} axis; "
+        "m",
+        (-10.0, 10.0),
+        f"away from the model's centre of mass along the body's own {axis} axis; "
         "bounds assumed",
         example=0.02 if scales else 0.0,
         scales=scales,
@@ -80,7 +77,7 @@ class BodyLength(BodyEffect):
     source = "inertia of a mass that is stretched evenly; bounds assumed"
     robots = ANY
     choices = parts.part("body")
-    parameters = (factor((0.1, 10.0), "length over the model's", example=1.1),)
+    parameter = factor((0.1, 10.0), "length over the model's", example=1.1)
 
     def _write(self, spec: Any) -> None:
         for body in parts.bodies(spec, self["part"]):
@@ -134,9 +131,7 @@ class GeomFriction(BodyEffect):
     source = "MuJoCo's contact model: the sliding coefficient is scaled"
     robots = ANY
     choices = parts.part("geom")
-    parameters = (
-        factor((0.0, WIDE), "sliding friction over the model's", example=0.5),
-    )
+    parameter = factor((0.0, WIDE), "sliding friction over the model's", example=0.5)
 
     def _write(self, spec: Any) -> None:
         for geom in parts.geoms(spec, self["part"]):
@@ -145,17 +140,7 @@ class GeomFriction(BodyEffect):
             geom.friction = friction
 
 
-def _place(name: str, nominal: float, low: float, high: float, doc: str) -> Parameter:
-    return Parameter(
-        name,
-        unit="m",
-        nominal=nominal,
-        low=low,
-        high=high,
-        doc=doc,
-        example=nominal,
-        scales=False,
-    )
+ROUND = (-0.065, 0.065)  # m; the Khepera III's body
 
 
 class Payload(BodyEffect):
@@ -172,15 +157,21 @@ class Payload(BodyEffect):
             "mass carried (the Khepera III itself: 0.69 kg); bounds assumed",
             example=0.5,
         ),
-        _place("x", 0.0, -0.065, 0.065, "ahead of the axle; bounds: the body's radius"),
-        _place("y", 0.0, -0.065, 0.065, "to the left; bounds: the body's radius"),
-        _place("z", 0.07, 0.0, 0.3, "above the floor; nominal: the top plate (69 mm)"),
+        place("x", "m", 0.0, ROUND, "ahead of the axle; bounds: the body's radius"),
+        place("y", "m", 0.0, ROUND, "to the left; bounds: the body's radius"),
+        place(
+            "z",
+            "m",
+            0.07,
+            (0.0, 0.3),
+            "above the floor; nominal: the top plate (69 mm)",
+        ),
     )
 
     def _write(self, spec: Any) -> None:
-        body = bodies.base(spec)
+        body = parts.base(spec)
         position = np.array([self["x"], self["y"], self["z"]])
-        inertial = bodies.Inertial.of(spec, body).plus_point(self["mass"], position)
+        inertial = parts.Inertial.of(spec, body).plus_point(self["mass"], position)
         inertial.write(body)
 
 
@@ -200,8 +191,8 @@ class CentreOfMass(BodyEffect):
     )
 
     def _write(self, spec: Any) -> None:
-        body = bodies.base(spec)
-        inertial = bodies.Inertial.of(spec, body)
+        body = parts.base(spec)
+        inertial = parts.Inertial.of(spec, body)
         centre = inertial.centre + np.array([self["dx"], self["dy"], 0.0])
         replace(inertial, centre=centre).write(body)
 
@@ -217,17 +208,15 @@ class FloorFriction(BodyEffect):
     name = "floor_friction"
     source = "contact rule: MuJoCo documentation, Computation, Contact; bounds assumed"
     robots = ("wheeled", "legged")
-    parameters = (
-        factor(
-            (0.01, 3.0),
-            "true friction coefficient over the model's; bounds assumed",
-            example=0.1,
-        ),
+    parameter = factor(
+        (0.01, 3.0),
+        "true friction coefficient over the model's; bounds assumed",
+        example=0.1,
     )
 
     def _write(self, spec: Any) -> None:
-        for body in (*bodies.grounded(spec), spec.worldbody):
-            for geom in bodies.contact_geoms(body):
+        for body in (*parts.grounded(spec), spec.worldbody):
+            for geom in parts.contact_geoms(body):
                 geom.friction[0] *= self["factor"]
 
 
@@ -271,9 +260,9 @@ class FloorCompliance(BodyEffect):
     name = "floor_compliance"
     source = "MuJoCo documentation, Modeling, Solver parameters; bounds assumed"
     robots = ("legged",)
-    parameters = (factor((1.0, 5.0), "time constant over the model's", example=2.5),)
+    parameter = factor((1.0, 5.0), "time constant over the model's", example=2.5)
 
     def _write(self, spec: Any) -> None:
         for body in spec.bodies:
-            for geom in bodies.contact_geoms(body):
+            for geom in parts.contact_geoms(body):
                 geom.solref[0] *= self["factor"]

@@ -1,18 +1,23 @@
-"""A camera that hangs stops the robot; one that drives is not taken to stand."""
+"""Driving: a camera that hangs stops the robot; sizes of wheels and axle are found.
+
+A robot that drives is not taken to stand.
+"""
 
 import numpy as np
 import pytest
 
-from bns.errors import BnsError
+from bns.errors import BnsError, FormatError
+from bns.hardware.driving import odometry
+from bns.hardware.driving.odometry import Wheels, fit
+from bns.hardware.emulators import run
+from bns.hardware.faults import SafetyStop, Void
 from bns.hardware.safety.motion_check import AXLE, SLOWEST, MotionCheck
 from bns.hardware.tracking.tracker import Frame, Sighting, Tracker
+from bns.hardware.worlds.wheeled import HardwareWorld
+from bns.models.khepera3.units import WHEEL_DIAMETER
 from bns.worlds.trial import Commands
 
 pytest.importorskip("cv2")
-
-from bns.hardware.emulators import virtual
-from bns.hardware.faults import SafetyStop, Void
-from bns.hardware.worlds.wheeled import HardwareWorld
 
 BOTH = np.ones(2)
 ROUND = Commands([[0.04, 0.10]], [4.0])
@@ -78,7 +83,7 @@ def test_what_need_not_move_is_left_alone():
 
 
 def test_a_picture_that_comes_again_is_marked():
-    rig = virtual.rig()
+    rig = run.rig()
     image = rig.eyes.source.paint_at(0.1)
     tracker = Tracker(rig.eyes.tracker.camera, rig.eyes.tracker.marker)
     first, again = (tracker.see(Frame(at, image, 0)) for at in (0.1, 0.2))
@@ -120,7 +125,7 @@ def hanging(rig, way):
 def test_a_camera_that_hangs_stops_the_robot_in_time(way, monkeypatch):
     if way == "frozen":  # a repeated picture is no sighting, whatever it shows
         monkeypatch.setattr(MotionCheck, "stands", lambda *words: False)
-    rig = virtual.rig(rate=30.0)
+    rig = run.rig(rate=30.0)
     broken, world = hanging(rig, way), HardwareWorld(rig=rig)
     with pytest.raises(Void):
         world._once(rig, ROUND, world._stages(4.0, 0, ())[0], 0, 0)
@@ -138,7 +143,7 @@ def test_a_picture_that_stays_stuck_ends_the_session_and_each_try_begins_at_rest
     monkeypatch,
 ):
     """A standing robot looks the same: that it is stuck shows only once it drives."""
-    rig = virtual.rig(rate=30.0)
+    rig = run.rig(rate=30.0)
     speeds, drive = [], rig.robot.drive
 
     def driven(left, right, **words):
@@ -157,7 +162,54 @@ def test_a_picture_that_stays_stuck_ends_the_session_and_each_try_begins_at_rest
 
 def test_a_robot_that_is_held_is_no_hanging_camera():
     dead = ["wheel_gain:wheel=left,factor=0", "wheel_gain:wheel=right,factor=0"]
-    rig = virtual.rig(dead)
+    rig = run.rig(dead)
     (trial,) = HardwareWorld(rig=rig).run([Commands([[0.1, 0.1]], [1.5])])
     assert np.ptp(trial.poses_world[:, 0]) < 0.002
     assert rig.faults.counts["stands"] >= 1
+
+
+def moved(left, right, *, sizes, axle):
+    """Motion of drives with constant speeds, ``(N, 3)``."""
+    way = (sizes[0] * left + sizes[1] * right) / 2
+    turn = (sizes[1] * right - sizes[0] * left) / axle
+    chord = way * np.sinc(turn / (2 * np.pi))
+    return np.column_stack([chord * np.cos(turn / 2), chord * np.sin(turn / 2), turn])
+
+
+def ways():
+    table = np.array(odometry.DRIVES)
+    return table[:, :2] * table[:, 2:]
+
+
+def test_known_sizes_are_found_and_kept(tmp_path):
+    given = ways()
+    seen = moved(*given.T, sizes=(1.02, 0.99), axle=0.0850)
+    seen += np.random.default_rng(3).normal(0, [2e-4, 2e-4, 1e-3], seen.shape)
+    found = fit(given, seen)
+    assert found.factors == pytest.approx((1.02, 0.99), abs=2e-3)
+    assert found.axle == pytest.approx(0.0850, abs=2e-4)
+    assert 0 < found.error[0] < 1e-4
+    found.write(tmp_path / "wheels.json")
+    assert Wheels.read(tmp_path / "wheels.json") == found
+
+
+def test_a_robot_that_is_none_is_refused(tmp_path):
+    with pytest.raises(BnsError, match="off nominal"):
+        fit(ways(), moved(*ways().T, sizes=(1.3, 1.3), axle=0.088))
+    with pytest.raises(BnsError, match="four"):
+        fit(ways()[:2], np.zeros((2, 3)))
+    Wheels(left=2 * WHEEL_DIAMETER, right=WHEEL_DIAMETER, axle=0.088).write(
+        tmp_path / "odd.json"
+    )
+    for name, words in (("odd.json", "nominal size"), ("none.json", "cannot be read")):
+        with pytest.raises(FormatError, match=words):
+            Wheels.read(tmp_path / name)
+
+
+@pytest.mark.parametrize("change", ['"axle": 0', '"axle": NaN', '"left": "wide"'])
+def test_wheels_that_cannot_be_are_refused(tmp_path, change):
+    text = '{"format": "bns-wheels", "left": 0.041, "right": 0.041, "axle": 0.0884,'
+    text += f' "error": [0, 0, 0], {change}}}'
+    (tmp_path / "wheels.json").write_text(text)
+    with pytest.raises(FormatError, match=r"wheels\.json"):
+        Wheels.read(tmp_path / "wheels.json")

@@ -6,22 +6,13 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.worlds.effects import parts
-from bns.worlds.effects.base import BodyEffect, Parameter, factor, strength
+from bns.worlds.effects.base import BodyEffect, Parameter, factor, place, strength
 from bns.worlds.effects.parts import ALL, ANY, UNSERVOED, WIDE
 
 
-def _added(unit: str, number: str, example: float) -> tuple[Parameter, ...]:
-    return (
-        Parameter(
-            "added",
-            unit=unit,
-            nominal=0.0,
-            low=-WIDE,
-            high=WIDE,
-            doc=f"added to the joint's {number}, which stays 0 at least",
-            example=example,
-        ),
-    )
+def _added(unit: str, number: str, example: float) -> Parameter:
+    doc = f"added to the joint's {number}, which stays 0 at least"
+    return strength("added", unit, (-WIDE, WIDE), doc, example=example)
 
 
 class _JointNumber(BodyEffect):
@@ -43,28 +34,28 @@ class JointDamping(_JointNumber):
     """A joint is damped more, or less, than the model says."""
 
     name, field, robots = "joint_damping", "damping", UNSERVOED
-    parameters = _added("N m s/rad or N s/m", "damping", 0.05)
+    parameter = _added("N m s/rad or N s/m", "damping", 0.05)
 
 
 class JointFriction(_JointNumber):
     """A joint has more, or less, dry friction than the model says."""
 
     name, field, robots = "joint_friction", "frictionloss", UNSERVOED
-    parameters = _added("N m or N", "friction loss", 0.1)
+    parameter = _added("N m or N", "friction loss", 0.1)
 
 
 class JointArmature(_JointNumber):
     """A joint carries more, or less, rotor inertia than the model says."""
 
     name, field, robots = "joint_armature", "armature", UNSERVOED
-    parameters = _added("kg m2 or kg", "armature", 0.02)
+    parameter = _added("kg m2 or kg", "armature", 0.02)
 
 
 class JointStiffness(_JointNumber):
     """A joint is held by a spring that the model does not know."""
 
     name, field, robots = "joint_stiffness", "stiffness", ANY
-    parameters = _added("N m/rad or N/m", "stiffness", 2.0)
+    parameter = _added("N m/rad or N/m", "stiffness", 2.0)
 
 
 class JointStribeck(BodyEffect):
@@ -82,15 +73,12 @@ class JointStribeck(BodyEffect):
         strength(
             "torque", "N m or N", (0.0, WIDE), "friction at standstill", example=0.5
         ),
-        Parameter(
+        place(
             "speed",
-            unit="rad/s or m/s",
-            nominal=0.1,
-            low=1e-4,
-            high=WIDE,
-            doc="at which it has faded to 37 %; nominal assumed",
-            example=0.1,
-            scales=False,
+            "rad/s or m/s",
+            0.1,
+            (1e-4, WIDE),
+            "at which it has faded to 37 %; nominal assumed",
         ),
     )
 
@@ -110,7 +98,7 @@ class JointBacklash(BodyEffect):
     robots = ("own",)
     choices = parts.part("joint")
     resizes = True
-    parameters = (strength("play", "rad or m", (0.0, 1.0), "full play", example=0.1),)
+    parameter = strength("play", "rad or m", (0.0, 1.0), "full play", example=0.1)
 
     def _write(self, spec: Any) -> None:
         for joint in parts.joints(spec, self["part"]):
@@ -129,10 +117,8 @@ class EncoderOffset(BodyEffect):
     source = "MuJoCo's joint coordinate, shifted; bounds: half a turn"
     robots = ("own",)
     choices = parts.part("joint")
-    parameters = (
-        strength(
-            "added", "rad or m", (-3.2, 3.2), "reading minus true position", example=0.1
-        ),
+    parameter = strength(
+        "added", "rad or m", (-3.2, 3.2), "reading minus true position", example=0.1
     )
 
     def _write(self, spec: Any) -> None:
@@ -148,8 +134,8 @@ NO_BIAS, AFFINE = 0, 1  # mjtBias
 LEAST = 1e-9  # of the force; MuJoCo takes a range of nothing for no limit at all
 
 
-def _factor(doc: str, example: float) -> tuple[Parameter, ...]:
-    return (factor((0.0, WIDE), doc, example=example),)
+def _factor(doc: str, example: float) -> Parameter:
+    return factor((0.0, WIDE), doc, example=example)
 
 
 class ActuatorGain(BodyEffect):
@@ -159,7 +145,7 @@ class ActuatorGain(BodyEffect):
     source = "MuJoCo's actuator model: gain and bias scaled together"
     robots = UNSERVOED
     choices = parts.part("actuator")
-    parameters = _factor("force over the model's", 0.7)
+    parameter = _factor("force over the model's", 0.7)
 
     def _write(self, spec: Any) -> None:
         for item in parts.actuators(spec, self["part"]):
@@ -191,7 +177,7 @@ class ActuatorKp(BodyEffect):
     source = "MuJoCo's position actuator: force = kp (goal - position) - kd speed"
     robots = UNSERVOED
     choices = parts.part("actuator")
-    parameters = _factor("kp over the model's", 0.7)
+    parameter = _factor("kp over the model's", 0.7)
 
     def _write(self, spec: Any) -> None:
         """See `BodyEffect.edit`.
@@ -213,7 +199,7 @@ class ActuatorKd(BodyEffect):
     source = "MuJoCo's position actuator: force = kp (goal - position) - kd speed"
     robots = UNSERVOED
     choices = parts.part("actuator")
-    parameters = _factor("kd over the model's", 0.5)
+    parameter = _factor("kd over the model's", 0.5)
 
     def _write(self, spec: Any) -> None:
         """See `BodyEffect.edit`.
@@ -236,7 +222,7 @@ class ActuatorTorqueLimit(BodyEffect):
     source = "MuJoCo's actuator model: the range of forces"
     robots = UNSERVOED
     choices = parts.part("actuator")
-    parameters = _factor("largest force over the model's", 0.5)
+    parameter = _factor("largest force over the model's", 0.5)
 
     def _write(self, spec: Any) -> None:
         """See `BodyEffect.edit`.

@@ -1,17 +1,27 @@
 """The robot is stopped, whatever fails.
 
 The stop order goes out first and in time; the watchdog gives it when the robot's driver
-is silent, gone, or unplugged.
+is silent, gone, or unplugged. Another program on the port is seen and named, and
+nothing is driven beside it.
 """
 
+import contextlib
 import os
+import pty
+import select
 import signal
+import subprocess
+import sys
+import termios
 import time
+import tty
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from bns.errors import BnsError
 from bns.hardware.clock import VirtualClock
 from bns.hardware.emulators.device import Reply, VirtualLine
 from bns.hardware.emulators.hexapod import ServoBank
@@ -19,8 +29,11 @@ from bns.hardware.emulators.khepera import KheperaBody, KheperaDevice
 from bns.hardware.emulators.pty_host import PtyHost
 from bns.hardware.faults import LinkError, SafetyStop, Void
 from bns.hardware.khepera.driver import Khepera3
+from bns.hardware.line import Openers
+from bns.hardware.safety import watchdog
 from bns.hardware.safety.stop_order import AGAIN, insist, khepera3, phantomx
 from bns.hardware.safety.watchdog_client import WatchdogClient
+from bns.hardware.worlds import real_robot
 
 GARBAGE = np.random.default_rng(3).bytes(4000)
 
@@ -290,3 +303,91 @@ def test_servos_without_torque_acknowledge_the_stop(tmp_path, serving):
         assert watchdog._process.wait(SLOW) == 0  # 1 where nothing acknowledges
         assert not any(table[24] for table in bank.tables.values())
         os.close(fd)
+
+
+ON_LINUX = pytest.mark.skipif(sys.platform != "linux", reason="the kernel tells")
+HOLD = 'sleep 60 9<>"$0" >/dev/null 2>&1 & echo $!'
+
+
+@pytest.fixture
+def port():
+    """Both ends of a pseudo terminal; the second is the robot's port."""
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    os.set_blocking(slave, False)
+    yield master, slave
+    for number in (master, slave):
+        with contextlib.suppress(OSError):
+            os.close(number)
+
+
+@ON_LINUX
+def test_who_holds_the_port_is_named_until_it_lets_go(port, waited):
+    name = os.ttyname(port[1])
+    openers = Openers(name)
+    assert not openers.intruder() and openers.others() == []
+    made = subprocess.run(["sh", "-c", HOLD, name], capture_output=True, text=True)
+    try:
+        assert waited(openers.intruder)
+        assert (
+            openers.others() == openers.others() == [f"sleep ({made.stdout.strip()})"]
+        )
+    finally:
+        os.kill(int(made.stdout), signal.SIGKILL)
+    assert waited(lambda: openers.others() == [])
+    openers.close()
+
+
+@ON_LINUX
+def test_a_child_that_shares_the_port_is_no_other_program(port):
+    name = os.ttyname(port[1])
+    openers = Openers(name)
+    os.close(os.open(name, os.O_RDWR | os.O_NOCTTY))
+    words = {"stdin": subprocess.PIPE, "pass_fds": (port[1],)}
+    child = subprocess.Popen([sys.executable, "-S", "-c", "input()"], **words)
+    assert openers.others() == []
+    child.communicate(b"\n")
+    openers.close()
+
+
+class Rig:
+    """Somebody else has its port open for some looks."""
+
+    def __init__(self, looks):
+        self.clock, self.looks, self.checks = VirtualClock(), looks, 0
+        self.operator = SimpleNamespace(check=self._check)
+
+    def _check(self):
+        self.checks += 1
+
+    def others(self):
+        self.looks -= 1
+        return ["picocom (17)"] if self.looks >= 0 else []
+
+
+@ON_LINUX
+def test_no_trial_begins_while_another_program_has_the_port():
+    rig = Rig(5)
+    real_robot._alone(rig)
+    assert rig.checks == 5 and rig.clock.now() == pytest.approx(0.5)
+    with pytest.raises(BnsError, match=r"picocom \(17\): end it"):
+        real_robot._alone(Rig(1000))
+
+
+@ON_LINUX
+def test_bytes_that_another_program_took_are_no_dead_line(port, monkeypatch):
+    master, slave = port
+    os.write(master, b"answer")
+    assert watchdog.receive(slave, SLOW) == b"answer"
+    assert watchdog.receive(slave, 0.0) == b""
+    ready = SimpleNamespace(select=lambda *words: words[:3], poll=select.poll)
+    for name in ("POLLIN", "POLLHUP", "POLLERR", "POLLNVAL"):
+        setattr(ready, name, getattr(select, name))
+    monkeypatch.setattr(watchdog, "select", ready)  # there was a byte; it is gone
+    settings = termios.tcgetattr(slave)
+    settings[6][termios.VMIN] = 0  # as pyserial sets it: a read gives nothing at once
+    termios.tcsetattr(slave, termios.TCSANOW, settings)
+    assert watchdog.receive(slave, SLOW) == b""
+    os.close(master)
+    with pytest.raises(OSError, match=r"line is dead|Input/output"):
+        watchdog.receive(slave, SLOW)
