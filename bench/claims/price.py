@@ -14,7 +14,7 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from bench.result import Result, bench
-from bns.claims import price, runner, sides
+from bns.claims import runner, schedule, sides
 from bns.claims.claim import INVESTIGATIONS, claims
 from bns.experiment.config import RunConfig
 
@@ -34,11 +34,13 @@ def claims_plan(quick: bool) -> Result:
     for world in ("mujoco", "static-snn"):
         for letter in INVESTIGATIONS:
             part = [claim for claim in every if claim.investigation == letter]
-            details[f"{letter} in {world}"] = asdict(price.planned(part, world=world))
+            details[f"{letter} in {world}"] = asdict(
+                schedule.planned(part, world=world)
+            )
         details[f"without such a world: {world}"] = list(
             runner.impossible(every, world=world)
         )
-    whole = price.planned(every, world="mujoco")
+    whole = schedule.planned(every, world="mujoco")
     return Result(
         figure=whole.hours,
         unit="h",
@@ -72,7 +74,7 @@ def claims_price(quick: bool) -> Result:
         unit="s",
         holds=None,
         n=RUNS,
-        details={"measured": found, "price.toml": price.rates()},
+        details={"measured": found, "price.toml": schedule.rates()},
     )
 
 
@@ -89,7 +91,7 @@ def rates(name: str, *, trials: int) -> dict[str, float]:
     late = np.median(times[-SOON:])
     evolution = config.evolution
     work = evolution.population * evolution.generations
-    per_trial = price.rates()[name]["patterns"] * (trials - SOON - first)
+    per_trial = schedule.rates()[name]["patterns"] * (trials - SOON - first)
     grown = (late - soon) / per_trial if per_trial > 0 else 0.0
     return {
         "a trial": float(soon / RUNS),

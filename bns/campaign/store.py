@@ -21,9 +21,17 @@ from typing import Annotated, Any
 
 import msgspec
 
-from bns.campaign.compact import FORMAT, SCHEMA, Compact, write
 from bns.campaign.identity import digest, identity
-from bns.campaign.part import Block, Part, decode, encode
+from bns.campaign.part import (
+    RESULTS_FORMAT,
+    RESULTS_SCHEMA,
+    Block,
+    Compact,
+    Part,
+    decode,
+    encode,
+    write_results,
+)
 from bns.campaign.work import packages
 from bns.errors import BnsError, FormatError
 from bns.storage import files, journal, reading, seal
@@ -102,8 +110,8 @@ class CampaignStore:
         files.write_json(
             directory / HEAD,
             {
-                "format": FORMAT,
-                "schema": SCHEMA,
+                "format": RESULTS_FORMAT,
+                "schema": RESULTS_SCHEMA,
                 "name": name,
                 "seed": seed,
                 "versions": dict(store.versions),
@@ -120,7 +128,9 @@ class CampaignStore:
         """
         directory = Path(directory)
         path = directory / HEAD
-        head = read_head(path, kind="campaign", format=FORMAT, schema=SCHEMA)
+        head = read_head(
+            path, kind="campaign", format=RESULTS_FORMAT, schema=RESULTS_SCHEMA
+        )
         said = reading.typed(head, Head, path)
         return cls(directory, said.name, said.seed, said.versions)
 
@@ -215,7 +225,7 @@ class CampaignStore:
         """Bring all batches into results.parquet."""
         loose = sorted(self.parts.glob("[0-9a-z]*.parquet"))
         if loose:
-            write(self.directory, list(self.read()))
+            write_results(self.directory, list(self.read()))
             for path in loose:
                 path.unlink()
         files.remove_tree(self.parts)

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bns.campaign.file import Member
-from bns.claims import held, provenance, published, sides, verdict
+from bns.claims import provenance, published, sides, verdict
 from bns.claims.claim import KINDS, Cell, Claim, claims, content
-from bns.claims.held import Held
+from bns.claims.provenance import Held
 from bns.claims.published import Library, Stale
 from bns.claims.verdict import Finding
 from bns.errors import BnsError
@@ -107,7 +107,7 @@ def judged(
     }
     have = {}
     if (directory / "campaign.json").exists():
-        have = held.read(directory, identities(members.values()))
+        have = provenance.read(directory, identities(members.values()))
     rows: dict[str, Judged] = {}
     judging = each if have else uncounted  # without runs it takes no time
     for letter in sorted(letters):
@@ -217,7 +217,7 @@ class _Judge:
         )
         if found is None:
             return None
-        return replace(found, made=held.made(have, min(found.runs)))
+        return replace(found, made=provenance.made(have, min(found.runs)))
 
 
 def looks(cell: Cell, runs: int = 0) -> Design:

@@ -11,7 +11,7 @@ from bns.campaign.engines.registry import Engine
 from bns.campaign.file import Campaign, Member
 from bns.campaign.plan import Job
 from bns.campaign.store import CampaignStore, adopt
-from bns.claims import held, price, report, schedule, sides
+from bns.claims import provenance, report, schedule, sides
 from bns.claims.claim import Claim
 from bns.claims.report import Judged
 from bns.experiment.batch import check_device
@@ -114,7 +114,7 @@ def run(
             if not todo:
                 break
             if progress and not quick:
-                print(price.left(rows, world=world))
+                print(schedule.left(rows, world=world))
             work(
                 todo,
                 store,
@@ -140,7 +140,7 @@ def _round(
     """The batches to run next; none that failed."""
     wanted = schedule.due(rows, world=world, quick=quick, runs=runs)
     members = {m.identity: m for each in wanted for m in each.members}
-    have = held.read(store.directory, report.identities(members.values()))
+    have = provenance.read(store.directory, report.identities(members.values()))
     done = {name: each.runs for name, each in have.items()}
     jobs = schedule.jobs(wanted, done, store.directory)
     known = {*store.failures(), *session.failed}
@@ -229,7 +229,7 @@ def take(
         store = drive.opened(campaign, out, resume=True, lock=lock)
         taken = []
         for folder in folders:
-            have = held.read(out, report.identities(members.values()))
+            have = provenance.read(out, report.identities(members.values()))
             taken += adopt(store, folder, set(members), set(have))
         store.compact()
     return taken

@@ -54,7 +54,6 @@ EXPERIMENT = {
         "robots",
         "run",
         "static_snn",
-        "static_walk",
         "world_factory",
     )
 } | {"bns.doctor", "bns.prior.maker"}

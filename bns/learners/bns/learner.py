@@ -20,10 +20,9 @@ from bns.experiment.config import RunConfig
 from bns.learners.base import Curves, Learner, Panel, Proposal
 from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.change_detection import Detector
+from bns.learners.bns.choice import Deployed, Seen, choose, packed, unpack
 from bns.learners.bns.config import BNS_SECTIONS
-from bns.learners.bns.deployed import Deployed, Seen, packed, unpack
 from bns.learners.bns.problem import Problem, should_compile
-from bns.learners.bns.trial_selection import choose
 from bns.tasks import registry as tasks
 from bns.tasks.base import Task
 from bns.worlds.trial import Trial

@@ -20,8 +20,7 @@ from bns.learners.bns.forgetting import contradicted, newer
 from bns.learners.bns.memory import Memory, Patterns
 from bns.learners.bns.problem import Problem
 from bns.path import integrate
-from bns.snn.network import Shape, forward, predict
-from bns.snn.scaling import AXLE, OUTPUTS, Scaling
+from bns.snn.network import AXLE, OUTPUTS, Scaling, Shape, forward, predict
 from bns.tasks.base import BOARD, Task
 from bns.tasks.navigation import PathGoal, WheeledTask
 from bns.worlds.trial import Trial, body_displacements

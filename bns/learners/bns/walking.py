@@ -33,9 +33,8 @@ from bns.learners.bns.memory import Memory
 from bns.learners.bns.navigation import OpenLoopProblem
 from bns.learners.bns.nominal import Nominal, said
 from bns.path import integrate
-from bns.snn import adam, fitting
-from bns.snn.network import Shape, forward
-from bns.snn.scaling import OUTPUTS
+from bns.snn import training
+from bns.snn.network import OUTPUTS, Shape, forward
 from bns.tasks import walk as walking
 from bns.tasks.base import Task
 from bns.worlds.trial import Trial, body_displacements
@@ -320,7 +319,7 @@ class WalkProblem(OpenLoopProblem):
         return (len(inputs) - newest) // size
 
     def train(
-        self, shape: Shape, theta: Tensor, patterns: fitting.Patterns
+        self, shape: Shape, theta: Tensor, patterns: training.Patterns
     ) -> tuple[Tensor, Tensor]:
         """See `Problem.train`; by Adam on parts of the patterns (walk.batch > 0)."""
         if self.nominal is not None:
@@ -328,7 +327,7 @@ class WalkProblem(OpenLoopProblem):
             patterns = patterns._replace(targets=rest)
         if self.config.walk.batch == 0:
             return super().train(shape, theta, patterns)
-        return adam.fit(shape, self.config, theta, patterns, self.draws)
+        return training.fit_adam(shape, self.config, theta, patterns, self.draws)
 
     def state(self) -> dict[str, np.ndarray]:
         """See `Problem.state`: how far each run trusts the model."""

@@ -12,7 +12,7 @@ from bns import presets, stats
 from bns.campaign.engines.registry import InlineEngine
 from bns.campaign.identity import identity
 from bns.campaign.part import Block
-from bns.claims import measures, price, report, runner, sides, verdict
+from bns.claims import measures, report, runner, schedule, sides, verdict
 from bns.claims.claim import Cell, claims, content, find
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig, WorldConfig
@@ -381,21 +381,21 @@ def test_a_side_runs_no_longer_than_what_is_asked_of_it(letter, side, trials):
 
 def test_a_comparison_costs_what_its_share_implies():
     clear, close = Cell(a="x", b="y", p="0.00000"), Cell(a="x", b="y", p="0.04207")
-    assert price.implied(close) == pytest.approx(0.5 + 0.153, abs=0.002)
-    assert price.expected(clear, price.implied(clear)) == 20
-    assert price.expected(close, price.implied(close)) == 50
-    assert price.expected(Cell(a="x", b="y", says="<"), 0.02) == 10
-    assert price.expected(Cell(a="x", b="y", says="="), 0.5) == 100
-    assert price.expected(Cell(a="x", at_most=5), 1.0) == 10
-    assert price.expected(Cell(a="x", b="y", variant="v"), 0.6) == 30
+    assert schedule.implied(close) == pytest.approx(0.5 + 0.153, abs=0.002)
+    assert schedule.expected(clear, schedule.implied(clear)) == 20
+    assert schedule.expected(close, schedule.implied(close)) == 50
+    assert schedule.expected(Cell(a="x", b="y", says="<"), 0.02) == 10
+    assert schedule.expected(Cell(a="x", b="y", says="="), 0.5) == 100
+    assert schedule.expected(Cell(a="x", at_most=5), 1.0) == 10
+    assert schedule.expected(Cell(a="x", b="y", variant="v"), 0.6) == 30
 
 
 def test_shared_trials_are_paid_once():
-    two = price.planned([find("D20")], world="mujoco")
+    two = schedule.planned([find("D20")], world="mujoco")
     assert two.sides == 4 and two.hours < two.apart  # 14, 14 data-reset, each printed
-    alone = price.planned([find("D31")], world="mujoco")
+    alone = schedule.planned([find("D31")], world="mujoco")
     assert alone.hours == alone.apart > 0
-    assert price.planned([find("B2")], world="static-snn").sides == 0
+    assert schedule.planned([find("B2")], world="static-snn").sides == 0
 
 
 def test_quick_sides_are_short():

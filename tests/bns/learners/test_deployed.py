@@ -7,7 +7,7 @@ import pytest
 
 from bns.experiment.batch import Batch
 from bns.experiment.run import train
-from bns.learners.bns.deployed import AGE, PAUSE, Deployed, packed, unpack
+from bns.learners.bns.choice import AGE, PAUSE, Deployed, packed, unpack
 from tests.bns import robots
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError
-from bns.prior.breeding import bred, crowding, fronts, inside, ranked
-from bns.prior.unknowns import Unknowns, varied
+from bns.prior.model_learner import bred, crowding, fronts, inside, ranked
+from bns.prior.modelling import Unknowns, varied
 
 GAINS = tuple(f"wheel_gain:wheel={side},factor=0.2..1.2" for side in ("left", "right"))
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bns.prior import tree
+from bns.prior import driving
 
-RULE = tree.Rule(iterations=1500, bonus=1.0)
+RULE = driving.Rule(iterations=1500, bonus=1.0)
 
 
 class Line:
@@ -47,23 +47,23 @@ class Gamble:
 
 
 def test_the_larger_reward_is_found_and_what_it_is_worth():
-    action, worth = tree.best(Line(), 0, RULE, np.random.default_rng(0))
+    action, worth = driving.best(Line(), 0, RULE, np.random.default_rng(0))
     assert action == -1
     assert worth == pytest.approx(0.9 * 2, abs=0.35)
-    far, _ = tree.best(Line(), 2, RULE, np.random.default_rng(0))
+    far, _ = driving.best(Line(), 2, RULE, np.random.default_rng(0))
     assert far == 1
 
 
 def test_the_best_of_infinitely_many_noisy_actions_is_found():
     rng = np.random.default_rng
-    found = [tree.best(Gamble(), 0, RULE, rng(seed))[0] for seed in range(9)]
+    found = [driving.best(Gamble(), 0, RULE, rng(seed))[0] for seed in range(9)]
     assert abs(np.median(found) - 0.7) < 0.1
 
 
 def test_the_same_seed_gives_the_same():
     rng = np.random.default_rng
-    one, again = (tree.best(Gamble(), 0, RULE, rng(3)) for _ in range(2))
-    assert one == again != tree.best(Gamble(), 0, RULE, rng(4))
+    one, again = (driving.best(Gamble(), 0, RULE, rng(3)) for _ in range(2))
+    assert one == again != driving.best(Gamble(), 0, RULE, rng(4))
 
 
 @pytest.mark.parametrize("exponent", [0.3, 0.5])
@@ -76,5 +76,5 @@ def test_actions_widen_with_the_power_of_the_visits(exponent):
             return super().proposed(state, rng)
 
     rule = replace(RULE, actions=exponent, iterations=400)
-    tree.best(Counted(), 0, rule, np.random.default_rng(0))
+    driving.best(Counted(), 0, rule, np.random.default_rng(0))
     assert len(asked) == pytest.approx(400**exponent, abs=2)

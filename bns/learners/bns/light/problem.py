@@ -20,8 +20,9 @@ from bns.experiment.config import RunConfig
 from bns.learners.base import Curves, Panel
 from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.forgetting import contradicted, newer
-from bns.learners.bns.light import innovations, islands
+from bns.learners.bns.light import islands
 from bns.learners.bns.light.simulator import (
+    CHANNELS,
     MOTION_OUTPUTS,
     SENSORS,
     Noise,
@@ -29,6 +30,7 @@ from bns.learners.bns.light.simulator import (
     State,
     Thetas,
     in_body,
+    innovations,
     mirrored_motion,
     mirrored_sensors,
     motion_patterns,
@@ -100,7 +102,7 @@ class LightProblem(Problem):
     """
 
     stream = "light-learner"
-    channels = innovations.CHANNELS
+    channels = CHANNELS
     relative_cost = 80.0  # 100 cycles, ten starts
     columns: ClassVar[Mapping[str, str]] = {
         "sensor_left": "RMS error of the left sensor's SNN on this trial [counts]",
@@ -390,7 +392,7 @@ class LightProblem(Problem):
         """See `Problem.innovation`."""
         (motion, sensors), (moved, light) = memories, new
         watch = self.config.watch
-        return innovations.innovations(motion, moved, sensors, light, run, watch)
+        return innovations(motion, moved, sensors, light, run, watch)
 
     def forget(self, run: int, memories: Sequence[Memory]) -> int:
         """See `Problem.forget`; each memory for itself."""
