@@ -14,7 +14,7 @@ from bns.hardware.emulators.device import Reply
 from bns.hardware.emulators.live_body import LiveBody
 from bns.hardware.khepera import protocol
 from bns.models.arena import SIZE
-from bns.models.khepera3.units import firmware
+from bns.models.khepera3 import firmware
 from bns.worlds.effects.base import Effect
 from bns.worlds.light import sensors
 from bns.worlds.light.field import Lamp, LightField

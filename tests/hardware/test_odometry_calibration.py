@@ -6,7 +6,7 @@ import pytest
 from bns.errors import BnsError, FormatError
 from bns.hardware.driving import odometry
 from bns.hardware.driving.odometry import Wheels, fit
-from bns.models.khepera3.units import WHEEL_DIAMETER
+from bns.models.khepera3 import WHEEL_DIAMETER
 
 
 def moved(left, right, *, sizes, axle):
