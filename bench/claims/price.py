@@ -14,8 +14,8 @@ from dataclasses import asdict, replace
 import numpy as np
 
 from bench.result import Result, bench
-from bns.claims import runner, schedule, sides
-from bns.claims.claim import INVESTIGATIONS, claims
+from bns.claims import runner, schedule
+from bns.claims.claim import INVESTIGATIONS, claims, member_of
 from bns.experiment.config import RunConfig
 
 MOST = 80
@@ -81,7 +81,7 @@ def claims_price(quick: bool) -> Result:
 def rates(name: str, *, trials: int) -> dict[str, float]:
     """The rates of a learner, each of one run [s]."""
     letter, side = CASES[name]
-    whole = sides.member(letter, side, world="mujoco").config
+    whole = member_of(letter, side, world="mujoco").config
     config = replace(whole, trials=trials, replicates=RUNS)
     config = replace(config, world=replace(config.world, damage=()))
     idle = np.median(_times(replace(config, trials=4), whole, evolved=False)[1:])

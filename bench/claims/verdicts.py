@@ -2,7 +2,7 @@
 
 from bench.result import Result, bench
 from bench.versions import ROOT
-from bns.claims import claim, provenance, published, report, runner, sides
+from bns.claims import claim, provenance, published, report, runner
 from bns.claims.report import Judged
 
 LEAST_MUJOCO, LEAST_STATIC = 150, 120
@@ -65,8 +65,8 @@ def _wrong(row: Judged, world: str) -> list[str]:
         letter = row.claim.investigation
         now = []
         for side in each.cell.sides:
-            config = sides.member(letter, side, world=world).config
-            ignored = sides.content(letter)["ignored"]
+            config = claim.member(letter, side, world=world).config
+            ignored = claim.content(letter)["ignored"]
             now.append(provenance.of(provenance.resolved(config, ignored)))
         if each.made is None or not provenance.current(each.made, tuple(now)):
             found.append(f"{world} {row.claim.id}: {each.cell.text}")

@@ -34,9 +34,9 @@ from bns.campaign.part import (
 )
 from bns.campaign.work import packages
 from bns.errors import BnsError, FormatError
-from bns.storage import files, journal, reading, seal
-from bns.storage.directory import read_head
+from bns.storage import files, reading, seal
 from bns.storage.lock import Lock
+from bns.storage.store import read_head
 
 HEAD, FILE = "campaign.json", "campaign.toml"
 
@@ -232,11 +232,11 @@ class CampaignStore:
 
     def note(self, **entry: Any) -> None:
         """Append a line to log.jsonl."""
-        journal.note(self.directory / "log.jsonl", **entry)
+        files.append_entry(self.directory / "log.jsonl", **entry)
 
     def log(self) -> list[dict[str, Any]]:
         """The lines of log.jsonl; a torn last line is left out."""
-        return journal.entries(self.directory / "log.jsonl")
+        return files.read_entries(self.directory / "log.jsonl")
 
 
 def merge(out: Path, others: Sequence[Path], *, mix: bool = False) -> int:

@@ -11,8 +11,8 @@ from bns.campaign.engines.registry import Engine
 from bns.campaign.file import Campaign, Member
 from bns.campaign.plan import Job
 from bns.campaign.store import CampaignStore, adopt
-from bns.claims import provenance, report, schedule, sides
-from bns.claims.claim import Claim
+from bns.claims import provenance, report, schedule
+from bns.claims.claim import Claim, lacking, member_of
 from bns.claims.report import Judged
 from bns.experiment.batch import check_device
 from bns.storage.lock import Lock
@@ -57,7 +57,7 @@ def impossible(claims: Iterable[Claim], *, world: str) -> dict[str, str]:
     found: dict[str, str] = {}
     for claim in claims:
         for cell in claim.cells:
-            why = sides.missing(claim.investigation, cell, world=world)
+            why = lacking(claim.investigation, cell, world=world)
             if why:
                 found.setdefault(claim.id, why)
     return found
@@ -219,9 +219,9 @@ def take(
         member.identity: member
         for claim in claims
         for cell in claim.cells
-        if not sides.missing(claim.investigation, cell, world=world)
+        if not lacking(claim.investigation, cell, world=world)
         for side in cell.sides
-        for member in [sides.member(claim.investigation, side, world=world)]
+        for member in [member_of(claim.investigation, side, world=world)]
     }
     campaign = _campaign(tuple(members.values()), world)
     out = directory(world, quick=False, root=root)

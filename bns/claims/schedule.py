@@ -31,8 +31,8 @@ from bns.campaign import trunk
 from bns.campaign.file import Member
 from bns.campaign.identity import batch_seed, digest, identity, world_seed
 from bns.campaign.plan import Job
-from bns.claims import published, report, sides, verdict
-from bns.claims.claim import Cell, Claim
+from bns.claims import published, report, verdict
+from bns.claims.claim import Cell, Claim, lacking, member_of
 from bns.claims.published import Stale
 from bns.claims.report import Judged
 from bns.claims.verdict import Finding
@@ -177,10 +177,10 @@ def _want(
 ) -> None:
     """Note the runs that the sides of a comparison need, or have."""
     letter = claim.investigation
-    if sides.missing(letter, cell, world=world):
+    if lacking(letter, cell, world=world):
         return
     for side in cell.sides:
-        member = sides.member(letter, side, world=world)
+        member = member_of(letter, side, world=world)
         name = member.identity
         if counts:
             found[name] = max(runs, found.get(name, 0))
@@ -253,9 +253,9 @@ def due(
             looks = (runs,) if quick else report.looks(cell, runs).looks
             later = [look for look in looks if look > seen.get(cell, 0)]
             letter = row.claim.investigation
-            if later and not sides.missing(letter, cell, world=world):
+            if later and not lacking(letter, cell, world=world):
                 members = tuple(
-                    sides.member(letter, side, world=world, quick=quick)
+                    member_of(letter, side, world=world, quick=quick)
                     for side in cell.sides
                 )
                 found.append(Due(cell, members, later[0]))

@@ -231,14 +231,14 @@ def moved_by(pose: Pose, x: float, y: float, turn: float) -> Pose:
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """The way to one objective, a `tree.Problem`: states are poses, actions rows.
+    """The way to one objective, a `Problem`: states are poses, actions rows.
 
     Attributes:
         means: expected x, y, cosine, sine of each behaviour, ``(N, 4)``.
         spread: standard deviation of each of these, ``(N,)``.
         goal: the objective [m].
         within: distance at which it counts as reached [m].
-        discount: as in `tree.Rule`.
+        discount: as in `Rule`.
     """
 
     means: np.ndarray
@@ -269,7 +269,7 @@ class Leg:
     def outcome(
         self, state: Pose, action: int, rng: np.random.Generator
     ) -> tuple[Pose, float, bool]:
-        """See `tree.Problem`: as likely as the process takes it to be."""
+        """See `Problem`: as likely as the process takes it to be."""
         drawn = self.means[action] + self.spread[action] * rng.standard_normal(4)
         x, y, cos, sin = drawn.tolist()
         after = moved_by(state, x, y, math.atan2(sin, cos))
@@ -280,7 +280,7 @@ class Leg:
         return after, 0.0, False
 
     def rollout(self, state: Pose, rng: np.random.Generator) -> float:
-        """See `tree.Problem`: straight for the objective, a few behaviours long."""
+        """See `Problem`: straight for the objective, a few behaviours long."""
         weight = 1.0
         for _ in range(HORIZON):
             state, reward, over = self.outcome(state, self.proposed(state, rng), rng)

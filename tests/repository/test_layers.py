@@ -11,9 +11,7 @@ BASE = {"bns", "bns.errors", "bns.progress", "bns.seeding", "bns.storage"} | {
     f"bns.storage.{name}"
     for name in (
         "arrays",
-        "csv_table",
         "files",
-        "journal",
         "lock",
         "numbers",
         "parquet",
@@ -49,7 +47,6 @@ PROTOCOL = {
 EXPERIMENT = {
     f"bns.experiment.{name}"
     for name in (
-        "background",
         "batch",
         "robots",
         "run",

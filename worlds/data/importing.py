@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from bns.errors import FormatError
-from bns.storage import csv_table
+from bns.storage import tables
 from bns.worlds.data import dataset_checks as checks
 from bns.worlds.data.column_map import SPEEDS, ColumnMap, Source, factor
 from bns.worlds.data.mcap_log import STAMPS
@@ -50,7 +50,7 @@ def from_csv(
     """
     found = _map(columns, units, robot)
     wanted = [source.column for source in found.columns.values()]
-    table = csv_table.read(path, wanted, delimiter=delimiter)
+    table = tables.read_csv(path, wanted, delimiter=delimiter)
     named = {name: table[source.column] for name, source in found.columns.items()}
     return trials(named, found, where=str(path))
 

@@ -22,7 +22,7 @@ from bns.evolution.chromosome import Population
 from bns.evolution.generation import Breeder, Coins, Genes, Rates, take
 from bns.experiment.config import RunConfig
 from bns.learners.base import Curves
-from bns.learners.bns.adaptation import Adaptations
+from bns.learners.bns.adaptations import Adaptations
 from bns.learners.bns.memory import Memory, Patterns
 from bns.snn import training
 from bns.snn.network import Shape
@@ -107,6 +107,14 @@ class Problem(ABC):
             raise BnsError(
                 "evolution.cells is for walking and navigation; leave it out."
             )
+        self.set_up()
+
+    def set_up(self) -> None:  # noqa: B027 (nothing to do is the default)
+        """Make encoding, breeder and networks, once configurations are known.
+
+        Raises:
+            BnsError: a setting that BNS cannot be with on this task.
+        """
 
     @classmethod
     def shared(cls, config: RunConfig, first: RunConfig) -> RunConfig:

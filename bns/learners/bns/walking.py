@@ -20,7 +20,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from bns.draws import Draws
 from bns.errors import BnsError
 from bns.evolution.chromosome import Population
 from bns.evolution.generation import Rates
@@ -28,15 +27,12 @@ from bns.evolution.goals import TICK, GoalBreeder, Goals
 from bns.experiment.config import RunConfig
 from bns.experiment.task_settings import WalkConfig
 from bns.learners.bns import change_detection
-from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.memory import Memory
 from bns.learners.bns.navigation import OpenLoopProblem
 from bns.learners.bns.nominal import Nominal, said
-from bns.path import integrate
 from bns.snn import training
-from bns.snn.network import OUTPUTS, Shape, forward
+from bns.snn.network import OUTPUTS, Shape, forward, integrate
 from bns.tasks import walk as walking
-from bns.tasks.base import Task
 from bns.worlds.trial import Trial, body_displacements
 
 GOAL = 0.5  # [rad] that is scaled to 1; assumed
@@ -214,14 +210,8 @@ class WalkProblem(OpenLoopProblem):
         "worth_predicted": "what it was worth inside the SNN",
     }
 
-    def __init__(
-        self,
-        task: Task,
-        configs: Sequence[RunConfig],
-        draws: Draws,
-        adaptations: Adaptations,
-    ):
-        super().__init__(task, configs, draws, adaptations)
+    def set_up(self) -> None:
+        """See `Problem.set_up`."""
         config = self.config
         if config.snn.kind != "ensemble":
             raise BnsError(

@@ -19,8 +19,7 @@ from bns.campaign.store import CampaignStore, merge
 from bns.campaign.table import table
 from bns.errors import BnsError, FormatError
 from bns.storage import files, reading
-from tests.bns.campaign.campaigns import campaign
-from tests.bns.contents import contents
+from tests.bns.shared import campaign, contents
 
 TIMES = ("log.jsonl",)
 
