@@ -1,12 +1,10 @@
 """Run what claims need, look by look, in a store of its own for each world."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import closing
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from bns.campaign import drive
-from bns.campaign.drive import Progress
+from bns.campaign.drive import Progress, Session, Stop
 from bns.campaign.engines.registry import Engine
 from bns.campaign.file import Campaign, Member
 from bns.campaign.plan import Job
@@ -20,25 +18,7 @@ from bns.storage.lock import Lock
 ROOT = Path("runs/claims")
 QUICK_RUNS = 6
 
-Stop = Callable[[], bool]
 Found = Callable[[], None]
-
-
-@dataclass
-class Session:
-    """What a call of `run` did.
-
-    Attributes:
-        done: batches it ran, trunks among them.
-        failed: batches that failed, by key, with the reason.
-        waiting: batches that failed before and were not tried again.
-        stopped: whether it was told to stop before the end.
-    """
-
-    done: int = 0
-    failed: dict[str, str] = field(default_factory=dict)
-    waiting: int = 0
-    stopped: bool = False
 
 
 def directory(world: str, *, quick: bool, root: Path = ROOT) -> Path:
@@ -173,16 +153,9 @@ def work(
     """
     for part in phases(jobs):
         shown = Progress(title, part, 0, enabled=progress)
-        with closing(drive.ended(part, store, engine, shown)) as outcomes:
-            for outcome in outcomes:
-                if outcome.data is None:
-                    session.failed[outcome.key] = outcome.reason
-                elif outcome.data:
-                    found()
-                session.done += outcome.data is not None
-                if stop():
-                    session.stopped = True
-                    return
+        drive.work(part, store, engine, shown, session, stop=stop, found=found)
+        if session.stopped:
+            return
 
 
 def phases(jobs: Sequence[Job]) -> Iterator[list[Job]]:
