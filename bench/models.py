@@ -110,10 +110,10 @@ def _ends(lists: np.ndarray, step: float, cone: str, impratio: float) -> Any:
 def khepera_calibration(quick: bool) -> Result:
     """Drive straight and spin from rest; quick changes nothing, it takes a second."""
     from bns import models
-    from bns.models.khepera3 import calibration
+    from bns.models import khepera3
 
-    measured = calibration.measure(models.spec("khepera3"))
-    shares = calibration.deviations(measured)
+    measured = khepera3.measure(models.spec("khepera3"))
+    shares = khepera3.deviations(measured)
     worst = 100 * max(shares.values())
     return Result(
         figure=round(worst, 2),
@@ -122,9 +122,9 @@ def khepera_calibration(quick: bool) -> Result:
         n=len(shares),
         details={
             "measured": measured._asdict(),
-            "target": {k: float(v) for k, v in calibration.TARGET._asdict().items()},
+            "target": {k: float(v) for k, v in khepera3.TARGET._asdict().items()},
             "deviation_percent": {
-                name: round(100 * share * getattr(calibration.TOLERANCE, name), 3)
+                name: round(100 * share * getattr(khepera3.TOLERANCE, name), 3)
                 for name, share in shares.items()
             },
             "units": "speed m/s, spin rad/s, lost_distance m, lost_angle rad",

@@ -5,8 +5,7 @@ import sys
 from collections.abc import Sequence
 
 from bns.cli import dispatch
-from bns.cli.extras import missing
-from bns.errors import BnsError
+from bns.errors import BnsError, missing
 
 WRONG_INPUT = 2
 INTERRUPTED = 130

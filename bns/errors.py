@@ -102,6 +102,35 @@ def install(extra: str) -> str:
     return f"{'pip' if own else f'{here} -m pip'} install 'bns-testbed[{extra}]'"
 
 
+EXTRAS = {
+    "torch": "learn",
+    "matplotlib": "report",
+    "pyarrow": "tables",
+    "rerun": "view",
+    "gymnasium": "gym",
+    "dm_env": "dm",
+    "mcap": "mcap",
+    "ray": "ray",
+    "serial": "hardware",
+    "cv2": "hardware",
+    "dynamixel_sdk": "hardware",
+    "imageio_ffmpeg": "video",
+}
+"""module that may be missing -> extra of bns-testbed that brings it"""
+
+
+def missing(error: ModuleNotFoundError) -> str:
+    """What to do about a module that is not installed; "" where it is not ours to say.
+
+    Args:
+        error: that was raised by its import.
+    """
+    name = (error.name or "").partition(".")[0]
+    if name not in EXTRAS:
+        return ""
+    return f"This needs {name}: {install(EXTRAS[name])}"
+
+
 class MissingDependencyError(BnsError):
     """An optional package or system library that a feature needs.
 

@@ -14,8 +14,7 @@ import numpy as np
 from bns.errors import BnsError
 from bns.models import ax12a, servo_numbers
 from bns.models.directory import make, named, short, text, texts
-from bns.models.legged_body import looks, masses, pairs, shapes
-from bns.models.new_legged import AX12A, CLEAR, Legged
+from bns.models.new_legged import AX12A, CLEAR, Legged, looks, masses, pairs, shapes
 from bns.models.servo_numbers import joint_numbers
 from bns.storage import reading
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from bns.errors import BnsError, OutOfBoundsError
 from bns.models.directory import make, named, short, texts
-from bns.models.legged_body import box
+from bns.models.new_legged import box
 
 GRAVITY = 9.81  # [m/s2]
 FRICTION = 0.8  # rubber on a board; assumed

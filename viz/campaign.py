@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bns.campaign.identity import shortened, text
 from bns.campaign.results import Results
-from bns.campaign.settings import shortened, text
 from bns.errors import BnsError
-from bns.stats import resampling
 from bns.stats.compare import MEASURES, values
+from bns.stats.measures import bootstrap_median, median_band
 from bns.storage import files
 from bns.viz import style
 
@@ -64,7 +64,7 @@ def curves(found: Results) -> "Figure | None":
         figure = figure_class(figsize=(style.WIDE.width, height), layout="constrained")
         axes = figure.subplots()
         for (member, record), colour in zip(shown, style.CYCLE, strict=False):
-            middle, low, high = resampling.median_band(record["fitness_best"])
+            middle, low, high = median_band(record["fitness_best"])
             trial = np.arange(len(middle))
             axes.fill_between(trial, low, high, color=colour, alpha=0.18, linewidth=0)
             said = f"{member.label} ({record.replicates} runs)"
@@ -159,7 +159,7 @@ def _line(
 ) -> None:
     for place in sorted(set(places)):
         at = [s for x, (_, s) in zip(places, pairs, strict=True) if x == place]
-        middle, low, high = resampling.median(np.concatenate(at))
+        middle, low, high = bootstrap_median(np.concatenate(at))
         if np.isfinite(middle):
             axes.plot([place - 0.18, place + 0.18], [middle] * 2, color=style.BLACK)
             high = min(high, 10 * middle) if np.isinf(high) else high

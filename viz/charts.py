@@ -9,8 +9,8 @@ from bns.experiment.record import RunRecord
 from bns.tasks import Picture
 from bns.tasks import registry as tasks
 from bns.viz import style
-from bns.viz.blueprint import TRIAL_TIMELINE
 from bns.viz.choices import Choice
+from bns.viz.rrd import TRIAL_TIMELINE
 
 if TYPE_CHECKING:
     from rerun import RecordingStream

@@ -8,9 +8,9 @@ import numpy as np
 from bns.experiment.record import RunRecord
 from bns.tasks import registry as tasks
 from bns.viz import geometry, rrd, style
-from bns.viz.blueprint import READINGS, TRIAL_TIMELINE
 from bns.viz.choices import Choice
 from bns.viz.paths import arcs, dashes, listed
+from bns.viz.rrd import READINGS, TRIAL_TIMELINE
 from bns.worlds.trial import Trial
 
 if TYPE_CHECKING:

@@ -356,7 +356,7 @@ def _nets(
     if nets is None and legged:
         raise BnsError(
             f"Robot {robot!r} has no ideal networks: give `nets`, such as those of "
-            "bns.experiment.static_walk.nets_for, or run `bns run hexapod-walk "
+            "bns.experiment.static_snn.nets_for, or run `bns run hexapod-walk "
             "--world.name static-snn`, which trains them."
         )
     found = kinematic_nets() if nets is None else nets

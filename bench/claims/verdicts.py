@@ -15,8 +15,8 @@ import numpy as np
 
 from bench.result import Result, bench
 from bench.versions import ROOT
-from bns.claims import claim, price, provenance, published, report, runner, sides
-from bns.claims.claim import INVESTIGATIONS
+from bns.claims import claim, provenance, published, report, runner, schedule
+from bns.claims.claim import INVESTIGATIONS, member_of
 from bns.claims.report import Judged
 from bns.experiment.config import RunConfig
 
@@ -80,8 +80,8 @@ def _wrong(row: Judged, world: str) -> list[str]:
         letter = row.claim.investigation
         now = []
         for side in each.cell.sides:
-            config = sides.member(letter, side, world=world).config
-            ignored = sides.content(letter)["ignored"]
+            config = claim.member(letter, side, world=world).config
+            ignored = claim.content(letter)["ignored"]
             now.append(provenance.of(provenance.resolved(config, ignored)))
         if each.made is None or not provenance.current(each.made, tuple(now)):
             found.append(f"{world} {row.claim.id}: {each.cell.text}")
@@ -141,11 +141,13 @@ def claims_plan(quick: bool) -> Result:
     for world in ("mujoco", "static-snn"):
         for letter in INVESTIGATIONS:
             part = [claim for claim in every if claim.investigation == letter]
-            details[f"{letter} in {world}"] = asdict(price.planned(part, world=world))
+            details[f"{letter} in {world}"] = asdict(
+                schedule.planned(part, world=world)
+            )
         details[f"without such a world: {world}"] = list(
             runner.impossible(every, world=world)
         )
-    whole = price.planned(every, world="mujoco")
+    whole = schedule.planned(every, world="mujoco")
     return Result(
         figure=whole.hours,
         unit="h",
@@ -179,14 +181,14 @@ def claims_price(quick: bool) -> Result:
         unit="s",
         holds=None,
         n=RUNS,
-        details={"measured": found, "price.toml": price.rates()},
+        details={"measured": found, "price.toml": schedule.rates()},
     )
 
 
 def rates(name: str, *, trials: int) -> dict[str, float]:
     """The rates of a learner, each of one run [s]."""
     letter, side = CASES[name]
-    whole = sides.member(letter, side, world="mujoco").config
+    whole = member_of(letter, side, world="mujoco").config
     config = replace(whole, trials=trials, replicates=RUNS)
     config = replace(config, world=replace(config.world, damage=()))
     idle = np.median(_times(replace(config, trials=4), whole, evolved=False)[1:])
@@ -196,7 +198,7 @@ def rates(name: str, *, trials: int) -> dict[str, float]:
     late = np.median(times[-SOON:])
     evolution = config.evolution
     work = evolution.population * evolution.generations
-    per_trial = price.rates()[name]["patterns"] * (trials - SOON - first)
+    per_trial = schedule.rates()[name]["patterns"] * (trials - SOON - first)
     grown = (late - soon) / per_trial if per_trial > 0 else 0.0
     return {
         "a trial": float(soon / RUNS),

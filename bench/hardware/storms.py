@@ -57,7 +57,7 @@ def protocol_fuzz(quick: bool) -> Result:
     from bns.hardware.emulators.device import VirtualLine
     from bns.hardware.emulators.run import NoDog
     from bns.hardware.khepera.driver import Khepera3
-    from bns.models.khepera3.units import firmware
+    from bns.models.khepera3 import firmware
 
     count = 300 if quick else CASES
     rng, clock = np.random.default_rng(3), VirtualClock()

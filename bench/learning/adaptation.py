@@ -80,7 +80,7 @@ def _row(
     record: RunRecord, affected: tuple[str, ...], whole: np.ndarray
 ) -> dict[str, int]:
     """Counts of one damage; `whole` are the costs of the unharmed twins."""
-    from bns.learners.bns.light.innovations import CHANNELS
+    from bns.learners.bns.light.simulator import CHANNELS
 
     onset = int(record.damage_onset[0])
     cost, alarm = record["fitness"], record["detected"] > 0

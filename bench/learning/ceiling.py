@@ -19,8 +19,8 @@ from bns.evolution.chromosome import Encoding, Population
 from bns.evolution.generation import Breeder, Rates
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
+from bns.experiment.task_settings import metres_per_second
 from bns.tasks.navigation import Route, score_trials
-from bns.units import metres_per_second
 
 RUNS, POPULATION, GENERATIONS = 1, 100, 12
 

@@ -382,8 +382,8 @@ def begin(trunk: RunConfig, branch: RunConfig, *, idle: tuple[str, ...] = ()) ->
     Raises:
         BnsError: the two differ before the trunk's end.
     """
+    from bns.experiment.record import Step
     from bns.experiment.run import facts
-    from bns.experiment.step import Step
     from bns.storage.store import RunStore
     from bns.worlds.damage import Damage
 

@@ -45,7 +45,7 @@ OTHERS = {  # the rest of 6.2.1; every fifth command or reading (silent)
 ALL = DAMAGES | OTHERS
 UNHARMED = {"unharmed": "wheel_intermittent:wheel=left,every=1000"}
 """what would have been: no trial has that many commands"""
-AFFECTED = {  # which of `bns.learners.bns.light.innovations.CHANNELS` a damage touches
+AFFECTED = {  # which of `bns.learners.bns.light.simulator.CHANNELS` a damage touches
     "slow-wheel": ("left wheel",),
     "noisy": ("left sensor", "right sensor"),
     "minimum": ("left sensor",),

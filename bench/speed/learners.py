@@ -201,8 +201,7 @@ def _population() -> tuple[Any, Any, Any]:
     from bns.evolution.chromosome import Encoding
     from bns.experiment.config import RunConfig
     from bns.learners.bns.navigation import Evaluator
-    from bns.snn.network import Shape
-    from bns.snn.scaling import Scaling
+    from bns.snn.network import Scaling, Shape
     from bns.tasks.navigation import Route
 
     torch.set_num_threads(1)

@@ -133,7 +133,7 @@ def _given() -> Iterator[Reader]:
     from bns.gap.models.mjcf.config import OwnConfig
     from bns.gap.planning import command_file
     from bns.models import mjcf, numbers, robot_model, servo_numbers
-    from bns.storage import journal
+    from bns.storage import files
     from bns.worlds import corrected
     from bns.worlds.data import importing
     from bns.worlds.data.importing import ColumnMap
@@ -150,7 +150,7 @@ def _given() -> Iterator[Reader]:
         ("config.toml", "run/config.toml",
          lambda h: loading.from_file(h / "run" / "config.toml"), finite),
         ("timing.jsonl", "run/timing.jsonl",
-         lambda h: journal.entries(h / "run" / "timing.jsonl"), _fine),
+         lambda h: files.read_entries(h / "run" / "timing.jsonl"), _fine),
         ("campaign file", "campaign.toml",
          lambda h: campaign_file.read(h / "campaign.toml"), _fine),
         ("worlds.toml", "worlds.toml",

@@ -3,9 +3,8 @@
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from bns.campaign.engines.registry import Engine, Outcome
 from bns.campaign.file import Campaign
@@ -92,21 +91,26 @@ class Progress:
         self.bar.update(self.before + self.here, brief, line=self.text())
 
 
-@dataclass(frozen=True)
+Stop = Callable[[], bool]
+
+
+@dataclass
 class Session:
-    """What a call of `run` did.
+    """What a call that runs batches did.
 
     Attributes:
-        done: batches it ran.
+        done: batches it ran, trunks among them.
         failed: batches that failed, by key, with the reason.
         waiting: batches that failed before and were not tried again.
-        missing: batches that it was stopped before.
+        missing: batches of a campaign that it was stopped before.
+        stopped: whether it was told to stop.
     """
 
-    done: int
-    failed: dict[str, str]
-    waiting: int
-    missing: int
+    done: int = 0
+    failed: dict[str, str] = field(default_factory=dict)
+    waiting: int = 0
+    missing: int = 0
+    stopped: bool = False
 
 
 def run(
@@ -118,7 +122,7 @@ def run(
     retry: bool = False,
     mix: bool = False,
     progress: bool = False,
-    stop: Callable[[], bool] = lambda: False,
+    stop: Stop = lambda: False,
 ) -> Session:
     """Run what is missing of a campaign.
 
@@ -150,9 +154,17 @@ def run(
         jobs = plan(campaign, done)
         known = store.failures()
         todo = [job for job in jobs if job.key not in known]
-        session = _work(campaign, store, engine, todo, done, progress, stop)
+        trials = {member.identity: member.config.trials for member in campaign.members}
+        behind = sum(trials[i] * count for i, count in done.items() if i in trials)
+        shown = Progress(campaign.name, todo, behind, enabled=progress)
+        session = Session(waiting=len(jobs) - len(todo))
+        store.note(event="start", engine=engine.name, batches=len(todo))
+        work(todo, store, engine, shown, session, stop=stop)
+        finished, failed = session.done, len(session.failed)
+        session.missing = len(todo) - finished - failed
+        store.note(event="end", done=finished, failed=failed, missing=session.missing)
         store.compact()
-    return Session(**session, waiting=len(jobs) - len(todo))
+    return session
 
 
 def opened(
@@ -228,32 +240,37 @@ def _reach(blocks: list[tuple[int, int]]) -> int:
     return reached
 
 
-def _work(
-    campaign: Campaign,
+def work(
+    jobs: Sequence[Job],
     store: CampaignStore,
     engine: Engine,
-    jobs: list[Job],
-    done: dict[str, int],
-    progress: bool,
-    stop: Callable[[], bool],
-) -> dict[str, Any]:
-    trials = {member.identity: member.config.trials for member in campaign.members}
-    behind = sum(trials[i] * count for i, count in done.items() if i in trials)
-    shown = Progress(campaign.name, jobs, behind, enabled=progress)
-    store.note(event="start", engine=engine.name, batches=len(jobs))
-    failed: dict[str, str] = {}
-    finished = 0
+    shown: Progress,
+    session: Session,
+    *,
+    stop: Stop,
+    found: Callable[[], None] = lambda: None,
+) -> None:
+    """Run batches until there are no more, or until it is told to stop.
+
+    Args:
+        jobs: the batches.
+        store: what keeps them.
+        engine: where they run.
+        shown: how far they are.
+        session: what was done, which is counted on.
+        stop: asked after every batch; True ends the session there.
+        found: told of every batch with runs.
+    """
     with closing(ended(jobs, store, engine, shown)) as outcomes:
         for outcome in outcomes:
             if outcome.data is None:
-                failed[outcome.key] = outcome.reason
-            else:
-                finished += 1
+                session.failed[outcome.key] = outcome.reason
+            elif outcome.data:
+                found()
+            session.done += outcome.data is not None
             if stop():
-                break
-    missing = len(jobs) - finished - len(failed)
-    store.note(event="end", done=finished, failed=len(failed), missing=missing)
-    return {"done": finished, "failed": failed, "missing": missing}
+                session.stopped = True
+                return
 
 
 def ended(

@@ -35,9 +35,7 @@ from typing import Any
 import numpy as np
 
 from bns import seeding
-from bns.campaign import settings
-from bns.campaign.identity import identity
-from bns.campaign.settings import known
+from bns.campaign.identity import flatten, identity, known, label, with_settings
 from bns.errors import BnsError, UnknownNameError
 from bns.experiment.config import RunConfig
 from bns.experiment.validate import BOUNDS
@@ -136,9 +134,9 @@ def from_content(
         "seed": _whole(content, "seed", 0, BOUNDS["seed"]),
         "batch_runs": _whole(content, "batch_runs", 30, BOUNDS["replicates"]),
     }
-    base = settings.with_settings(
+    base = with_settings(
         _base(content),
-        settings.flatten(_table(content, "settings"), "[settings]"),
+        flatten(_table(content, "settings"), "[settings]"),
     )
     parts = [_grid(content), _list(content)]
     _check_size(parts, content, numbers["replicates"], sure)
@@ -171,15 +169,15 @@ def _members(base: RunConfig, parts: list[list[dict[str, Any]]]) -> tuple[Member
             named = piece.get("label", named)
             varied |= {k: v for k, v in piece.items() if k != "label"}
         rest = {k: v for k, v in varied.items() if not named or k not in pieces[1]}
-        words = [word for word in (named, settings.label(rest)) if word]
-        config = settings.with_settings(base, varied)
+        words = [word for word in (named, label(rest)) if word]
+        config = with_settings(base, varied)
         member = Member(", ".join(words) or "as given", config, varied)
         members.setdefault(member.identity, member)
     return tuple(members.values())
 
 
 def _grid(content: Mapping[str, Any]) -> list[dict[str, Any]]:
-    axes = settings.flatten(_table(content, "grid"), "[grid]")
+    axes = flatten(_table(content, "grid"), "[grid]")
     for name, values in axes.items():
         if not isinstance(values, list):
             raise BnsError(f"[grid]: {name} = {values!r}: give a list of values.")
@@ -205,7 +203,7 @@ def _list(content: Mapping[str, Any]) -> list[dict[str, Any]]:
     for number, entry in enumerate(entries):
         named = {"label": str(entry["label"])} if "label" in entry else {}
         rest = {key: value for key, value in entry.items() if key != "label"}
-        rows.append(named | settings.flatten(rest, f"[[list]] {number + 1}"))
+        rows.append(named | flatten(rest, f"[[list]] {number + 1}"))
     return rows
 
 
@@ -216,7 +214,7 @@ def _sample(content: Mapping[str, Any]) -> list[dict[str, Any]]:
     count, seed = table.pop("count", 0), table.pop("seed", 0)
     if type(seed) is not int or seed < 0:
         raise BnsError(f"[sample]: seed = {seed!r}: give a whole number from 0 on.")
-    return draw(settings.flatten(table, "[sample]"), count, seed, "[sample]")
+    return draw(flatten(table, "[sample]"), count, seed, "[sample]")
 
 
 def _check_size(

@@ -21,14 +21,22 @@ from typing import Annotated, Any
 
 import msgspec
 
-from bns.campaign.compact import FORMAT, SCHEMA, Compact, write
 from bns.campaign.identity import digest, identity
-from bns.campaign.part import Block, Part, decode, encode
+from bns.campaign.part import (
+    RESULTS_FORMAT,
+    RESULTS_SCHEMA,
+    Block,
+    Compact,
+    Part,
+    decode,
+    encode,
+    write_results,
+)
 from bns.campaign.work import packages
 from bns.errors import BnsError, FormatError
-from bns.storage import files, journal, reading, seal
-from bns.storage.directory import read_head
+from bns.storage import files, reading, seal
 from bns.storage.lock import Lock
+from bns.storage.store import read_head
 
 HEAD, FILE = "campaign.json", "campaign.toml"
 
@@ -102,8 +110,8 @@ class CampaignStore:
         files.write_json(
             directory / HEAD,
             {
-                "format": FORMAT,
-                "schema": SCHEMA,
+                "format": RESULTS_FORMAT,
+                "schema": RESULTS_SCHEMA,
                 "name": name,
                 "seed": seed,
                 "versions": dict(store.versions),
@@ -120,7 +128,9 @@ class CampaignStore:
         """
         directory = Path(directory)
         path = directory / HEAD
-        head = read_head(path, kind="campaign", format=FORMAT, schema=SCHEMA)
+        head = read_head(
+            path, kind="campaign", format=RESULTS_FORMAT, schema=RESULTS_SCHEMA
+        )
         said = reading.typed(head, Head, path)
         return cls(directory, said.name, said.seed, said.versions)
 
@@ -215,18 +225,18 @@ class CampaignStore:
         """Bring all batches into results.parquet."""
         loose = sorted(self.parts.glob("[0-9a-z]*.parquet"))
         if loose:
-            write(self.directory, list(self.read()))
+            write_results(self.directory, list(self.read()))
             for path in loose:
                 path.unlink()
         files.remove_tree(self.parts)
 
     def note(self, **entry: Any) -> None:
         """Append a line to log.jsonl."""
-        journal.note(self.directory / "log.jsonl", **entry)
+        files.append_entry(self.directory / "log.jsonl", **entry)
 
     def log(self) -> list[dict[str, Any]]:
         """The lines of log.jsonl; a torn last line is left out."""
-        return journal.entries(self.directory / "log.jsonl")
+        return files.read_entries(self.directory / "log.jsonl")
 
 
 def merge(out: Path, others: Sequence[Path], *, mix: bool = False) -> int:

@@ -11,9 +11,10 @@ from bns.campaign.file import Member
 from bns.campaign.results import Results
 from bns.errors import BnsError
 from bns.experiment.validate import leaves
-from bns.stats import Interval, resampling
+from bns.stats import Interval
 from bns.stats.compare import values
-from bns.stats.resampling import power
+from bns.stats.designs import power
+from bns.stats.measures import bootstrap_median
 
 MOST_PAIRS = 500
 
@@ -85,7 +86,7 @@ def table(found: Results, measure: str = "observation") -> Table:
             f"`bns campaign status {found.store.directory}`."
         )
     rows = [
-        Row(m.label, len(s), int(np.isfinite(s).sum()), resampling.median(s))
+        Row(m.label, len(s), int(np.isfinite(s).sum()), bootstrap_median(s))
         for m, s in have
     ]
     return Table(measure, tuple(rows), tuple(_pairs(have, found.campaign.sampled)))

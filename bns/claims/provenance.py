@@ -4,16 +4,23 @@ A configuration is known by the digest of all its settings, defaults included, u
 their names in a file: dotted keys, sorted, and their values. Replicates, seeds, threads
 and the sections that an investigation names as `ignored` (those of other learners) are
 no part of it. Beside each finding the settings themselves are kept, so that what does
-not match says where.
+not match says where. Of the runs that a store holds of the sides of claims, those that
+are of today's settings and code are read.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 from bns.campaign.identity import NO_PART, digest
+from bns.campaign.part import Block
+from bns.campaign.results import joined
+from bns.campaign.store import CampaignStore
 from bns.experiment.config import RunConfig
 from bns.experiment.loading import flat, to_mapping
+from bns.experiment.record import RunRecord
 from bns.experiment.versions import REVISION
 
 LENGTH = 16  # hexadecimal digits of a digest
@@ -86,3 +93,109 @@ def current(made: Made, sides: tuple[str, ...]) -> bool:
         sides: digests of the sides as they are today.
     """
     return made.sides == sides and made.revision == REVISION
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """A block of runs of one configuration, and what its batch says of itself."""
+
+    block: Block
+    facts: Mapping[str, Any]
+    date: str
+    seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """Runs of one configuration, the first ones without a gap.
+
+    Attributes:
+        digest: of its settings.
+        batches: in the order of runs.
+    """
+
+    digest: str
+    batches: tuple[Batch, ...]
+
+    @property
+    def runs(self) -> int:
+        """How many there are."""
+        return sum(batch.block.count for batch in self.batches)
+
+    def record(self) -> RunRecord:
+        """All of them as one record."""
+        return joined([batch.block for batch in self.batches])
+
+
+def read(directory: Path, wanted: Mapping[str, tuple[str, Sequence[str]]]) -> dict:
+    """The runs in a store of configurations as they are today.
+
+    Args:
+        directory: of the store; one that is not there holds none.
+        wanted: identity -> digest of its settings today, and the sections that are no
+            part of it. Runs of other settings, or of code of another revision, are
+            not there.
+
+    Returns:
+        identity -> `Held`.
+
+    Raises:
+        FormatError: the store is damaged or of a newer version.
+    """
+    if not (directory / "campaign.json").exists():
+        return {}
+    store = CampaignStore.open(directory)
+    log = {entry["batch"]: entry for entry in store.log() if "batch" in entry}
+    found: dict[str, list[Batch]] = {}
+    for part in store.read():
+        if part.facts.get("revision", 0) != REVISION:
+            continue
+        entry = log.get(part.key, {})
+        share = float(entry.get("computed", 0.0)) / len(part.blocks)
+        for block in part.blocks:
+            if block.identity not in wanted:
+                continue
+            digest, ignored = wanted[block.identity]
+            if of(resolved(block.config, ignored)) == digest:
+                batch = Batch(block, part.facts, _date(entry), share)
+                found.setdefault(block.identity, []).append(batch)
+    return {
+        identity: Held(wanted[identity][0], first)
+        for identity, batches in found.items()
+        if (first := _without_gap(batches))
+    }
+
+
+def made(sides: Sequence[Held], runs: int) -> Made:
+    """From what the first `runs` runs of each side were made."""
+    used = [
+        batch for side in sides for batch in side.batches if batch.block.start < runs
+    ]
+    each = {id(batch): batch for batch in used}.values()
+    dates = sorted(batch.date for batch in each if batch.date)
+    versions: dict[str, str] = {}
+    for batch in each:
+        versions |= batch.facts.get("versions", {})
+    return Made(
+        sides=tuple(side.digest for side in sides),
+        revision=REVISION,
+        commits=tuple(sorted({b.facts.get("commit", "unknown") for b in each})),
+        dates=tuple(dict.fromkeys((dates[0], dates[-1]))) if dates else (),
+        seeds=tuple(dict.fromkeys(int(b.facts["seed"]) for b in each)),
+        versions=versions,
+        seconds=round(sum(batch.seconds for batch in each), 1),
+    )
+
+
+def _without_gap(batches: list[Batch]) -> tuple[Batch, ...]:
+    first: list[Batch] = []
+    for batch in sorted(batches, key=lambda item: item.block.start):
+        if batch.block.start == sum(each.block.count for each in first):
+            first.append(batch)
+    return tuple(first)
+
+
+def _date(entry: Mapping[str, Any]) -> str:
+    if "at" not in entry:
+        return ""
+    return datetime.fromtimestamp(entry["at"], UTC).date().isoformat()

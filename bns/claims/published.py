@@ -12,8 +12,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from bns.claims import provenance, sides
-from bns.claims.claim import Cell, Claim
+from bns.claims import provenance
+from bns.claims.claim import Cell, Claim, settings_of
 from bns.claims.provenance import Made
 from bns.claims.verdict import Finding
 from bns.errors import BnsError, FormatError
@@ -135,7 +135,7 @@ def _why_stale(row: Row, claim: Claim, cell: Cell, world: str, among: Library) -
         return f"of revision {row['revision']} of the code, today's is {REVISION}"
     for side, digest in zip(cell.sides, row["sides"], strict=True):
         try:
-            now = sides.settings_of(claim.investigation, side, world)
+            now = settings_of(claim.investigation, side, world)
         except BnsError as error:
             return str(error)
         if provenance.of(now) != digest:

@@ -6,9 +6,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bns.campaign.file import Member
-from bns.claims import held, provenance, published, sides, verdict
-from bns.claims.claim import KINDS, Cell, Claim, claims, content
-from bns.claims.held import Held
+from bns.claims import provenance, published, verdict
+from bns.claims.claim import (
+    KINDS,
+    Cell,
+    Claim,
+    claims,
+    content,
+    digest_of,
+    lacking,
+    member_of,
+    settings_of,
+)
+from bns.claims.provenance import Held
 from bns.claims.published import Library, Stale
 from bns.claims.verdict import Finding
 from bns.errors import BnsError
@@ -107,7 +117,7 @@ def judged(
     }
     have = {}
     if (directory / "campaign.json").exists():
-        have = held.read(directory, identities(members.values()))
+        have = provenance.read(directory, identities(members.values()))
     rows: dict[str, Judged] = {}
     judging = each if have else uncounted  # without runs it takes no time
     for letter in sorted(letters):
@@ -135,7 +145,7 @@ def identities(members: Iterable[Member]) -> dict[str, tuple[str, Sequence[str]]
     """Identity of sides -> digest of their settings, sections that are no part of it.
 
     Args:
-        members: as `bns.claims.sides.member` gives them.
+        members: as `bns.claims.claim.member_of` gives them.
     """
     found: dict[str, tuple[str, Sequence[str]]] = {}
     for member in members:
@@ -150,7 +160,7 @@ def _members(claim: Claim, cell: Cell, world: str, quick: bool) -> tuple[Member,
     letter = claim.investigation
     try:
         return tuple(
-            sides.member(letter, side, world=world, quick=quick) for side in cell.sides
+            member_of(letter, side, world=world, quick=quick) for side in cell.sides
         )
     except BnsError:
         return ()
@@ -178,7 +188,7 @@ class _Judge:
             elif isinstance(found, Stale):
                 stale.append(found)
             if not isinstance(found, Finding) and not cell.variant:
-                why = sides.missing(claim.investigation, cell, world=self.world)
+                why = lacking(claim.investigation, cell, world=self.world)
                 missing.append(why or "no runs yet")
         own = sum(not cell.variant for cell in claim.cells)
         if len(missing) == own:
@@ -217,7 +227,7 @@ class _Judge:
         )
         if found is None:
             return None
-        return replace(found, made=held.made(have, min(found.runs)))
+        return replace(found, made=provenance.made(have, min(found.runs)))
 
 
 def looks(cell: Cell, runs: int = 0) -> Design:
@@ -228,16 +238,13 @@ def looks(cell: Cell, runs: int = 0) -> Design:
     return up_to(runs)
 
 
-def publishable(
-    worlds: Mapping[str, Sequence[Judged]], among: Library | None = None
-) -> list[published.Row]:
+def publishable(worlds: Mapping[str, Sequence[Judged]]) -> list[published.Row]:
     """All findings as they are published, and the stale ones that nothing replaces.
 
     Args:
         worlds: name of the world -> claims, judged.
-        among: what was published before; by default what is in the package.
     """
-    before = (among or published.library()).rows
+    before = published.library().rows
     rows: list[published.Row] = []
     for world, judged_ in worlds.items():
         for row in judged_:
@@ -246,18 +253,16 @@ def publishable(
     return rows
 
 
-def settings(
-    worlds: Mapping[str, Sequence[Judged]], among: Library | None = None
-) -> dict[str, Mapping]:
-    """Digest -> settings of all sides in `publishable`; arguments as there."""
-    found = dict((among or published.library()).settings)
+def settings(worlds: Mapping[str, Sequence[Judged]]) -> dict[str, Mapping]:
+    """Digest -> settings of all sides in `publishable`."""
+    found = dict(published.library().settings)
     for world, rows in worlds.items():
         for row in rows:
             for each in row.findings:
                 for side in each.cell.sides:
                     letter = row.claim.investigation
-                    digest = sides.digest_of(letter, side, world)
-                    found[digest] = sides.settings_of(letter, side, world)
+                    digest = digest_of(letter, side, world)
+                    found[digest] = settings_of(letter, side, world)
     return found
 
 

@@ -1,18 +1,16 @@
 """Run what claims need, look by look, in a store of its own for each world."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import closing
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from bns.campaign import drive
-from bns.campaign.drive import Progress
+from bns.campaign.drive import Progress, Session, Stop
 from bns.campaign.engines.registry import Engine
 from bns.campaign.file import Campaign, Member
 from bns.campaign.plan import Job
 from bns.campaign.store import CampaignStore, adopt
-from bns.claims import held, price, report, schedule, sides
-from bns.claims.claim import Claim
+from bns.claims import provenance, report, schedule
+from bns.claims.claim import Claim, lacking, member_of
 from bns.claims.report import Judged
 from bns.experiment.batch import check_device
 from bns.storage.lock import Lock
@@ -20,25 +18,7 @@ from bns.storage.lock import Lock
 ROOT = Path("runs/claims")
 QUICK_RUNS = 6
 
-Stop = Callable[[], bool]
 Found = Callable[[], None]
-
-
-@dataclass
-class Session:
-    """What a call of `run` did.
-
-    Attributes:
-        done: batches it ran, trunks among them.
-        failed: batches that failed, by key, with the reason.
-        waiting: batches that failed before and were not tried again.
-        stopped: whether it was told to stop before the end.
-    """
-
-    done: int = 0
-    failed: dict[str, str] = field(default_factory=dict)
-    waiting: int = 0
-    stopped: bool = False
 
 
 def directory(world: str, *, quick: bool, root: Path = ROOT) -> Path:
@@ -57,7 +37,7 @@ def impossible(claims: Iterable[Claim], *, world: str) -> dict[str, str]:
     found: dict[str, str] = {}
     for claim in claims:
         for cell in claim.cells:
-            why = sides.missing(claim.investigation, cell, world=world)
+            why = lacking(claim.investigation, cell, world=world)
             if why:
                 found.setdefault(claim.id, why)
     return found
@@ -114,7 +94,7 @@ def run(
             if not todo:
                 break
             if progress and not quick:
-                print(price.left(rows, world=world))
+                print(schedule.left(rows, world=world))
             work(
                 todo,
                 store,
@@ -140,7 +120,7 @@ def _round(
     """The batches to run next; none that failed."""
     wanted = schedule.due(rows, world=world, quick=quick, runs=runs)
     members = {m.identity: m for each in wanted for m in each.members}
-    have = held.read(store.directory, report.identities(members.values()))
+    have = provenance.read(store.directory, report.identities(members.values()))
     done = {name: each.runs for name, each in have.items()}
     jobs = schedule.jobs(wanted, done, store.directory)
     known = {*store.failures(), *session.failed}
@@ -173,16 +153,9 @@ def work(
     """
     for part in phases(jobs):
         shown = Progress(title, part, 0, enabled=progress)
-        with closing(drive.ended(part, store, engine, shown)) as outcomes:
-            for outcome in outcomes:
-                if outcome.data is None:
-                    session.failed[outcome.key] = outcome.reason
-                elif outcome.data:
-                    found()
-                session.done += outcome.data is not None
-                if stop():
-                    session.stopped = True
-                    return
+        drive.work(part, store, engine, shown, session, stop=stop, found=found)
+        if session.stopped:
+            return
 
 
 def phases(jobs: Sequence[Job]) -> Iterator[list[Job]]:
@@ -219,9 +192,9 @@ def take(
         member.identity: member
         for claim in claims
         for cell in claim.cells
-        if not sides.missing(claim.investigation, cell, world=world)
+        if not lacking(claim.investigation, cell, world=world)
         for side in cell.sides
-        for member in [sides.member(claim.investigation, side, world=world)]
+        for member in [member_of(claim.investigation, side, world=world)]
     }
     campaign = _campaign(tuple(members.values()), world)
     out = directory(world, quick=False, root=root)
@@ -229,7 +202,7 @@ def take(
         store = drive.opened(campaign, out, resume=True, lock=lock)
         taken = []
         for folder in folders:
-            have = held.read(out, report.identities(members.values()))
+            have = provenance.read(out, report.identities(members.values()))
             taken += adopt(store, folder, set(members), set(have))
         store.compact()
     return taken

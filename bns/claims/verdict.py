@@ -48,8 +48,7 @@ from bns.claims.claim import Cell
 from bns.claims.provenance import Made
 from bns.experiment.record import RunRecord
 from bns.stats import Interval
-from bns.stats.designs import Design, equivalence, up_to
-from bns.stats.resampling import power
+from bns.stats.designs import Design, equivalence, power, up_to
 
 LEVEL = 0.05
 ALIKE = 0.04

@@ -27,7 +27,7 @@ VERBS = {
     "schema": ("schema", "JSON Schema of the TOML files, for editors"),
     "gap": ("gap", "diagnose the gap between recordings and a model (experimental)"),
     "hardware": ("hardware", "real robots: rehearse, check, calibrate, record"),
-    "doctor": ("doctor", "check this machine and say what to install"),
+    "doctor": ("lists", "check this machine and say what to install"),
     "completion": ("completion", "print the completion script of bash, zsh or fish"),
 }
 """verb -> module of this package, and what it does in one line"""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from bns.claims.price import Price
+from bns.claims.schedule import Price
 from bns.cli.campaign import Batches
 from bns.cli.fields import Positional
 from bns.cli.parse import Verbs, dispatch
@@ -150,7 +150,7 @@ def _list(given: List) -> int:
 
 
 def _plan(given: Plan) -> int:
-    from bns.claims import price, runner
+    from bns.claims import runner, schedule
     from bns.claims.claim import INVESTIGATIONS, chosen
 
     wanted = chosen(given.ids)
@@ -159,9 +159,11 @@ def _plan(given: Plan) -> int:
     for letter in INVESTIGATIONS:
         part = [claim for claim in wanted if claim.investigation == letter]
         if part:
-            cost = price.planned(part, world=given.world)
+            cost = schedule.planned(part, world=given.world)
             rows.append([letter, len(part), *_costs(cost)])
-    rows.append(["all", len(wanted), *_costs(price.planned(wanted, world=given.world))])
+    rows.append(
+        ["all", len(wanted), *_costs(schedule.planned(wanted, world=given.world))]
+    )
     show(head, [[str(word) for word in row] for row in rows], json=given.json)
     if not given.json:
         lacking = runner.impossible(wanted, world=given.world)
@@ -172,7 +174,12 @@ def _plan(given: Plan) -> int:
 
 
 def _costs(price: Price) -> list:
-    return [price.sides, price.runs, f"{price.hours:.1f}", f"{price.apart:.1f}"]
+    return [
+        price.sides,
+        price.runs,
+        f"{price.hours:.1f}",
+        f"{price.apart:.1f}",
+    ]
 
 
 def _some(names: Collection[str]) -> str:

@@ -1,4 +1,6 @@
-"""`bns presets`, `learners`, `tasks`, `worlds`, `robots`, `effects`, `examples`."""
+"""What there is: `bns presets`, `learners`, `tasks`, `worlds`, `robots`, `effects`,
+`examples`; and what this machine has: `bns doctor`.
+"""
 
 import ast
 import shutil
@@ -14,6 +16,8 @@ from bns.errors import BnsError, UnknownNameError
 
 PLACE = Path(__file__).parents[1] / "examples"
 LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.pyc", ".*")
+BAD = 1
+"""exit code of `bns doctor` when something must be changed"""
 FEW = 4  # commands of a robot that a list shows
 Stage = Literal["", "command", "actuator", "body", "optics", "sensor", "tracking"]
 Rows = tuple[list[str], list[list[str]]]
@@ -55,8 +59,21 @@ class Examples:
     """print JSON instead of a table"""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Doctor:
+    """Check versions, known-bad pins, graphics, compiler, cores, disk and serial
+    ports, and say what to install. Exit code 1 if something must be changed; what is
+    only missing for one feature does not count.
+    """
+
+    json: bool = False
+    """print JSON instead of a table"""
+
+
 def main(verb: str, argv: list[str]) -> int:
-    """Print the list that `verb` names."""
+    """Print the list that `verb` names; gives the exit code."""
+    if verb == "doctor":
+        return _doctor(parse(Doctor, argv, prog="bns doctor"))
     if verb == "effects":
         return _effects(parse(Effects, argv, prog="bns effects"))
     if verb == "examples":
@@ -232,3 +249,15 @@ LISTS: dict[str, Callable[[], Rows]] = {
     "worlds": worlds,
     "robots": robots,
 }
+
+
+def _doctor(given: Doctor) -> int:
+    from bns.doctor import examine
+
+    findings = examine()
+    rows = [[f.state, f.what, f.found, f.remedy] for f in findings]
+    show(["state", "what", "found", "what to do"], rows, json=given.json)
+    bad = [f.what for f in findings if f.state == "bad"]
+    if not given.json:
+        print(f"To be changed: {', '.join(bad)}." if bad else "Ready to run.")
+    return BAD if bad else 0

@@ -1,6 +1,7 @@
 """What `bns run` leaves beside the data, and what it says at the end."""
 
 import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -10,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from bns import stats
-from bns.cli.extras import attempt
-from bns.errors import install
+from bns.errors import BnsError, install, missing
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
 from bns.progress import Each, counting, uncounted, working
@@ -28,7 +28,7 @@ def live(choice: str, config: RunConfig) -> Iterator[Callable | None]:
     if choice != "live":
         yield None
         return
-    from bns.viz import live as viewer
+    from bns.viz import recording as viewer
 
     with viewer.stream(config) as on_trial:
         yield on_trial
@@ -63,6 +63,23 @@ def write(
     print(summary(record))
     for name, path in made.items():
         print(f"{name + ':':<11}{path}")
+
+
+def attempt(name: str, make: Callable[[], Path]) -> dict[str, Path]:
+    """What `make` wrote, by name; nothing, and a line that says why, where it failed.
+
+    A picture that cannot be made must not take the data with it.
+    """
+    try:
+        return {name: make()}
+    except (BnsError, OSError) as error:
+        why = str(error)
+    except ModuleNotFoundError as error:
+        why = missing(error)
+        if not why:
+            raise
+    print(f"bns: no {name}: {why}", file=sys.stderr)
+    return {}
 
 
 def write_report(

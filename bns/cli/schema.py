@@ -73,7 +73,7 @@ def run() -> dict[str, Any]:
 def campaign() -> dict[str, Any]:
     """Schema of a campaign's file."""
     from bns import presets
-    from bns.campaign.settings import OWN
+    from bns.campaign.identity import OWN
     from bns.experiment.config import RunConfig
 
     own = [s for s in settings(RunConfig) if ".".join(s.path) not in OWN]

@@ -63,10 +63,10 @@ def main(verb: str, argv: list[str]) -> int:
         raise MissingDependencyError("bns view", "Rerun", install("view"))
     recording = find(Path(given.directory))
     if given.png:
-        from bns.viz import picture
+        from bns.viz import pictures
 
         with working("drawing", usual=DRAWING):
-            reports = picture.save(recording, given.png)
+            reports = pictures.write_png(recording, given.png)
         for report in reports:
             print(f"bns: the viewer says: {report}", file=sys.stderr)
         print(given.png)
@@ -83,7 +83,7 @@ def film(given: Arguments) -> Path:
     """
     from bns.cli.outputs import shown
     from bns.storage.store import load
-    from bns.viz import choices, film, style
+    from bns.viz import choices, pictures, style
 
     path = Path(given.gif or given.mp4)
     if path.suffix != (".gif" if given.gif else ".mp4"):
@@ -105,7 +105,7 @@ def film(given: Arguments) -> Path:
         )
         for trial in given.trials
     ]
-    return film.write(
+    return pictures.write_film(
         record,
         dense,
         path,
@@ -161,9 +161,9 @@ def show(recording: Path, bind: str, *, web: bool = False) -> int:
     """
     import subprocess
 
-    from bns.viz import picture
+    from bns.viz import pictures
 
-    viewer = picture.executable()
+    viewer = pictures.executable()
     if viewer is None:
         raise MissingDependencyError("bns view", "the Rerun viewer", install("view"))
     if (
@@ -192,9 +192,9 @@ def _address(bind: str) -> IPv4Address | IPv6Address:
 
 def _served(bind: str) -> list[str]:
     """How the viewer is told to serve a browser; says where it does."""
-    from bns.viz import picture
+    from bns.viz import pictures
 
-    data, page = picture.free_port(DATA), picture.free_port(PAGE)
+    data, page = pictures.free_port(DATA), pictures.free_port(PAGE)
     everywhere = _address(bind).is_unspecified
     host = socket.gethostname() if everywhere else bind
     host = f"[{host}]" if ":" in host else host

@@ -12,8 +12,7 @@ import torch
 from torch import Tensor
 
 from bns.draws import Draws, whole_below
-from bns.experiment.task_settings import ControllerConfig
-from bns.units import metres_per_second
+from bns.experiment.task_settings import ControllerConfig, metres_per_second
 from bns.worlds.trial import Commands
 
 

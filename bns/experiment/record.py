@@ -1,13 +1,19 @@
-"""The record of a batch of runs: what analysis, reports and pictures read."""
+"""The record of a batch of runs: what analysis, reports and pictures read.
 
-from collections.abc import Mapping
+It is made of steps, one for each trial of every run, as they are stored.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bns.errors import MissingDependencyError, install
+from bns.errors import FormatError, MissingDependencyError, install
 from bns.experiment.config import RunConfig
+from bns.storage import reading
+from bns.worlds.trial import Channel, Commands, Outcome, Trial
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
@@ -85,3 +91,173 @@ class RunRecord:
         keys = {"replicate": runs.ravel(), "trial": trials.ravel()}
         figures = {name: array.ravel() for name, array in self.columns.items()}
         return pandas.DataFrame(keys | figures)
+
+
+ARRAYS = ("sent", "poses", "predicted")
+_TRIAL = ("times", "observed", "boundaries", "handled")
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What R runs did in one trial.
+
+    Attributes:
+        columns: the per-trial figures of `RunRecord`, each ``(R,)``.
+        arrays: "sent" ``(R, K, C)``, "poses" and "predicted" ``(R, K + 1, 3)``, and
+            what else a learner gives, the run first.
+        trials: the trials of the recorded replicates with all their samples.
+    """
+
+    columns: Mapping[str, np.ndarray]
+    arrays: Mapping[str, np.ndarray]
+    trials: Sequence[Trial] = ()
+
+    @classmethod
+    def of(
+        cls, observed: Mapping[str, np.ndarray], trials: Sequence[Trial] = ()
+    ) -> "Step":
+        """The step in what a learner's `observe` gives."""
+        arrays = {n: np.asarray(v) for n, v in observed.items() if np.ndim(v) > 1}
+        columns = {
+            name: np.asarray(value, dtype=np.float64)
+            for name, value in observed.items()
+            if name not in arrays
+        }
+        return cls(columns, arrays, trials)
+
+    def part(self, runs: slice) -> "Step":
+        """The step of some of the runs, without dense trials."""
+        return Step(
+            {name: value[runs] for name, value in self.columns.items()},
+            {name: value[runs] for name, value in self.arrays.items()},
+        )
+
+    def to_arrays(self) -> dict[str, np.ndarray]:
+        """Everything as named arrays, none of them of objects.
+
+        Returns:
+            name -> array: "column.NAME" ``(R,)``, "array.NAME" with the run first,
+            "trials" (JSON as uint8), and the samples of trial n as "trialn.NAME".
+        """
+        stored = {f"column.{name}": value for name, value in self.columns.items()}
+        stored |= {f"array.{name}": value for name, value in self.arrays.items()}
+        meta = [_trial_meta(trial) for trial in self.trials]
+        stored["trials"] = np.frombuffer(json.dumps(meta).encode(), np.uint8)
+        for index, trial in enumerate(self.trials):
+            stored |= _trial_arrays(trial, f"trial{index}.")
+        return stored
+
+    @classmethod
+    def from_arrays(
+        cls, stored: Mapping[str, np.ndarray], name: str = "A stored step"
+    ) -> "Step":
+        """The step that `to_arrays` stored; `name` is the file's, for messages.
+
+        Raises:
+            FormatError: something is missing, or not as it was stored.
+        """
+        try:
+            meta = reading.json(stored["trials"].tobytes(), name)
+            trials = [
+                _trial(item, stored, f"trial{index}.")
+                for index, item in enumerate(meta)
+            ]
+        except reading.UNREADABLE as error:
+            raise FormatError(f"{name} is not complete: {error}.") from error
+        return cls(_under("column.", stored), _under("array.", stored), trials)
+
+
+def assemble(
+    config: RunConfig,
+    steps: Sequence[Step],
+    *,
+    versions: Mapping[str, str],
+    conditions: Mapping[str, object],
+    damage_onset: np.ndarray,
+    directory: str = "",
+) -> RunRecord:
+    """The record of the steps done so far (none: a record of zero trials).
+
+    Args:
+        config: of the run: R replicates, commands of K places.
+        steps: one a trial, T of them, in order.
+        versions: package -> version, of what ran.
+        conditions: what else is known of how it ran.
+        damage_onset: first damaged trial of each replicate, ``(R,)``.
+        directory: of the run; empty where it is not stored.
+    """
+    runs, longest = config.replicates, config.controller.max_commands
+    empty = {
+        name: np.zeros((runs, 0, longest + (name != "sent"), 3)) for name in ARRAYS
+    }
+    names = list(steps[0].columns) if steps else []
+    stacked = {
+        name: np.stack([step.arrays[name] for step in steps], axis=1)
+        for name in (steps[0].arrays if steps else ())
+    }
+    arrays = {name: stacked.pop(name, empty[name]) for name in ARRAYS}
+    return RunRecord(
+        config=config,
+        versions=dict(versions),
+        columns={n: np.stack([s.columns[n] for s in steps], axis=1) for n in names},
+        damage_onset=np.asarray(damage_onset, dtype=np.int64),
+        directory=directory,
+        conditions=dict(conditions),
+        extra=stacked,
+        **arrays,
+    )
+
+
+def _under(prefix: str, stored: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {
+        name.removeprefix(prefix): value
+        for name, value in stored.items()
+        if name.startswith(prefix)
+    }
+
+
+def _plain(value: Any) -> Any:
+    """NumPy values inside `conditions` as JSON values."""
+    return value.tolist() if hasattr(value, "tolist") else str(value)
+
+
+def _plain_flag(value: Any) -> bool | int:
+    """A flag or a counter of an outcome as JSON holds it."""
+    return bool(value) if isinstance(value, bool | np.bool_) else int(value)
+
+
+def _trial_meta(trial: Trial) -> dict[str, Any]:
+    conditions = json.dumps(dict(trial.conditions), default=_plain)
+    return {
+        "channels": [list(channel) for channel in trial.channels],
+        "command_channels": [list(channel) for channel in trial.commands.channels],
+        "outcome": [_plain_flag(flag) for flag in trial.outcome],
+        "robot": trial.robot,
+        "world": trial.world,
+        "conditions": json.loads(conditions),
+        "truth": list(trial.truth),
+    }
+
+
+def _trial_arrays(trial: Trial, prefix: str) -> dict[str, np.ndarray]:
+    stored = {prefix + name: getattr(trial, name) for name in _TRIAL}
+    stored[f"{prefix}values"] = trial.commands.values
+    stored[f"{prefix}durations"] = trial.commands.durations
+    truth = {f"{prefix}truth.{name}": value for name, value in trial.truth.items()}
+    return stored | truth
+
+
+def _trial(
+    meta: dict[str, Any], stored: Mapping[str, np.ndarray], prefix: str
+) -> Trial:
+    channels = tuple(Channel(*pair) for pair in meta["command_channels"])
+    return Trial(
+        Commands(stored[f"{prefix}values"], stored[f"{prefix}durations"], channels),
+        **{name: stored[prefix + name] for name in _TRIAL},
+        channels=tuple(Channel(*pair) for pair in meta["channels"]),
+        outcome=Outcome(*meta["outcome"]),
+        robot=meta["robot"],
+        world=meta["world"],
+        conditions=meta["conditions"],
+        truth={name: stored[f"{prefix}truth.{name}"] for name in meta["truth"]},
+    )

@@ -10,7 +10,10 @@ import numpy as np
 from bns import models
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig
-from bns.units import SPEED_UNITS_PER_METRE_PER_SECOND, metres_per_second
+from bns.experiment.task_settings import (
+    SPEED_UNITS_PER_METRE_PER_SECOND,
+    metres_per_second,
+)
 from bns.worlds.trial import Channel
 
 

@@ -14,16 +14,14 @@ from bns.experiment import versions
 from bns.experiment.batch import Batch, check_device, check_world, resolve
 from bns.experiment.config import RunConfig
 from bns.experiment.loading import differences
-from bns.experiment.record import RunRecord
-from bns.experiment.step import Step, assemble
+from bns.experiment.record import RunRecord, Step, assemble
 from bns.experiment.validate import check
 from bns.experiment.world_factory import make_models, make_world, surroundings
 from bns.progress import Bar
 from bns.storage import files, reading
 from bns.storage.arrays import alike
-from bns.storage.directory import check_free
 from bns.storage.lock import Lock
-from bns.storage.store import RunStore
+from bns.storage.store import RunStore, check_free
 from bns.worlds.damage import Damage
 from bns.worlds.trial import Trial
 from bns.worlds.world import World
@@ -295,7 +293,7 @@ def _batch(
     config: RunConfig, store: RunStore | None, world: World | None, *, background: bool
 ) -> Batch:
     """Learner and world; a new directory is made once both are known to be possible."""
-    from bns.experiment.background import behind
+    from bns.experiment.batch import behind
 
     learner = behind(config) if background else None
     models = [] if background else make_models(config)

@@ -20,7 +20,7 @@ from bns.errors import BnsError
 from bns.experiment.config import LearnerSettings
 from bns.learners.base import Curves, Panel, Proposal, RememberingLearner
 from bns.learners.cma import CmaSettings, Search
-from bns.prior.unknowns import Unknowns
+from bns.prior.modelling import Unknowns
 from bns.tasks.base import Space
 from bns.tasks.light import LightTask
 from bns.worlds.trial import Trial

@@ -27,7 +27,6 @@ from bns.evolution.neat import Lineage, NeatSettings
 from bns.evolution.topology import KINDS, SLOPE, Ends, Marks, networks, sizes
 from bns.experiment.config import RunConfig
 from bns.learners.base import Curves, Panel, Proposal
-from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.config import BNS_SECTIONS
 from bns.learners.bns.learner import SNN_ERROR, Bns
 from bns.learners.bns.light.problem import LightProblem
@@ -146,16 +145,11 @@ class NeatProblem(LightProblem):
     stream = "neat"
     relative_cost = 0.0
 
-    def __init__(
-        self,
-        task: Task,
-        configs: Sequence[RunConfig],
-        draws: Draws,
-        adaptations: Adaptations,
-    ):
-        super().__init__(task, configs, draws, adaptations)
+    def set_up(self) -> None:
+        """See `Problem.set_up`."""
+        super().set_up()
         plain = self.simulator.controllers
-        self.rule = cast(NeatSettings, configs[0].settings)
+        self.rule = cast(NeatSettings, self.config.settings)
         common = {name: getattr(plain, name) for name in plain.__dataclass_fields__}
         self.kind = NeatControllers(**common, most=self.rule.most)
         if self.kind.ends.links > self.rule.most:

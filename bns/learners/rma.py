@@ -27,7 +27,7 @@ from bns.learners.domain_randomised import (
     Situations,
     Trained,
 )
-from bns.snn.adam import AdamState, adam
+from bns.snn.training import AdamState, adam
 from bns.tasks.base import Space
 from bns.tasks.light import lost, readings
 from bns.tasks.light_controller import (

@@ -17,7 +17,7 @@ import numpy as np
 from bns import seeding
 from bns.experiment.config import LearnerSettings
 from bns.learners.base import Curves, Panel, Proposal, RememberingLearner
-from bns.prior import driving, gaussian, tree
+from bns.prior import driving, gaussian
 from bns.tasks.navigation import NavigationTask
 from bns.worlds.trial import Trial
 
@@ -161,7 +161,7 @@ class Rte(RememberingLearner):
     def begin(self) -> None:
         """See `Learner.begin`."""
         self.rule = cast(RteSettings, self.config.settings)
-        self._search = tree.Rule(
+        self._search = driving.Rule(
             iterations=self.rule.iterations,
             bonus=self.rule.bonus,
             actions=self.rule.actions,

@@ -10,7 +10,7 @@ of BNS on the same task. Random trials are trials, and are charged like others.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, cast
 
@@ -23,7 +23,6 @@ from bns.evolution.generation import Genes
 from bns.experiment.config import LearnerSettings, RunConfig
 from bns.learners.base import Proposal
 from bns.learners.bns.learner import Bns
-from bns.worlds.world import CountedWorld
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,15 +55,13 @@ class StaticSnn(Bns):
     Settings = StaticSnnSettings
     sections = ("evolution", "snn", "compiled")
 
-    def __init__(
-        self,
-        configs: Sequence[RunConfig],
-        *,
-        replicates: Sequence[int],
-        onsets: Sequence[int],
-        models: Sequence[CountedWorld] = (),
-    ):
-        super().__init__(configs, replicates=replicates, onsets=onsets, models=models)
+    def begin(self) -> None:
+        """See `Learner.begin`.
+
+        Raises:
+            BnsError: no trial is left for what evolves.
+        """
+        super().begin()
         config, self.rule = self.config, cast(StaticSnnSettings, self.config.settings)
         self._encoding: Genes = self.problem.encoding
         each = config.light.cycles

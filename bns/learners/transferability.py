@@ -16,8 +16,13 @@ import numpy as np
 
 from bns.learners.base import Curves, Panel
 from bns.prior import gaussian
-from bns.prior.breeding import ranked
-from bns.prior.model_learner import Memory, ModelLearner, ModelLearnerSettings, Rollouts
+from bns.prior.model_learner import (
+    Memory,
+    ModelLearner,
+    ModelLearnerSettings,
+    Rollouts,
+    ranked,
+)
 from bns.tasks.base import BOARD, seen_places
 from bns.worlds.trial import Trial
 

@@ -4,6 +4,13 @@ All weights of a run are one row of `theta`, shape ``(R, D)``, so that Rprop is
 elementwise over one tensor. Two shapes are used: G = 3 networks with one output each
 (thesis Fig 4.4: forward, left, turn), or an ensemble of G networks with all three
 outputs and dropout (thesis 7.2.4).
+
+Inputs and outputs of the motion SNN are scaled to about -1..1. Inputs (thesis Fig 4.4):
+previous left and right wheel speed, new left and right wheel speed [m/s], duration [s];
+the previous speeds are 0 at the start. Outputs: forward, left [m] and turn [rad] in the
+body frame at the command's start.
+
+From displacements in the body frame to a path in the world frame, batched.
 """
 
 from dataclasses import dataclass
@@ -13,8 +20,55 @@ import torch
 from torch import Tensor
 
 from bns.draws import Draws
+from bns.evolution.chromosome import Encoding
 from bns.learners.bns.config import SnnConfig
-from bns.snn.scaling import INPUTS, OUTPUTS
+
+INPUTS = 5
+OUTPUTS = 3
+AXLE = 0.0884  # [m] Khepera III axle, only to scale the turn (not fitted)
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """Offsets and scales, from the encoding's bounds.
+
+    Attributes:
+        centre, half: of the inputs, ``(5,)`` [m/s x4, s].
+        output: scale of the outputs, ``(3,)`` [m, m, rad].
+    """
+
+    centre: Tensor
+    half: Tensor
+    output: Tensor
+
+    @classmethod
+    def of(cls, encoding: Encoding) -> "Scaling":
+        """Scaling for commands inside an encoding's bounds."""
+        top = encoding.high[0].item()
+        shortest, longest = encoding.low[2].item(), encoding.high[2].item()
+        middle, width = (shortest + longest) / 2, (longest - shortest) / 2
+        device = encoding.low.device
+        return cls(
+            centre=torch.tensor([0.0, 0.0, 0.0, 0.0, middle], device=device),
+            half=torch.tensor([top, top, top, top, width], device=device),
+            output=torch.tensor(
+                [top * longest, top * longest, top * longest / AXLE], device=device
+            ),
+        )
+
+    def inputs(self, decoded: Tensor) -> Tensor:
+        """Network inputs of command lists.
+
+        Args:
+            decoded: commands after the dead band, ``(..., K, 3)``.
+
+        Returns:
+            ``(..., K, 5)``, scaled.
+        """
+        speeds = decoded[..., :2]
+        before = torch.nn.functional.pad(speeds, (0, 0, 1, 0))[..., :-1, :]
+        return (torch.cat([before, decoded], dim=-1) - self.centre) / self.half
+
 
 Activation = Literal["sigmoid", "relu"]
 
@@ -163,3 +217,30 @@ def predict(
     if shape.outputs == 1:
         return outputs.squeeze(2)
     return outputs.mean(1)
+
+
+def integrate(
+    forward: Tensor,
+    left: Tensor,
+    turn: Tensor,
+    start: tuple[float, float, float],
+    dim: int = -1,
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Compose body-frame displacements along one axis.
+
+    Args:
+        forward, left: displacements of each command [m], any equal shapes.
+        turn: the same [rad].
+        start: pose in the world frame [m, m, rad].
+        dim: the axis along which commands follow each other.
+
+    Returns:
+        x, y [m] and yaw [rad] in the world frame after each command.
+    """
+    x, y, yaw = start
+    after = yaw + turn.cumsum(dim)
+    before = after - turn
+    cos, sin = before.cos(), before.sin()
+    px = x + (cos * forward - sin * left).cumsum(dim)
+    py = y + (sin * forward + cos * left).cumsum(dim)
+    return px, py, after

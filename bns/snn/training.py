@@ -1,16 +1,27 @@
-"""Training by Rprop on full batches, all runs together.
+"""Training of stacked networks on their patterns, all runs together.
 
-The gradient of a one-hidden-layer network is written out (tests compare it with
-autograd's), and Rprop follows `torch.optim.Rprop` step for step (tests compare the
-two), so that an epoch is a handful of batched products that torch can compile.
+By Rprop on all patterns: the gradient of a one-hidden-layer network is written out
+(tests compare it with autograd's), and Rprop follows `torch.optim.Rprop` step for step
+(tests compare the two), so that an epoch is a handful of batched products that torch
+can compile.
+
+By Adam on random parts of the patterns: for the walking SNN Rprop costs more the longer
+a run is, and its step sizes mistake the noise of dropout for a change of direction;
+Adam (Kingma and Ba 2015) on parts of fixed size does neither. Each run draws from its
+own patterns.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
 
-from bns.snn.network import Shape, hidden_layer, slope
+from bns.draws import Draws, whole_below
+from bns.experiment.config import RunConfig
+from bns.learners.bns.config import SnnConfig
+from bns.snn.network import Shape, forward, hidden_layer, slope
 
 FIRST_STEP = 0.01  # torch.optim.Rprop's defaults
 SHRINK, GROW = 0.5, 1.2
@@ -113,3 +124,180 @@ def epoch(
     """
     grad = gradient(shape, theta, inputs, targets, weight, keep)
     return rprop(theta, grad + decay * theta, state)
+
+
+Epoch = Callable[..., tuple[Tensor, RpropState]]
+
+
+class Patterns(NamedTuple):
+    """What R runs train on.
+
+    Attributes:
+        inputs: scaled, ``(R, I, N)``.
+        targets: scaled, ``(R, O, N)``.
+        weight: 1 for a pattern, 0 for padding, ``(R, 1, 1, N)``.
+    """
+
+    inputs: Tensor
+    targets: Tensor
+    weight: Tensor
+
+
+def epoch_of(shape: Shape, config: SnnConfig) -> Epoch:
+    """The epoch of a configuration, ready to be compiled."""
+    return partial(epoch, shape, decay=config.weight_decay)
+
+
+def fit(
+    shape: Shape,
+    config: SnnConfig,
+    theta: Tensor,
+    patterns: Patterns,
+    draws: Draws,
+    epoch: Epoch,
+) -> tuple[Tensor, Tensor]:
+    """Train all runs' networks from fresh step sizes.
+
+    Args:
+        shape: of the networks.
+        config: says for how many epochs, and how much dropout an ensemble has.
+        theta: weights ``(R, D)``.
+        patterns: what to train on.
+        draws: of the dropout.
+        epoch: `epoch_of`, compiled or not.
+
+    Returns:
+        new weights, and the mean squared error after training ``(R,)``.
+    """
+    inputs, targets, weight = patterns
+    shaped = targets.unsqueeze(2) if shape.outputs == 1 else targets.unsqueeze(1)
+    drop = config.kind == "ensemble" and config.dropout > 0
+    state = RpropState.fresh(theta)
+    for _ in range(config.epochs):
+        keep = dropout(shape, config.dropout, inputs, draws) if drop else None
+        theta, state = epoch(theta, state, inputs, shaped, weight, keep)
+    return theta, mean_error(shape, theta, patterns)
+
+
+def mean_error(shape: Shape, theta: Tensor, patterns: Patterns) -> Tensor:
+    """Mean squared error of scaled outputs on all patterns, ``(R,)``.
+
+    Args:
+        shape: of the networks.
+        theta: weights ``(R, D)``.
+        patterns: scaled; padding counts nothing.
+    """
+    inputs, targets, weight = patterns
+    shaped = targets.unsqueeze(2) if shape.outputs == 1 else targets.unsqueeze(1)
+    error = (forward(shape, theta, inputs) - shaped) * weight
+    count = weight.sum((1, 2, 3)).clamp(min=1.0)
+    heads = shape.groups * shape.outputs
+    return error.square().sum((1, 2, 3)) / (count * heads)
+
+
+def dropout(shape: Shape, rate: float, inputs: Tensor, draws: Draws) -> Tensor:
+    """Factors of the hidden neurons: 0, or 1 / (1 - rate).
+
+    Args:
+        shape: of the networks.
+        rate: probability that a neuron is dropped, below 1.
+        inputs: of the networks, ``(R, I, N)``; only their shape counts.
+        draws: source of randomness.
+
+    Returns:
+        ``(R, G, H, N)``.
+    """
+    runs, _, patterns = inputs.shape
+    coins = draws.uniform(runs, shape.groups, shape.hidden, patterns)
+    return (coins >= rate).float() / (1.0 - rate)
+
+
+BETAS = (0.9, 0.999)  # torch.optim.Adam's defaults
+EPSILON = 1e-8
+
+
+class AdamState(NamedTuple):
+    """First and second moments of every weight, each ``(R, D)``."""
+
+    first: Tensor
+    second: Tensor
+
+    @classmethod
+    def fresh(cls, theta: Tensor) -> "AdamState":
+        """The state before the first step."""
+        return cls(torch.zeros_like(theta), torch.zeros_like(theta))
+
+
+def adam(
+    theta: Tensor, grad: Tensor, state: AdamState, rate: Tensor, step: Tensor
+) -> tuple[Tensor, AdamState]:
+    """One step of Adam, as in `torch.optim.Adam`; steps count from 1.
+
+    Args:
+        theta: weights, ``(R, D)``.
+        grad: their gradient, ``(R, D)``.
+        state: moments before the step.
+        rate: learning rate, of no dimension or broadcasting to `theta`.
+        step: number of this step, from 1, of no dimension.
+
+    Returns:
+        weights and moments after the step.
+    """
+    first = torch.lerp(state.first, grad, 1 - BETAS[0])
+    second = torch.lerp(state.second, grad.square(), 1 - BETAS[1])
+    size = rate / (1 - BETAS[0] ** step)
+    scale = second.sqrt() / (1 - BETAS[1] ** step) ** 0.5 + EPSILON
+    return theta - size * first / scale, AdamState(first, second)
+
+
+def fit_adam(
+    shape: Shape,
+    config: RunConfig,
+    theta: Tensor,
+    patterns: Patterns,
+    draws: Draws,
+) -> tuple[Tensor, Tensor]:
+    """Train all runs' networks; the rate falls to zero along half a cosine.
+
+    The loss is that of `fit` divided by the number of patterns.
+
+    Args:
+        shape: of the networks.
+        config: size of the parts, rate, dropout, decay.
+        theta: weights ``(R, D)``.
+        patterns: what to draw from.
+        draws: of the parts and of the dropout.
+
+    Returns:
+        new weights, and the mean squared error on all patterns after training ``(R,)``.
+    """
+    inputs, targets, weight = patterns
+    counts = weight.sum((1, 2, 3)).long()
+    batch, off = config.walk.batch, config.snn.dropout
+    steps, state = config.snn.epochs, AdamState.fresh(theta)
+    decay = config.snn.weight_decay / counts.clamp(min=1)[:, None]
+    some = (counts > 0).float()[:, None, None, None].expand(-1, 1, 1, batch)
+    for number in range(steps):
+        coins = draws.uniform(len(theta), batch)
+        index = whole_below(coins, counts.clamp(min=1)[:, None])[:, None]
+        shown = inputs.gather(2, index.expand(-1, inputs.shape[1], -1))
+        wanted = targets.gather(2, index.expand(-1, targets.shape[1], -1))
+        keep = dropout(shape, off, shown, draws) if off else None
+        grad = (
+            _gradient_by_run(shape, theta, shown, wanted.unsqueeze(1), some, keep)
+            / batch
+        )
+        here = torch.tensor(number / steps)
+        rate = config.walk.learning_rate * (1 + torch.cos(torch.pi * here)) / 2
+        grad = grad + decay * theta
+        theta, state = adam(theta, grad, state, rate, torch.tensor(number + 1.0))
+    return theta, mean_error(shape, theta, patterns)
+
+
+def _gradient_by_run(shape: Shape, theta: Tensor, *patterns: Any) -> Tensor:
+    """As `gradient`; on a CPU run by run, since one run's activations fit its cache."""
+    if theta.device.type != "cpu":
+        return gradient(shape, theta, *patterns)
+    parts = [[None] * len(theta) if p is None else p.split(1) for p in patterns]
+    rows = zip(theta.split(1), *parts, strict=True)
+    return torch.cat([gradient(shape, *row) for row in rows])

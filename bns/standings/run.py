@@ -1,15 +1,16 @@
 """Run what the standings lack; sides that share trials train them once."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from bns.campaign import drive
+from bns.campaign.drive import Session, Stop
 from bns.campaign.engines.registry import Engine
 from bns.campaign.file import Campaign, Member
 from bns.campaign.plan import Job
 from bns.claims import schedule
-from bns.claims.runner import Session, work
+from bns.claims.runner import work
 from bns.experiment import versions
 from bns.experiment.batch import check_world
 from bns.learners import registry as learners
@@ -86,7 +87,7 @@ def run(
     retry: bool = False,
     mix: bool = False,
     progress: bool = True,
-    stop: Callable[[], bool] = lambda: False,
+    stop: Stop = lambda: False,
 ) -> Session:
     """Run what is missing of a part of the standings.
 

@@ -1,16 +1,20 @@
-"""Files that are whole or absent: written beside, synchronised, then renamed."""
+"""Files that are whole or absent: written beside, synchronised, then renamed.
+
+A journal is a file of JSON lines, one per event: appended to, never rewritten.
+"""
 
 import errno
 import json
 import os
 import shutil
+import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from bns.errors import BnsError
-from bns.storage import seal
+from bns.errors import BnsError, FormatError
+from bns.storage import reading, seal
 
 TEMPORARY = ".tmp-"
 """prefix of what is not whole yet; a resumed run removes it"""
@@ -167,3 +171,31 @@ def _flush(path: Path, flags: int) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+def append_entry(path: Path, **entry: Any) -> None:
+    """Append a line; its first field, `at`, is the time [s since 1970].
+
+    Raises:
+        StorageError: no space, or no permission.
+    """
+    line = json.dumps({"at": round(time.time(), 3), **entry}) + "\n"
+    try:
+        with open(path, "ab+") as file:
+            if file.tell() and file.seek(-1, os.SEEK_END) >= 0 and file.read() != b"\n":
+                line = "\n" + line  # the last one is torn
+            file.write(line.encode())
+    except OSError as error:
+        raise storage_error(path, error) from error
+
+
+def read_entries(path: Path) -> list[dict[str, Any]]:
+    """The lines so far; a torn one is left out, no file has none."""
+    if not path.exists():
+        return []
+    found = []
+    for line in reading.read_bytes(path, most=reading.DATA).splitlines():
+        with suppress(FormatError):
+            entry = reading.json(line, path)
+            found += [entry] if isinstance(entry, dict) else []
+    return found

@@ -1,7 +1,7 @@
 """Files from outside: regular, of a size that is told, parsed once, then typed.
 
 Every reader of the project comes through here (arrays and tables through `arrays`,
-`parquet` and `csv_table` beside it). Whatever a file holds, what comes out is its
+`parquet` and `tables` beside it). Whatever a file holds, what comes out is its
 content or a `FormatError` of one line.
 """
 

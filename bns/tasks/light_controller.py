@@ -17,7 +17,7 @@ from torch import Tensor
 
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig
-from bns.units import metres_per_second
+from bns.experiment.task_settings import metres_per_second
 
 READINGS = 2
 OUTPUTS = 2

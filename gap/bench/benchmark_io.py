@@ -20,7 +20,7 @@ from bns.gap.diagnose import diagnose
 from bns.gap.models.base import GapModel
 from bns.gap.records import plain
 from bns.progress import Each, uncounted
-from bns.storage import files, journal, reading, seal
+from bns.storage import files, reading, seal
 from bns.storage.lock import Lock
 from bns.worlds.data import dataset
 
@@ -107,7 +107,7 @@ def _run(places: Iterable[Path], model: GapModel, said: Path, seed: int) -> int:
             found = json.loads(diagnose(trials, model, seed=seed).to_json())
         except BnsError as error:
             found = {"error": str(error)}
-        journal.note(said, name=place.name, diagnosis=found)
+        files.append_entry(said, name=place.name, diagnosis=found)
         count += 1
     return count
 
@@ -152,7 +152,7 @@ def read_answers(answers: Path) -> dict[str, Any]:
 
 
 def _lines(file: Path) -> list[dict[str, Any]]:
-    lines = journal.entries(file)
+    lines = files.read_entries(file)
     for line in lines:
         if not (isinstance(line.get("name"), str) and "diagnosis" in line):
             raise FormatError(f"{file} holds a line without name or diagnosis.")

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from bns.errors import FormatError
-from bns.storage import csv_table, reading
+from bns.storage import reading, tables
 
 TIME, TRIAL, SENT = "time", "trial", "command_time"
 """columns that a log may have under these names, beside its channels"""
@@ -182,7 +182,7 @@ def _csv(path: Path) -> Table:
     """Columns of numbers; others are left out."""
     plain = path.with_suffix("") if path.suffix.lower() == PACKED else path
     tabbed = plain.suffix.lower() == ".tsv"
-    found = csv_table.read_numbers(path, delimiter="\t" if tabbed else ",")
+    found = tables.read_csv_numbers(path, delimiter="\t" if tabbed else ",")
     if not found or not len(next(iter(found.values()))):
         raise FormatError(f"{path} is no CSV table of numbers with a line of names.")
     return Table(tuple(Column(n, v) for n, v in found.items()), "CSV table")

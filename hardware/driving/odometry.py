@@ -11,7 +11,7 @@ import numpy as np
 from bns.errors import BnsError, FormatError
 from bns.hardware.driving import homing
 from bns.hardware.driving.motion import Mover, Point
-from bns.models.khepera3.units import WHEEL_DIAMETER
+from bns.models.khepera3 import WHEEL_DIAMETER
 from bns.storage import files, reading, seal
 from bns.storage.reading import Least, Positive
 from bns.worlds.trial import body_displacements

@@ -13,7 +13,7 @@ import numpy as np
 from bns.hardware.emulators.device import LiveBody, Reply
 from bns.hardware.khepera import protocol
 from bns.models.arena import SIZE
-from bns.models.khepera3.units import firmware
+from bns.models.khepera3 import firmware
 from bns.worlds.effects.base import Effect
 from bns.worlds.light import sensors
 from bns.worlds.light.law import Lamp, LightField

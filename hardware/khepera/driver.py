@@ -10,7 +10,7 @@ from bns.hardware.faults import FaultLog, LinkError, SafetyStop, Void
 from bns.hardware.khepera import protocol
 from bns.hardware.line import Line
 from bns.hardware.safety.stop_order import insist, khepera3
-from bns.models.khepera3.units import Firmware, firmware
+from bns.models.khepera3 import Firmware, firmware
 
 LARGEST = 43_000  # speed units, firmware < 3, regulated (manual 2.2, p. 14)
 NEWEST = 9  # firmware versions beyond it are not known and refused

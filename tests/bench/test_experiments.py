@@ -19,8 +19,8 @@ from bns.experiment.run import train
 from bns.learners.bns.config import AdaptationConfig, WatchConfig
 from bns.storage.store import RunStore
 from tests.bns import robots
-from tests.bns.contents import contents
 from tests.bns.robots import small
+from tests.bns.shared import contents
 
 ONSET = 6
 

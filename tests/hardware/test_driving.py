@@ -14,7 +14,7 @@ from bns.hardware.faults import SafetyStop, Void
 from bns.hardware.safety.motion_check import AXLE, SLOWEST, MotionCheck
 from bns.hardware.tracking.tracker import Frame, Sighting, Tracker
 from bns.hardware.worlds.wheeled import HardwareWorld
-from bns.models.khepera3.units import WHEEL_DIAMETER
+from bns.models.khepera3 import WHEEL_DIAMETER
 from bns.worlds.trial import Commands
 
 pytest.importorskip("cv2")

@@ -34,11 +34,11 @@ def test_overhead_camera_sees_the_whole_board():
 
 
 def test_the_robot_drives_on_the_board_as_in_its_scene():
-    from bns.models.khepera3 import calibration
+    from bns.models import khepera3
 
     board = models.scene_spec("khepera3", objectives=PLACES)
-    there = calibration.measure(board)
-    assert there == calibration.measure(models.spec("khepera3"))
+    there = khepera3.measure(board)
+    assert there == khepera3.measure(models.spec("khepera3"))
 
 
 def test_bare_board_keeps_the_sites():

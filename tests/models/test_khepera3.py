@@ -6,9 +6,8 @@ import pytest
 
 from bns import models
 from bns.errors import UnknownNameError
-from bns.models.khepera3 import calibration
-from bns.models.khepera3.calibration import COMMAND, drive
-from bns.models.khepera3.units import FIRMWARES, firmware
+from bns.models import khepera3
+from bns.models.khepera3 import COMMAND, FIRMWARES, drive, firmware
 
 FRONT = {
     "public": (76.7, 42.8, 13.3, -13.3, -42.8, -76.7),
@@ -97,7 +96,7 @@ def model():
 
 @pytest.fixture(scope="module")
 def measured():
-    return calibration.measure(models.spec("khepera3"))
+    return khepera3.measure(models.spec("khepera3"))
 
 
 def test_steady_speed_is_the_laboratorys(measured):
@@ -117,8 +116,8 @@ def test_starting_to_spin_loses_the_laboratorys_angle(measured):
 
 
 def test_deviations_are_shares_of_what_is_allowed():
-    off = calibration.TARGET._replace(speed=0.1214 * 0.985)
-    shares = calibration.deviations(off)
+    off = khepera3.TARGET._replace(speed=0.1214 * 0.985)
+    shares = khepera3.deviations(off)
     assert shares["speed"] == pytest.approx(0.5)
     assert shares["spin"] == 0
 
@@ -128,7 +127,7 @@ def test_a_slack_servo_is_noticed():
     for actuator in spec.actuators:
         actuator.gainprm[0] /= 2
         actuator.biasprm[2] /= 2
-    assert calibration.deviations(calibration.measure(spec))["lost_distance"] > 1
+    assert khepera3.deviations(khepera3.measure(spec))["lost_distance"] > 1
 
 
 def test_straight_is_straight(model):

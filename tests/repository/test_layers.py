@@ -11,9 +11,7 @@ BASE = {"bns", "bns.errors", "bns.progress", "bns.seeding", "bns.storage"} | {
     f"bns.storage.{name}"
     for name in (
         "arrays",
-        "csv_table",
         "files",
-        "journal",
         "lock",
         "numbers",
         "parquet",
@@ -49,12 +47,10 @@ PROTOCOL = {
 EXPERIMENT = {
     f"bns.experiment.{name}"
     for name in (
-        "background",
         "batch",
         "robots",
         "run",
         "static_snn",
-        "static_walk",
         "world_factory",
     )
 } | {"bns.doctor", "bns.prior.maker"}

@@ -12,7 +12,7 @@ from bns.gap.bench.wheeled_cases import commands
 from bns.gap.candidates import wheeled_rows
 from bns.gap.recordings import load_recordings
 from bns.viz.gap import report, scene
-from bns.viz.gap.view import view
+from bns.viz.gap.figures import view
 from bns.worlds import corrected
 from bns.worlds.data import dataset
 from bns.worlds.physics.wheeled_world import MujocoWorld

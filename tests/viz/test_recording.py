@@ -1,4 +1,4 @@
-"""Recordings: verified by Rerun's own tool, read back, and drawn; seen live.
+"""Recordings: verified by Rerun's own tool, read back, and drawn; seen live; films.
 
 A live view that fails is said once and does not stop the run. Legs of a walking robot
 are drawn as its servos reported them.
@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 
 from bns import models
-from bns.errors import FormatError, MissingDependencyError
-from bns.experiment.step import ARRAYS, Step
-from bns.viz import live, moments, picture, recording, scene
-from bns.viz.choices import choose, typical
+from bns.__main__ import main
+from bns.errors import BnsError, FormatError, MissingDependencyError
+from bns.experiment.record import ARRAYS, Step
+from bns.viz import moments, pictures, recording, scene, style
+from bns.viz.choices import Choice, choose, typical
 from bns.worlds.trial import POSE_CHANNELS, Channel, Commands, Trial
 
 pytest.importorskip("rerun")
@@ -48,7 +49,7 @@ def columns(rrd, path):
 
 
 def test_rerun_finds_nothing_wrong(rrd):
-    command = [picture.executable(), "rrd", "verify", str(rrd)]
+    command = [pictures.executable(), "rrd", "verify", str(rrd)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
 
@@ -110,16 +111,16 @@ def test_the_typical_replicate_by_default(record, tmp_path):
 
 
 def test_a_picture_without_warnings(rrd, tmp_path, monkeypatch):
-    monkeypatch.setattr(picture, "_SETTLE", 2.0)
-    problem = picture.missing()
+    monkeypatch.setattr(pictures, "_SETTLE", 2.0)
+    problem = pictures.missing()
     if problem:
         pytest.skip(str(problem))
     from PIL import Image
 
-    port = picture.free_port()
-    monkeypatch.setattr(picture, "free_port", lambda: port)
+    port = pictures.free_port()
+    monkeypatch.setattr(pictures, "free_port", lambda: port)
     png = tmp_path / "run.png"
-    assert picture.save(rrd, png) == []
+    assert pictures.write_png(rrd, png) == []
     with socket.socket() as probe:  # the viewer is gone, it listens no more
         assert probe.connect_ex(("127.0.0.1", port)) != 0
     with Image.open(png) as image:
@@ -129,17 +130,17 @@ def test_a_picture_without_warnings(rrd, tmp_path, monkeypatch):
 
 def test_no_such_recording(tmp_path):
     with pytest.raises(FormatError, match=r"no\.rrd is not a recording"):
-        picture.save(tmp_path / "no.rrd", tmp_path / "no.png")
+        pictures.write_png(tmp_path / "no.rrd", tmp_path / "no.png")
 
 
 def test_missing_vulkan_says_what_to_install(rrd, tmp_path, monkeypatch):
-    monkeypatch.setattr(picture, "_vulkan", lambda: False)
+    monkeypatch.setattr(pictures, "_vulkan", lambda: False)
     with pytest.raises(MissingDependencyError, match="mesa-vulkan-drivers"):
-        picture.save(rrd, tmp_path / "run.png")
+        pictures.write_png(rrd, tmp_path / "run.png")
 
 
 def test_broken_vulkan_says_what_to_install(rrd, tmp_path, monkeypatch):
-    problem = picture.missing()
+    problem = pictures.missing()
     if problem:
         pytest.skip(str(problem))
     driver = tmp_path / "driver.json"
@@ -147,7 +148,7 @@ def test_broken_vulkan_says_what_to_install(rrd, tmp_path, monkeypatch):
     monkeypatch.setenv("VK_DRIVER_FILES", str(driver))
     monkeypatch.setenv("WGPU_BACKEND", "vulkan")
     with pytest.raises(MissingDependencyError, match="mesa-vulkan-drivers"):
-        picture.save(rrd, tmp_path / "run.png")
+        pictures.write_png(rrd, tmp_path / "run.png")
 
 
 def step(record, trial):
@@ -158,10 +159,10 @@ def step(record, trial):
 
 
 def test_without_a_display_it_warns_once_and_goes_on(record, monkeypatch, caplog):
-    monkeypatch.setattr(live, "_no_display", lambda: True)
+    monkeypatch.setattr(recording, "_no_display", lambda: True)
     with (
         caplog.at_level(logging.WARNING),
-        live.stream(record.config) as on_trial,
+        recording.stream(record.config) as on_trial,
     ):
         for trial in range(3):
             on_trial(trial, step(record, trial), [])
@@ -170,32 +171,32 @@ def test_without_a_display_it_warns_once_and_goes_on(record, monkeypatch, caplog
 
 
 def test_unexpected_data_do_not_stop_the_run(record, monkeypatch, caplog):
-    monkeypatch.setattr(live.Stream, "_open", lambda self, url: None)
-    shown = live.Stream(record.config)
+    monkeypatch.setattr(recording.Stream, "_open", lambda self, url: None)
+    shown = recording.Stream(record.config)
     shown.on_trial(0, Step({}, {"poses": np.zeros((1, 1, 3))}))
     assert shown.failed
 
 
 def test_the_live_view_listens_on_this_machine_alone(monkeypatch):
     begun = []
-    monkeypatch.setattr(live, "_no_display", lambda: False)
-    monkeypatch.setattr(live, "executable", lambda: "viewer")
-    monkeypatch.setattr(live, "wait", lambda process, port: None)
+    monkeypatch.setattr(recording, "_no_display", lambda: False)
+    monkeypatch.setattr(recording, "executable", lambda: "viewer")
+    monkeypatch.setattr(recording, "wait", lambda process, port: None)
     monkeypatch.setattr(
-        live.subprocess, "Popen", lambda words, **_: begun.append(words)
+        recording.subprocess, "Popen", lambda words, **_: begun.append(words)
     )
-    assert live._spawn().startswith("rerun+http://127.0.0.1:")
+    assert recording._spawn().startswith("rerun+http://127.0.0.1:")
     ((_, flag, address, *_),) = begun
     assert (flag, address) == ("--bind", "127.0.0.1")
 
 
 def test_trials_reach_a_viewer(record):
-    problem = picture.missing()
+    problem = pictures.missing()
     if problem:
         pytest.skip(str(problem))
     with (
-        picture.viewer() as viewer,
-        live.stream(record.config, url=viewer.url) as on_trial,
+        pictures.viewer() as viewer,
+        recording.stream(record.config, url=viewer.url) as on_trial,
     ):
         for trial in range(3):
             on_trial(trial, step(record, trial), [])
@@ -265,12 +266,13 @@ def test_only_walking_robots_report_servos():
 @pytest.mark.parametrize("walks", [False, True])
 def test_a_recording_of_walking_shows_distances_and_no_wheels(walks):
     from bns import presets
-    from bns.viz import blueprint, charts, scene
+    from bns.viz import charts, scene
+    from bns.viz.rrd import blueprint
 
     config = presets.load("hexapod-walk" if walks else "khepera-simple")
     shown_task = scene.picture(config)
     titles = charts.chart_titles({}, shown_task)
-    layout = blueprint.blueprint(shown_task, charts=titles)
+    layout = blueprint(shown_task, charts=titles)
     shown = dict(_views(layout.root_container))
     assert ("/wheels" in shown) != walks
     title = shown["charts/fitness"]
@@ -285,3 +287,56 @@ def _views(part):
         if hasattr(inner, "origin"):
             yield inner.origin, inner.name
         yield from _views(inner)
+
+
+CHOICES = (Choice(1, "before damage", style.BLUE), Choice(20, "damaged", style.ORANGE))
+SMALL = {"size": (96, 64), "speed": 100.0, "replicate": 0, "choices": CHOICES}
+
+
+def test_a_gif_shows_each_trial(record, tmp_path, opengl):
+    from PIL import Image
+
+    path = pictures.write_film(record, {}, tmp_path / "run.gif", **SMALL)
+    with Image.open(path) as image:
+        assert image.size == (96, 64) and image.n_frames >= 4
+        seconds = 0.0
+        shown = []
+        for number in range(image.n_frames):
+            image.seek(number)
+            seconds += image.info["duration"] / 1000
+            shown.append(np.asarray(image.convert("RGB"), dtype=float))
+    assert seconds > 2 * pictures.HOLD
+    assert np.abs(shown[0] - shown[-1]).mean() > 1, "the robot has moved"
+
+
+def test_an_mp4_is_written(record, tmp_path, opengl):
+    pytest.importorskip("imageio_ffmpeg")
+    path = pictures.write_film(record, {}, tmp_path / "run.mp4", **SMALL)
+    assert path.read_bytes()[4:8] == b"ftyp"
+
+
+@pytest.mark.parametrize(
+    ("name", "more", "message"),
+    [
+        ("run.avi", {}, "ends in .gif or .mp4"),
+        ("nowhere/run.gif", {}, "There is no directory"),
+        ("run.gif", {"size": (97, 64)}, "give even numbers"),
+        ("run.gif", {"speed": 0.0}, "give 0.1 to 100"),
+    ],
+)
+def test_what_cannot_be_is_refused(record, tmp_path, name, more, message):
+    with pytest.raises(BnsError, match=message):
+        pictures.write_film(record, {}, tmp_path / name, **(SMALL | more))
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--gif", "a.gif", "--png", "a.png"], "Give one of"),
+        (["--gif", "a.mp4"], "give a name that ends in .gif"),
+    ],
+)
+def test_wrong_words_are_one_line(words, message, capsys, tmp_path):
+    assert main(["view", str(tmp_path), *words]) == 2
+    said = capsys.readouterr().err
+    assert message in said and said.count("\n") == 1

@@ -10,10 +10,9 @@ import numpy as np
 from bns.gap.models.base import GapModel
 from bns.gap.records import Diagnosis
 from bns.viz import rrd, style
-from bns.viz.blueprint import BACKGROUND, LIVE_TIMELINE
 from bns.viz.gap import scene
-from bns.viz.gap.figures import CORRECTED, NOMINAL
-from bns.viz.gap.view import MOST, View, view
+from bns.viz.gap.figures import CORRECTED, MOST, NOMINAL, View, view
+from bns.viz.rrd import BACKGROUND, LIVE_TIMELINE
 from bns.worlds.trial import POSE, Channel, Trial
 
 if TYPE_CHECKING:

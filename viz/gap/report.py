@@ -11,7 +11,7 @@ from bns.gap.models.base import GapModel
 from bns.gap.records import Diagnosis, Fit
 from bns.progress import Each, uncounted
 from bns.storage import files
-from bns.viz.gap import figures, view
+from bns.viz.gap import figures
 from bns.viz.page import picture, render
 from bns.worlds.trial import Trial
 
@@ -131,7 +131,7 @@ def _simulated(
     found: Diagnosis, trials: Sequence[Trial], model: GapModel
 ) -> dict[str, Callable[[], Any]]:
     """What draws the figures that need the simulation; the first one simulates."""
-    seen = cache(lambda: view.view(found, trials, model))
+    seen = cache(lambda: figures.view(found, trials, model))
     return {
         "motion": lambda: figures.motion(seen()),
         "horizons": lambda: figures.horizons(found, seen()),

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bns.viz import geometry, rrd, style
-from bns.viz.blueprint import LIVE_TIMELINE
-from bns.viz.gap.figures import NOMINAL
-from bns.viz.gap.view import View
+from bns.viz.gap.figures import NOMINAL, View
+from bns.viz.rrd import LIVE_TIMELINE
 
 if TYPE_CHECKING:
     from rerun import RecordingStream

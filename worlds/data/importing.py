@@ -34,7 +34,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bns.errors import BnsError, FormatError, UnknownNameError
-from bns.storage import csv_table, reading
+from bns.storage import reading, tables
 from bns.worlds.data import dataset_checks as checks
 from bns.worlds.data.mcap_log import STAMPS
 from bns.worlds.trial import POSE, WHEEL_CHANNELS, Channel, Commands, Trial
@@ -199,7 +199,7 @@ def from_csv(
     """
     found = _map(columns, units, robot)
     wanted = [source.column for source in found.columns.values()]
-    table = csv_table.read(path, wanted, delimiter=delimiter)
+    table = tables.read_csv(path, wanted, delimiter=delimiter)
     named = {name: table[source.column] for name, source in found.columns.items()}
     return trials(named, found, where=str(path))
 

@@ -18,16 +18,14 @@ from bns.errors import BnsError
 from bns.evolution.chromosome import Population
 from bns.experiment.config import RunConfig
 from bns.learners.base import Curves, Learner, Panel, Proposal
-from bns.learners.bns.adaptation import Adaptations
+from bns.learners.bns.adaptations import Adaptations
 from bns.learners.bns.change_detection import Detector
+from bns.learners.bns.choice import Deployed, Seen, choose, packed, unpack
 from bns.learners.bns.config import BNS_SECTIONS
-from bns.learners.bns.deployed import Deployed, Seen, packed, unpack
 from bns.learners.bns.problem import Problem, should_compile
-from bns.learners.bns.trial_selection import choose
 from bns.tasks import registry as tasks
 from bns.tasks.base import Task
 from bns.worlds.trial import Trial
-from bns.worlds.world import CountedWorld
 
 CHUNK = 5
 """generations between two looks whether a trial is over, in the background"""
@@ -93,15 +91,12 @@ class Bns(Learner):
     }
     figures = (SNN_ERROR, "displacement", DIVERSITY)
 
-    def __init__(
-        self,
-        configs: Sequence[RunConfig],
-        *,
-        replicates: Sequence[int],
-        onsets: Sequence[int],
-        models: Sequence[CountedWorld] = (),
-    ):
-        super().__init__(configs, replicates=replicates, onsets=onsets, models=models)
+    def begin(self) -> None:
+        """See `Learner.begin`.
+
+        Raises:
+            BnsError: detection of damage where there is nothing to detect it in.
+        """
         config, kind = self.config, self.kind(self.task)
         torch.set_num_threads(config.threads)
         watch = config.watch
@@ -111,12 +106,12 @@ class Bns(Learner):
                 "watch.forget is for walking, too."
             )
         self.draws = Draws(
-            seeding.integer(config.seed, kind.stream, *replicates), config.device
+            seeding.integer(config.seed, kind.stream, *self.replicates), config.device
         )
-        told = [-1] * self.runs if watch.detect else onsets
-        self.adaptations = Adaptations(configs, told)
+        told = [-1] * self.runs if watch.detect else self.onsets
+        self.adaptations = Adaptations(self.configs, told)
         self.detector = Detector.fresh(watch, self.runs, len(kind.channels))
-        self.problem = kind(self.task, configs, self.draws, self.adaptations)
+        self.problem = kind(self.task, self.configs, self.draws, self.adaptations)
         self.population, self.memories = self.problem.begin()
         self.cost = torch.empty(0)
         self._chosen = self._by_run(self.population).pick(

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from bns.draws import Draws, whole_below
 from bns.errors import FormatError
-from bns.snn import fitting
+from bns.snn import training
 from bns.snn.network import Shape, forward, predict
 
 BUCKET = 64  # patterns; training tensors grow in these steps, so shapes recur
@@ -27,7 +27,7 @@ class Patterns(NamedTuple):
 class Trainer(Protocol):
     """What fits networks to patterns."""
 
-    def train(self, shape: Shape, theta: Tensor, patterns: fitting.Patterns) -> Fit:
+    def train(self, shape: Shape, theta: Tensor, patterns: training.Patterns) -> Fit:
         """Fit the networks of all runs.
 
         Args:
@@ -246,16 +246,16 @@ class Memory:
         self.spread = torch.where(here, self._spread(patterns), self.spread)
         self.loss = torch.where(known, loss.cpu(), self.loss)
 
-    def _spread(self, patterns: fitting.Patterns) -> Tensor:
+    def _spread(self, patterns: training.Patterns) -> Tensor:
         """RMS error of each scaled output on patterns, ``(R, O)``."""
         weight = patterns.weight[:, 0]
         miss = predict(self.shape, self.theta, patterns.inputs) - patterns.targets
         total = (miss * weight).square().sum(2)
         return (total / weight.sum(2).clamp(min=1)).sqrt()
 
-    def _patterns(self) -> fitting.Patterns:
+    def _patterns(self) -> training.Patterns:
         """All patterns, or as many as a batch has, drawn anew each time."""
-        patterns = fitting.Patterns(*self.buffer.tensors(self.theta.device))
+        patterns = training.Patterns(*self.buffer.tensors(self.theta.device))
         counts = torch.from_numpy(self.buffer.counts).to(self.theta.device)[:, None]
         if not 0 < self.batch < int(counts.max()):
             return patterns
@@ -264,7 +264,7 @@ class Memory:
         whole = torch.arange(self.batch, device=drawn.device)
         index = torch.where(counts <= self.batch, whole, drawn)
         inputs, targets, weight = patterns
-        return fitting.Patterns(
+        return training.Patterns(
             inputs.gather(2, index[:, None].expand(-1, inputs.shape[1], -1)),
             targets.gather(2, index[:, None].expand(-1, targets.shape[1], -1)),
             weight.gather(3, index[:, None, None]),

@@ -9,20 +9,15 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from bns.draws import Draws
 from bns.evolution import generation
 from bns.evolution.chromosome import Encoding, Population
 from bns.evolution.generation import Breeder, Coins, Genes, Rates
-from bns.experiment.config import RunConfig
-from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.change_detection import Ground, Misses, innovation
 from bns.learners.bns.forgetting import contradicted, newer
 from bns.learners.bns.memory import Memory, Patterns
 from bns.learners.bns.problem import Problem
-from bns.path import integrate
-from bns.snn.network import Shape, forward, predict
-from bns.snn.scaling import AXLE, OUTPUTS, Scaling
-from bns.tasks.base import BOARD, Task
+from bns.snn.network import AXLE, OUTPUTS, Scaling, Shape, forward, integrate, predict
+from bns.tasks.base import BOARD
 from bns.tasks.navigation import PathGoal, WheeledTask
 from bns.worlds.trial import Trial, body_displacements
 
@@ -274,14 +269,8 @@ class WheeledProblem(OpenLoopProblem):
     channels = ("left wheel", "right wheel")
     has_behaviours = True
 
-    def __init__(
-        self,
-        task: Task,
-        configs: Sequence[RunConfig],
-        draws: Draws,
-        adaptations: Adaptations,
-    ):
-        super().__init__(task, configs, draws, adaptations)
+    def set_up(self) -> None:
+        """See `Problem.set_up`."""
         config = self.config
         self.encoding = Encoding.of(config.controller, config.device)
         self.scaling = Scaling.of(self.encoding)

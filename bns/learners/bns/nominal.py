@@ -21,10 +21,8 @@ from torch import Tensor
 from bns.draws import Draws, whole_below
 from bns.experiment import robots
 from bns.experiment.config import RunConfig
-from bns.snn.adam import AdamState, adam
-from bns.snn.fitting import Patterns
 from bns.snn.network import Shape, forward
-from bns.snn.training import gradient
+from bns.snn.training import AdamState, Patterns, adam, gradient
 
 GIVEN = 55.0  # patterns: five trials
 PIECES = 8  # of a command

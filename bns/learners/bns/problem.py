@@ -22,9 +22,9 @@ from bns.evolution.chromosome import Population
 from bns.evolution.generation import Breeder, Coins, Genes, Rates, take
 from bns.experiment.config import RunConfig
 from bns.learners.base import Curves
-from bns.learners.bns.adaptation import Adaptations
+from bns.learners.bns.adaptations import Adaptations
 from bns.learners.bns.memory import Memory, Patterns
-from bns.snn import fitting
+from bns.snn import training
 from bns.snn.network import Shape
 from bns.tasks.base import Task
 from bns.worlds.trial import Trial
@@ -102,11 +102,19 @@ class Problem(ABC):
         self.compiled = should_compile(configs[0], self.relative_cost)
         if self.compiled:
             torch._dynamo.config.cache_size_limit = 64
-        self._epochs: dict[Shape, fitting.Epoch] = {}
+        self._epochs: dict[Shape, training.Epoch] = {}
         if self.config.evolution.cells and not self.has_behaviours:
             raise BnsError(
                 "evolution.cells is for walking and navigation; leave it out."
             )
+        self.set_up()
+
+    def set_up(self) -> None:  # noqa: B027 (nothing to do is the default)
+        """Make encoding, breeder and networks, once configurations are known.
+
+        Raises:
+            BnsError: a setting that BNS cannot be with on this task.
+        """
 
     @classmethod
     def shared(cls, config: RunConfig, first: RunConfig) -> RunConfig:
@@ -336,7 +344,7 @@ class Problem(ABC):
         """Thesis equations 4.1, 5.1 and 7.3, each ``(R,)``."""
 
     def train(
-        self, shape: Shape, theta: Tensor, patterns: fitting.Patterns
+        self, shape: Shape, theta: Tensor, patterns: training.Patterns
     ) -> tuple[Tensor, Tensor]:
         """Train all runs' networks of a shape from fresh step sizes.
 
@@ -349,13 +357,13 @@ class Problem(ABC):
             new weights ``(R, D)``, and the mean squared error after training ``(R,)``.
         """
         if shape not in self._epochs:
-            epoch = fitting.epoch_of(shape, self.config.snn)
+            epoch = training.epoch_of(shape, self.config.snn)
             if self.compiled:
                 epoch = torch.compile(epoch, dynamic=False)
             self._epochs[shape] = epoch
         epoch = self._epochs[shape]
         snn = self.config.snn
-        return fitting.fit(shape, snn, theta, patterns, self.draws, epoch)
+        return training.fit(shape, snn, theta, patterns, self.draws, epoch)
 
     def state(self) -> dict[str, np.ndarray]:
         """What the next trial depends on beside population and memories.

@@ -20,7 +20,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from bns.draws import Draws
 from bns.errors import BnsError
 from bns.evolution.chromosome import Population
 from bns.evolution.generation import Rates
@@ -28,16 +27,12 @@ from bns.evolution.goals import TICK, GoalBreeder, Goals
 from bns.experiment.config import RunConfig
 from bns.experiment.task_settings import WalkConfig
 from bns.learners.bns import change_detection
-from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.memory import Memory
 from bns.learners.bns.navigation import OpenLoopProblem
 from bns.learners.bns.nominal import Nominal, said
-from bns.path import integrate
-from bns.snn import adam, fitting
-from bns.snn.network import Shape, forward
-from bns.snn.scaling import OUTPUTS
+from bns.snn import training
+from bns.snn.network import OUTPUTS, Shape, forward, integrate
 from bns.tasks import walk as walking
-from bns.tasks.base import Task
 from bns.worlds.trial import Trial, body_displacements
 
 GOAL = 0.5  # [rad] that is scaled to 1; assumed
@@ -215,14 +210,8 @@ class WalkProblem(OpenLoopProblem):
         "worth_predicted": "what it was worth inside the SNN",
     }
 
-    def __init__(
-        self,
-        task: Task,
-        configs: Sequence[RunConfig],
-        draws: Draws,
-        adaptations: Adaptations,
-    ):
-        super().__init__(task, configs, draws, adaptations)
+    def set_up(self) -> None:
+        """See `Problem.set_up`."""
         config = self.config
         if config.snn.kind != "ensemble":
             raise BnsError(
@@ -320,7 +309,7 @@ class WalkProblem(OpenLoopProblem):
         return (len(inputs) - newest) // size
 
     def train(
-        self, shape: Shape, theta: Tensor, patterns: fitting.Patterns
+        self, shape: Shape, theta: Tensor, patterns: training.Patterns
     ) -> tuple[Tensor, Tensor]:
         """See `Problem.train`; by Adam on parts of the patterns (walk.batch > 0)."""
         if self.nominal is not None:
@@ -328,7 +317,7 @@ class WalkProblem(OpenLoopProblem):
             patterns = patterns._replace(targets=rest)
         if self.config.walk.batch == 0:
             return super().train(shape, theta, patterns)
-        return adam.fit(shape, self.config, theta, patterns, self.draws)
+        return training.fit_adam(shape, self.config, theta, patterns, self.draws)
 
     def state(self) -> dict[str, np.ndarray]:
         """See `Problem.state`: how far each run trusts the model."""

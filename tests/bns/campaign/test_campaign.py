@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bns.campaign import drive, results
-from bns.campaign.engines import registry, worker
+from bns.campaign.engines import pool, registry
 from bns.campaign.engines.pool import PoolEngine
 from bns.campaign.engines.registry import InlineEngine, Outcome
 from bns.campaign.plan import plan
@@ -19,8 +19,7 @@ from bns.campaign.store import CampaignStore, merge
 from bns.campaign.table import table
 from bns.errors import BnsError, FormatError
 from bns.storage import files, reading
-from tests.bns.campaign.campaigns import campaign
-from tests.bns.contents import contents
+from tests.bns.shared import campaign, contents
 
 TIMES = ("log.jsonl",)
 
@@ -286,16 +285,14 @@ def test_progress_counts_what_runs_and_estimates_the_rest():
 
 
 def test_messages_arrive_in_pieces():
-    inbox = worker.Inbox()
-    data = worker.pack(worker.BEAT, b"12") + worker.pack(worker.DONE, b"x" * 300)
+    inbox = pool.Inbox()
+    data = pool.pack(pool.BEAT, b"12") + pool.pack(pool.DONE, b"x" * 300)
     found = [m for i in range(len(data)) for m in inbox.feed(data[i : i + 1])]
-    assert found == [(worker.BEAT, b"12"), (worker.DONE, b"x" * 300)]
+    assert found == [(pool.BEAT, b"12"), (pool.DONE, b"x" * 300)]
 
 
 def test_a_worker_goes_when_its_driver_goes():
-    from bns.campaign.engines.pool import Worker
-
-    worker = Worker()
+    worker = pool.Worker()
     threading.Timer(0.2, worker.input.close).start()
     assert worker.process.wait(timeout=30) == 0
     worker.stop()

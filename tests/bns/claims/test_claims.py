@@ -10,10 +10,11 @@ import pytest
 from bench.learning import experiments
 from bns import presets, stats
 from bns.campaign.engines.registry import InlineEngine
+from bns.campaign.file import Member
 from bns.campaign.identity import identity
 from bns.campaign.part import Block
-from bns.claims import measures, price, report, runner, sides, verdict
-from bns.claims.claim import Cell, claims, content, find
+from bns.claims import measures, report, runner, schedule, verdict
+from bns.claims.claim import Cell, claims, content, find, lacking, member_of
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig, WorldConfig
 from bns.experiment.run import train
@@ -57,10 +58,10 @@ def test_the_sides_of_a15_are_those_of_the_benches():
     for window in (0, 150, 300):
         piece = f" window-{window}" if window else ""
         given = {"window": window} if window else {}
-        ours = sides.member("A", f"left-20{piece}", world="mujoco").identity
+        ours = member_of("A", f"left-20{piece}", world="mujoco").identity
         assert ours == identity(experiments.damaged("left-20", **given))
     short = replace(experiments.undamaged("infinity"), trials=24)  # A6 asks no more
-    ours = sides.member("A", "undamaged-infinity", world="mujoco").identity
+    ours = member_of("A", "undamaged-infinity", world="mujoco").identity
     assert ours == identity(short)
 
 
@@ -70,9 +71,9 @@ def test_every_side_can_run_in_the_physics_a_and_d_in_the_static_world_too(claim
     if content(letter)["preset"] not in presets.names():
         pytest.skip(f"no preset {content(letter)['preset']}")
     for cell in claim.cells:
-        assert sides.missing(letter, cell, world="mujoco") == "", cell.text
+        assert lacking(letter, cell, world="mujoco") == "", cell.text
         if letter in "AD":
-            assert sides.missing(letter, cell, world="static-snn") == "", cell.text
+            assert lacking(letter, cell, world="static-snn") == "", cell.text
 
 
 @pytest.mark.parametrize("claim", claims().values(), ids=lambda claim: claim.id)
@@ -82,7 +83,7 @@ def test_two_sides_of_a_comparison_differ(claim):
     for cell in claim.cells:
         if cell.b and not cell.measure_b:
             names = {
-                sides.member(claim.investigation, side, world="mujoco").identity
+                member_of(claim.investigation, side, world="mujoco").identity
                 for side in cell.sides
             }
             assert len(names) == 2, cell.text
@@ -301,7 +302,7 @@ def tiny(monkeypatch):
             world=replace(config.world, damage=damage),
         )
 
-    monkeypatch.setattr(sides, "shrunk", shrunk)
+    monkeypatch.setattr("bns.claims.claim.shrunk", shrunk)
     monkeypatch.setattr(runner, "QUICK_RUNS", 2)
 
 
@@ -343,11 +344,11 @@ def test_finished_runs_are_taken(tmp_path, monkeypatch):
         world=WorldConfig(damage=("wheel_gain:wheel=left,factor=0.8@1",)),
     )
     made = train(config, tmp_path / "runs" / "one")
-    monkeypatch.setattr(
-        sides,
-        "member",
-        lambda *words, **named: sides.Member("A: x", config),
-    )
+    for user in ("claim", "report", "runner", "schedule"):
+        monkeypatch.setattr(
+            f"bns.claims.{user}.member_of",
+            lambda *words, **named: Member("A: x", config),
+        )
     place = {"world": "mujoco", "root": tmp_path}
     assert runner.take([find("A8")], [tmp_path / "runs"], **place) == ["one"]
     assert runner.take([find("A8")], [tmp_path / "runs"], **place) == []
@@ -362,7 +363,7 @@ def test_finished_runs_are_taken(tmp_path, monkeypatch):
 
 def test_a_side_that_needs_what_does_not_exist_says_so():
     cell = Cell(a="left-20 no-such-piece")
-    assert "Unknown piece of A" in sides.missing("A", cell, world="mujoco")
+    assert "Unknown piece of A" in lacking("A", cell, world="mujoco")
 
 
 @pytest.mark.parametrize(
@@ -376,30 +377,30 @@ def test_a_side_that_needs_what_does_not_exist_says_so():
     ],
 )
 def test_a_side_runs_no_longer_than_what_is_asked_of_it(letter, side, trials):
-    assert sides.member(letter, side, world="mujoco").config.trials == trials
+    assert member_of(letter, side, world="mujoco").config.trials == trials
 
 
 def test_a_comparison_costs_what_its_share_implies():
     clear, close = Cell(a="x", b="y", p="0.00000"), Cell(a="x", b="y", p="0.04207")
-    assert price.implied(close) == pytest.approx(0.5 + 0.153, abs=0.002)
-    assert price.expected(clear, price.implied(clear)) == 20
-    assert price.expected(close, price.implied(close)) == 50
-    assert price.expected(Cell(a="x", b="y", says="<"), 0.02) == 10
-    assert price.expected(Cell(a="x", b="y", says="="), 0.5) == 100
-    assert price.expected(Cell(a="x", at_most=5), 1.0) == 10
-    assert price.expected(Cell(a="x", b="y", variant="v"), 0.6) == 30
+    assert schedule.implied(close) == pytest.approx(0.5 + 0.153, abs=0.002)
+    assert schedule.expected(clear, schedule.implied(clear)) == 20
+    assert schedule.expected(close, schedule.implied(close)) == 50
+    assert schedule.expected(Cell(a="x", b="y", says="<"), 0.02) == 10
+    assert schedule.expected(Cell(a="x", b="y", says="="), 0.5) == 100
+    assert schedule.expected(Cell(a="x", at_most=5), 1.0) == 10
+    assert schedule.expected(Cell(a="x", b="y", variant="v"), 0.6) == 30
 
 
 def test_shared_trials_are_paid_once():
-    two = price.planned([find("D20")], world="mujoco")
+    two = schedule.planned([find("D20")], world="mujoco")
     assert two.sides == 4 and two.hours < two.apart  # 14, 14 data-reset, each printed
-    alone = price.planned([find("D31")], world="mujoco")
+    alone = schedule.planned([find("D31")], world="mujoco")
     assert alone.hours == alone.apart > 0
-    assert price.planned([find("B2")], world="static-snn").sides == 0
+    assert schedule.planned([find("B2")], world="static-snn").sides == 0
 
 
 def test_quick_sides_are_short():
-    whole = sides.member("A", "left-20-at-40", world="mujoco").config
-    short = sides.member("A", "left-20-at-40", world="mujoco", quick=True).config
+    whole = member_of("A", "left-20-at-40", world="mujoco").config
+    short = member_of("A", "left-20-at-40", world="mujoco", quick=True).config
     assert (whole.trials, short.trials) == (100, 20)
     assert short.world.damage == ("wheel_gain:wheel=left,factor=0.8@8",)

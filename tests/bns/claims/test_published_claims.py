@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bns.claims import page, provenance, published, report, sides, verdict
-from bns.claims.claim import claims, content, find
+from bns import presets
+from bns.claims import page, provenance, published, report, verdict
+from bns.claims.claim import _whole, claims, content, digest_of, find, settings_of
 from bns.claims.provenance import Made
 from bns.claims.published import Stale
 from bns.errors import FormatError
@@ -52,7 +53,7 @@ def a_library(**changed):
     found = made_finding()
     row = published.row(CLAIM, found, world="mujoco") | changed
     known = {
-        sides.digest_of("A", side, "mujoco"): sides.settings_of("A", side, "mujoco")
+        digest_of("A", side, "mujoco"): settings_of("A", side, "mujoco")
         for side in CELL.sides
     }
     return published.parse(published.text([row], known), "test")
@@ -62,7 +63,7 @@ def made_finding():
     """A finding with its provenance."""
     low = np.arange(10) / 7
     found = verdict.examine(CELL, low + 9, low, verdict.design(CELL))
-    digests = tuple(sides.digest_of("A", side, "mujoco") for side in CELL.sides)
+    digests = tuple(digest_of("A", side, "mujoco") for side in CELL.sides)
     made = Made(
         sides=digests,
         revision=REVISION,
@@ -105,23 +106,23 @@ def test_a_changed_default_makes_a_finding_stale_and_is_named(monkeypatch):
     changed = replace(
         RunConfig().evolution, generations=RunConfig().evolution.generations + 1
     )
-    plain = sides.presets.load
+    plain = presets.load
     monkeypatch.setattr(
-        sides.presets, "load", lambda name: replace(plain(name), evolution=changed)
+        presets, "load", lambda name: replace(plain(name), evolution=changed)
     )
-    for cached in (sides._whole, sides.settings_of, sides.digest_of):
+    for cached in (_whole, settings_of, digest_of):
         cached.cache_clear()
     try:
         kept = published.finding(CLAIM, CELL, world="mujoco", among=found)
     finally:
-        for cached in (sides._whole, sides.settings_of, sides.digest_of):
+        for cached in (_whole, settings_of, digest_of):
             cached.cache_clear()
     assert isinstance(kept, Stale)
     assert kept.why.endswith("evolution.generations was 60, is 61")
 
 
 def test_a_digest_is_of_names_and_values_and_of_nothing_else():
-    settings = sides.settings_of("A", "left-20", "mujoco")
+    settings = settings_of("A", "left-20", "mujoco")
     shuffled = dict(sorted(settings.items(), reverse=True))
     assert provenance.of(shuffled) == provenance.of(settings)
     assert settings["evolution.generations"] == 60 and "seed" not in settings

@@ -14,11 +14,10 @@ import pytest
 from bns import presets
 from bns.__main__ import INTERRUPTED, SPINS, WRONG_INPUT, main
 from bns.cli import VERBS
-from bns.cli.extras import EXTRAS
 from bns.cli.outputs import sentence
 from bns.cli.run import STOPPED, until_interrupted
 from bns.doctor import OPTIONAL, pins
-from bns.errors import install
+from bns.errors import EXTRAS, install
 from bns.storage.store import load
 
 TINY = [
@@ -178,84 +177,6 @@ def test_effects_are_found_by_a_part_of_their_name_and_by_stage(said, monkeypatc
     assert max(map(len, full.splitlines())) <= 80
     rows = json.loads(said("effects", "friction", "--json"))
     assert {"floor_friction", "servo_load_friction"} <= {row["effect"] for row in rows}
-
-
-WRONG = {
-    "no such effect": (["effects", "wheel_gian"], "Did you mean 'wheel_gain'?\n"),
-    "no such stage": (["effects", "--stage", "wheel"], "value of --stage 'wheel'."),
-    "no such verb": (["rum"], "Unknown command 'rum'. Did you mean 'run'?\n"),
-    "nothing to run": (["run"], "Nothing to run: give a preset (demo, "),
-    "device": (
-        ["run", "demo", "--device", "warp"],
-        "device = 'warp' is not available here: give cpu",
-    ),
-    "option first": (["run", "--trials", "3"], "comes too early: give a preset"),
-    "preset": (["run", "khepera-simpel"], "Did you mean 'khepera-simple'?"),
-    "file": (["run", "no.toml"], "There is no file no.toml"),
-    "option": (
-        ["run", "demo", "--evolution.populatoin", "3"],
-        "Unknown option --evolution.populatoin. Did you mean --evolution.population?\n",
-    ),
-    "flag": (["run", "demo", "--resum"], "--resum. Did you mean --resume?\n"),
-    "choice": (
-        ["run", "demo", "--evolution.selection", "x"],
-        "Unknown value of --evolution.selection 'x'. Available: best, random, roulette",
-    ),
-    "type": (["run", "demo", "--trials", "abc"], "--trials abc: give a whole number."),
-    "bound": (
-        ["run", "demo", "--task.radius", "5"],
-        "task.radius = 5.0 m is not allowed: give a number from 0.005 to 0.5 m",
-    ),
-    "nan": (["run", "demo", "--task.radius", "nan"], "task.radius = nan m is not"),
-    "world": (["run", "demo", "--world.name", "mujco"], "Did you mean 'mujoco'?"),
-    "robot": (["run", "demo", "--world.robot", "khepera"], "Did you mean 'khepera3'?"),
-    "effect": (["run", "demo", "--world.damage", "weel_gain"], "mean 'wheel_gain'?"),
-    "parameter": (
-        ["run", "demo", "--world.damage", "wheel_gain:factr=0.8"],
-        "Unknown parameter of wheel_gain 'factr'. Did you mean 'factor'?",
-    ),
-    "effect's bound": (
-        ["run", "demo", "--world.reality", "wheel_gain:factor=9"],
-        "wheel_gain:factor = 9",
-    ),
-    "damage's grammar": (
-        ["run", "demo", "--world.damage", "wheel_gain@soon"],
-        "cannot be read: write NAME",
-    ),
-    "no ensemble": (
-        ["run", "demo", "--choose", "disagreement", "--out", "new"],
-        "set snn.kind = 'ensemble'",
-    ),
-    "no lamps": (
-        ["run", "khepera-light", "--world.name", "static-snn", "--out", "new"],
-        "which 'static-snn' has not: give --world.name light.",
-    ),
-    "no legs": (
-        ["run", "hexapod-walk", "--world.name", "mujoco", "--out", "new"],
-        "'phantomx' is legged, this world is for wheeled ones",
-    ),
-    "foreign directory": (["run", "demo", "--out", "."], "not empty and holds no run"),
-    "no directory": (["report", "nowhere"], "nowhere is not a run directory"),
-    "nothing to report": (["report"], "No run was given"),
-    "one to compare": (["compare", "run"], "1 run was given: give two or more"),
-    "none to compare": (["compare"], "0 runs were given"),
-    "no recording": (["view", "no.rrd"], "There is no recording no.rrd"),
-    "nothing to view": (["view"], "Missing: DIRECTORY. See `bns view --help`."),
-    "an argument too many": (["worlds", "mujoco"], "'mujoco' is one argument too many"),
-}
-
-
-@pytest.mark.parametrize("case", WRONG)
-def test_wrong_input_is_one_line_and_changes_nothing(
-    said, run, monkeypatch, tmp_path, case
-):
-    argv, message = WRONG[case]
-    monkeypatch.chdir(tmp_path)
-    before = sorted(tmp_path.rglob("*"))
-    text = said(*argv, code=WRONG_INPUT)
-    assert message in text
-    assert text.startswith("bns: ") and text.count("\n") == 1
-    assert sorted(tmp_path.rglob("*")) == before
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "utf-8"])

@@ -9,6 +9,7 @@ import pytest
 from bns.__main__ import WRONG_INPUT, main
 from bns.cli import outputs
 from bns.storage.store import load
+from bns.viz import pictures
 
 
 def test_view_without_a_display_says_what_to_do(said, tmp_path, monkeypatch):
@@ -61,11 +62,9 @@ def test_view_of_a_diagnosis(said, tmp_path):
 def test_a_view_listens_on_this_machine_alone_unless_asked(
     words, address, tmp_path, monkeypatch
 ):
-    from bns.viz import picture
-
     called = []
     monkeypatch.setenv("DISPLAY", ":0")
-    monkeypatch.setattr(picture, "executable", lambda: "viewer")
+    monkeypatch.setattr(pictures, "executable", lambda: "viewer")
     monkeypatch.setattr(subprocess, "call", lambda given: called.append(given) or 0)
     recording = tmp_path / "a.rrd"
     recording.write_bytes(b"")
@@ -76,14 +75,13 @@ def test_a_view_listens_on_this_machine_alone_unless_asked(
 
 def test_a_second_view_in_a_browser_has_ports_of_its_own(said, tmp_path, monkeypatch):
     from bns.cli import view
-    from bns.viz import picture
 
     called = []
-    monkeypatch.setattr(picture, "executable", lambda: "viewer")
+    monkeypatch.setattr(pictures, "executable", lambda: "viewer")
     monkeypatch.setattr(subprocess, "call", lambda given: called.append(given) or 0)
     recording = tmp_path / "a.rrd"
     recording.write_bytes(b"")
-    free = picture.free_port()
+    free = pictures.free_port()
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
@@ -98,10 +96,9 @@ def test_a_second_view_in_a_browser_has_ports_of_its_own(said, tmp_path, monkeyp
 
 
 def test_a_view_on_no_address_says_what_is_one(said, tmp_path, monkeypatch):
-    from bns.viz import picture
 
     monkeypatch.setenv("DISPLAY", ":0")
-    monkeypatch.setattr(picture, "executable", lambda: "viewer")
+    monkeypatch.setattr(pictures, "executable", lambda: "viewer")
     recording = tmp_path / "a.rrd"
     recording.write_bytes(b"")
     text = said("view", recording, "--bind", "localhost:1", code=WRONG_INPUT)

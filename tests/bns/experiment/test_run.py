@@ -9,8 +9,7 @@ import pytest
 
 from bns import presets
 from bns.errors import BnsError
-from bns.experiment.background import behind
-from bns.experiment.batch import Batch
+from bns.experiment.batch import Batch, behind
 from bns.experiment.config import RunConfig, WorldConfig
 from bns.experiment.loading import with_learner
 from bns.experiment.run import train, train_many
@@ -22,7 +21,7 @@ from bns.storage import files
 from bns.storage.store import load
 from bns.worlds import registry
 from bns.worlds.trial import WHEEL_CHANNELS
-from tests.bns.contents import contents
+from tests.bns.shared import contents
 from tests.sources import ROOT
 
 LEFT = "wheel_gain:wheel=left,factor=0.5@1"

@@ -8,7 +8,6 @@ import pytest
 from bns import models
 from bns.errors import BnsError
 from bns.experiment import static_snn
-from bns.experiment import static_walk as static
 from bns.experiment.config import RunConfig
 from bns.worlds import registry
 from bns.worlds.effects.legs import RAISED
@@ -30,7 +29,7 @@ def test_imitates_a_known_world():
 
 @pytest.fixture(scope="module")
 def nets():
-    return static.fit(Slider(), small(), lists=80, steps=400)
+    return static_snn.fit_walker(Slider(), small(), lists=80, steps=400)
 
 
 def told(value=0.2, count=3):
@@ -67,10 +66,10 @@ def test_a_raised_leg_acts_as_the_pose_it_takes_before_the_first_command_too(net
 
 
 def test_lists_have_legs_up_in_a_part_of_them():
-    lists = static.commands(small(), 40)
+    lists = static_snn.walker_commands(small(), 40)
     up = [(item.values[:, 1::3] == RAISED["femur"]).all(0).sum() for item in lists]
     assert 8 <= np.count_nonzero(up) <= 32
-    assert max(up) <= static.MOST_UP
+    assert max(up) <= static_snn.MOST_UP
 
 
 def test_rectified_units_survive_a_file(nets, tmp_path):

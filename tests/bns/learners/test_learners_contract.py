@@ -18,8 +18,8 @@ from bns.experiment.run import train
 from bns.experiment.world_factory import make_models
 from bns.learners import registry
 from bns.learners.base import Curves
-from bns.learners.bns import adaptation
-from bns.learners.bns.adaptation import Adaptations
+from bns.learners.bns import adaptations
+from bns.learners.bns.adaptations import Adaptations
 from bns.learners.bns.config import AdaptationConfig
 from bns.storage import store
 from bns.tasks import registry as tasks
@@ -310,18 +310,18 @@ def test_cma_does_better_than_random_search_where_it_may_think():
     assert ceiling[0] < 2 * np.min(seen) < 0  # twice the square of the distance
 
 
-@pytest.mark.parametrize("name", adaptation.names())
+@pytest.mark.parametrize("name", adaptations.names())
 class TestEveryAdaptation:
     def test_says_what_it_is(self, name):
-        assert len(adaptation.describe(name)) > 20
+        assert len(adaptations.describe(name)) > 20
 
     def test_resets_known_parts_and_is_deterministic(self, name):
-        extra = adaptation.parse(name)
+        extra = adaptations.parse(name)
         seen = [extra.resets(t, onset) for t in range(60) for onset in (-1, 30)]
         again = [extra.resets(t, onset) for t in range(60) for onset in (-1, 30)]
         assert seen == again
         assert any(seen)
-        assert all(part in adaptation.PARTS for parts in seen for part in parts)
+        assert all(part in adaptations.PARTS for parts in seen for part in parts)
 
     def test_acts_on_its_own_run_only(self, name):
         config = RunConfig()
@@ -334,16 +334,16 @@ class TestEveryAdaptation:
 
     def test_unknown_parameter_is_refused(self, name):
         with pytest.raises(UnknownNameError, match=f"parameter of {name}"):
-            adaptation.parse(f"{name}:nonsense=1")
+            adaptations.parse(f"{name}:nonsense=1")
 
 
 def test_population_reset_every():
-    extra = adaptation.parse("population_reset_every:trials=7")
+    extra = adaptations.parse("population_reset_every:trials=7")
     assert [t for t in range(22) if extra.resets(t, -1)] == [7, 14, 21]
 
 
 def test_bad_text_is_refused():
     with pytest.raises(UnknownNameError, match="Unknown adaptation"):
-        adaptation.parse("population_reset_evry")
+        adaptations.parse("population_reset_evry")
     with pytest.raises(BnsError, match="positive number"):
-        adaptation.parse("population_reset_every:trials=nan")
+        adaptations.parse("population_reset_every:trials=nan")

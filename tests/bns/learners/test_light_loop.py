@@ -14,13 +14,13 @@ from bns.evolution.generation import Breeder, Rates
 from bns.experiment.config import RunConfig
 from bns.experiment.run import train
 from bns.experiment.task_settings import LightConfig
-from bns.learners.bns.adaptation import Adaptations
+from bns.learners.bns.adaptations import Adaptations
 from bns.learners.bns.learner import Bns
 from bns.learners.bns.light import islands
 from bns.learners.bns.light.problem import Weights
 from bns.tasks.light_controller import Controllers, GenomePolicy, LightController
-from tests.bns.contents import contents
 from tests.bns.robots import FakeLightWorld, small_light
+from tests.bns.shared import contents
 
 
 class TestEvolution:

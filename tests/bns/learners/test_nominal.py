@@ -10,7 +10,7 @@ from bns.learners.bns import nominal
 from bns.learners.bns.learner import Bns
 from bns.learners.bns.walking import GOAL, MOVED
 from bns.models.phantomx import gait, kinematics
-from bns.snn.fitting import Patterns
+from bns.snn.training import Patterns
 from tests.bns.robots import Slider, small
 
 STANDING = np.zeros((1, 18))

@@ -20,9 +20,9 @@ from bns.learners.bns.learner import Bns
 from bns.learners.bns.memory import PatternBuffer
 from bns.learners.bns.problem import should_compile
 from bns.learners.bns.walking import WalkEvaluator, path, variance
-from bns.snn import adam
-from bns.snn.fitting import Patterns
+from bns.snn import training
 from bns.snn.network import Shape, forward
+from bns.snn.training import Patterns
 from bns.tasks import walk as task
 from bns.tasks.walk import WalkTask
 from bns.worlds.trial import Commands, Outcome, Trial
@@ -111,12 +111,12 @@ class TestTraining:
         theta = draws.uniform(2, 5)
         weight = torch.nn.Parameter(theta.clone())
         optimiser = torch.optim.Adam([weight], lr=0.01)
-        state = adam.AdamState.fresh(theta)
+        state = training.AdamState.fresh(theta)
         for step in range(1, 4):
             grad = draws.uniform(2, 5) - 0.5
             weight.grad = grad.clone()
             optimiser.step()
-            theta, state = adam.adam(
+            theta, state = training.adam(
                 theta, grad, state, torch.tensor(0.01), torch.tensor(float(step))
             )
         torch.testing.assert_close(theta, weight.data)
@@ -131,7 +131,7 @@ class TestTraining:
         theta = SHAPE.random(2, draws)
         patterns = Patterns(inputs, targets, weight)
         config = replace(config, snn=replace(config.snn, epochs=400, dropout=0.0))
-        _, loss = adam.fit(SHAPE, config, theta, patterns, draws)
+        _, loss = training.fit_adam(SHAPE, config, theta, patterns, draws)
         assert (loss < 0.1 * targets[0].square().mean()).all()
 
     def test_slope_of_relu_is_that_of_autograd(self):

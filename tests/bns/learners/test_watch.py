@@ -10,9 +10,9 @@ from bns.learners.bns.change_detection import Detector, Ground, Misses, innovati
 from bns.learners.bns.config import AdaptationConfig, SnnConfig, WatchConfig
 from bns.learners.bns.forgetting import contradicted
 from bns.learners.bns.learner import Bns
-from bns.learners.bns.light.innovations import CHANNELS
+from bns.learners.bns.light.simulator import CHANNELS
 from bns.learners.bns.navigation import WheeledProblem, ways
-from bns.snn.scaling import AXLE
+from bns.snn.network import AXLE
 from bns.tasks.light_controller import GenomePolicy
 from tests.bns.learners.test_learner import SMALL, batch, play
 from tests.bns.robots import FakeLightWorld, small_light

@@ -8,8 +8,7 @@ from bns.evolution.chromosome import Encoding
 from bns.experiment.task_settings import ControllerConfig
 from bns.learners.bns.config import SnnConfig
 from bns.snn import training
-from bns.snn.network import Shape, forward, predict
-from bns.snn.scaling import Scaling
+from bns.snn.network import Scaling, Shape, forward, predict
 
 KINDS = [SnnConfig(), SnnConfig(kind="ensemble", members=4, hidden=7)]
 

@@ -10,10 +10,9 @@ from bns import stats
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
-from bns.stats import resampling
 from bns.stats.compare import compare
-from bns.stats.designs import MARGIN, Design, equivalence, of_share, up_to
-from bns.stats.resampling import power
+from bns.stats.designs import MARGIN, Design, equivalence, of_share, power, up_to
+from bns.stats.measures import bootstrap_median, median_band
 
 # |U - 450| and p as the dissertation prints it, thirty runs against thirty: tables
 # 5.3, 5.5, 5.6, 5.7, 5.10, 5.18, 6.2, 6.3b, 6.6, 7.6b, 7.7b.
@@ -295,23 +294,23 @@ def test_power_of_what_is_none(a12, runs):
 
 
 def test_bootstrap_median_by_hand():
-    assert resampling.median([4.0]) == (4.0, 4.0, 4.0)
-    assert resampling.median([1.0, 3.0]).value == 2.0
-    never = resampling.median([1.0, 2.0, np.inf])
+    assert bootstrap_median([4.0]) == (4.0, 4.0, 4.0)
+    assert bootstrap_median([1.0, 3.0]).value == 2.0
+    never = bootstrap_median([1.0, 2.0, np.inf])
     assert (never.value, never.low, never.high) == (2.0, 1.0, np.inf)
     values = np.random.default_rng(0).normal(size=30)
-    assert resampling.median(values) == resampling.median(values)
+    assert bootstrap_median(values) == bootstrap_median(values)
 
 
 def test_bootstrap_median_covers_at_its_nominal_rate():
     draws = np.random.default_rng(7).exponential(size=(30, 3000))
-    _, low, high = resampling.median_band(draws)
+    _, low, high = median_band(draws)
     assert 0.92 <= np.mean((low <= np.log(2)) & (np.log(2) <= high)) <= 0.96
 
 
 def test_bootstrap_of_a_curve_is_that_of_its_columns():
     curve = np.random.default_rng(2).normal(np.array([0, 5, 10]), size=(20, 3))
-    middle, low, high = resampling.median_band(curve)
+    middle, low, high = median_band(curve)
     np.testing.assert_allclose(middle, np.median(curve, axis=0))
     assert (low < middle).all() and (middle < high).all()
 
@@ -319,4 +318,4 @@ def test_bootstrap_of_a_curve_is_that_of_its_columns():
 @pytest.mark.parametrize("values", [np.zeros((0, 2)), [[np.nan]], [1.0]])
 def test_bootstrap_of_what_is_none(values):
     with pytest.raises(BnsError, match="no median"):
-        resampling.median_band(np.array(values))
+        median_band(np.array(values))

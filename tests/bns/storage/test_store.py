@@ -8,12 +8,12 @@ import pytest
 
 from bns.errors import BnsError, FormatError
 from bns.experiment.config import RunConfig
-from bns.experiment.step import Step
+from bns.experiment.record import Step
 from bns.storage import arrays, parquet
 from bns.storage.store import load, read_table
 from bns.worlds.data import dataset
 from bns.worlds.trial import Commands, Outcome, Trial
-from tests.bns.contents import contents
+from tests.bns.shared import contents
 
 
 @pytest.fixture

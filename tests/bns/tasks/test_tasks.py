@@ -13,7 +13,7 @@ from bns.experiment.config import RunConfig
 from bns.experiment.loading import with_learner
 from bns.experiment.run import train
 from bns.experiment.task_settings import TaskConfig
-from bns.path import integrate
+from bns.snn.network import integrate
 from bns.tasks import navigation
 from bns.tasks.navigation import Route
 from bns.tasks.park import TURN_COST, Bay, ParkTask

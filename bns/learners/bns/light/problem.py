@@ -18,10 +18,10 @@ from bns.evolution.generation import Breeder, Coins, Rates
 from bns.evolution.variation import normal
 from bns.experiment.config import RunConfig
 from bns.learners.base import Curves, Panel
-from bns.learners.bns.adaptation import Adaptations
 from bns.learners.bns.forgetting import contradicted, newer
-from bns.learners.bns.light import innovations, islands
+from bns.learners.bns.light import islands
 from bns.learners.bns.light.simulator import (
+    CHANNELS,
     MOTION_OUTPUTS,
     SENSORS,
     Noise,
@@ -29,6 +29,7 @@ from bns.learners.bns.light.simulator import (
     State,
     Thetas,
     in_body,
+    innovations,
     mirrored_motion,
     mirrored_sensors,
     motion_patterns,
@@ -36,8 +37,7 @@ from bns.learners.bns.light.simulator import (
 )
 from bns.learners.bns.memory import Memory, Patterns
 from bns.learners.bns.problem import Problem
-from bns.path import integrate
-from bns.tasks.base import Task
+from bns.snn.network import integrate
 from bns.tasks.light import LightTask
 from bns.tasks.light_controller import DARK, Controllers, counts
 from bns.worlds.trial import Trial
@@ -100,7 +100,7 @@ class LightProblem(Problem):
     """
 
     stream = "light-learner"
-    channels = innovations.CHANNELS
+    channels = CHANNELS
     relative_cost = 80.0  # 100 cycles, ten starts
     columns: ClassVar[Mapping[str, str]] = {
         "sensor_left": "RMS error of the left sensor's SNN on this trial [counts]",
@@ -136,20 +136,14 @@ class LightProblem(Problem):
     encoding: Weights
     task: LightTask
 
-    def __init__(
-        self,
-        task: Task,
-        configs: Sequence[RunConfig],
-        draws: Draws,
-        adaptations: Adaptations,
-    ):
-        super().__init__(task, configs, draws, adaptations)
+    def set_up(self) -> None:
+        """See `Problem.set_up`."""
         config, light = self.config, self.config.light
         check_islands(config)
         self.islands = light.islands
         self.simulator = Simulator.of(config)
         islanders = config.evolution.population // light.islands
-        reach = self._rows([c.light.weights for c in configs])
+        reach = self._rows([c.light.weights for c in self.configs])
         self.encoding = Weights.of(
             self.simulator.controllers, reach, light.weight_limit
         )
@@ -158,7 +152,7 @@ class LightProblem(Problem):
             population=islanders,
             elitism=min(config.evolution.elitism, islanders),
             tournament=min(config.evolution.tournament, islanders),
-            headless_chicken=max(c.evolution.headless_chicken for c in configs),
+            headless_chicken=max(c.evolution.headless_chicken for c in self.configs),
         )
         self.breeder = Breeder(evolution, self.encoding, True)
         pool = self.task.goal.start_pool()
@@ -390,7 +384,7 @@ class LightProblem(Problem):
         """See `Problem.innovation`."""
         (motion, sensors), (moved, light) = memories, new
         watch = self.config.watch
-        return innovations.innovations(motion, moved, sensors, light, run, watch)
+        return innovations(motion, moved, sensors, light, run, watch)
 
     def forget(self, run: int, memories: Sequence[Memory]) -> int:
         """See `Problem.forget`; each memory for itself."""

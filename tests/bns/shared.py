@@ -1,4 +1,7 @@
-"""A tiny campaign that tests share: four configurations, two replicates, no waiting."""
+"""What tests of runs share: a tiny campaign, and contents of directories.
+
+The campaign has four configurations of two replicates, and no waiting.
+"""
 
 from bns.campaign.file import from_content
 
@@ -23,3 +26,16 @@ CONTENT = {
 def campaign(**changes):
     """The tiny campaign with other entries at the top."""
     return from_content({**CONTENT, **changes}, "tiny")
+
+
+NOT_PROMISED = ("timing.jsonl", "recording.rrd", "report.html")
+"""what may differ between a run and the same one killed and resumed"""
+
+
+def contents(directory):
+    """Bytes of every file under a directory, by relative path."""
+    return {
+        str(path.relative_to(directory)): path.read_bytes()
+        for path in sorted(directory.rglob("*"))
+        if path.is_file() and path.name not in NOT_PROMISED
+    }

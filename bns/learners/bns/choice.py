@@ -1,4 +1,7 @@
-"""What a user would run if trials ended now: the best controller seen to work.
+"""Which controller is tried in the world, and which one is deployed.
+
+`choose` says which is tried (thesis 2.8 step 1, 5.3.9). Deployed is what a user would
+run if trials ended now: the best controller seen to work.
 
 BNS tries in each trial what evolution likes then, and nothing holds on to what worked.
 Here each run keeps the controllers that did best since its robot last changed. The one
@@ -14,10 +17,18 @@ trials differ by chance, only once, or where another may be better. Between two 
 trials lie `PAUSE` others, so that learning goes on.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import torch
+from torch import Tensor
+
+from bns.draws import Draws
+from bns.errors import UnknownNameError
+from bns.evolution import selection
+from bns.experiment.config import RunConfig
+from bns.experiment.validate import check_choice
 
 KEPT = 12
 """controllers that a run keeps; assumed"""
@@ -206,3 +217,50 @@ def unpack(runs: Sequence[Deployed], arrays: Mapping[str, np.ndarray]) -> None:
         run.misses = misses[number].tolist()
         surprised, run.again, run.changed = held["flags"][number].tolist()
         run.surprised = bool(surprised)
+
+
+def choose(
+    config: RunConfig,
+    trial: int,
+    cost: Tensor,
+    draws: Draws,
+    disagreement: Callable[[], Tensor],
+) -> Tensor:
+    """Index of one controller a run, ``(R,)``.
+
+    tournament: the best of a random share `choose_tournament` of the population;
+    best: the lowest predicted cost; random: any; best-worst-random: the three in turn,
+    trial by trial (Parker 2000); disagreement: the one on which the ensemble's members
+    differ most, among the better half (Bongard 2006 picks tests this way).
+
+    Args:
+        config: says how.
+        trial: its number.
+        cost: predicted, ``(R, P)``.
+        draws: source of randomness.
+        disagreement: gives how far an ensemble disagrees on each, ``(R, P)``.
+
+    Raises:
+        BnsError: disagreement without an ensemble.
+        UnknownNameError: no such rule.
+    """
+    kind: str = config.choose
+    if kind == "best-worst-random":
+        kind = ("best", "worst", "random")[trial % 3]
+    if kind == "best":
+        return cost.argmin(1)
+    if kind == "worst":
+        return cost.argmax(1)
+    if kind == "random":
+        return selection.random(cost, draws.uniform(len(cost), 1, 1)).squeeze(1)
+    if kind == "tournament":
+        size = max(1, round(config.choose_tournament * cost.shape[1]))
+        coins = draws.uniform(len(cost), 1, size)
+        return selection.tournament(cost, coins).squeeze(1)
+    if kind == "disagreement":
+        check_choice(config)
+        spread = disagreement()
+        good = cost <= cost.median(1, keepdim=True).values
+        return torch.where(good, spread, -1.0).argmax(1)
+    known = ("best", "tournament", "random", "best-worst-random", "disagreement")
+    raise UnknownNameError("choice", config.choose, known)

@@ -7,8 +7,8 @@ import torch
 
 from bns.draws import Draws
 from bns.evolution.chromosome import Encoding, Population
-from bns.evolution.icem import Icem, best, fitted, sampled
-from bns.evolution.icem import Normal as Distribution
+from bns.learners.pets import Icem, best, fitted, sampled
+from bns.learners.pets import Normal as Distribution
 
 GENES = Encoding(
     low=torch.tensor([-1.0, -1.0, 0.0]),
