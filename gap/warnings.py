@@ -45,15 +45,23 @@ def _travel(observed: np.ndarray) -> float:
     return float(np.ptp(seen, axis=0).max()) if len(seen) else 0.0
 
 
-def warnings(found: Diagnosis, rows: Sequence[Row]) -> tuple[str, ...]:
+def warnings(
+    found: Diagnosis, rows: Sequence[Row], untried: Sequence[str] = ()
+) -> tuple[str, ...]:
     """Further warnings on a diagnosis, one line each.
 
     Args:
         found: the diagnosis.
         rows: of its model.
+        untried: effects that it does not consider, by name.
     """
     made = []
-    if change := found.change:
+    if untried and found.verdict.kind != "no gap":
+        made.append(
+            f"Not tried: {', '.join(untried)}; list what can be the case in [effects]."
+        )
+    change = found.change
+    if change and not found.decomposition.get("onset"):
         made.append(
             f"The gap {change['direction']} at trial {change['trial']}, but effects "
             "are fitted as if they held throughout: diagnose what comes before and "

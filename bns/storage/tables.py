@@ -158,6 +158,8 @@ def read_csv_numbers(
 ) -> dict[str, np.ndarray]:
     """Columns of numbers and of truth values as doubles; those of text are left out.
 
+    A column of which most cells are numbers is one, and no cell of it may be text.
+
     Args:
         path: of the file; one that ends with `.gz` is unpacked.
         delimiter: between columns.
@@ -166,7 +168,7 @@ def read_csv_numbers(
         name -> column, ``(N,)``, N rows; empty cells are NaN.
 
     Raises:
-        FormatError: not there, no table, or a column twice.
+        FormatError: not there, no table, a column twice, or text among numbers.
     """
     from pyarrow import types
 
@@ -179,7 +181,33 @@ def read_csv_numbers(
         column = column.cast("int8") if types.is_boolean(column.type) else column
         if _is_number(column.type):
             found[name] = _csv_column(column, name, path)
+        elif types.is_string(column.type):
+            _check_text(column.to_pylist(), name, path)
     return found
+
+
+def _check_text(cells: Sequence[str | None], name: str, path: Path | str) -> None:
+    """Stop at a cell of text in a column of numbers.
+
+    Raises:
+        FormatError: there is one.
+    """
+    texts = [row for row, cell in enumerate(cells) if cell and not _reads(cell)]
+    if texts and len(texts) < len(cells) / 2:
+        row = texts[0]
+        raise FormatError(
+            f"{path}: the column {name!r} holds {cells[row]!r} in line {row + 2}, "
+            "which is no number; leave a cell empty where nothing was measured."
+        )
+
+
+def _reads(cell: str) -> bool:
+    """Whether a cell is a number."""
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
 
 
 def _parsed(data: bytes, path: Path | str, delimiter: str) -> tuple[Any, list[str]]:

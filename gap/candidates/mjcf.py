@@ -26,6 +26,8 @@ WIDER = (
     10.0  # times the largest value that is looked for first: geared servos have much
 )
 # friction and inertia for the links that they move; assumed
+LEAST = 0.002  # of a limit of force in the model, which may be far beyond the robot's
+TILT = 0.5  # [rad] largest tilt of a body
 PLAY = 0.3  # [rad or m] largest play, or offset of an encoder
 EXCITE = {
     "joint_damping": "fast motion of that joint",
@@ -48,6 +50,7 @@ EXCITE = {
     "encoder_offset": "motion against gravity, or between stops",
     "body_centre": "motion against gravity, or sudden changes of speed",
     "body_length": "large excursions",
+    "body_tilt": "motion against gravity",
     "actuator_kp": "steps, and loads that are held",
     "actuator_kd": "steps",
     "actuator_torque_limit": "large and sudden commands",
@@ -62,17 +65,20 @@ USUAL = (
     "joint_armature",
     "joint_stiffness",
     "body_mass",
+    "body_tilt",
     "actuator_gain",
     "actuator_kp",
     "actuator_kd",
     "actuator_torque_limit",
+    "command_limit",
     "command_delay",
     "command_lag",
     "reading_gain",
     "reading_offset",
 )
-"""considered where the user does not say which: `actuator_kp` and `actuator_kd` of
-position servos, `actuator_gain` of other actuators, a limit where there is one"""
+"""considered where the user does not say which: `actuator_kp`, `actuator_kd` and a
+limit of force of position servos, `actuator_gain` and `command_limit` of others, the
+tilt of what is bolted to the world"""
 
 
 def candidates(config: OwnConfig, model: mujoco.MjModel) -> tuple[Row, ...]:
@@ -125,22 +131,37 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
         "actuator_gain": set(told) - servos,
         "actuator_kp": servos,
         "actuator_kd": damped,
-        "actuator_torque_limit": limited,
+        "actuator_torque_limit": limited & servos,
+        "command_limit": [
+            item.channel.name
+            for item, number in zip(config.told, told, strict=True)
+            if number not in servos
+        ],
         "reading_gain": seen,
         "reading_offset": seen,
+        "body_tilt": _bolted(model, owned),
     }
     made: dict[str, tuple[str, ...]] = {}
     for name in USUAL:
         kind = effects.OWNERS.get(name)
         if kind == "actuator":
             made[name] = tuple(model.actuator(n).name for n in told if n in of[name])
-        elif kind:
+        elif kind and name not in of:
             made[name] = tuple(
                 part for part in (joints if kind == "joint" else bodies) if part
             )
         else:
             made[name] = tuple(of.get(name, (ALL,)))
     return {name: parts for name, parts in made.items() if parts}
+
+
+def _bolted(model: mujoco.MjModel, bodies: Iterable[int]) -> list[str]:
+    """Names of the bodies on the world that carry some bodies and are not afloat."""
+    afloat = {
+        int(model.jnt_bodyid[j]) for j in range(model.njnt) if not _hinged(model, j)
+    }
+    roots = {int(model.body_rootid[body]) for body in bodies} - afloat
+    return [model.body(root).name for root in sorted(roots) if model.body(root).name]
 
 
 def _hinged(model: mujoco.MjModel, joint: int) -> bool:
@@ -245,8 +266,12 @@ def _of_model(
     if part not in known:
         raise UnknownNameError(f"{kind} in [effects] {name}", part, known)
     at = known.index(part)
+    if name == "actuator_torque_limit":
+        return LEAST, 3.0, "1"
     if kind in ("actuator", "geom"):
         return 0.2, 3.0, "1"
+    if name == "body_tilt":
+        return -TILT, TILT, "rad"
     if name == "body_length":
         return 0.7, 1.4, "1"
     if kind == "body":

@@ -23,6 +23,9 @@ GROUPED = ("joint_damping", "joint_friction", "joint_armature")
 """effects that may be on all joints alike"""
 LATE = ("command_delay", "command_lag", "reading_delay")
 LAG_STEP = 0.01  # [s] for its derivative: a lag has next to none where there is none
+CUT = (0.15, 0.3, 0.5, 0.7, 0.9)  # of what was told at most: levels of a limit of it
+TAKEN = (0.4, 0.6, 0.75, 0.88, 0.95, 0.99)  # quantiles of forces, for their limits
+MORE, FULL = (1.25, 1.6), 0.98  # limits that are tried where the model's own is reached
 TOLD = (0.05, 0.12, 0.2, 0.3, 0.4, 0.55)  # quantiles of what was told, for dead zones
 EIGHTH = 0.125  # of the largest value: the plausible one
 OFFSET = 0.0625  # of the span of an offset
@@ -40,6 +43,7 @@ PLAUSIBLE = {
     "command_lag": (0.04, 0.0),
     "reading_delay": (0.04, 0.0),
     "body_length": (0.03, 0.001),
+    "body_tilt": (0.03, 0.001),
     "encoder_offset": (0.01, 0.0),
 }
 SHARE = 0.02  # slack of a number over its plausible departure
@@ -52,6 +56,7 @@ def rows(
     bodies: Mapping[str, Body],
     *,
     stepped: bool = False,
+    forces: Mapping[str, np.ndarray] | None = None,
 ) -> tuple[Row, ...]:
     """All numbers that may be off, with those of all joints alike.
 
@@ -62,6 +67,8 @@ def rows(
         bodies: whose mass may be off, by name.
         stepped: whether finer steps change the motion. Robots know no steps, and what
             was simulated by the model's own is a recording, too; neither is a gap.
+        forces: by actuator with a limit, those of the nominal motion over it, each
+            ``(n,)``.
     """
     lead = max(0.002, 0.5 * dt)
     late = max(lead, trial_conditions.moments_unknown(trials) / 2)
@@ -71,7 +78,7 @@ def rows(
             body = bodies[item.fixed["part"]]
             made += masses.rows(item, body, EXCITE[item.effect])
         else:
-            made += _of(item, trials, lead)
+            made += _of(item, trials, lead, forces or {})
     edge = max(0.02, late)
     made.append(
         Row(LEAD, 0.0, late, -LAGS * lead, edge, unit="s", nuisance=True, step=0.001)
@@ -108,7 +115,9 @@ def grouped(candidates: Sequence[Row]) -> list[Row]:
     return made
 
 
-def _of(item: Row, trials: Sequence[Trial], lead: float) -> Iterable[Row]:
+def _of(
+    item: Row, trials: Sequence[Trial], lead: float, forces: Mapping[str, np.ndarray]
+) -> Iterable[Row]:
     excite = EXCITE.get(item.effect, "any command")
     row = partial(Row, low=item.low, high=item.high, unit=item.unit, excite=excite)
     third = (item.high - item.low) / 3
@@ -117,8 +126,17 @@ def _of(item: Row, trials: Sequence[Trial], lead: float) -> Iterable[Row]:
             yield row(item.name, 0.0, third, smooth=False, stepped=True, levels=levels)
         return
     if item.effect == "command_limit":
-        levels = tuple(v for v in item.levels if item.low < v < item.high)
+        told = np.abs(_told(item, trials))
+        levels = tuple(share * float(told.max()) for share in CUT)
+        levels = tuple(v for v in levels if item.low < v < item.high)
         yield row(item.name, item.nominal, third, smooth=False, levels=levels)
+        return
+    if item.effect == "actuator_torque_limit":
+        taken = np.quantile(forces.get(item.fixed["part"], np.ones(1)), TAKEN).tolist()
+        levels = tuple(value for value in taken if value < 1.0)
+        levels += MORE if taken[-1] > FULL else ()
+        if levels:
+            yield row(item.name, 1.0, third, smooth=False, levels=levels)
         return
     sd, slack = _plausible(item)
     late, lag = item.effect in LATE, item.effect == "command_lag"
@@ -145,13 +163,17 @@ def _plausible(item: Row) -> tuple[float, float]:
     return sd or EIGHTH * (item.high - item.low), slack
 
 
-def _levels(item: Row, trials: Sequence[Trial]) -> tuple[float, ...]:
-    """Sizes of a dead zone between the magnitudes that were told."""
+def _told(item: Row, trials: Sequence[Trial]) -> np.ndarray:
+    """What the channel of a row was told in all trials, or every channel."""
     names = [channel.name for channel in trials[0].commands.channels]
     part = item.fixed["part"]
     chosen = slice(None) if part == ALL else [names.index(part)]
-    told = np.concatenate([trial.commands.values[:, chosen] for trial in trials])
-    sizes = np.unique(np.abs(told).round(9))
+    return np.concatenate([trial.commands.values[:, chosen] for trial in trials])
+
+
+def _levels(item: Row, trials: Sequence[Trial]) -> tuple[float, ...]:
+    """Sizes of a dead zone between the magnitudes that were told."""
+    sizes = np.unique(np.abs(_told(item, trials)).round(9))
     sizes = sizes[sizes > 0]
     if not len(sizes):
         return ()

@@ -9,7 +9,7 @@ import numpy as np
 
 from bns.gap.decomposition import fit as fits
 from bns.gap.decomposition import rest, search, shares, words
-from bns.gap.decomposition.decomposition import Decomposition
+from bns.gap.decomposition.decomposition import LARGE, Decomposition
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
@@ -164,9 +164,13 @@ def statements(made: Decomposition) -> list[str]:
             for name, number in made.unconfirmed.items()
         )
     )
-    if made.kind == "no gap":
-        return ["No gap beyond what the recording scatters by itself." + apart]
     before, beyond = _sizes(made, made.start.rest)
+    size = words.size(before, beyond, features, _over(problem))
+    if made.kind == "no gap":
+        said = ["No gap beyond what the recording scatters by itself." + apart]
+        if made.before > LARGE:
+            said += [size, "That does not recur: the robot scatters it, or the camera."]
+        return said
     _, left = _sizes(made, made.point.rest)
     listed = [_said(made, part) for part in made.parts]
     date = ""
@@ -174,7 +178,7 @@ def statements(made: Decomposition) -> list[str]:
         date = f"{made.onset.name} sets in at trial {made.onset.trial}."
     swapped = [" with ".join(_ordered(made, s)) for s in made.tied[1:]]
     return [
-        words.size(before, beyond, features, _over(problem)),
+        size,
         words.explained(listed, made.closed, date, swapped),
         words.left(
             made.left,
@@ -214,20 +218,15 @@ def _said(made: Decomposition, part: Part) -> str:
 def _beside(problem: Problem, part: Part) -> list[str]:
     """Further numbers of an explanation: what a dry friction takes to break away, where
     a load sits, which way a floor slopes."""
-    rows = {row.name: row for row in problem.rows}
-    if part.name in part.values:
-        return [
-            f"{name.partition('[')[0].rpartition('.')[2]} {value:.4g} {rows[name].unit}"
-            for name, value in part.values.items()
-            if name != part.name and value != rows[name].nominal
-        ]
     effect = problem.model.effect(part.name, part.values)
     if effect is None or len(part.values) == 1:
         return []
+    known = [
+        about for about in effect.parameters if effect[about.name] != about.nominal
+    ]
     return [
         f"{about.name} {effect[about.name]:.4g} {about.unit}".removesuffix(" 1")
-        for about in effect.parameters[1:]
-        if effect[about.name] != about.nominal
+        for about in known[1:]
     ]
 
 

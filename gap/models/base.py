@@ -274,6 +274,10 @@ class GapModel(ABC):
         del trial, predicted
         return frozenset()
 
+    def untried(self) -> tuple[str, ...]:
+        """Effects that act on such a robot and are not among its rows, by name."""
+        return ()
+
 
 class LibraryModel(GapModel):
     """A model whose rows say which effect of the library they are, and which is

@@ -11,6 +11,7 @@ from bns.worlds.trial import Trial
 
 TURNS = 1.5  # steps beside it that a spike is larger than; a turn is one; assumed
 SPIKE = 8.0  # robust standard deviations from both neighbours
+SPANS = 1.5  # turns that a wrapped angle spans at most; it is one
 WRAP = 0.6  # of a full turn, between two samples, that counts as a wrap
 LOST = 0.5  # share of samples that may be missing
 STUCK = 0.9  # share of equal neighbours, while commands move, that counts as stuck
@@ -130,6 +131,13 @@ def _repaired(trial: Trial, label: str, timed: bool) -> tuple[Trial, list[str]]:
         values = observed[:, column]
         if channel.unit == "rad":
             values, wraps = _unwrapped(values)
+            if wraps and np.ptp(observed[np.isfinite(observed[:, column]), column]) > (
+                SPANS * 2 * np.pi
+            ):
+                raise FormatError(
+                    f"{channel.name} of {label} jumps back as a wrapped angle does, "
+                    "but spans more than a turn: is it in degrees, told as rad?"
+                )
             if wraps:
                 notes.append(f"{label}: {channel.name} wrapped {wraps} times, undone")
         infinite = np.isinf(values)

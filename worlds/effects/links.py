@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from bns.errors import BnsError
@@ -63,6 +64,40 @@ class BodyCentre(BodyEffect):
             inertial = Inertial.of(spec, body)
             centre = inertial.centre + np.array([self["dx"], self["dy"], self["dz"]])
             replace(inertial, centre=centre).write(body)
+
+
+class BodyTilt(BodyEffect):
+    """A body is mounted aslant: turned about its parent's x and y axes.
+
+    It turns with its joints and with all that it carries. Of a robot that is bolted
+    down, its first body on the world is the base: a table that is not level.
+    """
+
+    name = "body_tilt"
+    source = "a rotation vector in the parent's frame; bounds assumed"
+    robots = ANY
+    choices = parts.part("body")
+    parameters = tuple(
+        strength(
+            name, "rad", (-1.0, 1.0), f"about the parent's {axis} axis", example=0.1
+        )
+        for name, axis in (("roll", "x"), ("pitch", "y"))
+    )
+
+    def _write(self, spec: Any) -> None:
+        model = spec.copy().compile()
+        turn, made = np.zeros(4), np.zeros(4)
+        mujoco.mju_axisAngle2Quat(turn, *_turn(self["roll"], self["pitch"]))
+        for body in parts.bodies(spec, self["part"]):
+            mujoco.mju_mulQuat(made, turn, model.body(body.name).quat)
+            body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+            body.quat = made
+
+
+def _turn(roll: float, pitch: float) -> tuple[np.ndarray, float]:
+    """Axis and angle of a rotation vector."""
+    angle = float(np.hypot(roll, pitch))
+    return np.array([roll, pitch, 0.0]) / max(angle, 1e-12), angle
 
 
 class BodyLength(BodyEffect):

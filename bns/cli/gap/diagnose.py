@@ -246,7 +246,8 @@ def _general(
         warnings.reproducible(usable, model)
         unchanged = recorded(replace(given, data=given.reference, trials=""), model)
         found = diagnose(trials, model, seed=given.seed, reference=unchanged, tell=tell)
-        more = warnings.warnings(found, model.rows(usable))
+        rows, untried = model.rows(usable), model.untried()
+        more = warnings.warnings(found, rows, untried)
         return replace(found, warnings=(*found.warnings, *more))
     except BnsError as error:
         if out and not isinstance(error, StorageError):

@@ -60,6 +60,7 @@ class OwnModel(GapModel):
             for item in self.listed
             if item.effect == "body_mass"
         }
+        self._limits = any(i.effect == "actuator_torque_limit" for i in self.listed)
         self._terms = {
             item.name: item for item in (*self.listed, *mjcf_rows.grouped(self.listed))
         }
@@ -94,8 +95,18 @@ class OwnModel(GapModel):
         self._parts = self.physics.needed(trials)
         items = tuple(self._terms.values())
         return mjcf_rows.rows(
-            items, trials, self.dt, self._bodies, stepped=self._parts > 1
+            items,
+            trials,
+            self.dt,
+            self._bodies,
+            stepped=self._parts > 1,
+            forces=self.physics.forces(trials) if self._limits else {},
         )
+
+    def untried(self) -> tuple[str, ...]:
+        """See `GapModel.untried`."""
+        tried = {item.effect for item in self.listed}
+        return tuple(name for name in sorted(own_effects.CLASSES) if name not in tried)
 
     def effect(self, term: str, values: Mapping[str, float]) -> Effect | None:
         """The effect of an explanation; None for the shift in time and the step."""

@@ -28,7 +28,8 @@ FINE = 0.005  # [s] between kept states; the step if that is longer
 FINEST = 0.0005  # [s] no step is cut shorter
 EXACT = 0.2  # of the noise: predictions that differ by less are alike
 BY_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
-TRIED = 4  # trials on which steps are compared
+TRIED = 4  # trials on which steps are compared, and forces looked at
+LOOKED = 500  # moments of a trial at which forces are looked at
 
 
 class Simulation:
@@ -131,6 +132,34 @@ class Simulation:
                 break
             parts, made = min(2 * parts, self.finest), finer
         return parts
+
+    def forces(self, trials: Sequence[Trial]) -> dict[str, np.ndarray]:
+        """How large forces are in the nominal motion, over the limit of each actuator
+        that has one, by name: ``(n,)``, at moments of some of the trials.
+
+        Args:
+            trials: recorded.
+        """
+        model = self.model
+        data = mujoco.MjData(model)
+        seen = []
+        for trial in trials[:: max(len(trials) // TRIED, 1)]:
+            job = self._job(trial, (), 1)
+            (motion,) = self._pool.map([job])
+            control = job.segments[0].control
+            every = max(1, len(control) // LOOKED)
+            moments = zip(motion.states[:-1:every], control[::every], strict=True)
+            for state, ctrl in moments:
+                if np.isfinite(state).all():
+                    mujoco.mj_setState(model, data, state, STATE)
+                    data.ctrl[:] = ctrl
+                    mujoco.mj_forward(model, data)
+                    seen.append(np.abs(data.actuator_force))
+        most = np.abs(model.actuator_forcerange).max(axis=1)
+        return {
+            model.actuator(number).name: np.array(seen)[:, number] / most[number]
+            for number in np.flatnonzero(model.actuator_forcelimited).tolist()
+        }
 
     def predicted(
         self,

@@ -123,6 +123,19 @@ class TestBodies:
         assert capsule.size[1] == pytest.approx(0.165)
         assert capsule.pos == pytest.approx([0.165, 0, 0])
 
+    def test_a_tilted_body_is_one_in_tilted_gravity(self):
+        tilted = compiled("body_tilt:part=rod,roll=0.3,pitch=-0.2", xml=ROD)
+        level = compiled(xml=ROD)
+        turn, gravity = np.zeros(4), np.zeros(3)
+        mujoco.mju_axisAngle2Quat(
+            turn, np.array([0.3, -0.2, 0]) / np.hypot(0.3, 0.2), -np.hypot(0.3, 0.2)
+        )
+        mujoco.mju_rotVecQuat(gravity, np.array([0, 0, -G]), turn)
+        level.opt.gravity = gravity
+        one, other = at_rest(tilted), at_rest(level)
+        assert one.qpos == pytest.approx(other.qpos, abs=1e-9)
+        assert abs(one.qpos[0] - 0.5) > 1e-3
+
     def test_a_centre_of_mass_further_out_pulls_harder(self):
         def pull(*texts):
             model = compiled(*texts, xml=ROD)
