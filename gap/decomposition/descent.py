@@ -22,6 +22,7 @@ ROUNDS = 2  # of levels
 MARGIN = 1.02  # of the held-out error that an autoregression may cost
 WEAK = 0.05  # of what a set explains: so little may be left to the others
 TRIED = 3  # of these, the weakest first
+SWAPPED = 30.0  # nats that another set may be worse by the linear model, to be fitted
 SLIGHT = 0.25  # of a plausible departure: next to none
 REWEIGHED = 2  # times that residuals are weighed by what is left of them
 WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
@@ -173,7 +174,7 @@ def decompose(tried: Singles) -> Point:
             break
         best = chosen
     best = narrowed(problem, best)
-    return best if problem.model.many else pruned(problem, best)
+    return swapped(problem, best) if problem.model.many else pruned(problem, best)
 
 
 def _by_itself(problem: Problem, level: Level, known: Noise) -> Point:
@@ -183,6 +184,27 @@ def _by_itself(problem: Problem, level: Level, known: Noise) -> Point:
     rows = list(problem.terms[level.name])
     values[rows] = level.values[rows]
     return descend(problem, values, {level.name}, known)
+
+
+def swapped(problem: Problem, point: Point) -> Point:
+    """A point with another explanation in the place of one of several, where that is
+    better once it is fitted: a delay for a lag.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+    """
+    linear, support = point.linear, point.support
+    if len(support) < 2:
+        return point
+    outside = set(linear.free) - support
+    swaps = [(support - {one}) | {other} for one in support for other in outside]
+    near = sorted((linear.cost(swap), sorted(swap)) for swap in swaps)[:TRIED]
+    worst = linear.cost(support) + SWAPPED
+    others = [
+        refitted(problem, point, frozenset(swap)) for cost, swap in near if cost < worst
+    ]
+    return better(problem, [point, *others])
 
 
 def narrowed(problem: Problem, point: Point) -> Point:
