@@ -25,7 +25,7 @@ from bns.worlds.trial import Trial
 LEAD = 1.0  # [s] of rest before a trial, so that what is late has something before it
 KEPT, MODELS = 20_000, 2000  # simulated trials and compiled models kept in memory
 FINE = 0.005  # [s] between kept states; the step if that is longer
-FINEST = 0.0005  # [s] no step is cut shorter
+FINEST, CUT = 0.0025, 4  # [s] longer steps are cut, shorter ones in so many parts
 EXACT = 0.2  # of the noise: predictions that differ by less are alike
 BY_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
 TRIED = 4  # trials on which steps are compared, and forces looked at
@@ -57,7 +57,7 @@ class Simulation:
         self._starts: dict[tuple, np.ndarray] = {}
         model = self.model
         self.dt = float(model.opt.timestep)
-        self.finest = math.ceil(self.dt / FINEST - 1e-9)
+        self.finest = max(math.ceil(self.dt / FINEST - 1e-9), CUT)
         self.actuators = [
             prepared.number(model, "actuator", t.actuator) for t in config.told
         ]
