@@ -18,12 +18,12 @@ LEAD = "step_lead"
 """shift of the simulation in time that no effect is"""
 LAGS = 1.5  # half steps that a simulation may lead by; a robot that is later is late
 STEP = "fine_steps"
-"""share of what finer steps change of the motion: 0 = as by the model's own step, 1 = as
-by finer ones; a third more = as by ever finer ones, where errors go with the step"""
+"""share of what finer steps change of the motion: 0 = as by the model's own step, 1 =
+as by finer ones; a third more = as by ever finer ones, where errors go with the step"""
 GROUPED = ("joint_damping", "joint_friction", "joint_armature")
 """effects that may be on all joints alike"""
 LATE = ("command_delay", "command_lag", "reading_delay")
-LAG_STEP = 0.01  # [s] for its derivative: a lag has next to none where there is none
+LATER = 0.01  # [s] for derivatives: a lag has next to none where there is none
 CUT = (0.15, 0.3, 0.5, 0.7, 0.9)  # of what was told at most: levels of a limit of it
 TAKEN = (0.4, 0.6, 0.75, 0.88, 0.95, 0.99)  # quantiles of forces, for their limits
 MORE, FULL = (1.25, 1.6), 0.98  # limits that are tried where the model's own is reached
@@ -107,7 +107,7 @@ def grouped(candidates: Sequence[Row]) -> list[Row]:
                     name=f"{name}[{ALL}]",
                     low=low,
                     high=high,
-                    sd=min(item.sd for item in parts),
+                    sd=max(item.sd for item in parts),
                     levels=grid or (high,),
                     fixed={"part": ALL},
                     slack=0.0,
@@ -140,14 +140,14 @@ def _of(
             yield row(item.name, 1.0, third, smooth=False, levels=levels)
         return
     sd, slack = _plausible(item)
-    late, lag = item.effect in LATE, item.effect == "command_lag"
+    late = item.effect in LATE
     yield row(
         item.name,
         item.nominal,
         sd,
         slack=item.slack or (lead if late else slack),  # its steps lead by as much
         levels=(0.15, 0.3) if late else (),
-        step=LAG_STEP if lag else lead if late else 0.0,
+        step=LATER if late else 0.0,
     )
 
 
