@@ -154,6 +154,10 @@ class Corrected(GapModel):
         """See `GapModel.parse`."""
         return self.model.parse(text)
 
+    def untried(self) -> tuple[str, ...]:
+        """See `GapModel.untried`."""
+        return self.model.untried()
+
     def at_rest(self, trial: Trial, predicted: np.ndarray) -> frozenset[str]:
         """See `GapModel.at_rest`."""
         return self.model.at_rest(trial, predicted)

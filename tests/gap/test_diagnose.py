@@ -90,7 +90,7 @@ def test_an_alias_is_never_a_single_name(find):
     named = {names for names in found.verdict.named}
     assert {("command_latency",), ("tracker_latency",)} <= named
     assert found.verdict.angle < 5
-    assert "steps in speed" in found.verdict.change
+    assert "the same whatever is commanded" in found.verdict.change
 
 
 def test_two_effects_together(find):

@@ -176,7 +176,8 @@ def test_trials_keep_their_numbers_in_what_is_said(model, tmp_path):
     found = diagnose(trials, model, rows=names)
     assert (found.change["trial"], found.change["direction"]) == (4, "sets in")
     notes = warnings.warnings(found, model.rows(trials))
-    assert any("sets in at trial 4, but" in note for note in notes)
+    assert "wheel_gain[left] sets in at trial 4" in found.verdict.sentence
+    assert not any("sets in" in note for note in notes)  # it was dated
     same = "trial 2 of run 0: the same samples as trial 1 of run 0, left out"
     assert same in found.faults
     after = load_recordings.trials([place], model, numbers="4-")
