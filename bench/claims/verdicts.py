@@ -80,7 +80,7 @@ def _wrong(row: Judged, world: str) -> list[str]:
         letter = row.claim.investigation
         now = []
         for side in each.cell.sides:
-            config = claim.member(letter, side, world=world).config
+            config = member_of(letter, side, world=world).config
             ignored = claim.content(letter)["ignored"]
             now.append(provenance.of(provenance.resolved(config, ignored)))
         if each.made is None or not provenance.current(each.made, tuple(now)):
