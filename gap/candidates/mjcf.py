@@ -22,10 +22,9 @@ SHARES = (0.02, 0.05, 0.12, 0.3, 1.0)  # of the largest value, beyond the nomina
 LOWER = (0.9, 0.5, 0.2)  # of the nominal value, taken off
 LATE = (0.01, 0.03, 0.08, 0.2, 0.5)  # [s]
 EIGHTH = 0.125  # of a range: a plausible departure where nothing else is known
-WIDER = (
-    10.0  # times the largest value that is looked for first: geared servos have much
-)
-# friction and inertia for the links that they move; assumed
+# Times the largest value that is looked for first: geared servos have much friction and
+# inertia for the links that they move; assumed.
+WIDER = 10.0
 LEAST = 0.002  # of a limit of force in the model, which may be far beyond the robot's
 TILT = 0.5  # [rad] largest tilt of a body
 PLAY = 0.3  # [rad or m] largest play, or offset of an encoder
@@ -57,7 +56,10 @@ EXCITE = {
     "command_limit": "large commands",
     "command_rate": "large steps",
 }
-_DELAYS = ("command_delay[all]", "reading_delay[all]")
+_DELAYS = {
+    "command_delay[all]": ("reading_delay[all]",),
+    "reading_delay[all]": ("command_delay[all]",),
+}
 """alike where every command and every reading is late"""
 USUAL = (
     "joint_damping",
@@ -196,11 +198,7 @@ def _candidates(
             fixed={"part": part},
             slack=given.get("slack", 0.0),
             excite=EXCITE[name],
-            aliases=tuple(
-                other
-                for other in _DELAYS
-                if f"{stem}[{part}]" in _DELAYS and other != f"{stem}[{part}]"
-            ),
+            aliases=_DELAYS.get(f"{stem}[{part}]", ()),
         )
 
 

@@ -65,7 +65,7 @@ class Simulation:
             prepared.number(
                 model, "key", config.keyframe
             )  # there, before anything runs
-        self._views = {model.nq: start.View.of(config, model)}
+        self._views = {model.names: start.View.of(config, model)}
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -74,9 +74,9 @@ class Simulation:
 
     def _view(self, model: mujoco.MjModel) -> start.View:
         """Where the observed channels are in a model: play is a joint more."""
-        if model.nq not in self._views:
-            self._views[model.nq] = start.View.of(self.config, model)
-        return self._views[model.nq]
+        if model.names not in self._views:
+            self._views[model.names] = start.View.of(self.config, model)
+        return self._views[model.names]
 
     def spec(self, effects: Sequence[Effect]) -> mujoco.MjSpec:
         """The model with the effects on its parts written into it.
@@ -156,6 +156,8 @@ class Simulation:
                     mujoco.mj_forward(model, data)
                     seen.append(np.abs(data.actuator_force))
         most = np.abs(model.actuator_forcerange).max(axis=1)
+        if not seen:  # it diverged at once
+            return {}
         return {
             model.actuator(number).name: np.array(seen)[:, number] / most[number]
             for number in np.flatnonzero(model.actuator_forcelimited).tolist()
@@ -241,12 +243,12 @@ class Simulation:
     def _start(self, trial: Trial, model: mujoco.MjModel) -> np.ndarray:
         """The state that a trial begins in, kept: effects do not change it, but for
         those with a joint or a friction's bristles more, which begin at zero."""
-        size = mujoco.mj_stateSize(model, STATE)
+        sizes = [mujoco.mj_stateSize(some, STATE) for some in (model, self.model)]
+        model = self.model if sizes[0] == sizes[1] else model
         state = str(trial.conditions.get(start.STATE))
-        key = (size, trial.observed[:1].tobytes(), state)
+        key = (model.names, trial.observed[:1].tobytes(), state)
         if key not in self._starts:
-            same = size == mujoco.mj_stateSize(self.model, STATE)
-            self._starts[key] = self._begun_in(trial, self.model if same else model)
+            self._starts[key] = self._begun_in(trial, model)
         return self._starts[key]
 
     def _begun_in(self, trial: Trial, model: mujoco.MjModel) -> np.ndarray:

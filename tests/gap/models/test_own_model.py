@@ -229,6 +229,19 @@ def test_play_behind_a_joint_is_found(arm, told):
     assert found.best.magnitudes[0] == pytest.approx(0.08, rel=0.1)
 
 
+def test_play_of_one_joint_is_not_read_as_that_of_another(arm, told):
+    trials = mjcf_cases.record(arm, told[:1], [])
+    effects = [
+        (arm.parse(f"joint_backlash:part={joint},play=0.08"),)
+        for joint in ("shoulder", "elbow")
+    ]
+    alone = [
+        OwnModel.read(ARM, threads=1).simulate(trials, [made])[0][0] for made in effects
+    ]
+    for (seen,), expected in zip(arm.simulate(trials, effects), alone, strict=True):
+        np.testing.assert_array_equal(seen, expected)
+
+
 def test_steps_of_a_simulation_are_no_gap(arm, told, tmp_path):
     """A model of 8 ms steps, and recordings by steps of 0.5 ms: no effect does that."""
     scene = ARM.with_name("arm.xml").read_text(encoding="utf-8")
