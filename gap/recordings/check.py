@@ -11,7 +11,8 @@ from bns.worlds.trial import Trial
 
 TURNS = 1.5  # steps beside it that a spike is larger than; a turn is one; assumed
 SPIKE = 8.0  # robust standard deviations from both neighbours
-SPANS = 1.5  # turns that a wrapped angle spans at most; it is one
+DEGREES = (300.0, 420.0)  # jumps of an angle that is wrapped in degrees
+OFTEN = 0.05  # of the samples, that no angle in radians jumps by `WRAP`
 WRAP = 0.6  # of a full turn, between two samples, that counts as a wrap
 LOST = 0.5  # share of samples that may be missing
 STUCK = 0.9  # share of equal neighbours, while commands move, that counts as stuck
@@ -131,12 +132,10 @@ def _repaired(trial: Trial, label: str, timed: bool) -> tuple[Trial, list[str]]:
         values = observed[:, column]
         if channel.unit == "rad":
             values, wraps = _unwrapped(values)
-            if wraps and np.ptp(observed[np.isfinite(observed[:, column]), column]) > (
-                SPANS * 2 * np.pi
-            ):
+            if wraps and _in_degrees(observed[:, column]):
                 raise FormatError(
-                    f"{channel.name} of {label} jumps back as a wrapped angle does, "
-                    "but spans more than a turn: is it in degrees, told as rad?"
+                    f"{channel.name} of {label} jumps by more than half a turn again "
+                    "and again: is it in degrees, told as rad?"
                 )
             if wraps:
                 notes.append(f"{label}: {channel.name} wrapped {wraps} times, undone")
@@ -176,6 +175,16 @@ def _unwrapped(values: np.ndarray) -> tuple[np.ndarray, int]:
     made = values.copy()
     made[seen] = np.unwrap(values[seen])
     return made, int(jumps.sum())
+
+
+def _in_degrees(values: np.ndarray) -> bool:
+    """Whether an angle jumps as one does that is wrapped at 180 or 360 degrees, or by
+    more than half a turn in many samples, beyond the turn that a wrapped one spans."""
+    seen = values[np.isfinite(values)]
+    jumps = np.abs(np.diff(seen))
+    back = (jumps > DEGREES[0]) & (jumps < DEGREES[1])
+    often = (jumps > WRAP * 2 * np.pi).mean() > OFTEN and np.ptp(seen) > 3 * np.pi
+    return bool(back.any() or often)
 
 
 def _spikes(observed: np.ndarray, times: np.ndarray) -> np.ndarray:

@@ -103,6 +103,20 @@ def test_a_condition_that_is_no_number_is_named(value):
         as_number({"speed": value}, "speed")
 
 
+def test_degrees_told_as_radians_are_refused_and_a_turn_in_a_gap_is_not(model, told):
+    (trial,) = MujocoWorld(reality=[NOISE], threads=1).run(told[:1], seeds=[0])
+    turned = trial.observed.copy()
+    turned[:, 2] = np.linspace(0, 12, len(turned))
+    turned[20:, 2] += 4.5  # more than half a turn between two samples
+    assert check.check([trial.replace(observed=turned)], model)
+    turned[:, 2] = (np.rad2deg(np.linspace(0, 12, len(turned))) + 180) % 360 - 180
+    with pytest.raises(FormatError, match="in degrees, told as rad"):
+        check.check([trial.replace(observed=turned)], model)
+    turned[:, 2] = 60 * np.sin(np.linspace(0, 40, len(turned)))  # and never wrapped
+    with pytest.raises(FormatError, match="in degrees, told as rad"):
+        check.check([trial.replace(observed=turned)], model)
+
+
 def test_a_robot_that_stays_has_no_places():
     noise = np.random.default_rng(0).normal(0, 1e-3, (50, 3))
     coarse = segments.coarse(noise + np.array([0.4, -0.2, 3.1]))
