@@ -214,12 +214,13 @@ def _rough(side: str, trials: Sequence[Trial]) -> list[Row]:
 
 
 def _bands(speeds: np.ndarray) -> tuple[float, ...]:
-    """Widths between the speeds told: between two of them a width does not matter."""
+    """Widths between the speeds told: between two of them a width does not matter. Of
+    more than `BANDS`, those that differ least by their ratio are left out."""
     between = (speeds + np.append(speeds[1:], speeds[-1:] * 1.2)) / 2
     between = between[between < 0.2]
-    if len(between) > BANDS:
-        at = np.unique(np.linspace(0, len(between) - 1, BANDS).astype(int))
-        between = between[at]
+    while len(between) > BANDS:
+        nearest = int(np.argmin(between[1:] / between[:-1]))
+        between = np.delete(between, nearest + 1)
     return tuple(between.tolist())
 
 
