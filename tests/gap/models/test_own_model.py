@@ -17,7 +17,9 @@ from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.models.mjcf.effects import CLASSES, OWNERS
 from bns.gap.models.mjcf.masses import Body
 from bns.gap.models.mjcf.model import OwnModel
+from bns.gap.recordings.trial_conditions import moments_unknown
 from bns.worlds.data import dataset
+from bns.worlds.data.importing import MOMENTS
 from tests.sources import ROOT
 
 ARM = ROOT / "examples" / "arm" / "arm.toml"
@@ -66,6 +68,19 @@ def test_a_planted_effect_is_named_with_its_value(find, text, name, value, toler
 
 def test_nothing_planted_is_no_gap(find):
     assert find().verdict.kind == "no gap"
+
+
+@pytest.mark.parametrize("delay", [0.015, 0.03])
+def test_a_delay_of_about_a_sample_is_no_shift_in_time(arm, told, delay):
+    late = arm.parse(f"command_delay:part=all,delay={delay}")
+    trials = [
+        trial.replace(conditions={MOMENTS: "sampled"})  # as in a log of 50 Hz
+        for trial in mjcf_cases.record(arm, told, [late], seed=1)
+    ]
+    assert moments_unknown(trials) == pytest.approx(0.02)
+    found = diagnose(trials, arm, rows=KEPT[3:], full=False)
+    assert found.verdict.named == ((KEPT[3],),)
+    assert found.best.magnitudes[0] == pytest.approx(delay, abs=0.003)
 
 
 def test_it_rests_at_home_and_follows(arm, told):
