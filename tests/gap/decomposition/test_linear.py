@@ -201,6 +201,16 @@ def test_a_whole_loss_is_kept_though_noise_puts_it_beyond_its_bound(value, kept)
     assert (search.best(linear)[1] == {"a"}) == kept
 
 
+@pytest.mark.parametrize(("value", "kept"), [(1.05, True), (1.3, False)])
+def test_what_the_data_leave_open_to_a_bound_is_at_it(value, kept):
+    rng = np.random.default_rng(7)
+    problem = Rows(rng, high=1.0)
+    linear = problem.linear(planted(rng, problem, a=value))
+    found, sd = linear.solve({"a"})[0], np.sqrt(linear.covariance({"a"})[0, 0])
+    assert found > 1.0 and (found - 1.0 < 3 * sd) == kept
+    assert (search.best(linear)[1] == {"a"}) == kept
+
+
 def test_the_cost_of_a_set_is_that_of_its_own_normal_equations():
     rng = np.random.default_rng(5)
     problem = Rows(rng)

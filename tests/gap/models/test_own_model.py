@@ -213,6 +213,21 @@ def test_every_effect_can_be_a_candidate(arm, name):
             assert item.make(magnitude)["part"] == part
 
 
+JOINTS = ("damping", "friction", "armature", "stiffness", "stribeck")
+
+
+@pytest.mark.parametrize("name", JOINTS)
+def test_geared_joints_may_have_ten_times_what_is_looked_for_first(arm, name):
+    effect = f"joint_{name}"
+    config = replace(OwnConfig.read(ARM), effects={effect: ("elbow",)}, bounds={})
+    made, *_ = mjcf.candidates(config, arm.physics.model)
+    largest = max(made.levels)
+    assert (made.high, made.sd) == pytest.approx((10 * largest, largest / 8))
+    given = replace(config, bounds={made.name: {"high": 0.1}})
+    made, *_ = mjcf.candidates(given, arm.physics.model)
+    assert made.high == max(made.levels) == 0.1
+
+
 UNFELT = {"geom_friction", "actuator_torque_limit"}  # no contact, no limit to scale
 
 
