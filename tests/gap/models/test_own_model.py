@@ -288,6 +288,55 @@ def test_steps_of_a_simulation_are_no_gap(arm, told, tmp_path):
         assert diagnose(trials, model, rows=KEPT, full=False).verdict.kind == "no gap"
 
 
+TORQUE, COMMAND = "actuator_torque_limit", "command_limit"
+
+
+def limited(tmp_path, most, part=TORQUE):
+    """The arm with a shoulder that takes so many N m, or goals of so many rad."""
+    scene = ARM.with_name("arm.xml").read_text(encoding="utf-8")
+    config = OwnConfig.read(ARM)
+    of = {TORQUE: "shoulder_servo", COMMAND: "shoulder_goal"}
+    if part == TORQUE:
+        scene = scene.replace('kp="30"', f'kp="30" forcerange="-{most} {most}"')
+    else:
+        wide = replace(config.told[0], low=-most, high=most)
+        config = replace(config, told=(wide, *config.told[1:]))
+    (tmp_path / "arm.xml").write_text(scene, encoding="utf-8")
+    effects = {part: (of[part],), "actuator_gain": (of[TORQUE],)}
+    config = replace(config, model=tmp_path / "arm.xml", effects=effects, bounds={})
+    return OwnModel(config, threads=1)
+
+
+@pytest.mark.parametrize(("most", "reached"), [(500.0, False), (6.0, True)])
+def test_limits_of_force_that_are_tried_lie_among_the_forces(
+    told, tmp_path, most, reached
+):
+    model = limited(tmp_path, most)
+    trials = mjcf_cases.record(model, told, [])
+    taken = model.physics.forces(trials)["shoulder_servo"] * most
+    levels = np.array(model.rows(trials)[0].levels) * most
+    assert (taken.max() == pytest.approx(most)) == (levels.max() > most) == reached
+    cut = [np.mean(taken > level) for level in levels[levels < most]]
+    assert len(cut) > 3 and all(0 < share < 0.7 for share in cut)
+
+
+@pytest.mark.parametrize(
+    ("part", "most", "text", "value"),
+    [
+        (TORQUE, 500.0, f"{TORQUE}:part=shoulder_servo,factor=0.012", 0.012),
+        (COMMAND, 100.0, f"{COMMAND}:part=shoulder_goal,limit=0.6", 0.6),
+    ],
+)
+def test_a_limit_far_below_that_of_the_model_is_named(
+    told, tmp_path, part, most, text, value
+):
+    model = limited(tmp_path, most, part)
+    trials = mjcf_cases.record(model, told, [model.parse(text)], seed=1)
+    found = diagnose(trials, model, full=False)
+    assert [name.partition("[")[0] for name in found.best.names] == [part]
+    assert found.best.magnitudes[0] == pytest.approx(value, rel=0.05)
+
+
 def test_former_names_in_a_description_are_read(arm):
     config = replace(
         OwnConfig.read(ARM),
