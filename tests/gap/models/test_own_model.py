@@ -10,6 +10,8 @@ import pytest
 from bns.errors import BnsError, FormatError
 from bns.gap.bench import mjcf_cases
 from bns.gap.candidates import mjcf
+from bns.gap.decomposition import descent, diagnosis
+from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
 from bns.gap.diagnose import diagnose
 from bns.gap.models.mjcf import masses
@@ -335,6 +337,23 @@ def test_a_limit_far_below_that_of_the_model_is_named(
     found = diagnose(trials, model, full=False)
     assert [name.partition("[")[0] for name in found.best.names] == [part]
     assert found.best.magnitudes[0] == pytest.approx(value, rel=0.05)
+
+
+LATE = {"command_delay": "delay=0.03", "command_lag": "time_constant=0.06"}
+
+
+@pytest.mark.parametrize("taken", sorted(LATE))
+@pytest.mark.parametrize("true", sorted(LATE))
+def test_a_delay_is_fitted_for_a_lag_and_the_better_is_kept(arm, told, true, taken):
+    texts = (f"{true}:part=all,{LATE[true]}", "joint_damping:part=elbow,added=0.06")
+    made = mjcf_cases.record(arm, told[:2], [arm.parse(t) for t in texts], seed=1)
+    names = [f"{name}[all]" for name in LATE]
+    problem = diagnosis.narrowed(Problem.of(made, arm), [KEPT[0], *names])
+    start = descent.nothing(problem)
+    point = descent.refitted(problem, start, frozenset({KEPT[0], f"{taken}[all]"}))
+    found = descent.swapped(problem, point)
+    assert found.support == {KEPT[0], f"{true}[all]"}
+    assert (found is point) == (taken == true)
 
 
 def test_former_names_in_a_description_are_read(arm):
