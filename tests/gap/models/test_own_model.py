@@ -2,17 +2,21 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
 import pytest
 
 from bns.errors import BnsError, FormatError
+from bns.gap import warnings
 from bns.gap.bench import mjcf_cases
 from bns.gap.candidates import mjcf
-from bns.gap.decomposition import descent, diagnosis
+from bns.gap.decomposition import descent, diagnosis, record
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.reference import Corrected
 from bns.gap.decomposition.row import Row
+from bns.gap.decomposition.shares import Part
 from bns.gap.diagnose import diagnose
 from bns.gap.models.mjcf import masses
 from bns.gap.models.mjcf.config import OwnConfig
@@ -380,6 +384,31 @@ def test_the_description_in_the_documentation_is_one(tmp_path):
     assert bounds["joint_damping[elbow]"].high == 0.5
     assert bounds["body_mass[forearm]"].slack == 0.01
     assert made.config.log["shoulder"] == ("q1", "deg")
+
+
+def test_a_mass_on_a_link_is_told_with_its_place(arm):
+    (item,) = [item for item in arm.listed if item.name == KEPT[1]]
+    body = Body.of(arm.physics.model, "forearm")
+    problem = SimpleNamespace(rows=masses.rows(item, body, "motion"), model=arm)
+    values = {KEPT[1]: 0.2, f"{KEPT[1]}.mx": 0.01, f"{KEPT[1]}.my": 0.0}
+    part = Part(KEPT[1], values, values, values, last=1.0, alone=1.0, sure=1.0)
+    assert record._said(SimpleNamespace(problem=problem), part) == (
+        "body_mass[forearm] = 0.2 kg [0.2, 0.2], dx 0.05 m (100 % of it)"
+    )
+
+
+@pytest.mark.parametrize("kind", ["effect", "none of the library", "no gap"])
+def test_a_verdict_on_a_gap_names_what_was_not_tried(arm, kind):
+    untried = arm.untried()
+    assert set(untried) == set(CLASSES) - {item.effect for item in arm.listed}
+    assert {"joint_backlash", "body_tilt"} < set(untried)
+    assert Corrected(arm, {}, {}).untried() == untried
+    found = SimpleNamespace(
+        verdict=SimpleNamespace(kind=kind), change={}, fits=(), signatures={}
+    )
+    text = " ".join(warnings.warnings(found, (), untried))
+    assert (f"Not tried: {', '.join(untried)}" in text) == (kind != "no gap")
+    assert "Not tried" not in " ".join(warnings.warnings(found, ()))
 
 
 NAME = "body_mass[load]"
