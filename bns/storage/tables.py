@@ -158,7 +158,8 @@ def read_csv_numbers(
 ) -> dict[str, np.ndarray]:
     """Columns of numbers and of truth values as doubles; those of text are left out.
 
-    A column of which most cells are numbers is one, and no cell of it may be text.
+    A column of which most cells that are filled are numbers is one, and no cell of it
+    may be text.
 
     Args:
         path: of the file; one that ends with `.gz` is unpacked.
@@ -192,11 +193,12 @@ def _check_text(cells: Sequence[str | None], name: str, path: Path | str) -> Non
     Raises:
         FormatError: there is one.
     """
-    texts = [row for row, cell in enumerate(cells) if cell and not _reads(cell)]
-    if texts and len(texts) < len(cells) / 2:
-        row = texts[0]
+    filled = [(row, cell) for row, cell in enumerate(cells) if cell]
+    texts = [(row, cell) for row, cell in filled if not _reads(cell)]
+    if texts and len(texts) < len(filled) / 2:
+        row, cell = texts[0]
         raise FormatError(
-            f"{path}: the column {name!r} holds {cells[row]!r} in line {row + 2}, "
+            f"{path}: the column {name!r} holds {cell!r} in line {row + 2}, "
             "which is no number; leave a cell empty where nothing was measured."
         )
 

@@ -25,7 +25,7 @@ EIGHTH = 0.125  # of a range: a plausible departure where nothing else is known
 # Times the largest value that is looked for first: geared servos have much friction and
 # inertia for the links that they move; assumed.
 WIDER = 10.0
-LEAST = 0.002  # of a limit of force in the model, which may be far beyond the robot's
+LEAST = 0.002  # of a limit in the model, which may be far beyond the robot's
 TILT = 0.5  # [rad] largest tilt of a body
 PLAY = 0.3  # [rad or m] largest play, or offset of an encoder
 EXCITE = {
@@ -246,7 +246,7 @@ def _of_channel(name: str, part: str, config: OwnConfig) -> tuple[float, float, 
         item = told[part]
         size = max(abs(item.low), abs(item.high))
         if name == "command_limit":
-            return 0.1 * size, size, item.channel.unit
+            return LEAST * size, size, item.channel.unit
         if name == "command_rate":  # two seconds for the whole way
             return 0.0, 2.0 / size, f"s/({item.channel.unit})"
         low = 0.0 if name == "command_dead_zone" else -0.3 * size

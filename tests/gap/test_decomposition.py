@@ -7,10 +7,11 @@ import pytest
 
 from bns.gap.bench.wheeled_cases import commands
 from bns.gap.candidates import legged
-from bns.gap.decomposition import diagnosis, rest, shares
+from bns.gap.decomposition import diagnosis, record, rest, shares
 from bns.gap.decomposition.decomposition import Decomposition
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
+from bns.gap.decomposition.shares import Part
 from bns.gap.diagnose import diagnose
 from bns.gap.models.wheeled import changes, drives
 from bns.gap.recordings import check
@@ -52,7 +53,8 @@ def test_damage_that_was_always_there_has_no_date(recorded, model):
     assert found.verdict.named == (("wheel_gain[left]",),)
     assert not found.change
     (part,) = found.decomposition["parts"]
-    assert part["last"] > 0.95 and part["alone"] > 0.95 and part["sure"] > 0.95
+    assert part["last"] == pytest.approx(1.0)  # of what closes: the rest is scatter
+    assert part["alone"] > 0.95 and part["sure"] > 0.95
     assert found.decomposition["left"] < 0.1
     assert len(found.decomposition["statements"]) == 3
 
@@ -118,6 +120,57 @@ def test_a_row_without_room_is_refused():
 
     with pytest.raises(BnsError, match="between low and high"):
         Row("x", 0.0, 1.0, 1.0, 2.0)
+
+
+def said(model, rows, *parts, **about):
+    """Statements on a gap of 10 mm, 10 mm and 10 mrad."""
+    gap = np.full((4, 3), 0.01)
+    windows = [SimpleNamespace(durations=np.full(4, 0.5))]
+    known = {
+        "problem": SimpleNamespace(model=model, rows=rows, windows=windows),
+        "start": SimpleNamespace(rest=gap),
+        "point": SimpleNamespace(rest=0 * gap),
+        "floor": SimpleNamespace(sd=0 * gap),
+        "inside": gap > 0,
+        "parts": parts,
+        **{"kind": "effect", "tied": (), "goes": "", "onset": None},
+        **{"before": 50.0, "closed": 0.9, "left": 0.0, "unconfirmed": {}},
+        **dict.fromkeys(("lasting", "failing", "recurring"), False),
+        **dict.fromkeys(("unstable", "strayed"), ()),
+    }
+    return record.statements(SimpleNamespace(**{**known, **about}))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "text"),
+    [
+        (
+            "floor_slope",
+            {"floor_slope.x": 0.03, "floor_slope.y": 0.04},
+            "floor_slope = 0.05 rad [0.036, 0.064], direction 0.9273 rad (100 % of it)",
+        ),
+        (
+            "payload",
+            {"payload.mass": 0.4, "payload.mx": 0.02, "payload.mz": 0.04},
+            "payload = 0.4 kg [0.39, 0.41], x 0.05 m, z 0.17 m (100 % of it)",
+        ),
+    ],
+)
+def test_directions_and_places_are_told(recorded, model, name, values, text):
+    low, high = ({n: v + off for n, v in values.items()} for off in (-0.01, 0.01))
+    part = Part(name, values, low, high, last=1.0, alone=1.0, sure=1.0)
+    _, explained, _ = said(model, model.rows(recorded[0]), part)
+    assert explained.startswith(f"{text} explains 90 % of the gap")
+
+
+@pytest.mark.parametrize(("before", "told"), [(5.0, True), (1.0, False)])
+def test_a_gap_that_only_scatters_has_its_size(model, before, told):
+    first, *more = said(model, (), kind="no gap", before=before)
+    assert first.startswith("No gap beyond what the recording scatters")
+    assert (
+        "10 mm forward, 10 mm left, 10 mrad turn over 0.5 s" in "".join(more)
+    ) == told
+    assert ("That does not recur" in "".join(more)) == told
 
 
 @pytest.mark.parametrize(

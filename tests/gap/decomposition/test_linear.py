@@ -133,6 +133,19 @@ def test_what_one_stretch_alone_shows_is_held_out_in_parts_of_it():
     assert parts.held_out({"a"}).sum() < 0.7 * parts.held_out(()).sum()
 
 
+def test_shares_are_of_what_is_closed_where_the_rest_does_not_last():
+    rng = np.random.default_rng(0)
+    problem = Rows(rng)
+    linear = problem.linear(planted(rng, problem, a=0.5, c=0.5))
+    point = SimpleNamespace(
+        linear=linear, support=frozenset({"a"}), values=linear.solve({"a"})
+    )
+    (part,) = shares.parts(problem, point, lasting=False)
+    assert part.last == part.alone == pytest.approx(1.0)
+    (part,) = shares.parts(problem, point, lasting=True)
+    assert part.last == part.alone == pytest.approx(0.5, abs=0.1)
+
+
 def test_a_row_that_sets_in_is_a_column_of_its_own():
     rng = np.random.default_rng(5)
     problem = Rows(rng)
@@ -198,6 +211,16 @@ def test_a_whole_loss_is_kept_though_noise_puts_it_beyond_its_bound(value, kept)
     linear = problem.linear(planted(rng, problem, a=value), lam=1.0)
     found = linear.solve({"a"})[0]
     assert abs(found - value) < 0.08
+    assert (search.best(linear)[1] == {"a"}) == kept
+
+
+@pytest.mark.parametrize(("value", "kept"), [(1.05, True), (1.3, False)])
+def test_what_the_data_leave_open_to_a_bound_is_at_it(value, kept):
+    rng = np.random.default_rng(7)
+    problem = Rows(rng, high=1.0)
+    linear = problem.linear(planted(rng, problem, a=value))
+    found, sd = linear.solve({"a"})[0], np.sqrt(linear.covariance({"a"})[0, 0])
+    assert found > 1.0 and (found - 1.0 < 3 * sd) == kept
     assert (search.best(linear)[1] == {"a"}) == kept
 
 

@@ -1,5 +1,6 @@
 """What a decomposition says where explanations bend to something else."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -41,3 +42,11 @@ def test_how_exact_a_fit_is_goes_by_its_least_exact_explanation():
     assert fit.inexact(problem(), np.array([0.9, 0.0])) == 0.01
     assert fit.inexact(problem(), np.array([0.9, 1e-4])) == 0.01
     assert fit.inexact(problem(), np.array([0.9, 0.004])) == 0.05
+
+
+@pytest.mark.parametrize(("shift", "there"), [(0.7, False), (0.9, True), (1.3, False)])
+def test_a_shift_in_time_that_is_at_its_bound_can_do_no_more(shift, there):
+    rows = (replace(ROWS[0], nuisance=True), ROWS[1])
+    made = SimpleNamespace(rows=rows)
+    assert fit.smooth(made, np.array([shift, 0.0])) == ([0, 1] if there else [1])
+    assert fit.smooth(problem(), np.array([shift, 0.0])) == [0, 1]  # an explanation

@@ -2,22 +2,30 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
 import pytest
 
 from bns.errors import BnsError, FormatError
+from bns.gap import warnings
 from bns.gap.bench import mjcf_cases
 from bns.gap.candidates import mjcf
+from bns.gap.decomposition import descent, diagnosis, record
+from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.reference import Corrected
 from bns.gap.decomposition.row import Row
+from bns.gap.decomposition.shares import Part
 from bns.gap.diagnose import diagnose
 from bns.gap.models.mjcf import masses
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.models.mjcf.effects import CLASSES, OWNERS
 from bns.gap.models.mjcf.masses import Body
 from bns.gap.models.mjcf.model import OwnModel
+from bns.gap.recordings.trial_conditions import moments_unknown
 from bns.worlds.data import dataset
+from bns.worlds.data.importing import MOMENTS
 from tests.sources import ROOT
 
 ARM = ROOT / "examples" / "arm" / "arm.toml"
@@ -66,6 +74,19 @@ def test_a_planted_effect_is_named_with_its_value(find, text, name, value, toler
 
 def test_nothing_planted_is_no_gap(find):
     assert find().verdict.kind == "no gap"
+
+
+@pytest.mark.parametrize("delay", [0.015, 0.03])
+def test_a_delay_of_about_a_sample_is_no_shift_in_time(arm, told, delay):
+    late = arm.parse(f"command_delay:part=all,delay={delay}")
+    trials = [
+        trial.replace(conditions={MOMENTS: "sampled"})  # as in a log of 50 Hz
+        for trial in mjcf_cases.record(arm, told, [late], seed=1)
+    ]
+    assert moments_unknown(trials) == pytest.approx(0.02)
+    found = diagnose(trials, arm, rows=KEPT[3:], full=False)
+    assert found.verdict.named == ((KEPT[3],),)
+    assert found.best.magnitudes[0] == pytest.approx(delay, abs=0.003)
 
 
 def test_it_rests_at_home_and_follows(arm, told):
@@ -198,6 +219,21 @@ def test_every_effect_can_be_a_candidate(arm, name):
             assert item.make(magnitude)["part"] == part
 
 
+JOINTS = ("damping", "friction", "armature", "stiffness", "stribeck")
+
+
+@pytest.mark.parametrize("name", JOINTS)
+def test_geared_joints_may_have_ten_times_what_is_looked_for_first(arm, name):
+    effect = f"joint_{name}"
+    config = replace(OwnConfig.read(ARM), effects={effect: ("elbow",)}, bounds={})
+    made, *_ = mjcf.candidates(config, arm.physics.model)
+    largest = max(made.levels)
+    assert (made.high, made.sd) == pytest.approx((10 * largest, largest / 8))
+    given = replace(config, bounds={made.name: {"high": 0.1}})
+    made, *_ = mjcf.candidates(given, arm.physics.model)
+    assert made.high == max(made.levels) == 0.1
+
+
 UNFELT = {"geom_friction", "actuator_torque_limit"}  # no contact, no limit to scale
 
 
@@ -258,6 +294,72 @@ def test_steps_of_a_simulation_are_no_gap(arm, told, tmp_path):
         assert diagnose(trials, model, rows=KEPT, full=False).verdict.kind == "no gap"
 
 
+TORQUE, COMMAND = "actuator_torque_limit", "command_limit"
+
+
+def limited(tmp_path, most, part=TORQUE):
+    """The arm with a shoulder that takes so many N m, or goals of so many rad."""
+    scene = ARM.with_name("arm.xml").read_text(encoding="utf-8")
+    config = OwnConfig.read(ARM)
+    of = {TORQUE: "shoulder_servo", COMMAND: "shoulder_goal"}
+    if part == TORQUE:
+        scene = scene.replace('kp="30"', f'kp="30" forcerange="-{most} {most}"')
+    else:
+        wide = replace(config.told[0], low=-most, high=most)
+        config = replace(config, told=(wide, *config.told[1:]))
+    (tmp_path / "arm.xml").write_text(scene, encoding="utf-8")
+    effects = {part: (of[part],), "actuator_gain": (of[TORQUE],)}
+    config = replace(config, model=tmp_path / "arm.xml", effects=effects, bounds={})
+    return OwnModel(config, threads=1)
+
+
+@pytest.mark.parametrize(("most", "reached"), [(500.0, False), (6.0, True)])
+def test_limits_of_force_that_are_tried_lie_among_the_forces(
+    told, tmp_path, most, reached
+):
+    model = limited(tmp_path, most)
+    trials = mjcf_cases.record(model, told, [])
+    taken = model.physics.forces(trials)["shoulder_servo"] * most
+    levels = np.array(model.rows(trials)[0].levels) * most
+    assert (taken.max() == pytest.approx(most)) == (levels.max() > most) == reached
+    cut = [np.mean(taken > level) for level in levels[levels < most]]
+    assert len(cut) > 3 and all(0 < share < 0.7 for share in cut)
+
+
+@pytest.mark.parametrize(
+    ("part", "most", "text", "value"),
+    [
+        (TORQUE, 500.0, f"{TORQUE}:part=shoulder_servo,factor=0.012", 0.012),
+        (COMMAND, 100.0, f"{COMMAND}:part=shoulder_goal,limit=0.6", 0.6),
+    ],
+)
+def test_a_limit_far_below_that_of_the_model_is_named(
+    told, tmp_path, part, most, text, value
+):
+    model = limited(tmp_path, most, part)
+    trials = mjcf_cases.record(model, told, [model.parse(text)], seed=1)
+    found = diagnose(trials, model, full=False)
+    assert [name.partition("[")[0] for name in found.best.names] == [part]
+    assert found.best.magnitudes[0] == pytest.approx(value, rel=0.05)
+
+
+LATE = {"command_delay": "delay=0.03", "command_lag": "time_constant=0.06"}
+
+
+@pytest.mark.parametrize("taken", sorted(LATE))
+@pytest.mark.parametrize("true", sorted(LATE))
+def test_a_delay_is_fitted_for_a_lag_and_the_better_is_kept(arm, told, true, taken):
+    texts = (f"{true}:part=all,{LATE[true]}", "joint_damping:part=elbow,added=0.06")
+    made = mjcf_cases.record(arm, told[:2], [arm.parse(t) for t in texts], seed=1)
+    names = [f"{name}[all]" for name in LATE]
+    problem = diagnosis.narrowed(Problem.of(made, arm), [KEPT[0], *names])
+    start = descent.nothing(problem)
+    point = descent.refitted(problem, start, frozenset({KEPT[0], f"{taken}[all]"}))
+    found = descent.swapped(problem, point)
+    assert found.support == {KEPT[0], f"{true}[all]"}
+    assert (found is point) == (taken == true)
+
+
 def test_former_names_in_a_description_are_read(arm):
     config = replace(
         OwnConfig.read(ARM),
@@ -282,6 +384,31 @@ def test_the_description_in_the_documentation_is_one(tmp_path):
     assert bounds["joint_damping[elbow]"].high == 0.5
     assert bounds["body_mass[forearm]"].slack == 0.01
     assert made.config.log["shoulder"] == ("q1", "deg")
+
+
+def test_a_mass_on_a_link_is_told_with_its_place(arm):
+    (item,) = [item for item in arm.listed if item.name == KEPT[1]]
+    body = Body.of(arm.physics.model, "forearm")
+    problem = SimpleNamespace(rows=masses.rows(item, body, "motion"), model=arm)
+    values = {KEPT[1]: 0.2, f"{KEPT[1]}.mx": 0.01, f"{KEPT[1]}.my": 0.0}
+    part = Part(KEPT[1], values, values, values, last=1.0, alone=1.0, sure=1.0)
+    assert record._said(SimpleNamespace(problem=problem), part) == (
+        "body_mass[forearm] = 0.2 kg [0.2, 0.2], dx 0.05 m (100 % of it)"
+    )
+
+
+@pytest.mark.parametrize("kind", ["effect", "none of the library", "no gap"])
+def test_a_verdict_on_a_gap_names_what_was_not_tried(arm, kind):
+    untried = arm.untried()
+    assert set(untried) == set(CLASSES) - {item.effect for item in arm.listed}
+    assert {"joint_backlash", "body_tilt"} < set(untried)
+    assert Corrected(arm, {}, {}).untried() == untried
+    found = SimpleNamespace(
+        verdict=SimpleNamespace(kind=kind), change={}, fits=(), signatures={}
+    )
+    text = " ".join(warnings.warnings(found, (), untried))
+    assert (f"Not tried: {', '.join(untried)}" in text) == (kind != "no gap")
+    assert "Not tried" not in " ".join(warnings.warnings(found, ()))
 
 
 NAME = "body_mass[load]"

@@ -117,6 +117,44 @@ def test_degrees_told_as_radians_are_refused_and_a_turn_in_a_gap_is_not(model, t
         check.check([trial.replace(observed=turned)], model)
 
 
+def test_a_single_count_of_a_coarse_encoder_is_no_spike(model):
+    ahead = Commands([[0.1, 0.1]], [6.0])
+    (trial,) = MujocoWorld(threads=1).run([ahead])
+    count, coarse = 2 * np.pi / 1024, trial.observed.copy()
+    coarse[:, 2] = 0.0
+    coarse[10:40:5, 2] = count
+    _, notes = check.check([trial.replace(observed=coarse)], model)
+    assert "spikes" not in " ".join(notes)
+    coarse[25, 2] = 50 * count
+    (made,), notes = check.check([trial.replace(observed=coarse)], model)
+    assert "1 spikes" in " ".join(notes) and np.isnan(made.observed[25]).all()
+
+
+@pytest.mark.parametrize("resumed", [True, False])
+def test_what_goes_on_from_where_it_rested_was_held_and_not_stuck(model, resumed):
+    turning = Commands([[0.1, 0.02]], [8.0])
+    (trial,) = MujocoWorld(reality=[NOISE], threads=1).run([turning], seeds=[0])
+    held = trial.observed.copy()
+    missed = held[50, 2] - held[30, 2]
+    held[30:51, 2] = held[30, 2]
+    held[51:, 2] -= missed if resumed else 0.0
+    ((made, notes),) = check.without_stuck([trial.replace(observed=held)], model)
+    assert any("yaw is stuck" in note for note in notes) == (not resumed)
+    assert np.isnan(made.observed[30:51]).any() == (not resumed)
+
+
+def test_moments_at_which_commands_began_are_no_lost_samples(model, told):
+    (trial,) = MujocoWorld(reality=[NOISE], threads=1).run(told[:1], seeds=[0])
+    begun, seen = trial.boundaries[1:-1], trial.observed.copy()
+    assert len(begun) > 1 and 20 not in begun
+    seen[begun] = np.nan
+    _, notes = check.check([trial.replace(observed=seen)], model)
+    assert "lost" not in " ".join(notes)
+    seen[20] = np.nan
+    _, notes = check.check([trial.replace(observed=seen)], model)
+    assert f"1 of {len(seen) - len(begun)} samples lost" in " ".join(notes)
+
+
 def test_a_robot_that_stays_has_no_places():
     noise = np.random.default_rng(0).normal(0, 1e-3, (50, 3))
     coarse = segments.coarse(noise + np.array([0.4, -0.2, 3.1]))

@@ -102,6 +102,21 @@ def test_a_csv_keeps_its_numbers_alone(tmp_path):
         table["x"]
 
 
+def test_text_among_numbers_is_named_with_its_line(tmp_path):
+    rows = ["0,1.5", "1,", "2,1.7", "3,off", "4,1.9"]
+    (tmp_path / "a.csv").write_text("\n".join(["t,q", *rows]) + "\n")
+    said = r"a\.csv: the column 'q' holds 'off' in line 5, which is no number"
+    with pytest.raises(FormatError, match=said):
+        tables.read(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("notes", [["", "", "pushed", ""], ["1", "on", "off", "on"]])
+def test_a_column_of_few_numbers_is_text(tmp_path, notes):
+    rows = [f"{time},{note},{time}" for time, note in enumerate(notes)]
+    (tmp_path / "a.csv").write_text("\n".join(["t,note,q", *rows]) + "\n")
+    assert tables.read(tmp_path / "a.csv").names == ("t", "q")
+
+
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
