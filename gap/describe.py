@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from bns.errors import BnsError, FormatError
-from bns.gap.candidates import mjcf
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column
 from bns.gap.models.mjcf import guesses, matching
@@ -21,15 +20,12 @@ from bns.gap.models.mjcf.channels import (
     commands,
     compiled,
     factor,
-    joint_of,
-    joints,
     observed,
     replayed,
     si_unit,
     tolds,
 )
 from bns.gap.models.mjcf.config import WINDOW
-from bns.gap.models.mjcf.effects import OWNERS
 from bns.gap.models.mjcf.log import split
 from bns.worlds.data.importing import FACTORS
 
@@ -169,12 +165,12 @@ def _columns(work: Work) -> tuple[list[Column], list[Column]]:
     actuators = [model.actuator(a).name for a in range(model.nu)]
     joints = [model.joint(j).name for j in range(model.njnt)]
     told, seen = matching.roles(rest, actuators, joints)
-    if not told and model.nu:  # noise has no steps: what stays to the bit is told
-        held = [column for column in seen if _held(column.values)]
-        if len(held) == model.nu:
-            told, seen = held, [column for column in seen if column not in held]
+    if not told:
+        told, why = matching.second_choice(seen, actuators)
+        seen = [column for column in seen if column not in told]
+        if why:
             listed = ", ".join(column.name for column in told)
-            work.unsure.append(f"commands: {listed}, for they change in steps")
+            work.unsure.append(f"commands: {listed}, for {why}")
     if not told:
         raise BnsError(
             f"No column of {work.log} is a command; it has "
@@ -182,10 +178,6 @@ def _columns(work: Work) -> tuple[list[Column], list[Column]]:
             "JOINT_goal."
         )
     return told, seen
-
-
-def _held(values: np.ndarray) -> bool:
-    return bool(np.isfinite(values).all() and (np.diff(values) == 0).mean() > 0.8)
 
 
 def _settled(work: Work, rows: np.ndarray, pose: str) -> bool:
@@ -288,35 +280,7 @@ def toml(work: Work, out: Path) -> str:
         lines += _table(f"observed.{_text(column.name)}", given)
     if work.start:
         lines += _table("start", work.start)
-    return "\n".join([*lines, *_effects(work), *_log(work)]) + "\n"
-
-
-def _effects(work: Work) -> list[str]:
-    """[effects] where the model has bodies that no actuator can move."""
-    model = work.model
-    root = {}
-    for joint in joints(model):
-        body = int(model.joint(joint).bodyid[0])
-        root[joint] = int(model.body_rootid[body])
-    drives = {joint_of(model, model.actuator(a).id) for _, a, _ in work.told}
-    moved = {root[joint] for joint in drives if joint in root}
-    if not moved or set(root.values()) <= moved:
-        return []
-    bodies = {int(model.joint(j).bodyid[0]) for j in root if root[j] in moved}
-    parts = {
-        "joint": [j for j in root if root[j] in moved],
-        "body": [model.body(b).name for b in sorted(bodies) if model.body(b).name],
-        "actuator": [actuator for _, actuator, _ in work.told],
-    }
-    seen = [column.name for column, _, _ in work.seen]
-    given = {
-        name: parts.get(
-            OWNERS.get(name, ""), seen if name == "sensor_gain" else ["all"]
-        )
-        for name in mjcf.USUAL
-    }
-    work.guessed.append("effects: the usual ones, on parts that the commands can move")
-    return _table("effects", given)
+    return "\n".join([*lines, *_log(work)]) + "\n"
 
 
 def _log(work: Work) -> list[str]:

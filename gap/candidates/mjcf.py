@@ -78,9 +78,9 @@ USUAL = (
     "reading_gain",
     "reading_offset",
 )
-"""considered where the user does not say which: `actuator_kp`, `actuator_kd` and a
-limit of force of position servos, `actuator_gain` and `command_limit` of others, the
-tilt of what is bolted to the world"""
+"""considered where the user does not say which, on what the commands move:
+`actuator_kp`, `actuator_kd` and a limit of force of position servos, `actuator_gain`
+and `command_limit` of others, the tilt of what is bolted to the world"""
 
 
 def candidates(config: OwnConfig, model: mujoco.MjModel) -> tuple[Row, ...]:
@@ -120,11 +120,12 @@ def _called(item: Row, given: str) -> Row:
 
 
 def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]]:
-    joints = tuple(model.joint(j).name for j in range(model.njnt) if _hinged(model, j))
-    owned = {int(model.jnt_bodyid[j]) for j in range(model.njnt)}
+    told = [model.actuator(item.actuator).id for item in config.told]
+    moved = _moved(model, told)
+    joints = tuple(model.joint(j).name for j in moved if _hinged(model, j))
+    owned = {int(model.jnt_bodyid[j]) for j in moved}
     bodies = [model.body(number).name for number in sorted(owned)]
     seen = tuple(item.channel.name for item in config.seen)
-    told = [model.actuator(item.actuator).id for item in config.told]
     affine = model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE
     servos = {n for n in told if affine[n] and model.actuator_biasprm[n][1]}
     damped = {number for number in servos if model.actuator_biasprm[number][2]}
@@ -155,6 +156,18 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
         else:
             made[name] = tuple(of.get(name, (ALL,)))
     return {name: parts for name, parts in made.items() if parts}
+
+
+def _moved(model: mujoco.MjModel, told: Iterable[int]) -> list[int]:
+    """Joints on what the actuators that are told can move: no ball that lies there."""
+    joints = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+    root = model.body_rootid[model.jnt_bodyid]
+    roots = set()
+    for actuator in told:
+        if int(model.actuator_trntype[actuator]) not in map(int, joints):
+            return list(range(model.njnt))
+        roots.add(int(root[model.actuator_trnid[actuator][0]]))
+    return [joint for joint in range(model.njnt) if int(root[joint]) in roots]
 
 
 def _bolted(model: mujoco.MjModel, bodies: Iterable[int]) -> list[str]:

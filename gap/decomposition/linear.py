@@ -336,6 +336,17 @@ class Linear:
         values = self.solve(support, slack=False)
         return float(square - 2 * slope @ values + values @ normal @ values)
 
+    def square_of(self, values: np.ndarray, names: Iterable[str]) -> float:
+        """Weighted square of what some explanations change at values of all rows.
+
+        Args:
+            values: in units of their priors, ``(K,)``.
+            names: explanations.
+        """
+        rows = [row for name in names for row in self.terms[name]]
+        normal = self._total()[0][np.ix_(rows, rows)]
+        return float(values[rows] @ normal @ values[rows])
+
     def held_out(self, support: Iterable[str]) -> np.ndarray:
         """Weighted square of each stretch, the rows fitted to the others, ``(B,)``."""
         support = tuple(support)

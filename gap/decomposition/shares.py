@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -17,6 +18,9 @@ CLEARLY = 0.02  # of the held-out error that a further explanation has to lower
 PIECES = 4  # of a stretch, each left out by itself for the share that is closed
 SLIGHT = 0.15  # of what is left: less may as well come from that,
 TRIFLE = 1e-3  # of the gap, if it is less than this too: a thirtieth of its size
+CANCELLED = 5e-3  # of the gap: what explanations that cancel close at most
+LEFT_OVER = 0.01  # of what they change by themselves, squared: the others undo it
+LOOKED_AT = 8  # weakest explanations among which some may cancel
 EXACT = 1e-3  # of the smallest deviation that is believed: no fit is more exact
 ELSEWHERE = 0.05  # of what a level gains in its best trial: no more is nothing
 NINETY = 1.645  # standard deviations of a 90 % interval
@@ -267,7 +271,31 @@ def weighty(problem: Problem, point: Point, left: float) -> Support:
         if without[name] >= least:
             break
         support = support - {name}
-    return support
+    return support - cancelling(linear, support)
+
+
+def cancelling(linear: Linear, support: Support) -> Support:
+    """Explanations of a set that cancel: they change much, but the others undo it, and
+    without them hardly any of the gap comes back. They are directions that the data see
+    next to nothing of: a gain and a diameter, masses of two links.
+
+    Args:
+        linear: around the fit.
+        support: the set.
+    """
+    least = CANCELLED * (linear.squares(()) - linear.squares(linear.free))
+    here = linear.squares(support)
+    weak = {n: linear.squares(support - {n}) - here for n in sorted(support)}
+    names = sorted(weak, key=weak.__getitem__)[:LOOKED_AT]
+    names = [name for name in names if weak[name] < least and name in linear.terms]
+    values = linear.solve(support, slack=False)
+    for size in range(len(names), 0, -1):
+        for some in map(frozenset, combinations(names, size)):
+            back = linear.squares(support - some) - here
+            each = sum(linear.square_of(values, {name}) for name in some)
+            if some != support and back < min(least, LEFT_OVER * each):
+                return some
+    return frozenset()
 
 
 def _grown(linear: Linear, held: HeldOut, support: Support) -> Support:

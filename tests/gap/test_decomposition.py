@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bns.gap.bench.wheeled_cases import commands
-from bns.gap.candidates import legged
+from bns.gap.candidates import legged, wheeled_rows
 from bns.gap.decomposition import diagnosis, record, rest, shares
 from bns.gap.decomposition.decomposition import Decomposition
 from bns.gap.decomposition.problem import Problem
@@ -108,6 +108,17 @@ def test_every_row_of_a_wheeled_robot_makes_its_effect(recorded, model):
         value = row.levels[0] if row.levels else row.nominal + row.difference
         made = changes.effect(row.term, {row.name: value})
         assert not made.in_trial(1).is_nominal, row.name
+
+
+def test_between_slow_commands_a_width_of_a_dead_band_is_tried_however_many_are_fast():
+    slow = [0.009, 0.01, 0.012, 0.02, 0.025, 0.03, 0.05]
+    told = np.concatenate([slow, np.arange(0.07, 0.2, 0.004)])
+    trial = SimpleNamespace(
+        commands=Commands(np.column_stack([told, told]), np.ones(len(told))),
+        conditions={},
+    )
+    rows = {row.name: row for row in wheeled_rows.rows([trial])}
+    assert any(0.03 < level < 0.05 for level in rows["dead_band[both]"].levels)
 
 
 def test_speeds_told_are_averaged_over_a_step():

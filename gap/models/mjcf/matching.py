@@ -3,6 +3,8 @@
 import re
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column
 
@@ -67,6 +69,11 @@ def core(name: str) -> str:
     return "".join(word for word in said if word not in dropped)
 
 
+def _bare(name: str) -> str:
+    """What is left of a name without words for that it is told or seen."""
+    return "".join(word for word in words(name) if word not in TOLD | SEEN)
+
+
 def quantity(column: Column) -> str:
     """Position, speed or effort, as `bns.gap.importers.tables` calls them."""
     if column.quantity:
@@ -99,7 +106,7 @@ def roles(
     """Columns that are told, and those that are seen.
 
     By the format; by a joint's own name; by words in the name; an actuator's own name,
-    where a joint has another one or is seen in another column.
+    where a joint has another one or is seen elsewhere, and no goal is called so.
 
     Args:
         columns: of the log.
@@ -109,6 +116,7 @@ def roles(
     told: list[Column] = []
     seen: list[Column] = []
     own, joint = set(actuators) - set(joints), set(joints) - set(actuators)
+    goals = {core(c.name) for c in columns if set(words(c.name)) & TOLD}
     for column in columns:
         said = set(words(column.name))
         measured = bool(said & (SEEN | SPEED | EFFORT))
@@ -116,7 +124,7 @@ def roles(
             (told if column.role == tables.TOLD else seen).append(column)
         elif column.name in joint or measured:
             seen.append(column)
-        elif said & TOLD or column.name in own:
+        elif said & TOLD or (column.name in own and core(column.name) not in goals):
             told.append(column)
         else:
             seen.append(column)
@@ -125,6 +133,42 @@ def roles(
         told = [c for c in seen if c.name in actuators and core(c.name) in again]
         seen = [column for column in seen if column not in told]
     return told, seen
+
+
+def second_choice(
+    columns: Sequence[Column], actuators: Sequence[str]
+) -> tuple[list[Column], str]:
+    """Columns that are commands where no other is, and why.
+
+    Torques and speeds that are told: beside goals a controller made them. Then as many
+    as there are actuators, or so called: efforts, what is called after a drive, and
+    what changes in steps to the bit, as noise does not.
+
+    Args:
+        columns: of the log, none of which `roles` finds to be told.
+        actuators: names in the model.
+
+    Returns:
+        the columns, and why they may be commands; "" = their names say so.
+    """
+    free = [(c, set(words(c.name))) for c in columns if not c.role]
+    for kind in (EFFORT, SPEED):
+        if told := [c for c, said in free if said & kind and said & TOLD - SEEN]:
+            return told, ""
+    cores = {core(name) for name in actuators} - {""}
+    for made, why in (
+        ([c for c, said in free if said & EFFORT], "no other column is one"),
+        ([c for c, said in free if said & DRIVE], "no other column is one"),
+        ([c for c, _ in free if _held(c.values)], "they change in steps"),
+    ):
+        called = all(core(column.name) in cores for column in made)
+        if made and (called or len(made) == len(actuators)):
+            return made, why
+    return [], ""
+
+
+def _held(values: np.ndarray) -> bool:
+    return bool(np.isfinite(values).all() and (np.diff(values) == 0).mean() > 0.8)
 
 
 def match(
@@ -146,6 +190,7 @@ def match(
     why: dict[str, str] = {}
     rules = (
         ("by its name", lambda c, p: (c.part or c.name) == p),
+        ("by its name", lambda c, p: _alike(_bare(c.part or c.name), _bare(p))),
         ("by its name", lambda c, p: _alike(core(c.part or c.name), core(p))),
         ("by the end of its name", lambda c, p: _ends(core(c.part or c.name), core(p))),
     )

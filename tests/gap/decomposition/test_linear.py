@@ -266,3 +266,20 @@ def test_residuals_that_scatter_explains_weigh_as_what_it_leaves_of_them():
         at = Point(problem.nominal, frozenset(), rest, linear, slopes, known)
         costs.append(descent.relinearised(problem, at, known).cost(()))
     assert costs[1] == pytest.approx(costs[0], abs=1.0)
+
+
+@pytest.mark.parametrize(("apart", "dropped"), [(0.02, True), (0.5, False)])
+def test_explanations_of_which_one_undoes_the_other_are_none(apart, dropped):
+    rng = np.random.default_rng(4)
+    problem = Rows(rng, alike=[(1, 2)])
+    problem.columns[2] += apart * rng.normal(size=problem.columns[2].shape)
+    linear = problem.linear(planted(rng, problem, a=3.0, b=2.0, c=-2.0))
+    found = shares.cancelling(linear, frozenset("abc"))
+    assert found == (frozenset("bc") if dropped else frozenset())
+
+
+def test_a_small_explanation_that_nothing_undoes_stays():
+    rng = np.random.default_rng(4)
+    problem = Rows(rng)
+    linear = problem.linear(planted(rng, problem, a=3.0, b=0.1))
+    assert shares.cancelling(linear, frozenset("ab")) == frozenset()

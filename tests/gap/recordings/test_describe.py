@@ -7,7 +7,8 @@ import pytest
 from bns.__main__ import main
 from bns.errors import BnsError, FormatError
 from bns.gap.describe import describe
-from bns.gap.models.mjcf import cuts, start
+from bns.gap.importers import tables
+from bns.gap.models.mjcf import cuts, matching, start
 from bns.gap.models.mjcf.model import OwnModel
 from bns.gap.recordings import load_recordings
 
@@ -182,3 +183,46 @@ def test_a_time_that_is_missing_is_told(tmp_path):
     path.write_text("\n".join(lines) + "\n")
     with pytest.raises(FormatError, match="'stamp' is missing in row 5"):
         describe(tmp_path / "arm.xml", path)
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        ("cmd_torque q_hip", "cmd_torque"),
+        ("tau_hip tau_calf q_hip q_calf", "tau_hip tau_calf"),
+        ("torque_1 torque_2 motor1_rot motor2_rot", "torque_1 torque_2"),
+        ("q_hip q_calf act_hip act_calf", "act_hip act_calf"),
+        ("hip_vel_cmd calf_vel_cmd hip calf", "hip_vel_cmd calf_vel_cmd"),
+        ("q_hip q_calf", ""),
+    ],
+)
+def test_commands_are_found_where_no_goal_is(names, told):
+    values = np.random.default_rng(0).normal(size=50)
+    columns = [tables.Column(name, values) for name in names.split()]
+    drives = ["hip", "calf"][: max(len(told.split()), 1)]
+    found, _ = matching.roles(columns, drives, ["leg_hip", "leg_calf"])
+    found = found or matching.second_choice(columns, drives)[0]
+    assert [column.name for column in found] == told.split()
+
+
+def test_a_column_called_as_an_actuator_is_measured_where_a_goal_is_called_so():
+    values = np.zeros(5)
+    columns = [tables.Column(name, values) for name in ("cmd_hip", "hip")]
+    told, seen = matching.roles(columns, ["hip"], ["robot:hip"])
+    assert [c.name for c in told] == ["cmd_hip"]
+    assert [c.name for c in seen] == ["hip"]
+
+
+def test_what_commands_cannot_move_has_no_effects(tmp_path):
+    ball = '<body name="ball"><freejoint/><geom size=".05" mass="1"/></body>'
+    text = ARM.replace("ACTUATORS", MOTORS).replace("<worldbody>", "<worldbody>" + ball)
+    (tmp_path / "arm.xml").write_text(text)
+    told = "".join(
+        f'[commands.{name}]\nactuator = "FL_{name}_joint"\nlow = -1\nhigh = 1\n'
+        for name in ("hip", "calf")
+    )
+    seen = '[observed.hip]\njoint = "FL_hip_joint"\nnoise = 0.001\n'
+    (tmp_path / "own.toml").write_text(f'model = "arm.xml"\n{told}{seen}')
+    names = [row.name for row in OwnModel.read(tmp_path / "own.toml").rows([])]
+    assert "body_mass[lower]" in names and "command_limit[calf]" in names
+    assert not any("ball" in name for name in names)
