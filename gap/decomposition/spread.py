@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+LEAST = 1e-12  # of a prior's variance: what double precision leaves
+
 
 @dataclass(frozen=True, eq=False)
 class Spread:
@@ -68,7 +70,11 @@ class Spread:
             return self.cost, np.zeros(0)
         inner, pull = self.inner[np.ix_(rows, rows)], self.pull[rows]
         wider = np.eye(len(rows)) + inner * more
-        left = np.linalg.solve(wider, pull)
+        try:
+            left = np.linalg.solve(wider, pull)
+        except np.linalg.LinAlgError:  # known better than doubles can tell from exactly
+            wider += LEAST * np.eye(len(rows))
+            left = np.linalg.solve(wider, pull)
         cost = self.cost + 0.5 * np.linalg.slogdet(wider)[1]
         cost -= 0.5 * float((more * pull) @ left)
         return cost, (self.variance[rows] + more) * left

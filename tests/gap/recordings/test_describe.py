@@ -218,11 +218,12 @@ def test_what_commands_cannot_move_has_no_effects(tmp_path):
     text = ARM.replace("ACTUATORS", MOTORS).replace("<worldbody>", "<worldbody>" + ball)
     (tmp_path / "arm.xml").write_text(text)
     told = "".join(
-        f'[commands.{name}]\nactuator = "FL_{name}_joint"\nunit = "1"\nlow = -1\nhigh = 1\n'
+        f'[commands.{name}]\nactuator = "FL_{name}_joint"\nunit = "1"\n'
+        "low = -1\nhigh = 1\n"
         for name in ("hip", "calf")
     )
     seen = '[observed.hip]\njoint = "FL_hip_joint"\nunit = "rad"\nnoise = 0.001\n'
     (tmp_path / "own.toml").write_text(f'name = "arm"\nmodel = "arm.xml"\n{told}{seen}')
-    names = [row.name for row in OwnModel.read(tmp_path / "own.toml").rows([])]
+    names = [row.name for row in OwnModel.read(tmp_path / "own.toml").listed]
     assert "body_mass[lower]" in names and "command_limit[calf]" in names
     assert not any("ball" in name for name in names)
