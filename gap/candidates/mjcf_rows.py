@@ -40,9 +40,9 @@ PLAUSIBLE = {
     "command_gain": (0.1, 0.003),
     "reading_gain": (0.03, 0.001),
     "geom_friction": (0.3, 0.0),
-    "command_delay": (0.04, 0.0),
-    "command_lag": (0.04, 0.0),
-    "reading_delay": (0.04, 0.0),
+    "command_delay": (0.04, 8e-4),
+    "command_lag": (0.04, 8e-4),
+    "reading_delay": (0.04, 8e-4),
     "body_length": (0.03, 0.001),
     "body_tilt": (0.03, 0.001),
     "encoder_offset": (0.01, 0.0),
@@ -79,7 +79,7 @@ def rows(
             body = bodies[item.fixed["part"]]
             made += masses.rows(item, body, EXCITE[item.effect])
         else:
-            made += _of(item, trials, lead, forces or {})
+            made += _of(item, trials, forces or {})
     edge = max(0.02, late)
     made.append(
         Row(LEAD, 0.0, late, -LAGS * lead, edge, unit="s", nuisance=True, step=0.001)
@@ -117,7 +117,7 @@ def grouped(candidates: Sequence[Row]) -> list[Row]:
 
 
 def _of(
-    item: Row, trials: Sequence[Trial], lead: float, forces: Mapping[str, np.ndarray]
+    item: Row, trials: Sequence[Trial], forces: Mapping[str, np.ndarray]
 ) -> Iterable[Row]:
     excite = EXCITE.get(item.effect, "any command")
     row = partial(Row, low=item.low, high=item.high, unit=item.unit, excite=excite)
@@ -145,7 +145,7 @@ def _of(
         item.name,
         item.nominal,
         sd,
-        slack=item.slack or (lead if late else slack),  # its steps lead by as much
+        slack=item.slack or slack,
         levels=(0.15, 0.3) if late else (),
         step=LATER if late else 0.0,
     )

@@ -187,16 +187,14 @@ def _by_itself(problem: Problem, level: Level, known: Noise) -> Point:
 
 
 def swapped(problem: Problem, point: Point) -> Point:
-    """A point with another explanation in the place of one of several, where that is
-    better once it is fitted: a delay for a lag.
+    """A point with another explanation in the place of one, where that is better once
+    it is fitted: a delay for a lag.
 
     Args:
         problem: the recording.
         point: a fitted set.
     """
     linear, support = point.linear, point.support
-    if len(support) < 2:
-        return point
     outside = set(linear.free) - support
     swaps = [(support - {one}) | {other} for one in support for other in outside]
     near = sorted((linear.cost(swap), sorted(swap)) for swap in swaps)[:TRIED]

@@ -9,13 +9,14 @@ recording, so that thousands of sets, stretches left out and moments at which a 
 sets in cost no simulation.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.spread import Spread
 
 KAPPA = 3.0
@@ -47,6 +48,7 @@ class Linear:
         penalty: what each explanation costs.
         family: of explanations that share one cause, and pay once.
         covers: explanations that add nothing beside one, by that.
+        joins: explanations beside all of which one adds nothing, by that.
         design: whitened-free columns, ``(N, C, K)``.
         target: residuals of the nominal model, ``(N, C)``.
         weight: of the squares, ``(N, C)``.
@@ -67,6 +69,7 @@ class Linear:
     penalty: Mapping[str, float]
     family: Mapping[str, str]
     covers: Mapping[str, frozenset[str]]
+    joins: Mapping[str, frozenset[str]]
     design: np.ndarray
     target: np.ndarray
     weight: np.ndarray
@@ -124,6 +127,7 @@ class Linear:
             penalty=dict.fromkeys(free, problem.model.odds),
             family={row.term: row.family or row.term for row in rows},
             covers={row.term: frozenset(row.covers) for row in rows if row.covers},
+            joins=_joins(problem.rows),
             design=matrix,
             target=target,
             weight=weight,
@@ -253,6 +257,9 @@ class Linear:
         for name, covered in self.covers.items():
             if name in key and covered & key:
                 return self.cost(key - covered) + KAPPA * len(covered & key)
+        for name, parts in self.joins.items():
+            if name in key and parts <= key:  # the parts alone can be all that it is
+                return self.cost(key - {name}) + KAPPA
         rows = [row for name in key for row in self.terms[name]]
         plain = self.spread(frozenset())
         value, found = plain.changed(rows, 1.0 - self.slack[rows] ** 2)
@@ -392,6 +399,17 @@ class Linear:
             normal=normal,
             slope=slope,
         )
+
+
+def _joins(rows: Sequence[Row]) -> dict[str, frozenset[str]]:
+    """By explanation that is one of several that hold alike, these; one of both wheels
+    for one of each."""
+    term = {row.name: row.term for row in rows}
+    return {
+        row.term: frozenset(term.get(part, part) for part in row.joins)
+        for row in rows
+        if row.joins
+    }
 
 
 def tail(values: np.ndarray) -> float:

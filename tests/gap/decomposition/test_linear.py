@@ -283,3 +283,13 @@ def test_a_small_explanation_that_nothing_undoes_stays():
     problem = Rows(rng)
     linear = problem.linear(planted(rng, problem, a=3.0, b=0.1))
     assert shares.cancelling(linear, frozenset("ab")) == frozenset()
+
+
+def test_one_of_both_adds_nothing_to_one_of_each():
+    rng = np.random.default_rng(7)
+    problem = Rows(rng)
+    problem.columns[0] = problem.columns[1] + problem.columns[2]
+    problem.rows = (replace(problem.rows[0], joins=("b", "c")), *problem.rows[1:])
+    linear = problem.linear(planted(rng, problem, b=2.0, c=-1.0))
+    assert linear.cost(frozenset("abc")) == linear.cost(frozenset("bc")) + KAPPA
+    assert linear.cost(frozenset("ab")) < linear.cost(frozenset("a"))

@@ -116,6 +116,11 @@ def test_every_effect_is_nothing_at_its_nominal_value_and_reads_back(name):
         CLASSES[name]({"part": "a,b"})
 
 
+def test_a_part_may_have_the_name_of_its_robot_before_a_colon():
+    text = "joint_damping:part=robot:panda0_joint1,added=0.25"
+    assert str(OwnModel.parse(text)) == text
+
+
 def test_effects_act_on_their_part_alone(arm):
     plain = arm.physics.model
     doubled = arm.physics.compiled(
