@@ -51,7 +51,7 @@ class Part(Choice):
             BnsError: it is empty or can not be written in text.
         """
         name = str(value)
-        if not name or set(name) & set(",=@%~ "):
+        if not name or name != name.strip() or set(name) & set(",=@%~"):
             raise BnsError(f"{effect}:{self.name} = {value!r} names no part.")
         return name
 

@@ -116,8 +116,9 @@ def test_every_effect_is_nothing_at_its_nominal_value_and_reads_back(name):
         CLASSES[name]({"part": "a,b"})
 
 
-def test_a_part_may_have_the_name_of_its_robot_before_a_colon():
-    text = "joint_damping:part=robot:panda0_joint1,added=0.25"
+@pytest.mark.parametrize("part", ["robot:panda0_joint1", "robot0:hand mount"])
+def test_a_part_may_have_a_colon_or_a_space_in_its_name(part):
+    text = f"joint_damping:part={part},added=0.25"
     assert str(OwnModel.parse(text)) == text
 
 
