@@ -12,7 +12,7 @@ from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.onset import Onset
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
-from bns.gap.decomposition.shares import Part
+from bns.gap.decomposition.shares import HeldOut, Part
 from bns.gap.decomposition.singles import Singles
 from bns.gap.recordings import trial_conditions
 from bns.progress import Tell, unheard
@@ -77,7 +77,7 @@ class Decomposition:
         problem, point = self.problem, self.point
         if not point.support:
             return 0.0
-        held = shares.HeldOut.of(problem, point, shares.PIECES, self.inside)
+        held = HeldOut.of(problem, point, shares.PIECES, self.inside)
         none, some = held.nominal(self.start.rest), held.error(point.support).sum()
         least = held.nominal(self.floor.sd)
         if not self.lasting:
@@ -262,7 +262,7 @@ class _Sizes:
     """How large a gap is, and what a point leaves of it; see `Decomposition`.
 
     Attributes:
-        plain: what the point leaves, ``(N, C)``.
+        plain: what the point leaves, its slack taken, ``(N, C)``.
         strayed: windows of trials that went another way than their repeats, ``(N,)``.
     """
 
@@ -283,9 +283,9 @@ class _Sizes:
         inside = rest.kept(problem, full, point.noise.sd)
         strayed = rest.strayed(problem, point.rest, known)
         inside &= ~strayed[:, None]
-        plain = point.rest
-        if not point.noise.memory.factors.size:
-            plain = linear.rest(linear.solve(point.support))
+        remembering = bool(point.noise.memory.factors.size)
+        plain = HeldOut.of(problem, point).plain if remembering else linear
+        plain = plain.rest(linear.solve(point.support))
         return cls(
             inside,
             strayed,

@@ -19,6 +19,12 @@ from bns.gap.where import horizons, localised
 from bns.gap.where.compared import Compared
 
 SINGLES = 8  # explanations whose share alone is reported
+HALF = 0.5  # of a gap: what is left where most is within the model's own doubts
+SCATTERED = "That does not recur: the robot scatters it, or the camera."
+UNSURE = (
+    "The nominal model is unsure by as much, of its timing first: a shift of some "
+    "milliseconds, gains by thousandths."
+)
 
 
 def recorded(
@@ -169,7 +175,7 @@ def statements(made: Decomposition) -> list[str]:
     if made.kind == "no gap":
         said = ["No gap beyond what the recording scatters by itself." + apart]
         if made.before > LARGE:
-            said += [size, "That does not recur: the robot scatters it, or the camera."]
+            said += [size, UNSURE if made.left < HALF else SCATTERED]
         return said
     _, left = _sizes(made, made.point.rest)
     listed = [_said(made, part) for part in made.parts]
