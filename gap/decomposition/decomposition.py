@@ -20,6 +20,7 @@ from bns.progress import Tell, unheard
 MOST = 0.5  # share of the gap beyond which what is left is most of it
 PINNED = 0.15  # the same where an explanation ended at the edge of what is possible
 EDGE = 0.01  # plausible departures from a bound that are at it
+SILENT = 1e-3  # weighted square of what a plausible departure changes: no evidence
 FELT = 0.02  # of the floor's variance: a gap below shows in no picture
 LARGE = 2.0  # variances of the floor: more than heavy tails of any camera's noise
 SCATTER = 3.0  # times what differs between repeats
@@ -246,15 +247,29 @@ def _settled(
 def _steady(
     problem: Problem, seed: int
 ) -> tuple[Problem, Point, rest.Floor, np.ndarray]:
-    """A recording without trials that may go anywhere, the nominal model in it, the
-    floor, and the windows ``(N,)`` of these trials."""
+    """A recording without trials that may go anywhere, and with what changes nothing in
+    it; the nominal model, the floor, and the windows ``(N,)`` of these trials."""
     start = descent.nothing(problem)
     known = rest.floor(problem, start.noise.starts, seed=seed)
     unstable = rest.unstable(problem, start.slopes, known)
     if unstable.any() and not unstable.all():
         problem = problem.without(unstable)
         start = descent.nothing(problem)
-    return problem, start, known, unstable
+    return replace(problem, silent=_silent(problem, start)), start, known, unstable
+
+
+def _silent(problem: Problem, start: Point) -> frozenset[str]:
+    """Names of rows whose plausible departures change next to nothing: what no command
+    moves, a moment of mass across the plane of all motion."""
+    changed = {
+        number: float((start.linear.weight * (slope * problem.sd[number]) ** 2).sum())
+        for number, slope in start.slopes.items()
+    }
+    return frozenset(
+        problem.rows[number].name
+        for number, square in changed.items()
+        if square < SILENT and problem.rows[number].smooth
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,8 +299,8 @@ class _Sizes:
         strayed = rest.strayed(problem, point.rest, known)
         inside &= ~strayed[:, None]
         remembering = bool(point.noise.memory.factors.size)
-        plain = HeldOut.of(problem, point).plain if remembering else linear
-        plain = plain.rest(linear.solve(point.support))
+        bare = HeldOut.of(problem, point).plain if remembering else linear
+        plain = bare.rest(linear.solve(point.support))
         return cls(
             inside,
             strayed,

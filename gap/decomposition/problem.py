@@ -40,6 +40,8 @@ class Problem:
     numbers: tuple[int, ...]
     onset: Mapping[str, int] = field(default_factory=dict)
     """first trial of the rows that set in later, by name"""
+    silent: frozenset[str] = frozenset()
+    """names of rows that change nothing here, whose derivatives are 0"""
 
     @classmethod
     def of(cls, trials: Sequence[Trial], model: GapModel) -> "Problem":
@@ -198,6 +200,8 @@ class Problem:
         """
         high = self.bounds[1]
         sets, steps = [values], []
+        silent = [number for number in which if self.rows[number].name in self.silent]
+        which = [number for number in which if number not in silent]
         joined = self._joined(which)
         simulated = [number for number in which if number not in joined]
         for number in simulated:
@@ -221,7 +225,7 @@ class Problem:
                 ],
                 axis=0,
             )
-        return found
+        return found | dict.fromkeys(silent, np.zeros_like(base))
 
     def _joined(self, which: Sequence[int]) -> dict[int, list[int]]:
         """Rows whose derivative is the sum of those of the rows that they join, by the

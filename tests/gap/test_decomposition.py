@@ -1,5 +1,6 @@
 """The joint fit on recordings: shares, statements, dates, and what is left out."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -99,6 +100,16 @@ def test_repeats_are_found_with_tolerance(model):
 def test_a_problem_can_be_narrowed_but_keeps_its_nuisance(recorded, model):
     problem = diagnosis.narrowed(Problem.of(recorded[0], model), ["axle_length"])
     assert [row.name for row in problem.rows] == ["axle_length", "step_lead"]
+
+
+def test_what_changes_nothing_is_simulated_no_more(recorded, model):
+    problem = diagnosis.narrowed(Problem.of(recorded[0], model), KEPT[:2])
+    at = next(n for n, row in enumerate(problem.rows) if row.name == KEPT[1])
+    quiet = replace(problem, silent=frozenset({KEPT[1]}))
+    loud = problem.slopes(problem.nominal, [0, at])
+    found = quiet.slopes(problem.nominal, [0, at])
+    assert loud[at].any() and not found[at].any()
+    np.testing.assert_array_equal(found[0], loud[0])
 
 
 def test_every_row_of_a_wheeled_robot_makes_its_effect(recorded, model):
