@@ -223,8 +223,9 @@ def _settled(
     worse, that are no gap, or that close hardly any of it; the problem that takes some
     of these as slack; the sizes; and what one trial alone shows (`unconfirmed`)."""
     unconfirmed = shares.unconfirmed(problem, point)
-    if unconfirmed:
-        point = descent.refitted(problem, point, point.support - unconfirmed.keys())
+    support = shares.departing(problem, point) - unconfirmed.keys()
+    if support != point.support:
+        point = descent.refitted(problem, point, support)
     support = shares.guarded(problem, point)
     if support != point.support:
         point = descent.refitted(problem, point, support)

@@ -1,5 +1,6 @@
 """A decomposition written down as a diagnosis: verdict, statements, fits."""
 
+import re
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -18,6 +19,7 @@ from bns.gap.records import Diagnosis, Fit, Verdict
 from bns.gap.where import horizons, localised
 from bns.gap.where.compared import Compared
 
+KINDS = 4  # of motion that a further recording is asked for
 SINGLES = 8  # explanations whose share alone is reported
 HALF = 0.5  # of a gap: what is left where most is within the model's own doubts
 SCATTERED = "That does not recur: the robot scatters it, or the camera."
@@ -128,7 +130,9 @@ def _change(made: Decomposition, kind: str) -> str:
         left, right = first - other, other - first
         if not _alike(left, right, rows):
             apart |= left | right
-    wanted = sorted({rows[name].excite for name in apart} - {""})
+    listed = ", ".join(sorted({rows[name].excite for name in apart} - {""}))
+    pieces = [re.sub("^(and|or) ", "", piece) for piece in listed.split(", ") if piece]
+    wanted = list(dict.fromkeys(pieces))[:KINDS]
     if not wanted:
         return (
             "They do the same whatever is commanded: observe another quantity, or "

@@ -21,6 +21,7 @@ TRIFLE = 1e-3  # of the gap, if it is less than this too: a thirtieth of its siz
 CANCELLED = 5e-3  # of the gap: what explanations that cancel close at most
 LEFT_OVER = 0.01  # of what they change by themselves, squared: the others undo it
 LOOKED_AT = 8  # weakest explanations among which some may cancel
+MOVED = 1e-6  # plausible departures
 EXACT = 1e-3  # of the smallest deviation that is believed: no fit is more exact
 ELSEWHERE = 0.05  # of what a level gains in its best trial: no more is nothing
 NINETY = 1.645  # standard deviations of a 90 % interval
@@ -186,6 +187,12 @@ def _pieces(block: np.ndarray, count: int) -> np.ndarray:
         rows = np.flatnonzero(block == number)
         made[rows] = number * count + np.arange(len(rows)) * count // len(rows)
     return np.unique(made, return_inverse=True)[1]
+
+
+def departing(problem: Problem, point: Point) -> Support:
+    """The set of a point without what came back to its nominal values."""
+    off = np.abs(point.values - problem.nominal) > MOVED * problem.sd
+    return frozenset(n for n in point.support if off[list(problem.terms[n])].any())
 
 
 def guarded(problem: Problem, point: Point) -> Support:

@@ -222,6 +222,14 @@ def test_what_holds_for_the_fitted_motion_alone_is_no_answer(before, closed, kin
     assert Decomposition.kind.fget(made) == kind
 
 
+def test_what_came_back_to_its_nominal_value_is_none(recorded, model):
+    problem = diagnosis.narrowed(Problem.of(recorded[0], model), KEPT[:2])
+    values = problem.nominal.copy()
+    values[0] = 0.9
+    point = SimpleNamespace(values=values, support=frozenset(KEPT[:2]))
+    assert shares.departing(problem, point) == {KEPT[0]}
+
+
 @pytest.mark.parametrize(("value", "slack"), [(1.2, 0.1), (0.76, 0.1), (1.3, 0.004)])
 def test_what_a_model_is_unsure_by_is_slack_and_no_explanation(value, slack):
     grip = Row("foot_slippery[all]", 1.0, 0.4, 0.1, 2.0, slack=0.004, unsure=0.1)
