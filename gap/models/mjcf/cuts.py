@@ -92,6 +92,10 @@ def _nearest(units: np.ndarray, change: np.ndarray) -> np.ndarray:
         change: what one standard deviation of each number makes of them, ``(K, T, J)``.
     """
     seen = np.isfinite(units) & np.isfinite(change).all(axis=0)
+    # a model that is off by more than the noise tells starts as badly as it is off
+    square = np.where(seen, units, 0.0) ** 2
+    off = np.sqrt(square.sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
+    units, change = units / np.maximum(off, 1.0), change / np.maximum(off, 1.0)
     design = change[:, seen].T
     curvature = design.T @ design + np.eye(len(change))
     return np.linalg.solve(curvature, design.T @ units[seen])

@@ -101,6 +101,20 @@ def test_pieces_start_in_motion_and_the_loop_follows(arm):
         assert np.nanstd(rest) < 3e-3  # 1e-3 is noise
 
 
+def test_a_model_that_is_far_off_leaves_starts_as_the_data_tell_them(arm):
+    found, model, path = arm
+    soft = path.with_name("soft.toml")
+    soft.write_text(found.toml.replace("kp = 20", "kp = 8"))
+    models = model, OwnModel.read(soft, threads=1)
+    one, other = (load_recordings.trials([str(path)], m)[1:] for m in models)
+    for right, wrong in zip(one, other, strict=True):
+        for joint, (_, sd) in right.conditions[start.UNSURE].items():
+            speeds = (
+                trial.conditions[start.STATE][joint][1] for trial in (right, wrong)
+            )
+            assert abs(np.subtract(*speeds)) < 4 * sd
+
+
 def test_a_command_that_is_late_is_late_in_every_piece(arm):
     _, model, path = arm
     trials = load_recordings.trials([str(path)], model)[1:2]
