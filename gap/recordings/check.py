@@ -128,6 +128,7 @@ def _channels(trial: Trial, model: GapModel, label: str) -> None:
 def _repaired(trial: Trial, label: str, timed: bool) -> tuple[Trial, list[str]]:
     notes: list[str] = []
     observed = trial.observed.copy()
+    dropped = np.zeros(len(observed), dtype=bool)  # and told as such
     for column, channel in enumerate(trial.channels):
         values = observed[:, column]
         if channel.unit == "rad":
@@ -142,20 +143,23 @@ def _repaired(trial: Trial, label: str, timed: bool) -> tuple[Trial, list[str]]:
         infinite = np.isinf(values)
         if infinite.any():
             values = np.where(infinite, np.nan, values)
+            dropped |= infinite
             notes.append(f"{label}: {infinite.sum()} infinite {channel.name}, dropped")
         observed[:, column] = values
         notes += _noticed(trial, values, channel.name, label)
     spikes = _spikes(observed, trial.times)
     if spikes.any():
         observed[spikes] = np.nan
-        notes.append(f"{label}: {spikes.sum()} spikes, dropped")
+        dropped |= spikes
+        many = "s" if spikes.sum() > 1 else ""
+        notes.append(f"{label}: {spikes.sum()} spike{many}, dropped")
     lost = ~np.isfinite(observed).all(axis=1)
     observed[lost] = np.nan
     # a reader adds moments without a sample, at which commands began
     sampled = np.ones(len(lost), dtype=bool)
     sampled[trial.boundaries[1:-1]] = False
-    if (lost & sampled).any():
-        count = (lost & sampled).sum()
+    count = (lost & sampled & ~dropped).sum()
+    if count:
         notes.append(f"{label}: {count} of {sampled.sum()} samples lost, bridged")
     repeated = np.diff(trial.times, prepend=trial.times[0] - 1) <= 0
     if repeated.any():

@@ -55,7 +55,7 @@ def test_faults_are_noticed(model, seed):
     _, notes = check.check(case.trials, model)
     words = {
         "wrap": "wrapped",
-        "spikes": "spikes",
+        "spikes": "spike",
         "duplicate": "the same samples",
         "stuck": "stuck",
         "lost": "samples",
