@@ -127,7 +127,7 @@ def test_a_single_count_of_a_coarse_encoder_is_no_spike(model):
     assert "spike" not in " ".join(notes)
     coarse[25, 2] = 50 * count
     (made,), notes = check.check([trial.replace(observed=coarse)], model)
-    assert notes == ["trial 0: 1 spike, dropped"] and np.isnan(made.observed[25]).all()
+    assert notes[-1] == "trial 0: 1 spike, dropped" and np.isnan(made.observed[25, 0])
 
 
 @pytest.mark.parametrize("resumed", [True, False])
