@@ -25,7 +25,7 @@ def test_faults_are_repaired_and_listed(model, told):
     made, notes = check.check(broken, model)
     assert len(made) == 4
     text = " ".join(notes)
-    assert "spikes" in text and "the same samples" in text
+    assert "spike" in text and "the same samples" in text
     assert np.abs(np.diff(made[0].observed[:, 2])).max() < 3
     assert np.isnan(made[1].observed[20]).all()
 
