@@ -364,11 +364,12 @@ def _with_level(problem: Problem, best: Single, start: Point) -> Point | None:
 
 
 def _from_all(problem: Problem, start: Point) -> Point:
-    """From everything at once, fitted until it stays."""
+    """From everything at once: a step of the fit, linear again there, and so on; the
+    derivatives of all rows are what costs time."""
     linear, known, values = start.linear, start.noise, start.values
     everything = set(linear.free) | fit.nuisances(problem)
-    for _ in range(3):
-        values, rest = newton(problem, values, everything, known)
+    for _ in range(STEPS):
+        values, rest = newton(problem, values, everything, known, turns=1)
         linear, known, _ = linearised(problem, values, rest, known)
     found = search.best(linear)[1]
     values = placed(problem, linear, found, values)
