@@ -1,4 +1,5 @@
-"""Check types: of all packages, and of the Python in README and the documentation.
+"""Check types: of all packages, and of the Python in README and the documentation; of
+benches, that what they import and name is there.
 
 usage: python .ci/check_types.py
 """
@@ -11,6 +12,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 FENCE = re.compile(r"^```python[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
+ABSENT = re.compile(
+    r"\[(name-defined|import-not-found)\]|Module .* has no attribute|"
+    r"Unexpected keyword|Missing positional"
+)
 MYPY = (sys.executable, "-m", "mypy", "--config-file", str(ROOT / "pyproject.toml"))
 
 
@@ -26,12 +31,22 @@ def snippets(folder: Path) -> list[str]:
     return made
 
 
+def absent() -> list[str]:
+    """What benches import, name or hand over that is not there."""
+    made = subprocess.run(
+        [*MYPY, "-p", "bench"], cwd=ROOT, capture_output=True, text=True
+    )
+    return [line for line in made.stdout.splitlines() if ABSENT.search(line)]
+
+
 def main() -> int:
-    """Run mypy over both; 0 = nothing to say."""
+    """Run mypy over all; 0 = nothing to say."""
     with tempfile.TemporaryDirectory(prefix="snippets-") as folder:
         runs = (["-p", "bns"], snippets(Path(folder)))
         codes = [subprocess.run([*MYPY, *what], cwd=ROOT).returncode for what in runs]
-    return max(codes)
+    broken = absent()
+    print("\n".join(broken or ["Benches name what there is."]))
+    return max(*codes, len(broken) > 0)
 
 
 if __name__ == "__main__":
