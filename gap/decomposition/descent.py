@@ -200,9 +200,12 @@ def swapped(problem: Problem, point: Point) -> Point:
     near = sorted((linear.cost(swap), sorted(swap)) for swap in swaps)[:TRIED]
     worst = linear.cost(support) + SWAPPED
     others = [
-        refitted(problem, point, frozenset(swap)) for cost, swap in near if cost < worst
+        refitted(problem, point, frozenset(swap), near=True)
+        for cost, swap in near
+        if cost < worst
     ]
-    return better(problem, [point, *others])
+    best = better(problem, [point, *others])
+    return best if best is point else fitted_at(problem, best, best.support)
 
 
 def narrowed(problem: Problem, point: Point) -> Point:
@@ -276,19 +279,24 @@ def joined(problem: Problem, point: Point) -> Point:
     return point
 
 
-def refitted(problem: Problem, point: Point, support: Support) -> Point:
-    """A point with a smaller set, fitted to the simulation.
+def refitted(
+    problem: Problem, point: Point, support: Support, *, near: bool = False
+) -> Point:
+    """A point with another set, fitted to the simulation.
 
     Args:
         problem: the recording.
         point: a fitted set.
-        support: the smaller set.
+        support: the other set.
+        near: see `fitted_at`.
     """
     values = placed(problem, point.linear, support, point.values)
-    return fitted_at(problem, replace(point, values=values), support)
+    return fitted_at(problem, replace(point, values=values), support, near=near)
 
 
-def fitted_at(problem: Problem, point: Point, support: Iterable[str]) -> Point:
+def fitted_at(
+    problem: Problem, point: Point, support: Iterable[str], *, near: bool = False
+) -> Point:
     """A set fitted from a point's values, without what has no slope and came back to
     its nominal value.
 
@@ -296,13 +304,16 @@ def fitted_at(problem: Problem, point: Point, support: Iterable[str]) -> Point:
         problem: the recording.
         point: values and noise to start from.
         support: the set.
+        near: so near to the point that its derivatives do: for a first look, since
+            those of all rows are what costs time.
     """
     support = frozenset(support)
     fitted = _fitted(problem, support)
     most = 3 if problem.model.singly else STEPS
     values, rest = newton(problem, point.values, fitted, point.noise, turns=most)
     values, rest = levels.zoomed(problem, values, rest, support, point.noise)
-    linear, known, slopes = linearised(problem, values, rest, point.noise)
+    kept = point.slopes if near else None
+    linear, known, slopes = linearised(problem, values, rest, point.noise, kept)
     return Point(values, support & set(linear.terms), rest, linear, slopes, known)
 
 
