@@ -9,6 +9,7 @@ import torch
 
 from bench.result import Result, bench
 from bench.walking import runs
+from bns import presets
 from bns.experiment.config import RunConfig
 
 LIMIT = 1.5
@@ -43,8 +44,6 @@ def learner_cost(quick: bool) -> Result:
 
 
 def _config(window: int, trials: int) -> RunConfig:
-    from bns import presets
-
     config = presets.load("khepera-simple")
     return replace(
         config,
@@ -129,7 +128,6 @@ def batch_cost(quick: bool) -> Result:
 
 
 def _batch(size: int) -> tuple[Any, Any]:
-    from bns import presets
     from bns.experiment.batch import Batch, resolve
     from bns.experiment.world_factory import make_world
 
@@ -258,6 +256,42 @@ def hexapod_run_cost(quick: bool) -> Result:
         holds=None if quick else minutes <= RUN_LIMIT,
         n=config.trials,
         details=details,
+    )
+
+
+HALF, SOON = 0.5, 20  # of the world's processor time; trials
+
+
+@bench(
+    "processor time of learning over that of the same trials, light following, 30 runs",
+    bar="<= 0.5 x",
+)
+def light_cost(quick: bool) -> Result:
+    """`khepera-light`, 30 runs of 20 trials, one thread; quick: 2 runs of 2."""
+    return _shared(presets.load("khepera-light"), quick=quick)
+
+
+@bench(
+    "processor time of learning over that of the same trials, walking, 30 runs",
+    bar="<= 0.5 x",
+)
+def walk_cost(quick: bool) -> Result:
+    """`hexapod-walk`, 30 runs of 20 trials, one thread; quick: 2 runs of 2."""
+    return _shared(presets.load("hexapod-walk"), quick=quick)
+
+
+def _shared(config: RunConfig, *, quick: bool) -> Result:
+    """Evolution and training over the world, start-up and compilation left out."""
+    count, trials = (2, 2) if quick else (BATCH, SOON)
+    config = replace(config, replicates=count, trials=trials, threads=1)
+    taken = processor_times(config)
+    ratio = (taken["evolution [s]"] + taken["training [s]"]) / taken["world [s]"]
+    return Result(
+        figure=round(ratio, 3),
+        unit="x",
+        holds=None if quick else ratio <= HALF,
+        n=count * trials,
+        details=taken,
     )
 
 
