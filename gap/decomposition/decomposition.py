@@ -20,6 +20,7 @@ from bns.progress import Tell, unheard
 MOST = 0.5  # share of the gap beyond which what is left is most of it
 PINNED = 0.15  # the same where an explanation ended at the edge of what is possible
 EDGE = 0.01  # plausible departures from a bound that are at it
+WITHIN = 0.1  # of what explanations leave: all but that is within the model's slack
 SILENT = 1e-3  # weighted square of what a plausible departure changes: no evidence
 FELT = 0.02  # of the floor's variance: a gap below shows in no picture
 LARGE = 2.0  # variances of the floor: more than heavy tails of any camera's noise
@@ -299,9 +300,13 @@ class _Sizes:
         inside = rest.kept(problem, full, point.noise.sd)
         strayed = rest.strayed(problem, point.rest, known)
         inside &= ~strayed[:, None]
-        remembering = bool(point.noise.memory.factors.size)
-        bare = HeldOut.of(problem, point).plain if remembering else linear
-        plain = bare.rest(linear.solve(point.support))
+        plain, slack = point.rest, linear.solve(point.support)
+        if not point.noise.memory.factors.size:
+            plain = linear.rest(slack)
+        else:  # under a memory of residuals slack takes too much, unless it is all
+            within = HeldOut.of(problem, point).plain.rest(slack)
+            sizes = [rest.excess(x, known, inside) for x in (within, plain)]
+            plain = within if sizes[0] < WITHIN * sizes[1] else plain
         return cls(
             inside,
             strayed,
