@@ -272,8 +272,8 @@ def weighty(problem: Problem, point: Point, left: float) -> Support:
     least = max(min(SLIGHT * left, TRIFLE), fit.inexact(problem, point.values) ** 2)
     least *= linear.squares(()) - linear.squares(linear.free)
     while len(support) > 1:
-        here = linear.squares(support)
-        without = {n: linear.squares(support - {n}) - here for n in sorted(support)}
+        here = _height(linear, support)
+        without = {n: _height(linear, support - {n}) - here for n in sorted(support)}
         name = min(without, key=without.__getitem__)
         if without[name] >= least:
             break
@@ -291,18 +291,25 @@ def cancelling(linear: Linear, support: Support) -> Support:
         support: the set.
     """
     least = CANCELLED * (linear.squares(()) - linear.squares(linear.free))
-    here = linear.squares(support)
-    weak = {n: linear.squares(support - {n}) - here for n in sorted(support)}
+    here = _height(linear, support)
+    weak = {n: _height(linear, support - {n}) - here for n in sorted(support)}
     names = sorted(weak, key=weak.__getitem__)[:LOOKED_AT]
     names = [name for name in names if weak[name] < least and name in linear.terms]
     values = linear.solve(support, slack=False)
     for size in range(len(names), 0, -1):
         for some in map(frozenset, combinations(names, size)):
-            back = linear.squares(support - some) - here
+            back = _height(linear, support - some) - here
             each = sum(linear.square_of(values, {name}) for name in some)
             if some != support and back < min(least, LEFT_OVER * each):
                 return some
     return frozenset()
+
+
+def _height(linear: Linear, support: Support) -> float:
+    """Weighted square of what a set leaves, and what nuisances pay for it: a delay is
+    no trifle that only a shift beyond all reason makes up for."""
+    paid = linear.solve(support, slack=False)[linear.always]
+    return linear.squares(support) + linear.lam * float(paid @ paid)
 
 
 def _grown(linear: Linear, held: HeldOut, support: Support) -> Support:
