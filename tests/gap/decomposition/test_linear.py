@@ -299,6 +299,6 @@ def test_what_only_a_nuisance_beyond_reason_makes_up_for_is_no_trifle():
     rng = np.random.default_rng(4)
     problem = Rows(rng, alike=[(1, 5)])
     problem.rows = (*problem.rows[:5], replace(problem.rows[5], nuisance=True, slack=0))
-    linear = problem.linear(planted(rng, problem, a=30.0, b=20.0), sd=10.0)
+    linear = problem.linear(planted(rng, problem, a=30.0, b=20.0), sd=3.0)
     assert linear.squares("a") - linear.squares("ab") < 0.005 * linear.squares("")
     assert shares.cancelling(linear, frozenset("ab")) == frozenset()
