@@ -257,20 +257,29 @@ def _steady(
     if unstable.any() and not unstable.all():
         problem = problem.without(unstable)
         start = descent.nothing(problem)
-    return replace(problem, silent=_silent(problem, start)), start, known, unstable
+    return replace(problem, silent=silent(problem, start)), start, known, unstable
 
 
-def _silent(problem: Problem, start: Point) -> frozenset[str]:
-    """Names of rows whose plausible departures change next to nothing: what no command
-    moves, a moment of mass across the plane of all motion."""
+def silent(problem: Problem, start: Point) -> frozenset[str]:
+    """Names of rows of explanations that change next to nothing as far as they may
+    plausibly depart: of joints that no command moves, in a model of one's own. One of
+    several numbers of an explanation is none: where a load sits does nothing until
+    there is one.
+
+    Args:
+        problem: the recording.
+        start: the nominal model.
+    """
     changed = {
         number: float((start.linear.weight * (slope * problem.sd[number]) ** 2).sum())
         for number, slope in start.slopes.items()
+        if problem.rows[number].smooth and problem.model.many
     }
     return frozenset(
         problem.rows[number].name
-        for number, square in changed.items()
-        if square < SILENT and problem.rows[number].smooth
+        for numbers in problem.terms.values()
+        if all(changed.get(number, 1.0) < SILENT for number in numbers)
+        for number in numbers
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from bns.gap.bench.wheeled_cases import commands
 from bns.gap.candidates import legged, wheeled_rows
-from bns.gap.decomposition import diagnosis, record, rest, shares
+from bns.gap.decomposition import decomposition, diagnosis, record, rest, shares
 from bns.gap.decomposition.decomposition import Decomposition
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
@@ -110,6 +110,22 @@ def test_what_changes_nothing_is_simulated_no_more(recorded, model):
     found = quiet.slopes(problem.nominal, [0, at])
     assert loud[at].any() and not found[at].any()
     np.testing.assert_array_equal(found[0], loud[0])
+
+
+@pytest.mark.parametrize(("many", "names"), [(True, {"limp"}), (False, set())])
+def test_where_a_load_sits_is_never_silent(many, names):
+    rows = ("load", "place", "limp", "moved")
+    changes = dict(enumerate([1.0, 0.0, 0.0, 1.0]))
+    problem = SimpleNamespace(
+        rows=tuple(Row(name, 0.0, 1.0, -1.0, 1.0) for name in rows),
+        terms={"load": (0, 1), "limp": (2,), "moved": (3,)},
+        sd=np.ones(4),
+        model=SimpleNamespace(many=many),
+    )
+    linear = SimpleNamespace(weight=np.ones((5, 1)))
+    slopes = {n: np.full((5, 1), size) for n, size in changes.items()}
+    start = SimpleNamespace(linear=linear, slopes=slopes)
+    assert decomposition.silent(problem, start) == names
 
 
 def test_every_row_of_a_wheeled_robot_makes_its_effect(recorded, model):
