@@ -282,9 +282,10 @@ def weighty(problem: Problem, point: Point, left: float) -> Support:
 
 
 def cancelling(linear: Linear, support: Support) -> Support:
-    """Explanations of a set that cancel: they change much, but the others undo it, and
-    without them hardly any of the gap comes back. They are directions that the data see
-    next to nothing of: a gain and a diameter, masses of two links.
+    """Several explanations of a set that cancel: they change much, but the others undo
+    it, and without them hardly any of the gap comes back. They are directions that the
+    data see next to nothing of: a gain and a diameter, masses of two links. One alone
+    is none: what a shift of the clock undoes may be a delay.
 
     Args:
         linear: around the fit.
@@ -296,7 +297,7 @@ def cancelling(linear: Linear, support: Support) -> Support:
     names = sorted(weak, key=weak.__getitem__)[:LOOKED_AT]
     names = [name for name in names if weak[name] < least and name in linear.terms]
     values = linear.solve(support, slack=False)
-    for size in range(len(names), 0, -1):
+    for size in range(len(names), 1, -1):
         for some in map(frozenset, combinations(names, size)):
             back = _height(linear, support - some) - here
             each = sum(linear.square_of(values, {name}) for name in some)
