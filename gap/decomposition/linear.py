@@ -339,8 +339,15 @@ class Linear:
 
     def squares(self, support: Iterable[str]) -> float:
         """Weighted square of what a set leaves, the others exactly nominal."""
+        return self.left(self.solve(support, slack=False))
+
+    def left(self, values: np.ndarray) -> float:
+        """Weighted square of what values of all rows leave.
+
+        Args:
+            values: in units of their priors, ``(K,)``.
+        """
         normal, slope, square = self._total()
-        values = self.solve(support, slack=False)
         return float(square - 2 * slope @ values + values @ normal @ values)
 
     def square_of(self, values: np.ndarray, names: Iterable[str]) -> float:

@@ -309,8 +309,9 @@ def cancelling(linear: Linear, support: Support) -> Support:
 def _height(linear: Linear, support: Support) -> float:
     """Weighted square of what a set leaves, and what nuisances pay for it: a delay is
     no trifle that only a shift beyond all reason makes up for."""
-    paid = linear.solve(support, slack=False)[linear.always]
-    return linear.squares(support) + linear.lam * float(paid @ paid)
+    values = linear.solve(support, slack=False)
+    paid = values[linear.always]
+    return linear.left(values) + linear.lam * float(paid @ paid)
 
 
 def _grown(linear: Linear, held: HeldOut, support: Support) -> Support:

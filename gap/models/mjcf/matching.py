@@ -21,7 +21,8 @@ SEEN = _set(
     "meas measured actual state obs observed observation fb feedback enc encoder real"
 )
 SPEED = _set("vel velocity velocities speed dq qd qvel omega")
-EFFORT = _set("torque torques tau current effort load force voltage temp")
+TORQUE = _set("torque torques tau effort force")
+EFFORT = TORQUE | _set("current load voltage temp")
 POSITION = _set("pos position positions angle q qpos joint jnt dof")
 DRIVE = _set("motor servo act actuator drive")
 UNITS = {
@@ -152,12 +153,13 @@ def second_choice(
         the columns, and why they may be commands; "" = their names say so.
     """
     free = [(c, set(words(c.name))) for c in columns if not c.role]
+    said_so = [(c, said) for c, said in free if said & TOLD and not said & SEEN]
     for kind in (EFFORT, SPEED):
-        if told := [c for c, said in free if said & kind and said & TOLD - SEEN]:
+        if told := [c for c, said in said_so if said & kind]:
             return told, ""
     cores = {core(name) for name in actuators} - {""}
     for made, why in (
-        ([c for c, said in free if said & EFFORT], "no other column is one"),
+        ([c for c, said in free if said & TORQUE], "no other column is one"),
         ([c for c, said in free if said & DRIVE], "no other column is one"),
         ([c for c, _ in free if _held(c.values)], "they change in steps"),
     ):

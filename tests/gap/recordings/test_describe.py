@@ -208,6 +208,8 @@ def test_a_time_that_is_missing_is_told(tmp_path):
         ("q_hip q_calf act_hip act_calf", "act_hip act_calf"),
         ("hip_vel_cmd calf_vel_cmd hip calf", "hip_vel_cmd calf_vel_cmd"),
         ("q_hip q_calf", ""),
+        ("temp_hip temp_calf q_hip q_calf", ""),
+        ("torque_ref_meas_hip torque_ref_meas_calf q_hip q_calf vel_cmd", "vel_cmd"),
     ],
 )
 def test_commands_are_found_where_no_goal_is(names, told):
