@@ -261,9 +261,8 @@ def pruned(problem: Problem, point: Point) -> Point:
 def joined(problem: Problem, point: Point) -> Point:
     """A point with one explanation for several where they hold alike: one dead band of
     both wheels for one of each."""
-    at = {row.name: number for number, row in enumerate(problem.rows)}
     for name, numbers in problem.terms.items():
-        joins = [[at[n] for n in problem.rows[k].joins if n in at] for k in numbers]
+        joins = [list(problem.joins.get(number, ())) for number in numbers]
         whole = {problem.rows[k].term for parts in joins for k in parts}
         if not all(joins) or not whole <= point.support:
             continue

@@ -9,14 +9,13 @@ recording, so that thousands of sets, stretches left out and moments at which a 
 sets in cost no simulation.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from bns.gap.decomposition.problem import Problem
-from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.spread import Spread
 
 KAPPA = 3.0
@@ -107,6 +106,7 @@ class Linear:
         }
         terms = {name: found for name, found in terms.items() if found}
         rows = [problem.rows[k] for k in columns]
+        term = [row.term for row in problem.rows]
         always = np.array([row.nuisance for row in rows])
         free = tuple(n for n, found in terms.items() if not always[found[0]])
         low, high = (bound[columns] for bound in problem.bounds)
@@ -127,7 +127,12 @@ class Linear:
             penalty=dict.fromkeys(free, problem.model.odds),
             family={row.term: row.family or row.term for row in rows},
             covers={row.term: frozenset(row.covers) for row in rows if row.covers},
-            joins=_joins(problem.rows),
+            joins={
+                problem.rows[number].term: frozenset(
+                    problem.rows[k].term for k in parts
+                )
+                for number, parts in problem.joins.items()
+            },
             design=matrix,
             target=target,
             weight=weight,
@@ -406,17 +411,6 @@ class Linear:
             normal=normal,
             slope=slope,
         )
-
-
-def _joins(rows: Sequence[Row]) -> dict[str, frozenset[str]]:
-    """By explanation that is one of several that hold alike, these; one of both wheels
-    for one of each."""
-    term = {row.name: row.term for row in rows}
-    return {
-        row.term: frozenset(term.get(part, part) for part in row.joins)
-        for row in rows
-        if row.joins
-    }
 
 
 def tail(values: np.ndarray) -> float:

@@ -92,6 +92,16 @@ class Problem:
         return made
 
     @cached_property
+    def joins(self) -> dict[int, tuple[int, ...]]:
+        """By number of a row that is several others alike, the numbers of these."""
+        at = {row.name: number for number, row in enumerate(self.rows)}
+        return {
+            number: tuple(at[name] for name in row.joins)
+            for number, row in enumerate(self.rows)
+            if row.joins and at.keys() >= set(row.joins)
+        }
+
+    @cached_property
     def seen(self) -> np.ndarray:
         """Which features were seen, ``(N, C)``."""
         return np.isfinite(self.recorded)
@@ -227,15 +237,11 @@ class Problem:
             )
         return found | dict.fromkeys(silent, np.zeros_like(base))
 
-    def _joined(self, which: Sequence[int]) -> dict[int, list[int]]:
+    def _joined(self, which: Sequence[int]) -> dict[int, tuple[int, ...]]:
         """Rows whose derivative is the sum of those of the rows that they join, by the
         chain rule: a gain of both wheels is one of each."""
-        names = {self.rows[k].name: k for k in which}
-        return {
-            number: [names[name] for name in self.rows[number].joins]
-            for number in which
-            if self.rows[number].joins and set(self.rows[number].joins) <= set(names)
-        }
+        chosen = [number for number in which if number in self.joins]
+        return {n: self.joins[n] for n in chosen if set(self.joins[n]) <= set(which)}
 
     def sample(self, seconds: float = SAMPLE) -> list[int]:
         """Numbers of trials that are a first look: spread over the recording, no two of

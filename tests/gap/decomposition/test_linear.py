@@ -28,6 +28,7 @@ class Rows:
             for name in NAMES
         )  # fmt: skip
         self.terms = {name: (at,) for at, name in enumerate(NAMES)}
+        self.joins = {}
         self.model = SimpleNamespace(odds=KAPPA)
         self.nominal, self.sd = np.zeros(6), np.ones(6)
         self.bounds = np.full(6, low), np.full(6, high)
@@ -289,7 +290,7 @@ def test_one_of_both_adds_nothing_to_one_of_each():
     rng = np.random.default_rng(7)
     problem = Rows(rng)
     problem.columns[0] = problem.columns[1] + problem.columns[2]
-    problem.rows = (replace(problem.rows[0], joins=("b", "c")), *problem.rows[1:])
+    problem.joins = {0: (1, 2)}
     linear = problem.linear(planted(rng, problem, b=2.0, c=-1.0))
     assert linear.cost(frozenset("abc")) == linear.cost(frozenset("bc")) + KAPPA
     assert linear.cost(frozenset("ab")) < linear.cost(frozenset("a"))
