@@ -128,9 +128,7 @@ class Linear:
             family={row.term: row.family or row.term for row in rows},
             covers={row.term: frozenset(row.covers) for row in rows if row.covers},
             joins={
-                problem.rows[number].term: frozenset(
-                    problem.rows[k].term for k in parts
-                )
+                term[number]: frozenset(term[k] for k in parts)
                 for number, parts in problem.joins.items()
             },
             design=matrix,
