@@ -24,6 +24,7 @@ LOOKED_AT = 8  # weakest explanations among which some may cancel
 MOVED = 1e-6  # plausible departures
 EXACT = 1e-3  # of the smallest deviation that is believed: no fit is more exact
 ELSEWHERE = 0.05  # of what a level gains in its best trial: no more is nothing
+AS_ELSEWHERE = 3.0  # times what is left in other trials: no more is noise
 NINETY = 1.645  # standard deviations of a 90 % interval
 
 
@@ -221,20 +222,34 @@ def guarded(problem: Problem, point: Point) -> Support:
 def unconfirmed(problem: Problem, point: Point) -> dict[str, int]:
     """Levels of a point that gain in one of several trials alone, and its number.
 
-    A level was chosen by that trial, and no other one says that it is right.
+    A level was chosen by that trial, and no other one says that it is right. Nor does
+    what it leaves there, where that is more than is left in the other trials: an
+    obstacle stops a robot not quite when a command begins.
     """
     levels = {row.term for row in problem.rows if not row.smooth} & point.support
     if not levels or len(problem.trials) < FEWEST:
         return {}
     held, rest, found = HeldOut.of(problem, point), np.nan_to_num(point.rest), {}
+    left = (held.weight * rest**2).sum(axis=1)
     for name in sorted(levels & held.fixed.keys()):
-        without = rest + held.fixed[name][1]
-        more = (held.weight * (without**2 - rest**2)).sum(axis=1)
+        change = held.fixed[name][1]
+        more = (held.weight * ((rest + change) ** 2 - rest**2)).sum(axis=1)
         gains = np.bincount(problem.trial, more)
         best = int(gains.argmax())
-        if gains.sum() - gains[best] < ELSEWHERE * gains[best]:
+        if gains.sum() - gains[best] >= ELSEWHERE * gains[best]:
+            continue
+        inside = problem.trial == best
+        changed = inside & ((held.weight * change**2).sum(axis=1) > 1)
+        usual = np.median(_by_trial(problem.trial[~inside], left[~inside]))
+        if left[changed].mean() > AS_ELSEWHERE * usual:
             found[name] = problem.numbers[best]
     return found
+
+
+def _by_trial(trial: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Means of values ``(N,)`` of windows by number of their trial ``(N,)``."""
+    count = np.bincount(trial)
+    return np.bincount(trial, values)[count > 0] / count[count > 0]
 
 
 def within_slack(problem: Problem, point: Point) -> Problem:

@@ -70,23 +70,44 @@ def test_a_trial_that_strays_from_its_repeat_is_named_and_does_not_count(model, 
     assert "Trial 1 went another way than its repeat" in found.verdict.sentence
 
 
-@pytest.mark.parametrize(("stops", "kind"), [(1, "none of the library"), (2, "effect")])
-def test_a_level_that_one_trial_alone_shows_is_not_named(model, told, stops, kind):
+@pytest.mark.parametrize(
+    ("stops", "late", "named"), [(1, 0.1, False), (1, 0.02, True), (2, 0.02, True)]
+)
+def test_a_level_that_one_trial_alone_shows_is_named_if_it_leaves_nothing(
+    model, told, stops, late, named
+):
     long = [
         Commands([[0.1, 0.08]] * 5, [0.6] * 5),
         Commands([[0.08, 0.1]] * 5, [0.6] * 5),
     ]
     short = [Commands(item.values[:4], item.durations[:4]) for item in told[:4]]
-    plain = MujocoWorld(reality=[NOISE], threads=1).run([*long, *short], seeds=range(6))
-    stopping = MujocoWorld(
-        reality=["wheel_intermittent:wheel=both,every=5,speed=0", NOISE], threads=1
-    )
-    stuck = stopping.run(long, seeds=[0, 1])  # an obstacle, at the fifth command
-    trials = [*stuck[:stops], *plain[2:]]
-    found = diagnose(trials, model, rows=LEVELS, full=False)
-    assert found.verdict.kind == kind
-    if stops == 2:
+    world = MujocoWorld(reality=[NOISE], threads=1)
+    plain = world.run([*long, *short], seeds=range(6))
+    stuck = [  # at the fifth command, or by an obstacle a little later
+        replace(
+            trial,
+            commands=item,
+            boundaries=np.delete(trial.boundaries, 5),
+            handled=trial.handled[:5],
+        )
+        for trial, item in zip(
+            world.run(
+                [
+                    Commands([*item.values, [0.0, 0.0]], [0.6] * 4 + [late, 0.6 - late])
+                    for item in long
+                ],
+                seeds=[0, 1],
+            ),
+            long,
+            strict=True,
+        )
+    ]
+    found = diagnose([*stuck[:stops], *plain[2:]], model, rows=LEVELS, full=False)
+    if named:
         assert found.verdict.named == (("wheel_intermittent[both]",),)
+    else:
+        assert found.verdict.kind == "none of the library"
+        assert "no other does" in found.verdict.sentence
 
 
 def test_repeats_are_found_with_tolerance(model):
