@@ -61,8 +61,8 @@ def parts(problem: Problem, point: Point, *, lasting: bool = True) -> list[Part]
     """
     linear, support = point.linear, point.support
     spread = NINETY * np.sqrt(np.diagonal(linear.covariance(support)))
-    none, every = linear.squares(()), linear.squares(linear.free)
-    left = linear.squares(support)
+    none, every = _height(linear, frozenset()), _height(linear, frozenset(linear.free))
+    left = _height(linear, support)
     whole = max(none - (every if lasting else left), 1e-9)
     made = []
     for name in support:
@@ -73,8 +73,8 @@ def parts(problem: Problem, point: Point, *, lasting: bool = True) -> list[Part]
                 values=values,
                 low=low,
                 high=high,
-                last=(linear.squares(support - {name}) - left) / whole,
-                alone=(none - linear.squares({name})) / whole,
+                last=(_height(linear, support - {name}) - left) / whole,
+                alone=(none - _height(linear, frozenset({name}))) / whole,
                 sure=search.inclusion(linear, name),
             )
         )
@@ -180,6 +180,11 @@ class HeldOut:
             )
         return made
 
+    def loss(self, support: Support) -> float:
+        """Squared error of all stretches, and what nuisances pay for it."""
+        fitted = support - self.fixed.keys()
+        return float(self.error(support).sum()) + _paid(self.linear, fitted)
+
 
 def _pieces(block: np.ndarray, count: int) -> np.ndarray:
     """Each stretch of windows ``(N,)`` cut into so many, numbered through."""
@@ -198,7 +203,8 @@ def departing(problem: Problem, point: Point) -> Support:
 
 def guarded(problem: Problem, point: Point) -> Support:
     """The set of a point without what makes the plain held-out error worse; of those
-    within `CHOICE` nats by one change the one with the least."""
+    within `CHOICE` nats by one change the one with the least. What nuisances pay counts
+    as error: a shift of the clock beyond all reason is a delay."""
     if not point.support:
         return point.support
     held = HeldOut.of(problem, point)
@@ -207,11 +213,11 @@ def guarded(problem: Problem, point: Point) -> Support:
     near = [s for s in near if len(s) <= len(support)]
     best = support
     if len(support) > 3:  # several at once: which of them is for the held-out error
-        best = min([support, *near], key=lambda s: held.error(s).sum())
+        best = min([support, *near], key=held.loss)
         best = _grown(point.linear, held, best)
     while best:
-        total = held.error(best).sum()
-        without = {name: held.error(best - {name}).sum() for name in sorted(best)}
+        total = held.loss(best)
+        without = {name: held.loss(best - {name}) for name in sorted(best)}
         name = min(without, key=without.__getitem__)
         if without[name] >= total:
             break
@@ -324,9 +330,13 @@ def cancelling(linear: Linear, support: Support) -> Support:
 def _height(linear: Linear, support: Support) -> float:
     """Weighted square of what a set leaves, and what nuisances pay for it: a delay is
     no trifle that only a shift beyond all reason makes up for."""
-    values = linear.solve(support, slack=False)
-    paid = values[linear.always]
-    return linear.left(values) + linear.lam * float(paid @ paid)
+    return linear.squares(support) + _paid(linear, support)
+
+
+def _paid(linear: Linear, support: Support) -> float:
+    """What nuisances pay for what they depart by beside a set."""
+    paid = linear.solve(support, slack=False)[linear.always]
+    return linear.lam * float(paid @ paid)
 
 
 def _grown(linear: Linear, held: HeldOut, support: Support) -> Support:

@@ -303,3 +303,8 @@ def test_what_only_a_nuisance_beyond_reason_makes_up_for_is_no_trifle():
     linear = problem.linear(planted(rng, problem, a=30.0, b=20.0), sd=3.0)
     assert linear.squares("a") - linear.squares("ab") < 0.005 * linear.squares("")
     assert shares.cancelling(linear, frozenset("ab")) == frozenset()
+    held = shares.HeldOut(
+        linear, linear, linear.weight, {}
+    )  # nor for what was not fitted
+    assert held.error("a").sum() < 1.05 * held.error("ab").sum()
+    assert held.loss(frozenset("a")) > 1.2 * held.loss(frozenset("ab"))
