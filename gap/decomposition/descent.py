@@ -25,6 +25,7 @@ TRIED = 3  # of these, the weakest first
 SWAPPED = 30.0  # nats that another set may be worse by the linear model, to be fitted
 SLIGHT = 0.25  # of a plausible departure: next to none
 REWEIGHED = 2  # times that residuals are weighed by what is left of them
+ALIKE = 0.4  # cosine of what two explanations change, from which one may undo the other
 WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
 
 
@@ -236,7 +237,7 @@ def pruned(problem: Problem, point: Point) -> Point:
         problem: the recording.
         point: a fitted set.
     """
-    point = joined(problem, point)
+    point = parted(problem, joined(problem, point))
     while len(point.support) > 1:
         linear, support = point.linear, point.support
         whole = max(linear.squares(()) - linear.squares(support), 1e-9)
@@ -275,6 +276,43 @@ def joined(problem: Problem, point: Point) -> Point:
         least, here = costs(problem, [other, point])
         if least <= here:
             point = other
+    return point
+
+
+def parted(problem: Problem, point: Point) -> Point:
+    """A point with one of two parts for an explanation that joins them and another one
+    that undoes it on the other part: a larger right wheel for both larger and a lower
+    gain of the left one.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+    """
+    for name in sorted(point.support):
+        numbers = problem.terms[name]
+        joins = [list(problem.joins.get(number, ())) for number in numbers]
+        if any(len(parts) != 2 for parts in joins):
+            continue
+        for gone, kept in ((0, 1), (1, 0)):
+            undone = {problem.rows[parts[gone]].term for parts in joins}
+            undoing = [
+                other
+                for other in sorted(point.support - {name})
+                if max(point.linear.alike(other, part) for part in undone) > ALIKE
+            ]
+            for other in undoing:
+                values = point.values.copy()
+                rows = [parts[kept] for parts in joins]
+                values[rows] = values[list(numbers)]
+                back = [*numbers, *problem.terms[other]]
+                values[back] = problem.nominal[back]
+                support = (point.support - {name, other}) | {
+                    problem.rows[row].term for row in rows
+                }
+                simpler = fitted_at(problem, replace(point, values=values), support)
+                least, here = costs(problem, [simpler, point])
+                if least <= here:
+                    return simpler
     return point
 
 

@@ -336,6 +336,14 @@ class Linear:
         """Cost of each set that was asked for so far."""
         return self._costs
 
+    def alike(self, one: str, other: str) -> float:
+        """Largest cosine, without its sign, of what rows of two explanations change."""
+        rows, columns = (self.terms.get(name, ()) for name in (one, other))
+        normal = self._total()[0]
+        size = np.sqrt(np.maximum(np.diagonal(normal), 1e-300))
+        found = [abs(normal[i, j]) / (size[i] * size[j]) for i in rows for j in columns]
+        return float(max(found, default=0.0))
+
     def rest(self, values: np.ndarray) -> np.ndarray:
         """Residuals at values of the rows, ``(N, C)``."""
         return self.target - self.design @ values

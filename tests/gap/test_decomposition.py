@@ -8,7 +8,14 @@ import pytest
 
 from bns.gap.bench.wheeled_cases import commands
 from bns.gap.candidates import legged, wheeled_rows
-from bns.gap.decomposition import decomposition, diagnosis, record, rest, shares
+from bns.gap.decomposition import (
+    decomposition,
+    descent,
+    diagnosis,
+    record,
+    rest,
+    shares,
+)
 from bns.gap.decomposition.decomposition import Decomposition
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
@@ -131,6 +138,27 @@ def test_what_changes_nothing_is_simulated_no_more(recorded, model):
     found = quiet.slopes(problem.nominal, [0, at])
     assert loud[at].any() and not found[at].any()
     np.testing.assert_array_equal(found[0], loud[0])
+
+
+@pytest.mark.parametrize(
+    ("effects", "simpler"),
+    [
+        (["wheel_diameter:wheel=right,factor=1.04"], True),
+        (["wheel_diameter:wheel=both,factor=1.08", GAIN], False),
+    ],
+)
+def test_two_explanations_of_which_one_undoes_half_of_the_other_are_one(
+    model, told, effects, simpler
+):
+    several = frozenset({"wheel_diameter[both]", "wheel_gain[left]"})
+    one = "wheel_diameter[right]"
+    trials = MujocoWorld(reality=[*effects, NOISE], threads=1).run(told, seeds=range(4))
+    trials, _ = check.check(trials, model)
+    names = [*sorted(several), one, "wheel_diameter[left]"]
+    problem = diagnosis.narrowed(Problem.of(trials, model), names)
+    point = descent.refitted(problem, descent.nothing(problem), several)
+    found = descent.parted(problem, point)
+    assert found.support == ({one} if simpler else several)
 
 
 @pytest.mark.parametrize(("many", "names"), [(True, {"limp"}), (False, set())])
