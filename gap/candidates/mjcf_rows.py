@@ -111,6 +111,7 @@ def grouped(candidates: Sequence[Row]) -> list[Row]:
                     levels=grid or (high,),
                     fixed={"part": ALL},
                     slack=0.0,
+                    joins=tuple(item.name for item in parts),
                 )
             )
     return made
@@ -121,6 +122,7 @@ def _of(
 ) -> Iterable[Row]:
     excite = EXCITE.get(item.effect, "any command")
     row = partial(Row, low=item.low, high=item.high, unit=item.unit, excite=excite)
+    row = partial(row, joins=item.joins)
     third = (item.high - item.low) / 3
     if item.effect == "command_dead_zone":
         if levels := _levels(item, trials):

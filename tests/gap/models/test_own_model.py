@@ -366,6 +366,20 @@ def test_a_delay_is_fitted_for_a_lag_and_the_better_is_kept(arm, told, true, tak
     assert (found is point) == (taken == true)
 
 
+def test_damping_of_all_joints_changes_what_those_of_each_change_together(arm, told):
+    parts = [f"joint_damping[{joint}]" for joint in ("shoulder", "elbow")]
+    trials = mjcf_cases.record(arm, told[:2], [], seed=1)
+    names = ["joint_damping[all]", *parts]
+    problem = diagnosis.narrowed(Problem.of(trials, arm), names)
+    number = {row.name: n for n, row in enumerate(problem.rows)}
+    every = number["joint_damping[all]"]
+    assert [problem.rows[n].name for n in problem.joins[every]] == parts
+    summed = problem.slopes(problem.nominal, [number[name] for name in names])
+    alone = problem.slopes(problem.nominal, [every])
+    size = np.abs(alone[every]).max()
+    np.testing.assert_allclose(summed[every], alone[every], atol=0.02 * size)
+
+
 def test_former_names_in_a_description_are_read(arm):
     config = replace(
         OwnConfig.read(ARM),
