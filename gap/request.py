@@ -5,6 +5,7 @@ killed leaves it there: the same command then goes on, or starts over. Where a d
 has to stop, what its check found is kept instead.
 """
 
+import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,31 @@ class Request(msgspec.Struct):
 
     format: str
     asked: dict[str, Any]
+
+
+def place(named: Path, asked: Mapping[str, Any]) -> Path:
+    """A directory for a diagnosis to which none was given.
+
+    Args:
+        named: the first to be tried; further ones end in -2, -3 and so on.
+        asked: what is diagnosed.
+
+    Returns:
+        the first that is free, or holds the same diagnosis unfinished.
+    """
+    for number in itertools.count(1):
+        out = named if number == 1 else named.with_name(f"{named.name}-{number}")
+        path = out / FILE
+        try:
+            if path.exists():
+                content = seal.opened(reading.read_json(path), path)
+                if reading.typed(content, Request, path).asked == dict(asked):
+                    return out
+            elif not out.exists() or not any(out.iterdir()):
+                return out
+        except (BnsError, OSError):
+            continue  # no directory, or not to be read: none to write to
+    raise AssertionError("numbers end nowhere")
 
 
 def begin(out: Path, asked: Mapping[str, Any]) -> None:

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,9 @@ from bns.errors import BnsError, FormatError, install
 from bns.progress import Each, Tell, counting, working
 
 LISTED = 8  # faults that are printed at most
+NONE = "none"
+"""in place of a directory: print only"""
+RESULTS = Path("runs/gap")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,8 +72,9 @@ class Diagnose(Check):
     verdict; writes OUT/diagnosis.json, report.html and recording.rrd.
     """
 
-    out: str = field(default="")
-    """directory for the results; none: print only"""
+    out: str = ""
+    """directory for the results (default: runs/gap/DATA, or the first of DATA-2, ...
+    that is free); none: print only"""
     report: bool = True
     """write report.html"""
     rerun: bool = True
@@ -168,15 +172,19 @@ def _motion(trials: list[Any], model: Any) -> list[Any]:
 
 
 def _diagnose(given: Diagnose) -> int:
-    if not given.out:
+    if given.out == NONE:
         return _diagnosed(given, None)
     from bns.gap import request
     from bns.storage.files import StorageError
     from bns.storage.lock import Lock
 
-    with Lock(given.out):
+    asked = _asked(given)
+    if given.out:
         out = Path(given.out)
-        request.begin(out, _asked(given))
+    else:
+        out = request.place(RESULTS / _called(given.data), asked)
+    with Lock(out):
+        request.begin(out, asked)
         try:
             code = _diagnosed(given, out)
         except BnsError as error:
@@ -185,6 +193,12 @@ def _diagnose(given: Diagnose) -> int:
             raise
         request.end(out)
     return code
+
+
+def _called(data: Sequence[str]) -> str:
+    """A name for the results of recordings: that of the first."""
+    path = Path(data[0] if data else "diagnosis").resolve()
+    return path.stem if path.is_file() else path.name
 
 
 def _asked(given: Diagnose) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from bns.__main__ import WRONG_INPUT, main
+from bns.gap import request
 from bns.storage.lock import Lock
 from bns.worlds import registry
 from bns.worlds.data import dataset
@@ -59,6 +60,29 @@ def test_an_existing_output_is_not_overwritten(recording, tmp_path, capsys):
     words = ["gap", "diagnose", str(recording), "--out", str(tmp_path)]
     assert main(words) == 2
     assert "not overwritten" in capsys.readouterr().err
+
+
+def test_results_go_to_the_first_free_directory_of_the_recording(
+    recording, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    words = ["gap", "diagnose", str(recording), "--no-report", "--no-rerun"]
+    for name in ("drives", "drives-2"):
+        assert main(words) == 0
+        assert f"runs/gap/{name}/diagnosis.json" in capsys.readouterr().out
+    assert main([*words, "--out", "none"]) == 0
+    assert len(list((tmp_path / "runs" / "gap").iterdir())) == 2
+
+
+def test_an_unfinished_diagnosis_is_gone_on_with_by_the_same_command(tmp_path):
+    named, asked = tmp_path / "drives", {"seed": 0}
+    assert request.place(named, asked) == named
+    named.mkdir()
+    request.begin(named, asked)
+    assert request.place(named, asked) == named
+    assert request.place(named, {"seed": 1}) == tmp_path / "drives-2"
+    (tmp_path / "drives-2").write_text("a file")
+    assert request.place(named, {"seed": 1}) == tmp_path / "drives-3"
 
 
 def test_help_without_a_verb(capsys):
