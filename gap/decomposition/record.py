@@ -18,7 +18,9 @@ from bns.gap.decomposition.shares import Part
 from bns.gap.records import Diagnosis, Fit, Verdict
 from bns.gap.where import horizons, localised
 from bns.gap.where.compared import Compared
+from bns.worlds.effects.parts import ALL
 
+ANY = ("any command", "any drive")  # show it, for what that is worth
 KINDS = 4  # of motion that a further recording is asked for
 SINGLES = 8  # explanations whose share alone is reported
 HALF = 0.5  # of a gap: what is left where most is within the model's own doubts
@@ -130,15 +132,25 @@ def _change(made: Decomposition, kind: str) -> str:
         left, right = first - other, other - first
         if not _alike(left, right, rows):
             apart |= left | right
-    listed = ", ".join(sorted({rows[name].excite for name in apart} - {""}))
+    listed = ", ".join(sorted({_exciting(rows[name]) for name in apart} - {""}))
     pieces = [re.sub("^(and|or) ", "", piece) for piece in listed.split(", ") if piece]
-    wanted = list(dict.fromkeys(pieces))[:KINDS]
+    pieces.sort(key=lambda piece: piece in ANY)
+    wanted = [p for p in dict.fromkeys(pieces) if p not in ANY or p == pieces[0]]
+    wanted = wanted[:KINDS]
+    if wanted and wanted[0] in ANY:
+        return "A longer or less noisy recording may separate them."
     if not wanted:
         return (
             "They do the same whatever is commanded: observe another quantity, or "
             "measure one of them."
         )
     return f"A recording with {', '.join(wanted)} may separate them."
+
+
+def _exciting(row: Row) -> str:
+    """Which commands make a row felt, its joint by name."""
+    part = row.fixed.get("part", ALL)
+    return row.excite if part == ALL else row.excite.replace("that joint", str(part))
 
 
 def _alike(left: Support, right: Support, rows: Mapping[str, Row]) -> bool:

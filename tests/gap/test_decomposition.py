@@ -161,6 +161,24 @@ def test_two_explanations_of_which_one_undoes_half_of_the_other_are_one(
     assert found.support == ({one} if simpler else several)
 
 
+@pytest.mark.parametrize(
+    ("excite", "said"),
+    [
+        ("any command", "A longer or less noisy recording may separate them."),
+        ("fast motion of that joint", "A recording with fast motion of elbow may"),
+    ],
+)
+def test_what_parts_explanations_is_said_with_the_name_of_its_joint(excite, said):
+    rows = [
+        Row("a", 0.0, 1.0, -1.0, 1.0, excite="any command"),
+        Row("b", 0.0, 1.0, -1.0, 1.0, excite=excite, fixed={"part": "elbow"}),
+    ]
+    made = SimpleNamespace(
+        tied=(frozenset("a"), frozenset("b")), problem=SimpleNamespace(rows=rows)
+    )
+    assert record._change(made, "either").startswith(said)
+
+
 @pytest.mark.parametrize(("many", "names"), [(True, {"limp"}), (False, set())])
 def test_where_a_load_sits_is_never_silent(many, names):
     rows = ("load", "place", "limp", "moved")
