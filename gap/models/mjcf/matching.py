@@ -170,7 +170,8 @@ def second_choice(
 
 
 def _held(values: np.ndarray) -> bool:
-    return bool(np.isfinite(values).all() and (np.diff(values) == 0).mean() > 0.8)
+    steps = np.diff(values)
+    return bool(np.isfinite(values).all() and 0.8 < (steps == 0).mean() < 1.0)
 
 
 def match(

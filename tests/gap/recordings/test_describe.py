@@ -221,6 +221,18 @@ def test_commands_are_found_where_no_goal_is(names, told):
     assert [column.name for column in found] == told.split()
 
 
+def test_what_never_changes_is_no_command():
+    noise = np.random.default_rng(0).normal(size=60)
+    columns = [
+        tables.Column("ambient", np.full(60, 21.0)),
+        tables.Column("a", np.repeat([0.0, 1.0, -1.0], 20)),
+        tables.Column("b", noise),
+    ]
+    found, why = matching.second_choice(columns, ["hip"])
+    assert [column.name for column in found] == ["a"]
+    assert why == "they change in steps"
+
+
 def test_a_column_called_as_an_actuator_is_measured_where_a_goal_is_called_so():
     values = np.zeros(5)
     columns = [tables.Column(name, values) for name in ("cmd_hip", "hip")]
