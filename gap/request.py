@@ -40,19 +40,23 @@ def place(named: Path, asked: Mapping[str, Any]) -> Path:
     Returns:
         the first that is free, or holds the same diagnosis unfinished.
     """
-    for number in itertools.count(1):
-        out = named if number == 1 else named.with_name(f"{named.name}-{number}")
-        path = out / FILE
-        try:
-            if path.exists():
-                content = seal.opened(reading.read_json(path), path)
-                if reading.typed(content, Request, path).asked == dict(asked):
-                    return out
-            elif not out.exists() or not any(out.iterdir()):
-                return out
-        except (BnsError, OSError):
-            continue  # no directory, or not to be read: none to write to
+    numbered = (named.with_name(f"{named.name}-{n}") for n in itertools.count(2))
+    for out in itertools.chain([named], numbered):
+        if _unfinished(out, asked) or not out.exists():
+            return out
+        if out.is_dir() and not any(out.iterdir()):
+            return out
     raise AssertionError("numbers end nowhere")
+
+
+def _unfinished(out: Path, asked: Mapping[str, Any]) -> bool:
+    """Whether a directory holds the same diagnosis unfinished."""
+    path = out / FILE
+    try:
+        content = seal.opened(reading.read_json(path), path)
+        return bool(reading.typed(content, Request, path).asked == dict(asked))
+    except BnsError:  # none is there, or it is not to be read
+        return False
 
 
 def begin(out: Path, asked: Mapping[str, Any]) -> None:

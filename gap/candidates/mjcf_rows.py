@@ -121,8 +121,14 @@ def _of(
     item: Row, trials: Sequence[Trial], forces: Mapping[str, np.ndarray]
 ) -> Iterable[Row]:
     excite = EXCITE.get(item.effect, "any command")
-    row = partial(Row, low=item.low, high=item.high, unit=item.unit, excite=excite)
-    row = partial(row, joins=item.joins)
+    row = partial(
+        Row,
+        low=item.low,
+        high=item.high,
+        unit=item.unit,
+        excite=excite,
+        joins=item.joins,
+    )
     third = (item.high - item.low) / 3
     if item.effect == "command_dead_zone":
         if levels := _levels(item, trials):

@@ -134,10 +134,8 @@ def _change(made: Decomposition, kind: str) -> str:
             apart |= left | right
     listed = ", ".join(sorted({_exciting(rows[name]) for name in apart} - {""}))
     pieces = [re.sub("^(and|or) ", "", piece) for piece in listed.split(", ") if piece]
-    pieces.sort(key=lambda piece: piece in ANY)
-    wanted = [p for p in dict.fromkeys(pieces) if p not in ANY or p == pieces[0]]
-    wanted = wanted[:KINDS]
-    if wanted and wanted[0] in ANY:
+    wanted = [piece for piece in dict.fromkeys(pieces) if piece not in ANY][:KINDS]
+    if pieces and not wanted:
         return "A longer or less noisy recording may separate them."
     if not wanted:
         return (

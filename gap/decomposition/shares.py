@@ -247,7 +247,7 @@ def unconfirmed(problem: Problem, point: Point) -> dict[str, int]:
         inside = problem.trial == best
         changed = inside & ((held.weight * change**2).sum(axis=1) > 1)
         usual = np.median(_by_trial(problem.trial[~inside], left[~inside]))
-        if left[changed].mean() > AS_ELSEWHERE * usual:
+        if not changed.any() or left[changed].mean() > AS_ELSEWHERE * usual:
             found[name] = problem.numbers[best]
     return found
 
