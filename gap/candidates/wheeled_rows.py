@@ -17,6 +17,7 @@ SIDES = ("left", "right", "both")
 TURNS = "turns in place and arcs"
 LEAD = "step_lead"
 """shift of the simulation in time that no effect is: its own steps lead or lag"""
+REASON = 4.0  # standard deviations by which a nuisance may be off: beyond is an effect
 BANDS = 10  # widths of a dead band that are tried
 WAYS = ("forward", "backward", "commanded")
 
@@ -113,7 +114,8 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
         for name, sd, low, high, unit, given in _LOAD
     ]  # fmt: skip
     lead = max(0.003, trial_conditions.moments_unknown(trials) / 2)
-    made.append(Row(LEAD, 0.0, lead, -0.06, 0.06, unit="s", nuisance=True, step=0.001))
+    edge = REASON * lead
+    made.append(Row(LEAD, 0.0, lead, -edge, edge, unit="s", nuisance=True, step=0.001))
     for name, sd, high, sided, levels in _ROUND:
         for side in SIDES[:2] if sided else ("",):
             whole = f"{name}[{side}]" if side else name

@@ -140,6 +140,20 @@ def test_what_changes_nothing_is_simulated_no_more(recorded, model):
     np.testing.assert_array_equal(found[0], loud[0])
 
 
+def test_a_delay_beside_a_gain_is_no_shift_of_the_clock(model, told):
+    hidden = ["wheel_gain:wheel=left,factor=0.94", "command_latency:delay=0.06", NOISE]
+    trials = MujocoWorld(reality=hidden, threads=1).run(told, seeds=range(4))
+    rows = ("wheel_gain[left]", "wheel_gain[right]", "command_latency")
+    found = diagnose(trials, model, rows=rows, full=False)
+    assert {frozenset(names) for names in found.verdict.named} == {
+        frozenset({"wheel_gain[left]", "command_latency"})
+    }
+    trials, _ = check.check(trials, model)
+    problem = diagnosis.narrowed(Problem.of(trials, model), rows)
+    number = [row.name for row in problem.rows].index("step_lead")
+    assert abs(descent.nothing(problem).values[number]) < 0.02
+
+
 @pytest.mark.parametrize(
     ("effects", "simpler"),
     [
