@@ -41,16 +41,14 @@ def place(named: Path, asked: Mapping[str, Any]) -> Path:
         the first that is free, or holds the same diagnosis unfinished.
     """
     numbered = (named.with_name(f"{named.name}-{n}") for n in itertools.count(2))
-    for out in itertools.chain([named], numbered):
-        if _unfinished(out, asked) or not out.exists():
-            return out
-        if out.is_dir() and not any(out.iterdir()):
-            return out
-    raise AssertionError("numbers end nowhere")
+    every = itertools.chain([named], numbered)
+    return next(out for out in every if _free(out, asked))
 
 
-def _unfinished(out: Path, asked: Mapping[str, Any]) -> bool:
-    """Whether a directory holds the same diagnosis unfinished."""
+def _free(out: Path, asked: Mapping[str, Any]) -> bool:
+    """Whether a directory is empty, or holds the same diagnosis unfinished."""
+    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
+        return True
     path = out / FILE
     try:
         content = seal.opened(reading.read_json(path), path)
