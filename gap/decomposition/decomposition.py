@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bns.gap.decomposition import descent, flexible, onset, rest, shares, ties
+from bns.gap.decomposition import descent, flexible, onset, refit, rest, shares, ties
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.onset import Onset
@@ -226,22 +226,22 @@ def _settled(
     unconfirmed = shares.unconfirmed(problem, point)
     support = shares.departing(problem, point) - unconfirmed.keys()
     if support != point.support:
-        point = descent.refitted(problem, point, support)
+        point = refit.refitted(problem, point, support)
     support = shares.guarded(problem, point)
     if support != point.support:
-        point = descent.refitted(problem, point, support)
+        point = refit.refitted(problem, point, support)
     loose = shares.within_slack(problem, point)
     if loose is not problem:
         slack = {
             row.term for row in loose.rows if row.unsure and row.slack == row.unsure
         }
-        problem, point = loose, descent.refitted(loose, point, point.support - slack)
+        problem, point = loose, refit.refitted(loose, point, point.support - slack)
     if _worse(problem, start, point, known):
-        point = descent.refitted(problem, point, frozenset())
+        point = refit.refitted(problem, point, frozenset())
     size = _Sizes.of(problem, start, point, known)
     support = shares.weighty(problem, point, size.unexplained)
     if support != point.support:
-        point = descent.refitted(problem, point, support)
+        point = refit.refitted(problem, point, support)
         size = _Sizes.of(problem, start, point, known)
     return problem, point, size, unconfirmed
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bns.gap.decomposition import descent, search
+from bns.gap.decomposition import descent, refit, search
 from bns.gap.decomposition.fit import Point, placed
 from bns.gap.decomposition.linear import KAPPA, Linear, Support
 from bns.gap.decomposition.problem import Problem
@@ -66,7 +66,7 @@ def dated(
     values = _values(split, point, cut, support)
     wanted = (support - {LATE}) | {name}
     late = descent.descend(split, values, wanted, best.noise)
-    costs = descent.costs(split, [best, late])
+    costs = refit.costs(split, [best, late])
     paid = np.log(len(cuts))
     if name not in late.support or costs[1] + paid + WORTH > costs[0]:
         return None

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bns.gap.decomposition import descent, levels
+from bns.gap.decomposition import levels, refit
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.problem import Problem
@@ -53,10 +53,10 @@ def _refitted(
     if not rivals:
         return []
     made = [
-        descent.fitted_at(problem, replace(point, values=one.values), {one.name})
+        refit.fitted_at(problem, replace(point, values=one.values), {one.name})
         for one in rivals
     ]
-    here, *costs = descent.costs(problem, [point, *made])
+    here, *costs = refit.costs(problem, [point, *made])
     return [
         (cost - here, other.support)
         for cost, other in zip(costs, made, strict=True)

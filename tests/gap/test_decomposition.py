@@ -13,8 +13,10 @@ from bns.gap.decomposition import (
     descent,
     diagnosis,
     record,
+    refit,
     rest,
     shares,
+    simpler,
 )
 from bns.gap.decomposition.decomposition import Decomposition
 from bns.gap.decomposition.problem import Problem
@@ -155,14 +157,14 @@ def test_a_delay_beside_a_gain_is_no_shift_of_the_clock(model, told):
 
 
 @pytest.mark.parametrize(
-    ("effects", "simpler"),
+    ("effects", "one_does"),
     [
         (["wheel_diameter:wheel=right,factor=1.04"], True),
         (["wheel_diameter:wheel=both,factor=1.08", GAIN], False),
     ],
 )
 def test_two_explanations_of_which_one_undoes_half_of_the_other_are_one(
-    model, told, effects, simpler
+    model, told, effects, one_does
 ):
     several = frozenset({"wheel_diameter[both]", "wheel_gain[left]"})
     one = "wheel_diameter[right]"
@@ -170,9 +172,9 @@ def test_two_explanations_of_which_one_undoes_half_of_the_other_are_one(
     trials, _ = check.check(trials, model)
     names = [*sorted(several), one, "wheel_diameter[left]"]
     problem = diagnosis.narrowed(Problem.of(trials, model), names)
-    point = descent.refitted(problem, descent.nothing(problem), several)
-    found = descent.parted(problem, point)
-    assert found.support == ({one} if simpler else several)
+    point = refit.refitted(problem, descent.nothing(problem), several)
+    found = simpler.parted(problem, point)
+    assert found.support == ({one} if one_does else several)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 
 from bns.errors import BnsError, FormatError
 from bns.gap import request, stages
-from bns.gap.decomposition import descent
+from bns.gap.decomposition import descent, refit
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.reference import Corrected
 from bns.gap.diagnose import diagnose
@@ -293,6 +293,6 @@ def test_a_limit_that_came_back_to_the_nominal_explains_nothing():
     trials = MujocoWorld("khepera3", reality=[TURNING_NOISE], threads=1).run([told] * 3)
     names = ["wheel_gain[left]", "speed_saturation[right]"]
     problem = Problem.of(trials, model)
-    point = descent.fitted_at(problem, descent.nothing(problem), names)
+    point = refit.fitted_at(problem, descent.nothing(problem), names)
     assert point.support == {"wheel_gain[left]"}
     assert np.isfinite(point.cost)

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.gap.decomposition import descent, search, shares
+from bns.gap.decomposition import refit, search, shares
 from bns.gap.decomposition.fit import Noise, Point
 from bns.gap.decomposition.linear import KAPPA, Linear, inflation, tail
 from bns.gap.decomposition.noise import Memory, Starts, correlated, scale, weights
@@ -265,7 +265,7 @@ def test_residuals_that_scatter_explains_weigh_as_what_it_leaves_of_them():
         linear = problem.linear(rest)
         slopes = dict(enumerate(problem.columns))
         at = Point(problem.nominal, frozenset(), rest, linear, slopes, known)
-        costs.append(descent.relinearised(problem, at, known).cost(()))
+        costs.append(refit.relinearised(problem, at, known).cost(()))
     assert costs[1] == pytest.approx(costs[0], abs=1.0)
 
 

@@ -12,7 +12,7 @@ from bns.errors import BnsError, FormatError
 from bns.gap import warnings
 from bns.gap.bench import mjcf_cases
 from bns.gap.candidates import mjcf
-from bns.gap.decomposition import descent, diagnosis, record
+from bns.gap.decomposition import descent, diagnosis, record, refit, simpler
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.reference import Corrected
 from bns.gap.decomposition.row import Row
@@ -360,8 +360,8 @@ def test_a_delay_is_fitted_for_a_lag_and_the_better_is_kept(arm, told, true, tak
     names = [f"{name}[all]" for name in LATE]
     problem = diagnosis.narrowed(Problem.of(made, arm), [KEPT[0], *names])
     start = descent.nothing(problem)
-    point = descent.refitted(problem, start, frozenset({KEPT[0], f"{taken}[all]"}))
-    found = descent.swapped(problem, point)
+    point = refit.refitted(problem, start, frozenset({KEPT[0], f"{taken}[all]"}))
+    found = simpler.swapped(problem, point)
     assert found.support == {KEPT[0], f"{true}[all]"}
     assert (found is point) == (taken == true)
 

@@ -1,0 +1,147 @@
+"""A fitted set made simpler: one explanation for several, another one in the place of
+one, and none that the others do as well."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from bns.gap.decomposition import refit
+from bns.gap.decomposition.fit import Point
+from bns.gap.decomposition.problem import Problem
+
+WEAK = 0.05  # of what a set explains: so little may be left to the others
+TRIED = 3  # of these, the weakest first
+SWAPPED = 30.0  # nats that another set may be worse by the linear model, to be fitted
+SLIGHT = 0.25  # of a plausible departure: next to none
+ALIKE = 0.4  # cosine of what two explanations change, from which one may undo the other
+
+
+def swapped(problem: Problem, point: Point) -> Point:
+    """A point with another explanation in the place of one, where that is better once
+    it is fitted: a delay for a lag.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+    """
+    linear, support = point.linear, point.support
+    outside = set(linear.free) - support
+    swaps = [(support - {one}) | {other} for one in support for other in outside]
+    near = sorted((linear.cost(swap), sorted(swap)) for swap in swaps)[:TRIED]
+    worst = linear.cost(support) + SWAPPED
+    others = [
+        refit.refitted(problem, point, frozenset(swap), near=True)
+        for cost, swap in near
+        if cost < worst
+    ]
+    best = refit.better(problem, [point, *others])
+    return best if best is point else refit.fitted_at(problem, best, best.support)
+
+
+def narrowed(problem: Problem, point: Point) -> Point:
+    """A point with what an explanation covers in its place where that is as good: a
+    shifted centre of mass for a load of next to no mass.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+    """
+    for name in sorted(point.support & set(point.linear.covers)):
+        first = problem.terms[name][0]
+        covered = point.linear.covers[name] & set(problem.terms)
+        off = point.values[first] - problem.nominal[first]
+        if covered and abs(off) < SLIGHT * problem.sd[first]:
+            support = (point.support - {name}) | covered
+            other = refit.refitted(problem, point, support)
+            point = other if _as_good(problem, other, point) else point
+    return point
+
+
+def pruned(problem: Problem, point: Point) -> Point:
+    """A point without what the others explain as well once they are fitted again: what
+    is strong and not linear leaves that to small ones beside it.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+    """
+    point = parted(problem, joined(problem, point))
+    while len(point.support) > 1:
+        linear, support = point.linear, point.support
+        whole = max(linear.squares(()) - linear.squares(support), 1e-9)
+        last = {
+            name: (linear.squares(support - {name}) - linear.squares(support)) / whole
+            for name in support
+        }
+        weak = sorted((n for n in last if last[n] < WEAK), key=lambda n: (last[n], n))
+        several = not problem.model.singly and 1 < len(weak) < len(support)
+        together = [set(weak)] if several else []
+        for names in (*together, *({name} for name in weak[:TRIED])):
+            smaller = refit.refitted(problem, point, support - names)
+            if _as_good(problem, smaller, point):
+                point = smaller
+                break
+        else:
+            return point
+    return point
+
+
+def joined(problem: Problem, point: Point) -> Point:
+    """A point with one explanation for several where they hold alike: one dead band of
+    both wheels for one of each."""
+    for name, numbers in problem.terms.items():
+        joins = [list(problem.joins.get(number, ())) for number in numbers]
+        whole = {problem.rows[k].term for parts in joins for k in parts}
+        if not all(joins) or not whole <= point.support:
+            continue
+        values = point.values.copy()
+        for number, parts in zip(numbers, joins, strict=True):
+            values[number] = values[parts].mean()
+            values[parts] = problem.nominal[parts]
+        support = (point.support - whole) | {name}
+        other = refit.fitted_at(problem, replace(point, values=values), support)
+        if _as_good(problem, other, point):
+            point = other
+    return point
+
+
+def parted(problem: Problem, point: Point) -> Point:
+    """A point with one of two parts for an explanation that joins them and another one
+    that undoes it on the other part: a larger right wheel for both larger and a lower
+    gain of the left one.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+    """
+    for name, other, rows in _halves(problem, point):
+        numbers = list(problem.terms[name])
+        values = point.values.copy()
+        values[rows] = values[numbers]
+        back = [*numbers, *problem.terms[other]]
+        values[back] = problem.nominal[back]
+        parts = {problem.rows[row].term for row in rows}
+        support = (point.support - {name, other}) | parts
+        half = refit.fitted_at(problem, replace(point, values=values), support)
+        if _as_good(problem, half, point):
+            return half
+    return point
+
+
+def _halves(problem: Problem, point: Point) -> Iterator[tuple[str, str, list[int]]]:
+    """An explanation that joins two parts, another one that may undo it on one of
+    them, and the rows of the other part."""
+    for name in sorted(point.support):
+        joins = [problem.joins.get(number, ()) for number in problem.terms[name]]
+        if any(len(parts) != 2 for parts in joins):
+            continue
+        for gone, kept in ((0, 1), (1, 0)):
+            undone = {problem.rows[parts[gone]].term for parts in joins}
+            for other in sorted(point.support - {name}):
+                if max(point.linear.alike(other, part) for part in undone) > ALIKE:
+                    yield name, other, [parts[kept] for parts in joins]
+
+
+def _as_good(problem: Problem, other: Point, point: Point) -> bool:
+    """Whether a simpler point has at least the evidence of another one."""
+    least, here = refit.costs(problem, [other, point])
+    return least <= here
