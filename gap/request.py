@@ -46,15 +46,14 @@ def place(named: Path, asked: Mapping[str, Any]) -> Path:
 
 
 def _free(out: Path, asked: Mapping[str, Any]) -> bool:
-    """Whether a directory is empty, or holds the same diagnosis unfinished."""
-    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
+    """Whether a diagnosis can begin in a directory, or go on there."""
+    if not out.exists():
         return True
-    path = out / FILE
     try:
-        content = seal.opened(reading.read_json(path), path)
-        return bool(reading.typed(content, Request, path).asked == dict(asked))
-    except BnsError:  # none is there, or it is not to be read
+        _check(out, asked)
+    except (BnsError, NotADirectoryError):
         return False
+    return True
 
 
 def begin(out: Path, asked: Mapping[str, Any]) -> None:
@@ -66,18 +65,22 @@ def begin(out: Path, asked: Mapping[str, Any]) -> None:
         BnsError: it holds a finished diagnosis, one of another request, or something
             else.
     """
-    path = out / FILE
-    if path.exists():
-        content = seal.opened(reading.read_json(path), path)
-        if reading.typed(content, Request, path).asked != dict(asked):
-            raise BnsError(
-                f"{out} holds an unfinished diagnosis of something else: repeat its "
-                "command, give another --out, or remove it."
-            )
-    else:
-        _check_free(out)
+    _check(out, asked)
     files.remove_temporary(out)
-    files.write_json(path, {"format": FORMAT, "asked": dict(asked)})
+    files.write_json(out / FILE, {"format": FORMAT, "asked": dict(asked)})
+
+
+def _check(out: Path, asked: Mapping[str, Any]) -> None:
+    path = out / FILE
+    if not path.exists():
+        _check_free(out)
+        return
+    content = seal.opened(reading.read_json(path), path)
+    if reading.typed(content, Request, path).asked != dict(asked):
+        raise BnsError(
+            f"{out} holds an unfinished diagnosis of something else: repeat its "
+            "command, give another --out, or remove it."
+        )
 
 
 def _check_free(out: Path) -> None:

@@ -101,7 +101,7 @@ def unstable(
         for k, slope in slopes.items()
     ]
     spread = np.sum(loose, axis=0).mean(axis=1)
-    size = _by_trial(problem, spread)
+    size = by_trial(problem, spread)
     far = (size > ANYWHERE**2) & (size > ANYWHERE * np.median(size))
     return far[problem.trial]
 
@@ -117,7 +117,7 @@ def strayed(problem: Problem, rest: np.ndarray, known: Floor) -> np.ndarray:
         known: the floor.
     """
     units = (np.nan_to_num(rest) / known.sd) ** 2
-    size = _by_trial(problem, units.mean(axis=1))
+    size = by_trial(problem, units.mean(axis=1))
     pairs = repeats(problem)
     apart = [
         (one, other)
@@ -130,7 +130,7 @@ def strayed(problem: Problem, rest: np.ndarray, known: Floor) -> np.ndarray:
     return problem.trial == max(apart[0], key=lambda n: size[n])
 
 
-def _by_trial(problem: Problem, values: np.ndarray) -> np.ndarray:
+def by_trial(problem: Problem, values: np.ndarray) -> np.ndarray:
     """Mean of values ``(N,)`` over the windows of each trial."""
     count = np.maximum(np.bincount(problem.trial), 1)
     return np.bincount(problem.trial, values) / count

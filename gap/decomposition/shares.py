@@ -10,6 +10,7 @@ from bns.gap.decomposition import fit, search
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import KAPPA, Linear, Support
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.rest import by_trial
 
 CHOICE = 4.0  # nats within which the held-out error decides
 WITHIN = 2.5  # standard deviations of what a model is unsure by: no gap (assumed)
@@ -246,16 +247,11 @@ def unconfirmed(problem: Problem, point: Point) -> dict[str, int]:
             continue
         inside = problem.trial == best
         changed = inside & ((held.weight * change**2).sum(axis=1) > 1)
-        usual = np.median(_by_trial(problem.trial[~inside], left[~inside]))
+        others = np.unique(problem.trial[~inside])
+        usual = np.median(by_trial(problem, left)[others])
         if not changed.any() or left[changed].mean() > AS_ELSEWHERE * usual:
             found[name] = problem.numbers[best]
     return found
-
-
-def _by_trial(trial: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Means of values ``(N,)`` of windows by number of their trial ``(N,)``."""
-    count = np.bincount(trial)
-    return np.bincount(trial, values)[count > 0] / count[count > 0]
 
 
 def within_slack(problem: Problem, point: Point) -> Problem:

@@ -83,6 +83,10 @@ def test_an_unfinished_diagnosis_is_gone_on_with_by_the_same_command(tmp_path):
     assert request.place(named, {"seed": 1}) == tmp_path / "drives-2"
     (tmp_path / "drives-2").write_text("a file")
     assert request.place(named, {"seed": 1}) == tmp_path / "drives-3"
+    stopped = tmp_path / "drives-3"
+    stopped.mkdir()
+    (stopped / request.PARTIAL).write_text("{}")  # what a check found: no result
+    assert request.place(named, {"seed": 1}) == stopped
 
 
 def test_help_without_a_verb(capsys):
