@@ -1,8 +1,7 @@
 """A decomposition written down as a diagnosis: verdict, statements, fits."""
 
-import re
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,15 +12,11 @@ from bns.gap.decomposition import rest, search, shares, words
 from bns.gap.decomposition.decomposition import LARGE, Decomposition
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.problem import Problem
-from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.shares import Part
 from bns.gap.records import Diagnosis, Fit, Verdict
 from bns.gap.where import horizons, localised
 from bns.gap.where.compared import Compared
-from bns.worlds.effects.parts import ALL
 
-ANY = ("any command", "any drive")  # show it, for what that is worth
-KINDS = 4  # of motion that a further recording is asked for
 SINGLES = 8  # explanations whose share alone is reported
 HALF = 0.5  # of a gap: what is left where most is within the model's own doubts
 SCATTERED = "That does not recur: the robot scatters it, or the camera."
@@ -125,38 +120,7 @@ def _change(made: Decomposition, kind: str) -> str:
         return "An effect that the library lacks; see where and when the gap sits."
     if kind != "either":
         return ""
-    first, *others = made.tied
-    rows = {row.term: row for row in made.problem.rows}
-    apart: set[str] = set()
-    for other in others:
-        left, right = first - other, other - first
-        if not _alike(left, right, rows):
-            apart |= left | right
-    listed = ", ".join(sorted({_exciting(rows[name]) for name in apart} - {""}))
-    pieces = [re.sub("^(and|or) ", "", piece) for piece in listed.split(", ") if piece]
-    wanted = [piece for piece in dict.fromkeys(pieces) if piece not in ANY][:KINDS]
-    if pieces and not wanted:
-        return "A longer or less noisy recording may separate them."
-    if not wanted:
-        return (
-            "They do the same whatever is commanded: observe another quantity, or "
-            "measure one of them."
-        )
-    return f"A recording with {', '.join(wanted)} may separate them."
-
-
-def _exciting(row: Row) -> str:
-    """Which commands make a row felt, its joint by name."""
-    part = row.fixed.get("part", ALL)
-    return row.excite if part == ALL else row.excite.replace("that joint", str(part))
-
-
-def _alike(left: Support, right: Support, rows: Mapping[str, Row]) -> bool:
-    """Whether two explanations are known to do the same whatever is commanded."""
-    if len(left) != 1 or len(right) != 1:
-        return False
-    (one,), (other,) = left, right
-    return other in rows[one].aliases
+    return words.apart(made.tied, made.problem.rows)
 
 
 def _ordered(made: Decomposition, support: Support) -> tuple[str, ...]:

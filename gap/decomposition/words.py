@@ -1,13 +1,20 @@
-"""A decomposition in words: how large the gap is, what explains it, what is left."""
+"""A decomposition in words: how large the gap is, what explains it, what is left, what
+would tell more."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from bns.gap.decomposition.linear import Support
+from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.shares import Part
+from bns.worlds.effects.parts import ALL
 from bns.worlds.trial import Channel
 
 WORDS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3)}
+ANY = ("any command", "any drive")  # show it, for what that is worth
+KINDS = 4  # of motion that a further recording is asked for
 LISTED = 4  # alternatives, or channels, in a sentence
 
 
@@ -119,6 +126,47 @@ def left(share: float, lasting: bool, recurs: bool, sizes: str, goes: str) -> st
         f"What is left, {_percent(share)} of the gap, {how} and is explained by no "
         f"effect of the library: about {sizes}."
     )
+
+
+def apart(tied: Sequence[Support], rows: Sequence[Row]) -> str:
+    """Which further recording may separate explanations that these data cannot tell.
+
+    Args:
+        tied: sets of explanations, the best first.
+        rows: numbers that may be off.
+    """
+    first, *others = tied
+    by_term = {row.term: row for row in rows}
+    unlike: set[str] = set()
+    for other in others:
+        left, right = first - other, other - first
+        if not _alike(left, right, by_term):
+            unlike |= left | right
+    listed = ", ".join(sorted({_exciting(by_term[name]) for name in unlike} - {""}))
+    pieces = [re.sub("^(and|or) ", "", piece) for piece in listed.split(", ") if piece]
+    wanted = [piece for piece in dict.fromkeys(pieces) if piece not in ANY][:KINDS]
+    if wanted:
+        return f"A recording with {', '.join(wanted)} may separate them."
+    if pieces:
+        return "A longer or less noisy recording may separate them."
+    return (
+        "They do the same whatever is commanded: observe another quantity, or measure "
+        "one of them."
+    )
+
+
+def _exciting(row: Row) -> str:
+    """Which commands make a row felt, its joint by name."""
+    part = row.fixed.get("part", ALL)
+    return row.excite if part == ALL else row.excite.replace("that joint", str(part))
+
+
+def _alike(left: Support, right: Support, rows: Mapping[str, Row]) -> bool:
+    """Whether two explanations are known to do the same whatever is commanded."""
+    if len(left) != 1 or len(right) != 1:
+        return False
+    (one,), (other,) = left, right
+    return other in rows[one].aliases
 
 
 def _percent(share: float) -> str:
