@@ -6,7 +6,7 @@ from bns.cli.parse import HELP, HELP_ALL
 from bns.errors import UnknownNameError
 
 VERBS = {
-    "describe": ("diagnose", "write the description of a robot of your own"),
+    "describe": ("describe", "write the description of a robot of your own"),
     "check": ("diagnose", "is the recording sound? repairs and faults, one a line"),
     "diagnose": ("diagnose", "is there a gap, where, which effect, how far closed"),
     "plan": ("after", "the next command, which separates what is still tied"),

@@ -1,7 +1,6 @@
-"""`bns gap describe`, `check` and `diagnose`: from a robot's MJCF to a diagnosis."""
+"""`bns gap check` and `diagnose`: from recordings to a diagnosis."""
 
 import json
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib.util import find_spec
@@ -18,28 +17,6 @@ LISTED = 8  # faults that are printed at most
 NONE = "none"
 """in place of a directory: print only"""
 RESULTS = Path("runs/gap")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Describe:
-    """Write the description of a robot of your own (docs/gap_your_robot.md) from its
-    MJCF and a log: which column is which actuator and joint, units, noise, start.
-    Prints what was guessed and what had better be looked at. Then:
-    bns gap diagnose LOG --model OUT
-    """
-
-    model: Positional[str]
-    """MJCF file of the robot"""
-    log: Positional[str]
-    """CSV, PACE (.pt) or MCAP file, or directory of a SAGE motion or LeRobotDataset"""
-    out: str = ""
-    """file for the description; default: MODEL.toml in the working directory"""
-    kp: float = 0.0
-    """gain of the position loop that the robot has and its MJCF has not [N m/rad]"""
-    kd: float = 0.0
-    """its damping [N m s/rad]"""
-    torque: float = math.inf
-    """its largest torque [N m]; default: that of the MJCF's motors"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,31 +67,9 @@ class Diagnose(Check):
 
 def main(verb: str, argv: list[str]) -> int:
     """Run the verb; gives the exit code."""
-    if verb == "describe":
-        return _describe(parse(Describe, argv, prog="bns gap describe"))
     if verb == "check":
         return _check(parse(Check, argv, prog="bns gap check"))
     return _diagnose(parse(Diagnose, argv, prog="bns gap diagnose"))
-
-
-def _describe(given: Describe) -> int:
-    from bns.gap.describe import describe, place
-
-    found = describe(
-        given.model,
-        given.log,
-        out=given.out,
-        kp=given.kp,
-        kd=given.kd,
-        torque=given.torque,
-    )
-    for title, lines in (("guessed", found.guessed), ("unsure", found.unsure)):
-        for line in lines:
-            print(f"{title}:  {line}")
-    path = found.write(place(given.model, given.out))
-    print(f"{path}: look at what is unsure, then")
-    print(f"  bns gap diagnose {given.log} --model {path}")
-    return 0
 
 
 def nominal(given: Check, threads: int = 1) -> Any:

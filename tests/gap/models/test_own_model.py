@@ -15,7 +15,6 @@ from bns.gap.candidates import mjcf
 from bns.gap.decomposition import descent, diagnosis, record, refit, simpler
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.reference import Corrected
-from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.shares import Part
 from bns.gap.diagnose import diagnose
 from bns.gap.models.mjcf import masses
@@ -429,64 +428,3 @@ def test_a_verdict_on_a_gap_names_what_was_not_tried(arm, kind):
     text = " ".join(warnings.warnings(found, (), untried))
     assert (f"Not tried: {', '.join(untried)}" in text) == (kind != "no gap")
     assert "Not tried" not in " ".join(warnings.warnings(found, ()))
-
-
-NAME = "body_mass[load]"
-BODY = Body(mass=0.9, gyration=0.11, spread=0.002)
-MODEL = """
-<mujoco><worldbody><body name="load">
-  <joint name="swing" axis="0 1 0"/>
-  <geom type="box" size="0.01 0.02 0.3" pos="0 0 -0.4" mass="0.9"/>
-</body></worldbody></mujoco>
-"""
-
-
-def compiled(*effects):
-    spec = mujoco.MjSpec.from_string(MODEL)
-    for effect in effects:
-        effect.edit(spec)
-    return spec.compile()
-
-
-def about_origin(model):
-    """Mass, first moment and inertia about the body's own frame, y axis."""
-    mass, centre = model.body_mass[1], model.body_ipos[1]
-    turn = np.empty(9)
-    mujoco.mju_quat2Mat(turn, model.body_iquat[1])
-    axes = turn.reshape(3, 3)
-    inertia = (axes @ np.diag(model.body_inertia[1]) @ axes.T)[1, 1]
-    return mass, mass * centre, inertia + mass * (centre[0] ** 2 + centre[2] ** 2)
-
-
-def test_a_mass_sits_where_its_moments_say():
-    values = {NAME: 0.4, f"{NAME}.mz": -0.4 * 0.1}
-    made = masses.changes(NAME, values, "load", BODY)
-    before, after = about_origin(compiled()), about_origin(compiled(*made))
-    assert after[0] - before[0] == pytest.approx(0.4)
-    assert (after[1] - before[1])[2] == pytest.approx(0.4 * -0.5)
-    assert after[2] - before[2] == pytest.approx(0.4 * 0.5**2)
-
-
-@pytest.mark.parametrize("mass", [0.0, 0.005])
-def test_moments_have_a_slope_where_there_is_no_mass(mass):
-    made = masses.changes(NAME, {NAME: mass, f"{NAME}.mx": 0.001}, "load", BODY)
-    before, after = about_origin(compiled()), about_origin(compiled(*made))
-    assert (after[1] - before[1])[0] == pytest.approx(0.001)
-
-
-@pytest.mark.parametrize("mass", [-0.8, -0.3, 0.5])
-def test_far_moments_leave_a_body_that_can_be(mass):
-    values = {NAME: mass, f"{NAME}.mx": 5.0}
-    model = compiled(masses.added(NAME, values, "load", Body.of(compiled(), "load")))
-    assert model.body_inertia[1].min() > 0
-
-
-def test_mass_and_moments_are_one_explanation_that_covers_a_shifted_centre():
-    item = Row(
-        name=NAME, effect="body_mass", parameter="added", unit="kg", nominal=0.0,
-        sd=0.1, low=-0.8, high=1.8, levels=(0.1,), fixed={"part": "load"},
-    )  # fmt: skip
-    rows = masses.rows(item, BODY, "motion")
-    assert [row.name for row in rows] == [NAME, *(f"{NAME}.m{a}" for a in "xyz")]
-    assert {row.term for row in rows} == {NAME}
-    assert rows[0].covers == tuple(f"body_centre.d{a}[load]" for a in "xyz")
