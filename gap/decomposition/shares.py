@@ -164,13 +164,7 @@ class HeldOut:
 
     def error(self, support: Iterable[str]) -> np.ndarray:
         """Squared error of each stretch, the rows fitted to the others, ``(B,)``."""
-        linear, plain, fitted = self.linear, self.plain, []
-        for name in support:
-            if name in self.fixed:
-                linear = linear.moved(self.fixed[name][0])
-                plain = plain.moved(self.fixed[name][1])
-            else:
-                fitted.append(name)
+        linear, plain, fitted = self._levelled(support)
         made = np.empty(len(plain.square))
         for number in range(len(made)):
             values = linear.solve(fitted, slack=False, without=number)
@@ -183,8 +177,20 @@ class HeldOut:
 
     def loss(self, support: Support) -> float:
         """Squared error of all stretches, and what nuisances pay for it."""
-        fitted = support - self.fixed.keys()
-        return float(self.error(support).sum()) + _paid(self.linear, fitted)
+        linear, _, fitted = self._levelled(support)
+        paid = _paid(linear, linear.solve(fitted, slack=False))
+        return float(self.error(support).sum()) + paid
+
+    def _levelled(self, support: Iterable[str]) -> tuple[Linear, Linear, list[str]]:
+        """Both models without what levels of a set change, and the rest of the set."""
+        linear, plain, fitted = self.linear, self.plain, []
+        for name in support:
+            if name in self.fixed:
+                linear = linear.moved(self.fixed[name][0])
+                plain = plain.moved(self.fixed[name][1])
+            else:
+                fitted.append(name)
+        return linear, plain, fitted
 
 
 def _pieces(block: np.ndarray, count: int) -> np.ndarray:
@@ -326,12 +332,13 @@ def cancelling(linear: Linear, support: Support) -> Support:
 def _height(linear: Linear, support: Support) -> float:
     """Weighted square of what a set leaves, and what nuisances pay for it: a delay is
     no trifle that only a shift beyond all reason makes up for."""
-    return linear.squares(support) + _paid(linear, support)
+    values = linear.solve(support, slack=False)
+    return linear.left(values) + _paid(linear, values)
 
 
-def _paid(linear: Linear, support: Support) -> float:
-    """What nuisances pay for what they depart by beside a set."""
-    paid = linear.solve(support, slack=False)[linear.always]
+def _paid(linear: Linear, values: np.ndarray) -> float:
+    """What nuisances pay at values of all rows, ``(K,)``."""
+    paid = values[linear.always]
     return linear.lam * float(paid @ paid)
 
 

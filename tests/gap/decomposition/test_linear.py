@@ -303,8 +303,9 @@ def test_what_only_a_nuisance_beyond_reason_makes_up_for_is_no_trifle():
     linear = problem.linear(planted(rng, problem, a=30.0, b=20.0), sd=3.0)
     assert linear.squares("a") - linear.squares("ab") < 0.005 * linear.squares("")
     assert shares.cancelling(linear, frozenset("ab")) == frozenset()
-    held = shares.HeldOut(
-        linear, linear, linear.weight, {}
-    )  # nor for what was not fitted
+    held = shares.HeldOut(linear, linear, linear.weight, {})  # nor where held out
     assert held.error("a").sum() < 1.05 * held.error("ab").sum()
     assert held.loss(frozenset("a")) > 1.2 * held.loss(frozenset("ab"))
+    change = 20.0 * problem.columns[1]  # of a level: what it does nothing pays for
+    fixed = shares.HeldOut(linear, linear, linear.weight, {"b": (change, change)})
+    assert fixed.loss(frozenset("ab")) < 1.01 * fixed.error("ab").sum()
