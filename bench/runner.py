@@ -37,6 +37,11 @@ class Bench:
     doc: str
     bar: str
 
+    @property
+    def room(self) -> str:
+        """Folder of this package that it lies in, where its row is kept, too."""
+        return self.module.split(".")[1] if self.module.count(".") > 1 else "other"
+
     def run(self, *, quick: bool) -> Result:
         """Measure."""
         function = getattr(import_module(self.module), self.name.replace("-", "_"))
@@ -99,8 +104,13 @@ def keeps(row: Mapping[str, object]) -> bool:
     return bool(row["quick"]) or "-dirty" not in str(row["commit"])
 
 
-def store(row: Mapping[str, object], directory: Path = RESULTS) -> Path:
+def store(row: Mapping[str, object], room: str, directory: Path = RESULTS) -> Path:
     """Write a row; a quick one goes to `quick/` and never replaces a full one.
+
+    Args:
+        row: as `measure` returns it.
+        room: folder that it belongs to, `Bench.room`.
+        directory: of all rows.
 
     Raises:
         BnsError: a full row of code that no commit has.
@@ -110,7 +120,7 @@ def store(row: Mapping[str, object], directory: Path = RESULTS) -> Path:
             f"{row['name']} was measured with files that differ from the commit: it "
             "is not kept. Commit them and measure again, or give --quick."
         )
-    folder = directory / "quick" if row["quick"] else directory
+    folder = (directory / "quick" if row["quick"] else directory) / room
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{row['name']}.json"
     write(path, json.dumps(row, indent=1, allow_nan=False) + "\n")
@@ -120,8 +130,9 @@ def store(row: Mapping[str, object], directory: Path = RESULTS) -> Path:
 def stored(*, quick: bool = False, directory: Path = RESULTS) -> dict[str, dict]:
     """Rows kept so far, by name."""
     folder = directory / "quick" if quick else directory
-    rows = (json.loads(path.read_text()) for path in sorted(folder.glob("*.json")))
-    return {row["name"]: row for row in rows}
+    found = [json.loads(path.read_text()) for path in folder.glob("*/*.json")]
+    rows = [row for row in found if row["quick"] == quick]
+    return {row["name"]: row for row in sorted(rows, key=lambda row: row["name"])}
 
 
 def write(path: Path, text: str) -> None:
@@ -164,7 +175,7 @@ def _read(path: Path) -> Iterator[Bench]:
 HEAD = """# Results of the benches
 
 Each row is one bench: `python -m bench NAME` measures it again, `python -m bench list`
-says what each measures. The figures behind a row are in `NAME.json` beside this file.
+says what each measures. The figures behind a row are in `ROOM/NAME.json` beside this file.
 """
 COLUMNS = ("bench", "figure", "bar", "holds", "n", "seconds", "commit")
 HOLDS = {True: "yes", False: "**no**", None: "-"}

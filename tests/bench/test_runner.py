@@ -74,8 +74,8 @@ def test_a_row_holds_everything(small, capsys):
 
 
 def test_a_quick_row_never_replaces_a_full_one(small, tmp_path):
-    store({**measure(small, quick=False), "commit": "abc"}, tmp_path)
-    store({**measure(small, quick=True), "figure": 9.0}, tmp_path)
+    store({**measure(small, quick=False), "commit": "abc"}, "speed", tmp_path)
+    store({**measure(small, quick=True), "figure": 9.0}, "speed", tmp_path)
     assert stored(directory=tmp_path)["small"]["figure"] == 1.05
     assert stored(quick=True, directory=tmp_path)["small"]["figure"] == 9.0
 
@@ -83,8 +83,8 @@ def test_a_quick_row_never_replaces_a_full_one(small, tmp_path):
 def test_a_full_row_of_code_that_no_commit_has_is_not_kept(small, tmp_path):
     row = measure(small, quick=False)
     with pytest.raises(BnsError, match="not kept"):
-        store({**row, "commit": "abc-dirty"}, tmp_path)
-    store({**row, "commit": "abc-dirty", "quick": True}, tmp_path)
+        store({**row, "commit": "abc-dirty"}, "speed", tmp_path)
+    store({**row, "commit": "abc-dirty", "quick": True}, "speed", tmp_path)
     assert not stored(directory=tmp_path)
 
 
