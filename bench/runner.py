@@ -175,7 +175,8 @@ def _read(path: Path) -> Iterator[Bench]:
 HEAD = """# Results of the benches
 
 Each row is one bench: `python -m bench NAME` measures it again, `python -m bench list`
-says what each measures. The figures behind a row are in `ROOM/NAME.json` beside this file.
+says what each measures. The figures behind a row are in `ROOM/NAME.json` beside this
+file.
 """
 COLUMNS = ("bench", "figure", "bar", "holds", "n", "seconds", "commit")
 HOLDS = {True: "yes", False: "**no**", None: "-"}

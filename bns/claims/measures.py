@@ -46,24 +46,22 @@ def measure(name: str) -> Measure:
 
 
 def of(record: RunRecord, name: str) -> np.ndarray:
-    """A measure of every run that has it.
+    """A measure of every run.
 
     Args:
         record: R runs.
         name: of the measure.
 
     Returns:
-        ``(n,)``, n <= R, in the measure's unit; runs without a value (NaN) are left
-        out.
+        ``(R,)`` in the measure's unit; NaN where a run has no value.
 
     Raises:
         BnsError: the runs lack a column that it needs.
     """
     try:
-        values = measure(name).values(record)
+        return measure(name).values(record)
     except KeyError as error:
         raise BnsError(f"These runs have no {error}, which {name!r} needs.") from error
-    return values[~np.isnan(values)]
 
 
 def _onset(record: RunRecord) -> int:
@@ -121,7 +119,7 @@ def _dip(every: int) -> Values:
 
 
 def _peak(record: RunRecord) -> np.ndarray:
-    """Cost around the worst trial after the damage, as the other runs place it.
+    """Cost around the worst trial after the damage, as others of the batch place it.
 
     Smoothed over five trials. To place it by the run's own cost would pick its noise,
     and find an improvement in any run that does not change.

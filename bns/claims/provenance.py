@@ -8,19 +8,21 @@ not match says where. Of the runs that a store holds of the sides of claims, tho
 are of today's settings and code are read.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from bns.campaign.identity import NO_PART, digest
-from bns.campaign.part import Block
-from bns.campaign.results import joined
 from bns.campaign.store import CampaignStore
+from bns.claims import measures
 from bns.experiment.config import RunConfig
 from bns.experiment.loading import flat, to_mapping
-from bns.experiment.record import RunRecord
 from bns.experiment.versions import REVISION
 
 LENGTH = 16  # hexadecimal digits of a digest
@@ -97,12 +99,23 @@ def current(made: Made, sides: tuple[str, ...]) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """A block of runs of one configuration, and what its batch says of itself."""
+    """Consecutive runs of one configuration, and where they come from.
 
-    block: Block
+    Attributes:
+        start: number of the first run.
+        count: how many runs.
+        facts: seed, commit and versions, as the batch itself says.
+        date: day on which it ended, ISO.
+        seconds: that it took.
+        values: name of a measure -> its value in every run, ``(count,)``; NaN = none.
+    """
+
+    start: int
+    count: int
     facts: Mapping[str, Any]
     date: str
     seconds: float
+    values: Callable[[str], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,14 +133,18 @@ class Held:
     @property
     def runs(self) -> int:
         """How many there are."""
-        return sum(batch.block.count for batch in self.batches)
+        return sum(batch.count for batch in self.batches)
 
-    def record(self) -> RunRecord:
-        """All of them as one record."""
-        return joined([batch.block for batch in self.batches])
+    def values(self, measure: str) -> np.ndarray:
+        """A measure of every run, ``(R,)``; NaN where a run has no value."""
+        return np.concatenate([batch.values(measure) for batch in self.batches])
 
 
-def read(directory: Path, wanted: Mapping[str, tuple[str, Sequence[str]]]) -> dict:
+def read(
+    directory: Path,
+    wanted: Mapping[str, tuple[str, Sequence[str]]],
+    kept: Mapping[str, Sequence[Batch]] = MappingProxyType({}),
+) -> dict[str, Held]:
     """The runs in a store of configurations as they are today.
 
     Args:
@@ -135,6 +152,7 @@ def read(directory: Path, wanted: Mapping[str, tuple[str, Sequence[str]]]) -> di
         wanted: identity -> digest of its settings today, and the sections that are no
             part of it. Runs of other settings, or of code of another revision, are
             not there.
+        kept: digest of settings -> batches that lie elsewhere and count as well.
 
     Returns:
         identity -> `Held`.
@@ -142,9 +160,22 @@ def read(directory: Path, wanted: Mapping[str, tuple[str, Sequence[str]]]) -> di
     Raises:
         FormatError: the store is damaged or of a newer version.
     """
-    if not (directory / "campaign.json").exists():
-        return {}
-    store = CampaignStore.open(directory)
+    found: dict[str, list[Batch]] = {}
+    if (directory / "campaign.json").exists():
+        found = _stored(CampaignStore.open(directory), wanted)
+    for identity, (settings, _) in wanted.items():
+        if settings in kept:
+            found.setdefault(identity, []).extend(kept[settings])
+    return {
+        identity: Held(wanted[identity][0], first)
+        for identity, batches in found.items()
+        if (first := _without_gap(batches))
+    }
+
+
+def _stored(
+    store: CampaignStore, wanted: Mapping[str, tuple[str, Sequence[str]]]
+) -> dict[str, list[Batch]]:
     log = {entry["batch"]: entry for entry in store.log() if "batch" in entry}
     found: dict[str, list[Batch]] = {}
     for part in store.read():
@@ -157,20 +188,17 @@ def read(directory: Path, wanted: Mapping[str, tuple[str, Sequence[str]]]) -> di
                 continue
             digest, ignored = wanted[block.identity]
             if of(resolved(block.config, ignored)) == digest:
-                batch = Batch(block, part.facts, _date(entry), share)
+                values = partial(measures.of, block.record())
+                batch = Batch(
+                    block.start, block.count, part.facts, _date(entry), share, values
+                )
                 found.setdefault(block.identity, []).append(batch)
-    return {
-        identity: Held(wanted[identity][0], first)
-        for identity, batches in found.items()
-        if (first := _without_gap(batches))
-    }
+    return found
 
 
 def made(sides: Sequence[Held], runs: int) -> Made:
     """From what the first `runs` runs of each side were made."""
-    used = [
-        batch for side in sides for batch in side.batches if batch.block.start < runs
-    ]
+    used = [batch for side in sides for batch in side.batches if batch.start < runs]
     each = {id(batch): batch for batch in used}.values()
     dates = sorted(batch.date for batch in each if batch.date)
     versions: dict[str, str] = {}
@@ -189,8 +217,8 @@ def made(sides: Sequence[Held], runs: int) -> Made:
 
 def _without_gap(batches: list[Batch]) -> tuple[Batch, ...]:
     first: list[Batch] = []
-    for batch in sorted(batches, key=lambda item: item.block.start):
-        if batch.block.start == sum(each.block.count for each in first):
+    for batch in sorted(batches, key=lambda item: item.start):
+        if batch.start == sum(each.count for each in first):
             first.append(batch)
     return tuple(first)
 

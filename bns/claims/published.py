@@ -2,19 +2,24 @@
 
 A finding belongs to the settings and the code that its runs had (`provenance`). One
 that is not of today's is *stale*: it is shown as such and counts as not run.
+
+Beside the findings stands what was measured of every run behind them, batch by batch. A
+comparison that asks for more runs goes on from there, on any machine.
 """
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from bns.claims import provenance
 from bns.claims.claim import Cell, Claim, settings_of
-from bns.claims.provenance import Made
+from bns.claims.provenance import Batch, Made
 from bns.claims.verdict import Finding
 from bns.errors import BnsError, FormatError
 from bns.experiment.versions import REVISION
@@ -22,7 +27,9 @@ from bns.stats import Interval
 from bns.storage.files import write_bytes
 
 FILE = "published.json"
-SCHEMA = 2
+SCHEMA = 3
+NEVER = "never"
+FACTS = ("revision", "seed", "commit", "versions")
 NO_SETTINGS = "made before findings kept the settings of their runs"
 
 Row = Mapping[str, Any]
@@ -54,10 +61,18 @@ class Library:
     Attributes:
         rows: a finding each, by world, claim and text of the comparison.
         settings: digest of a side -> its settings.
+        runs: digest of a side -> batches of it, as `line` gives them, run by the code
+            of today's revision.
     """
 
     rows: Mapping[tuple[str, str, str], Row]
     settings: Mapping[str, provenance.Settings]
+    runs: Mapping[str, Sequence[Row]] = field(default_factory=dict)
+
+    def batches(self, digest: str, measures: Collection[str]) -> list[Batch]:
+        """The batches of a side of which all of these measures are known."""
+        lines = self.runs.get(digest, ())
+        return [_batch(each) for each in lines if set(measures) <= set(each["values"])]
 
 
 @cache
@@ -88,9 +103,54 @@ def parse(text: str, name: str) -> Library:
             digest: _whole(bases[base], differing)
             for digest, (base, differing) in content["sides"].items()
         }
+        runs: dict[str, list[Row]] = {}
+        for each in content.get("runs", ()):
+            if _batch(each).facts["revision"] == REVISION:
+                runs.setdefault(each["side"], []).append(each)
     except (KeyError, TypeError, ValueError) as error:
         raise FormatError(f"{name} holds no findings: {error}.") from error
-    return Library(rows, known)
+    return Library(rows, known, runs)
+
+
+def _batch(line: Row) -> Batch:
+    """A batch from its line: null is no value, "never" is infinite."""
+    said = {None: np.nan, NEVER: np.inf}
+    values = {
+        name: np.array([said.get(value, value) for value in found], float)
+        for name, found in line["values"].items()
+    }
+    facts = {key: line[key] for key in FACTS}
+    start, count = int(line["start"]), int(line["count"])
+    if any(len(found) != count for found in values.values()):
+        raise ValueError(f"a batch of {line['side']} has not {count} values")
+    return Batch(start, count, facts, line["date"], line["seconds"], values.__getitem__)
+
+
+def line(digest: str, batch: Batch, measures: Sequence[str]) -> dict[str, Any]:
+    """A batch of runs as it is published.
+
+    Args:
+        digest: of the side's settings.
+        batch: its runs.
+        measures: names of what is published of each.
+    """
+    return {
+        "side": digest,
+        "start": batch.start,
+        "count": batch.count,
+        **{key: batch.facts[key] for key in FACTS},
+        "date": batch.date,
+        "seconds": round(batch.seconds, 1),
+        "values": {
+            name: [_told(value) for value in batch.values(name)] for name in measures
+        },
+    }
+
+
+def _told(value: float) -> float | str | None:
+    if np.isnan(value):
+        return None
+    return NEVER if value == np.inf else float(value)
 
 
 def finding(
@@ -172,13 +232,18 @@ def row(claim: Claim, found: Finding, *, world: str) -> dict[str, Any]:
     }
 
 
-def text(rows: Sequence[Row], settings: Mapping[str, provenance.Settings]) -> str:
+def text(
+    rows: Sequence[Row],
+    settings: Mapping[str, provenance.Settings],
+    runs: Sequence[Row] = (),
+) -> str:
     """The file of findings, a line each.
 
     Args:
         rows: the findings.
         settings: digest of a side -> its settings, of all sides in `rows` of which
             they are known.
+        runs: batches, as `line` gives them.
     """
     used = sorted({d for r in rows if "revision" in r for d in r["sides"]})
     bases: dict[str, Mapping[str, Any]] = {}
@@ -194,12 +259,16 @@ def text(rows: Sequence[Row], settings: Mapping[str, provenance.Settings]) -> st
         _block("bases", (f'"{k}": {json.dumps(v)}' for k, v in bases.items()), "{}"),
         _block("sides", lines, "{}"),
         _block("findings", (json.dumps(each) for each in rows), "[]"),
+        _block("runs", (json.dumps(each) for each in runs), "[]"),
     ]
     return "{\n" + ",\n".join(parts) + "\n}\n"
 
 
 def write(
-    path: Path, rows: Sequence[Row], settings: Mapping[str, provenance.Settings]
+    path: Path,
+    rows: Sequence[Row],
+    settings: Mapping[str, provenance.Settings],
+    runs: Sequence[Row] = (),
 ) -> None:
     """Publish findings as `text` writes them.
 
@@ -207,11 +276,12 @@ def write(
         path: of the file, replaced whole.
         rows: the findings.
         settings: digest of a side -> its settings, see `text`.
+        runs: batches, as `line` gives them.
 
     Raises:
         StorageError: no space, or no permission.
     """
-    write_bytes(path, text(rows, settings).encode())
+    write_bytes(path, text(rows, settings, runs).encode())
 
 
 def _block(name: str, lines: Iterable[str], brackets: str) -> str:

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 from bns.campaign.file import Member
@@ -117,7 +118,7 @@ def judged(
     }
     have = {}
     if (directory / "campaign.json").exists():
-        have = provenance.read(directory, identities(members.values()))
+        have = held(members.values(), directory, own=own or quick, among=among)
     rows: dict[str, Judged] = {}
     judging = each if have else uncounted  # without runs it takes no time
     for letter in sorted(letters):
@@ -153,6 +154,51 @@ def identities(members: Iterable[Member]) -> dict[str, tuple[str, Sequence[str]]
         settings = provenance.resolved(member.config, ignored)
         found[member.identity] = (provenance.of(settings), ignored)
     return found
+
+
+def held(
+    members: Iterable[Member],
+    directory: Path,
+    *,
+    own: bool = False,
+    among: Library | None = None,
+) -> dict[str, Held]:
+    """The runs there are of sides: in a store, and those that are published.
+
+    Args:
+        members: as `bns.claims.claim.member_of` gives them.
+        directory: the store; one that is not there holds none.
+        own: those in the store alone.
+        among: what is published; by default that of the package.
+
+    Returns:
+        identity -> `Held`.
+
+    Raises:
+        FormatError: the store is damaged or of a newer version.
+    """
+    wanted = identities(members)
+    if own:
+        return provenance.read(directory, wanted)
+    among = among or published.library()
+    kept = {}
+    for name, (digest, _) in wanted.items():
+        kept[digest] = among.batches(digest, asked()[name])
+    return provenance.read(directory, wanted, kept)
+
+
+@cache
+def asked() -> Mapping[str, tuple[str, ...]]:
+    """Identity of a side -> what any comparison measures of its runs, sorted."""
+    found: dict[str, set[str]] = {}
+    for claim in claims().values():
+        for cell in claim.cells:
+            measures = cell.measure, cell.measure_b or cell.measure
+            for world in content(claim.investigation)["worlds"]:
+                sides = _members(claim, cell, world, quick=False)
+                for member, name in zip(sides, measures, strict=False):
+                    found.setdefault(member.identity, set()).add(name)
+    return {identity: tuple(sorted(names)) for identity, names in found.items()}
 
 
 def _members(claim: Claim, cell: Cell, world: str, quick: bool) -> tuple[Member, ...]:
@@ -218,11 +264,10 @@ class _Judge:
         have = [self.have[m.identity] for m in members if m.identity in self.have]
         if not have or len(have) < len(cell.sides):
             return None
-        records = [each.record() for each in have]
         found = verdict.judge(
             cell,
-            records[0],
-            records[1] if cell.b else None,
+            have[0].values,
+            have[1].values if cell.b else None,
             looks=looks(cell, self.runs),
         )
         if found is None:
@@ -251,6 +296,30 @@ def publishable(worlds: Mapping[str, Sequence[Judged]]) -> list[published.Row]:
             rows += [published.row(row.claim, f, world=world) for f in row.findings]
             rows += [before[world, row.claim.id, s.text] for s in row.stale]
     return rows
+
+
+def runs(stores: Mapping[str, Path]) -> list[published.Row]:
+    """The runs of all sides as they are published, those published before included.
+
+    Args:
+        stores: name of the world -> its store.
+
+    Raises:
+        FormatError: a store is damaged or of a newer version.
+    """
+    found: dict[tuple[str, int], published.Row] = {}
+    for world, directory in stores.items():
+        members = {
+            member.identity: member
+            for claim in claims().values()
+            for cell in claim.cells
+            for member in _members(claim, cell, world, quick=False)
+        }
+        for name, each in held(members.values(), directory).items():
+            for batch in each.batches:
+                line = published.line(each.digest, batch, asked()[name])
+                found[each.digest, batch.start] = line
+    return [found[key] for key in sorted(found)]
 
 
 def settings(worlds: Mapping[str, Sequence[Judged]]) -> dict[str, Mapping]:

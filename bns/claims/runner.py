@@ -68,7 +68,7 @@ def run(
         runs: runs a side at most, instead of those of the design; 0 = the design's.
         root: where stores are.
         own: by runs of this store alone; else what is published of today's settings
-            need not be run.
+            need not be run, and runs that are published are gone on from.
         mix: allow results of several package versions in one store.
         retry: try batches again that failed before.
         stop: asked after every batch; True ends the session there.
@@ -90,7 +90,7 @@ def run(
             rows = report.judged(
                 claims, out, world=world, quick=quick, own=own, runs=last
             )
-            todo = _round(rows, store, world, quick, last, session)
+            todo = _round(rows, store, world, session, quick=quick, runs=last, own=own)
             if not todo:
                 break
             if progress and not quick:
@@ -113,14 +113,16 @@ def _round(
     rows: Sequence[Judged],
     store: CampaignStore,
     world: str,
+    session: Session,
+    *,
     quick: bool,
     runs: int,
-    session: Session,
+    own: bool,
 ) -> list[Job]:
     """The batches to run next; none that failed."""
     wanted = schedule.due(rows, world=world, quick=quick, runs=runs)
     members = {m.identity: m for each in wanted for m in each.members}
-    have = provenance.read(store.directory, report.identities(members.values()))
+    have = report.held(members.values(), store.directory, own=own or quick)
     done = {name: each.runs for name, each in have.items()}
     jobs = schedule.jobs(wanted, done, store.directory)
     known = {*store.failures(), *session.failed}

@@ -36,7 +36,7 @@ is tested for equivalence at 100. Variants stop at 30. What has not stopped, nor
 its last look, is provisional. Figures are those of the look at which it stopped.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,7 +46,6 @@ from bns import stats
 from bns.claims import measures
 from bns.claims.claim import Cell
 from bns.claims.provenance import Made
-from bns.experiment.record import RunRecord
 from bns.stats import Interval
 from bns.stats.designs import Design, equivalence, power, up_to
 
@@ -61,6 +60,10 @@ ALIKE_FROM = 30  # runs a side: sooner, nothing can be shown to be equivalent
 VARIANT_RUNS = 30
 ORDER = ("reversed", "null", "direction only", "holds")
 """verdicts, least favourable first"""
+
+
+Values = Callable[[str], np.ndarray]
+"""name of a measure -> its value in every run of a side, ``(R,)``; NaN = none"""
 
 
 @dataclass(frozen=True)
@@ -114,31 +117,32 @@ def design(cell: Cell) -> Design:
 
 
 def judge(
-    cell: Cell, a: RunRecord, b: RunRecord | None, *, looks: Design | None = None
+    cell: Cell, a: Values, b: Values | None, *, looks: Design | None = None
 ) -> Finding | None:
     """The finding of a cell; None where runs lack what is measured.
 
     Args:
         cell: what is compared.
-        a: runs of its first side.
-        b: runs of its second, None for a number.
+        a: measures of the runs of its first side; runs without a value are left out.
+        b: those of its second, None for a number.
         looks: at how many runs; by default those of `design`.
-
-    Raises:
-        BnsError: a column is missing.
     """
     looks = looks or design(cell)
-    mine = measures.of(a, cell.measure)
+    mine = _known(a(cell.measure))
     if len(mine) == 0:
         return None
     if b is None:
         return _against_number(cell, mine, looks)
-    other = measures.of(b, cell.measure_b or cell.measure)
+    other = _known(b(cell.measure_b or cell.measure))
     if len(other) == 0:
         return None
     if measures.measure(cell.measure).low:
         return examine(cell, -mine, -other, looks)
     return examine(cell, mine, other, looks)
+
+
+def _known(values: np.ndarray) -> np.ndarray:
+    return values[~np.isnan(values)]
 
 
 def examine(cell: Cell, mine: np.ndarray, other: np.ndarray, looks: Design) -> Finding:

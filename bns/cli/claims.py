@@ -248,13 +248,11 @@ class Keeper:
         """Write them now; of quick runs none."""
         if self.given.quick:
             return
-        from bns.claims import published, report
         from bns.storage import files
 
         path = Path(self.given.findings or f"{self.given.root}/findings.json")
         files.make_directory(path.parent)
-        worlds = _both(self.given.root)
-        published.write(path, report.publishable(worlds), report.settings(worlds))
+        _publish(path, self.given.root, _both(self.given.root))
         self.wrote = time.monotonic()
 
 
@@ -273,6 +271,21 @@ def _both(root: str, *, own: bool = False, each: Each = uncounted) -> dict:
         )
         for world in WORLDS
     }
+
+
+def _publish(path: Path, root: str, worlds: dict) -> None:
+    """Write findings, and what was measured of the runs behind them."""
+    from bns.claims import published, report, runner
+
+    stores = {
+        world: runner.directory(world, quick=False, root=Path(root)) for world in worlds
+    }
+    published.write(
+        path,
+        report.publishable(worlds),
+        report.settings(worlds),
+        report.runs(stores),
+    )
 
 
 def _take(given: Take) -> int:
@@ -330,7 +343,7 @@ def _table(given: Table) -> int:
 
 def _written(given: Table, worlds: dict) -> None:
     """The page, the findings, or both as files."""
-    from bns.claims import page, published, report
+    from bns.claims import page
     from bns.storage import files
     from bns.viz import claims
 
@@ -340,9 +353,7 @@ def _written(given: Table, worlds: dict) -> None:
         claims.write(worlds, picture)
         print(f"{given.write}\n{picture}")
     if given.publish:
-        published.write(
-            Path(given.publish), report.publishable(worlds), report.settings(worlds)
-        )
+        _publish(Path(given.publish), given.root, worlds)
         print(given.publish)
 
 

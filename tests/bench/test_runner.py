@@ -140,7 +140,9 @@ def test_the_exit_code_tells_whether_the_bar_holds(
     result = Result(figure=1.0, unit="x", holds=holds, n=1)
     monkeypatch.setattr(Bench, "run", lambda self, *, quick: result)
     monkeypatch.setattr(command, "find", lambda name: small)
-    monkeypatch.setattr(command, "store", lambda row: runner.store(row, tmp_path))
+    monkeypatch.setattr(
+        command, "store", lambda row, room: runner.store(row, room, tmp_path)
+    )
     monkeypatch.setattr(runner, "commit", lambda: "abc")
     assert command.main(["small"]) == code
     assert json.loads(capsys.readouterr().out)["holds"] is holds

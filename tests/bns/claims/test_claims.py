@@ -3,6 +3,7 @@
 import csv
 from collections import Counter
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from bns.campaign.engines.registry import InlineEngine
 from bns.campaign.file import Member
 from bns.campaign.identity import identity
 from bns.campaign.part import Block
-from bns.claims import measures, report, runner, schedule, verdict
+from bns.claims import measures, published, report, runner, schedule, verdict
 from bns.claims.claim import Cell, claims, content, find, lacking, member_of
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig, WorldConfig
@@ -172,6 +173,11 @@ def test_a_variant_counts_for_nothing():
     assert verdict.of_claim("S", [first, second]) == "holds"
 
 
+def values(runs):
+    """The measures of runs, as `verdict.judge` takes them."""
+    return partial(measures.of, runs)
+
+
 def record(cost, *, onset=2, solved=None):
     """Runs with the given costs, ``(R, T)``."""
     cost = np.array(cost, dtype=float)
@@ -189,8 +195,9 @@ def test_a_claim_has_the_least_favourable_verdict_of_its_kind():
     worse, better = np.full((30, 4), 9.0), np.full((30, 4), 1.0)
     worse += np.arange(30)[:, None] * 1e-3
     better += np.arange(30)[:, None] * 1e-3
-    won = verdict.judge(Cell(a="x", b="y"), record(better), record(worse))
-    lost = verdict.judge(Cell(a="x", b="y", says="="), record(better), record(worse))
+    better, worse = values(record(better)), values(record(worse))
+    won = verdict.judge(Cell(a="x", b="y"), better, worse)
+    lost = verdict.judge(Cell(a="x", b="y", says="="), better, worse)
     won, lost = verdict.adjusted([won, lost])
     assert (won.verdict, lost.verdict) == ("holds", "reversed")
     assert won.share.value == 1.0 and won.p < 0.01 and won.runs == (10, 10)
@@ -201,7 +208,7 @@ def test_a_claim_has_the_least_favourable_verdict_of_its_kind():
 
 
 def test_more_of_what_is_neither_good_nor_bad():
-    low, high = record(np.full((5, 4), 1.0)), record(np.full((5, 4), 3.0))
+    low, high = (values(record(np.full((5, 4), cost))) for cost in (1.0, 3.0))
     more = verdict.judge(Cell(a="x", b="y", measure="diversity41-end"), high, low)
     assert more.share.value == 1.0
     less = verdict.judge(Cell(a="x", b="y", measure="end"), high, low)
@@ -211,7 +218,7 @@ def test_more_of_what_is_neither_good_nor_bad():
 def test_a_side_against_a_number():
     solved = np.zeros((30, 6))
     solved[:24, 3] = 1  # 24 of 30 recover within 2 trials from the damage in trial 2
-    runs = record(np.ones((30, 6)), solved=solved)
+    runs = values(record(np.ones((30, 6)), solved=solved))
     found = verdict.judge(Cell(a="x", measure="recover", at_most=2), runs, None)
     assert found.share.value == 1.0 and found.verdict == "holds"
     assert found.runs == (10,) and found.p_look == pytest.approx(2 / 2**10)
@@ -234,7 +241,9 @@ def test_measures_by_hand():
     assert measures.of(runs, "observation").tolist() == [45, 40]
     assert measures.of(runs, "snn-onset").tolist() == [0.3, 0.1]
     whole = record(cost, onset=-1)
-    assert len(measures.of(whole, "after")) == 0
+    assert np.isnan(measures.of(whole, "after")).all()
+    after, whole = Cell(a="x", b="y", measure="after"), values(whole)
+    assert verdict.judge(after, whole, whole) is None
     with pytest.raises(BnsError, match="diversity_73"):
         measures.of(runs, "diversity73-end")
 
@@ -259,7 +268,7 @@ def test_nothing_but_noise_is_no_improvement():
     rng = np.random.default_rng(3)
     noise = record(rng.normal(size=(100, 100)), onset=30)
     cell = Cell(a="x", b="x", measure="end", measure_b="peak")
-    found = verdict.judge(cell, noise, noise)
+    found = verdict.judge(cell, values(noise), values(noise))
     assert found.share.low < 0.5 < found.share.high
     own = np.array([c[30:].max() for c in noise["fitness_best"]])
     assert stats.a12_value(own, measures.of(noise, "end")) > 0.99  # a run's own worst
@@ -332,8 +341,9 @@ def test_claims_run_once_and_are_judged(tiny, tmp_path):
     ]
 
 
-def test_finished_runs_are_taken(tmp_path, monkeypatch):
-    config = RunConfig(
+def small_config():
+    """Two runs of three trials, damaged in the second."""
+    return RunConfig(
         trials=3,
         replicates=2,
         record_replicates=0,
@@ -343,6 +353,10 @@ def test_finished_runs_are_taken(tmp_path, monkeypatch):
         snn=replace(RunConfig().snn, epochs=2),
         world=WorldConfig(damage=("wheel_gain:wheel=left,factor=0.8@1",)),
     )
+
+
+def test_finished_runs_are_taken(tmp_path, monkeypatch):
+    config = small_config()
     made = train(config, tmp_path / "runs" / "one")
     for user in ("claim", "report", "runner", "schedule"):
         monkeypatch.setattr(
@@ -359,6 +373,41 @@ def test_finished_runs_are_taken(tmp_path, monkeypatch):
     assert np.isfinite(stats.observation_after(made)).all()
     with pytest.raises(BnsError, match="no folder"):
         runner.take([find("A8")], [tmp_path / "none"], **place)
+
+
+def test_published_runs_are_gone_on_from_elsewhere(tmp_path, monkeypatch):
+    """The same finding as of a store that was never left, and nothing run twice."""
+
+    def whole(investigation, side, world):
+        gone = {"left-20": 0.8, "left-20 population-reset": 0.7}.get(side, 0.6)
+        world = WorldConfig(damage=(f"wheel_gain:wheel=left,factor={gone}@1",))
+        return replace(small_config(), world=world), {}
+
+    monkeypatch.setattr("bns.claims.claim._whole", whole)
+    report.asked.cache_clear()
+
+    def run(root, runs):
+        root, asked = tmp_path / root, {"runs": runs, "own": False}
+        done = runner.run(
+            [find("A8")], InlineEngine(), root=root, progress=False, **asked
+        ).done
+        place = runner.directory("mujoco", quick=False, root=root)
+        (row,) = report.judged([find("A8")], place, world="mujoco", **asked)
+        return done, row.findings[0], place
+
+    empty = published.parse(published.text([], {}), "none")
+    monkeypatch.setattr(published, "library", lambda: empty)
+    _, _, place = run("here", 2)
+    written = published.text([], {}, report.runs({"mujoco": place}))
+    more, stayed, _ = run("here", 4)
+    monkeypatch.setattr(published, "library", lambda: published.parse(written, "x"))
+    there, moved, place = run("there", 4)
+    assert there == more == 3  # a trunk, and what each side has after it
+    assert moved == replace(stayed, made=moved.made) and moved.runs == (4, 4)
+    assert moved.made.seeds == stayed.made.seeds
+    again = [(line["start"], line["count"]) for line in report.runs({"mujoco": place})]
+    assert again == [(0, 2), (2, 2)] * 2
+    report.asked.cache_clear()
 
 
 def test_a_side_that_needs_what_does_not_exist_says_so():

@@ -9,7 +9,7 @@ import pytest
 from bns import presets
 from bns.claims import page, provenance, published, report, verdict
 from bns.claims.claim import _whole, claims, content, digest_of, find, settings_of
-from bns.claims.provenance import Made
+from bns.claims.provenance import Batch, Made
 from bns.claims.published import Stale
 from bns.errors import FormatError
 from bns.experiment.config import RunConfig
@@ -132,6 +132,23 @@ def test_a_digest_is_of_names_and_values_and_of_nothing_else():
     for letter in "ABCD":
         for piece in content(letter)["pieces"].values():
             assert not set(piece) & set(content(letter)["ignored"])
+
+
+def test_runs_come_back_with_what_is_missing_and_what_is_never():
+    facts = {"revision": REVISION, "seed": 5, "commit": "abc", "versions": {}}
+    found = {"recover": np.array([3.0, np.inf]), "end": np.array([np.nan, 0.1])}
+    batch = Batch(0, 2, facts, "2026-11-25", 1.5, found.__getitem__)
+    line = published.line("d1", batch, ["end", "recover"])
+    assert line["values"] == {"end": [None, 0.1], "recover": [3.0, "never"]}
+    kept = published.parse(published.text([], {}, [line]), "x")
+    (back,) = kept.batches("d1", ["recover"])
+    assert np.array_equal(back.values("recover"), found["recover"])
+    assert np.array_equal(back.values("end"), found["end"], equal_nan=True)
+    assert kept.batches("d1", ["solve"]) == []  # asked since: not known of these runs
+    old = published.text([], {}, [line | {"revision": REVISION - 1}])
+    assert published.parse(old, "x").batches("d1", ["end"]) == []
+    with pytest.raises(FormatError, match="3 values"):
+        published.parse(published.text([], {}, [line | {"count": 3}]), "x")
 
 
 def test_a_newer_file_and_a_damaged_one_are_refused():
