@@ -287,15 +287,12 @@ def _judge(jax: Any, own: Own) -> Callable[..., Any]:
     return judge
 
 
-def _generation(jax: Any, own: Own) -> Callable[..., Any]:
-    """One generation of one run: a child at a time, mapped over children."""
-    np_, problem = jax.numpy, own.problem
-    evolution, encoding = own.config.evolution, problem.encoding
+def _breeding(jax: Any, own: Own) -> tuple[Callable[..., Any], ...]:
+    """A whole number below a limit, the winner of a tournament, a child of two lists."""
+    np_, encoding = jax.numpy, own.problem.encoding
     low, high = (np_.asarray(each.numpy()) for each in (encoding.low, encoding.high))
-    shortest, longest = encoding.initial
     rate = float(own.rates.rate[0])
     magnitude = np_.asarray(own.rates.magnitude[0].numpy())
-    judge = _judge(jax, own)
 
     def below(coin: Any, limit: Any) -> Any:
         """A uniform number as a whole one below a limit."""
@@ -320,6 +317,17 @@ def _generation(jax: Any, own: Own) -> Callable[..., Any]:
         changed = np_.clip(genes + (2 * share - 1) * magnitude, low, high)
         genes = np_.where(coins < rate, changed, genes)
         return np_.where((place < length)[:, None], genes, 0.0), length
+
+    return below, winner, child
+
+
+def _generation(jax: Any, own: Own) -> Callable[..., Any]:
+    """One generation of one run: a child at a time, mapped over children."""
+    np_, encoding = jax.numpy, own.problem.encoding
+    evolution, judge = own.config.evolution, _judge(jax, own)
+    low, high = (np_.asarray(each.numpy()) for each in (encoding.low, encoding.high))
+    shortest, longest = encoding.initial
+    below, winner, child = _breeding(jax, own)
 
     def generation(theta: Any, lists: Any, cost: Any, coins: Any) -> Any:
         """Lists and costs after one generation."""
