@@ -288,7 +288,7 @@ def _judge(jax: Any, own: Own) -> Callable[..., Any]:
 
 
 def _breeding(jax: Any, own: Own) -> tuple[Callable[..., Any], ...]:
-    """A whole number below a limit, the winner of a tournament, a child of two lists."""
+    """Whole numbers below a limit, the winner of a tournament, a child of two."""
     np_, encoding = jax.numpy, own.problem.encoding
     low, high = (np_.asarray(each.numpy()) for each in (encoding.low, encoding.high))
     rate = float(own.rates.rate[0])
