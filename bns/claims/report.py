@@ -110,12 +110,7 @@ def judged(
     """
     letters = {claim.investigation for claim in wanted}
     family = [c for c in claims().values() if c.investigation in letters]
-    members = {
-        member.label: member
-        for claim in each(family)
-        for cell in claim.cells
-        for member in _members(claim, cell, world, quick)
-    }
+    members = sides(each(family), world, quick=quick)
     have = {}
     if (directory / "campaign.json").exists():
         have = held(members.values(), directory, own=own or quick, among=among)
@@ -181,9 +176,10 @@ def held(
     if own:
         return provenance.read(directory, wanted)
     among = among or published.library()
-    kept = {}
-    for name, (digest, _) in wanted.items():
-        kept[digest] = among.batches(digest, asked()[name])
+    kept = {
+        digest: among.batches(digest, asked()[name])
+        for name, (digest, _) in wanted.items()
+    }
     return provenance.read(directory, wanted, kept)
 
 
@@ -199,6 +195,24 @@ def asked() -> Mapping[str, tuple[str, ...]]:
                 for member, name in zip(sides, measures, strict=False):
                     found.setdefault(member.identity, set()).add(name)
     return {identity: tuple(sorted(names)) for identity, names in found.items()}
+
+
+def sides(
+    wanted: Iterable[Claim], world: str, *, quick: bool = False
+) -> dict[str, Member]:
+    """Identity -> side, of all comparisons of claims that can run in a world.
+
+    Args:
+        wanted: the claims.
+        world: where they run.
+        quick: small and short versions.
+    """
+    return {
+        member.identity: member
+        for claim in wanted
+        for cell in claim.cells
+        for member in _members(claim, cell, world, quick)
+    }
 
 
 def _members(claim: Claim, cell: Cell, world: str, quick: bool) -> tuple[Member, ...]:
@@ -309,12 +323,7 @@ def runs(stores: Mapping[str, Path]) -> list[published.Row]:
     """
     found: dict[tuple[str, int], published.Row] = {}
     for world, directory in stores.items():
-        members = {
-            member.identity: member
-            for claim in claims().values()
-            for cell in claim.cells
-            for member in _members(claim, cell, world, quick=False)
-        }
+        members = sides(claims().values(), world)
         for name, each in held(members.values(), directory).items():
             for batch in each.batches:
                 line = published.line(each.digest, batch, asked()[name])

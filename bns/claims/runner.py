@@ -10,7 +10,7 @@ from bns.campaign.file import Campaign, Member
 from bns.campaign.plan import Job
 from bns.campaign.store import CampaignStore, adopt
 from bns.claims import provenance, report, schedule
-from bns.claims.claim import Claim, lacking, member_of
+from bns.claims.claim import Claim, lacking
 from bns.claims.report import Judged
 from bns.experiment.batch import check_device
 from bns.storage.lock import Lock
@@ -190,14 +190,7 @@ def take(
     Raises:
         BnsError: no such folder, or a run that cannot be read.
     """
-    members = {
-        member.identity: member
-        for claim in claims
-        for cell in claim.cells
-        if not lacking(claim.investigation, cell, world=world)
-        for side in cell.sides
-        for member in [member_of(claim.investigation, side, world=world)]
-    }
+    members = report.sides(claims, world)
     campaign = _campaign(tuple(members.values()), world)
     out = directory(world, quick=False, root=root)
     with Lock(out) as lock:
