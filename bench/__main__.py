@@ -59,7 +59,7 @@ def _run(benches, *, quick: bool) -> int:
     for bench in benches:
         row = measure(bench, quick=quick)
         print(json.dumps(row, allow_nan=False), flush=True)
-        store(row, bench.room)
+        store(row, bench.subject)
         broken = broken or row["holds"] is False
     return int(broken)
 

@@ -38,7 +38,7 @@ class Bench:
     bar: str
 
     @property
-    def room(self) -> str:
+    def subject(self) -> str:
         """Folder of this package that it lies in, where its row is kept, too."""
         return self.module.split(".")[1] if self.module.count(".") > 1 else "other"
 
@@ -104,12 +104,12 @@ def keeps(row: Mapping[str, object]) -> bool:
     return bool(row["quick"]) or "-dirty" not in str(row["commit"])
 
 
-def store(row: Mapping[str, object], room: str, directory: Path = RESULTS) -> Path:
+def store(row: Mapping[str, object], subject: str, directory: Path = RESULTS) -> Path:
     """Write a row; a quick one goes to `quick/` and never replaces a full one.
 
     Args:
         row: as `measure` returns it.
-        room: folder that it belongs to, `Bench.room`.
+        subject: folder that it belongs to, `Bench.subject`.
         directory: of all rows.
 
     Raises:
@@ -120,7 +120,7 @@ def store(row: Mapping[str, object], room: str, directory: Path = RESULTS) -> Pa
             f"{row['name']} was measured with files that differ from the commit: it "
             "is not kept. Commit them and measure again, or give --quick."
         )
-    folder = (directory / "quick" if row["quick"] else directory) / room
+    folder = (directory / "quick" if row["quick"] else directory) / subject
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{row['name']}.json"
     write(path, json.dumps(row, indent=1, allow_nan=False) + "\n")
@@ -175,7 +175,7 @@ def _read(path: Path) -> Iterator[Bench]:
 HEAD = """# Results of the benches
 
 Each row is one bench: `python -m bench NAME` measures it again, `python -m bench list`
-says what each measures. The figures behind a row are in `ROOM/NAME.json` beside this
+says what each measures. The figures behind a row are in `SUBJECT/NAME.json` beside this
 file.
 """
 COLUMNS = ("bench", "figure", "bar", "holds", "n", "seconds", "commit")

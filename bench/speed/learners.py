@@ -8,6 +8,7 @@ from typing import Any
 import torch
 
 from bench.result import Result, bench
+from bench.speed.overhead import interleaved
 from bench.walking import runs
 from bns import presets
 from bns.experiment.config import RunConfig
@@ -107,7 +108,7 @@ def batch_cost(quick: bool) -> Result:
     """The same preset as a batch of 1 and of 30, both compiled, trials interleaved."""
     trials, warm = (6, 3) if quick else (25, 5)
     sizes = (1, BATCH) if quick else (1, 3, 10, BATCH)
-    runs = {size: _batch(size) for size in sizes}
+    runs = {size: simple(size) for size in sizes}
     seconds: dict[int, list[float]] = {size: [] for size in sizes}
     for trial in range(trials):
         for size, (batch, world) in runs.items():
@@ -127,7 +128,8 @@ def batch_cost(quick: bool) -> Result:
     )
 
 
-def _batch(size: int) -> tuple[Any, Any]:
+def simple(size: int) -> tuple[Any, Any]:
+    """A compiled batch of `khepera-simple` of so many runs, and its world."""
     from bns.experiment.batch import Batch, resolve
     from bns.experiment.world_factory import make_world
 
@@ -172,16 +174,11 @@ def rollouts(quick: bool) -> Result:
         ),
         "physics": lambda: world.run(commands),
     }
-    seconds: dict[str, list[float]] = {name: [] for name in calls}
-    for repeat in range(repeats + 1):
-        for name, call in calls.items():
-            begin = time.perf_counter()
-            call()
-            if repeat:  # the first warms up, and compiles
-                seconds[name].append(time.perf_counter() - begin)
+    # the first of each warms up, and compiles
+    seconds = interleaved(tuple(calls.values()), repeats + 1)[1:, :, 0]
     rate = {
         name: (physics_durations if name == "physics" else durations) / median(values)
-        for name, values in seconds.items()
+        for name, values in zip(calls, seconds.T.tolist(), strict=True)
     }
     return Result(
         figure=round(rate["SNN, compiled"] / rate["physics"], 1),

@@ -2,6 +2,7 @@
 
 import os
 import time
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from statistics import median
 from typing import Any
@@ -57,15 +58,15 @@ def _ratios(damage: list, repeats: int, *, ragged: bool = False) -> list[float]:
     bare = _bare(world, commands)
     world.run(commands)
     bare()
-    seconds = _interleaved(bare, lambda: world.run(commands), repeats)
+    seconds = interleaved((bare, lambda: world.run(commands)), repeats)
     return (seconds[:, 1, 0] / seconds[:, 0, 0]).tolist()
 
 
-def _interleaved(bare: Any, call: Any, repeats: int) -> np.ndarray:
-    """Wall and processor time [s] of a bare call and of another, ``(R, 2, 2)``."""
-    seconds = np.zeros((repeats, 2, 2))
+def interleaved(calls: Sequence[Callable[[], Any]], repeats: int) -> np.ndarray:
+    """Wall and processor time [s] of C calls, one after another, ``(R, C, 2)``."""
+    seconds = np.zeros((repeats, len(calls), 2))
     for repeat in seconds:
-        for row, each in zip(repeat, (bare, call), strict=True):
+        for row, each in zip(repeat, calls, strict=True):
             row -= time.perf_counter(), time.process_time()
             each()
             row += time.perf_counter(), time.process_time()
@@ -182,8 +183,8 @@ def _loop_ratios(damage: list, repeats: int) -> np.ndarray:
     policy, seeds = Networks(), range(ROBOTS)
     bare = _bare_loop(world, policy, seeds)
     bare()
-    seconds = _interleaved(
-        bare, lambda: world.drive(policy, cycles=CYCLES, seeds=seeds), repeats
+    seconds = interleaved(
+        (bare, lambda: world.drive(policy, cycles=CYCLES, seeds=seeds)), repeats
     )
     return seconds[:, 1] / seconds[:, 0]
 
@@ -272,7 +273,7 @@ def _measured(damage: list, repeats: int) -> dict[str, float]:
     walks = world.motions(plans)
     bare = _bare_walks(plans, walks)
     steps = sum(len(walk.control) for walk in walks)
-    seconds = _interleaved(bare, lambda: world.run(commands), repeats + 1)[1:]
+    seconds = interleaved((bare, lambda: world.run(commands)), repeats + 1)[1:]
     wall, processor = np.median(seconds[:, 1] / seconds[:, 0], axis=0).tolist()
     return {
         "wall": wall,

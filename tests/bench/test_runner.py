@@ -141,7 +141,7 @@ def test_the_exit_code_tells_whether_the_bar_holds(
     monkeypatch.setattr(Bench, "run", lambda self, *, quick: result)
     monkeypatch.setattr(command, "find", lambda name: small)
     monkeypatch.setattr(
-        command, "store", lambda row, room: runner.store(row, room, tmp_path)
+        command, "store", lambda row, subject: runner.store(row, subject, tmp_path)
     )
     monkeypatch.setattr(runner, "commit", lambda: "abc")
     assert command.main(["small"]) == code
