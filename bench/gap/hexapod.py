@@ -30,6 +30,7 @@ SLOWEST = 300.0  # [s] a case on two cores
 
 def one(kind: str, seed: int) -> dict[str, Any]:
     """One case: what is true, what was said, and how long it took."""
+    from bns.errors import BnsError
     from bns.gap.bench import cases, scoring
     from bns.gap.bench.walk_cases import LARGE, WalkStand
     from bns.gap.diagnose import diagnose
@@ -39,8 +40,11 @@ def one(kind: str, seed: int) -> dict[str, Any]:
     sizes = LARGE if kind == "large" else None
     case = cases.build(seed, kind, WalkStand(WalkModel()), sizes=sizes)
     watch = Stopwatch()
-    found = diagnose(case.trials, WalkModel(), seed=seed, full=False)
-    row = scoring.row(kind, seed, case, found)
+    try:
+        found = diagnose(case.trials, WalkModel(), seed=seed, full=False)
+        row = scoring.row(kind, seed, case, found)
+    except BnsError as error:
+        row = scoring.refused(kind, seed, case, str(error))
     row |= watch.read()
     return plain(row)
 

@@ -32,6 +32,19 @@ def row(kind: str, seed: int, case: Case, found: Diagnosis) -> dict[str, Any]:
     return {"kind": kind, "seed": seed, "answer": case.answer.as_dict(), "said": said}
 
 
+def refused(kind: str, seed: int, case: Case, why: str) -> dict[str, Any]:
+    """A case of which nothing was said: neither right nor named wrongly.
+
+    Args:
+        kind: of case.
+        seed: of it.
+        case: with the true answer.
+        why: the error's text.
+    """
+    said = {"verdict": "error", "named": [], "sets": [], "parts": [], "error": why}
+    return {"kind": kind, "seed": seed, "answer": case.answer.as_dict(), "said": said}
+
+
 def edited(found: Diagnosis, case: Case, model: GapModel) -> dict[str, float]:
     """Take the first true effect away; predict a recording with the second alone.
 

@@ -97,7 +97,8 @@ def decompose(tried: Singles) -> Point:
 
     Started from a tangent at the nominal model, from the best single explanation (a
     strong one looks like several through a tangent), from all at once where several
-    are strong, and from levels of what has no slope at the nominal.
+    are strong, and from levels of what has no slope at the nominal. Nothing, if they have
+    no more evidence than the best of so many has by chance.
 
     Args:
         tried: the recording, the nominal model, and single explanations fitted.
@@ -122,11 +123,12 @@ def decompose(tried: Singles) -> Point:
             break
         best = chosen
     best = simpler.narrowed(problem, best)
-    return (
+    best = (
         simpler.swapped(problem, best)
         if problem.model.many
         else simpler.pruned(problem, best)
     )
+    return _beyond_chance(problem, start, best, len(start.linear.free))
 
 
 def _by_itself(problem: Problem, level: Level, known: Noise) -> Point:
@@ -174,15 +176,20 @@ def _simple(tried: Singles) -> list[Point]:
 
 
 def _alone(tried: Singles) -> Point:
-    """From the single explanation that leaves least; nothing, if it is no better than
-    the best of so many fits is by chance."""
+    """From the single explanation that leaves least, or nothing."""
     problem, start = tried.problem, tried.start
     if not tried.fitted:
         return start
     best = tried.fitted[0]
     found = descend(problem, best.values, {best.name}, start.noise)
+    return _beyond_chance(problem, start, found, len(tried.fitted))
+
+
+def _beyond_chance(problem: Problem, start: Point, found: Point, count: int) -> Point:
+    """A point; the nominal model, if it is no better than the best of `count`
+    explanations is by chance."""
     nominal, here = refit.costs(problem, [start, found])
-    return found if here + np.log(len(tried.fitted)) < nominal else start
+    return found if here + np.log(count) < nominal else start
 
 
 def _with_level(problem: Problem, best: Single, start: Point) -> Point | None:

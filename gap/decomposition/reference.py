@@ -140,9 +140,9 @@ class Corrected(GapModel):
         """See `GapModel.begun`."""
         return self.model.begun(trial)
 
-    def read_log(self, path: str) -> list[Trial]:
+    def read_log(self, path: str, columns: str = "") -> list[Trial]:
         """See `GapModel.read_log`."""
-        return self.model.read_log(path)
+        return self.model.read_log(path, columns)
 
     def excitations(
         self, *, seed: int = 0, told: Mapping[str, float] | None = None

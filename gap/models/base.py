@@ -244,8 +244,13 @@ class GapModel(ABC):
             first += int(number.max(initial=0)) + 1
         return np.concatenate(made)
 
-    def read_log(self, path: str) -> list[Trial]:
+    def read_log(self, path: str, columns: str = "") -> list[Trial]:
         """Trials of a log as the model describes it, where `logs` says that it does.
+
+        Args:
+            path: of the log.
+            columns: TOML file that maps its columns to channels; "" = the model's own
+                names.
 
         Raises:
             BnsError: it does not.

@@ -358,8 +358,13 @@ def _without(
                 continue
             if not _others_move(trial.observed[first : last + 1], column, model):
                 continue  # the robot stands still, which is no fault of a channel
-            if _resumed(trial.observed[:, column], predicted[:, column], first, last):
+            seen, due = trial.observed[:, column], predicted[:, column]
+            if _resumed(seen, due, first, last):
                 continue  # nor where it goes on from where it rested: it was held
+            if not np.isfinite(seen[last + 1 :]).any() and (
+                np.ptp(due[first : first + RUN]) < least
+            ):
+                continue  # nor where it came to rest and stayed there
             name, unit = model.channels[column].name, model.channels[column].unit
             observed[first : last + 1] = np.nan
             seconds = trial.times[last] - trial.times[first]
@@ -372,8 +377,8 @@ def _without(
 
 def _resumed(seen: np.ndarray, predicted: np.ndarray, first: int, last: int) -> bool:
     """Whether a channel goes on from the value that it kept: by less than `CAUGHT_UP`
-    of what it should have moved by then. A channel that was stuck jumps; a part in its
-    play, or held by friction, does not.
+    of what it should have moved by then, beyond what it should move in that sample. A
+    channel that was stuck jumps; a part in its play, or held by friction, does not.
 
     Args:
         seen: recorded, ``(T,)``.
@@ -384,7 +389,8 @@ def _resumed(seen: np.ndarray, predicted: np.ndarray, first: int, last: int) -> 
     if not len(after):
         return False
     due = abs(predicted[after[0]] - predicted[first])
-    return bool(abs(seen[after[0]] - seen[last]) < CAUGHT_UP * due)
+    step = abs(predicted[after[0]] - predicted[last])
+    return bool(abs(seen[after[0]] - seen[last]) < CAUGHT_UP * due + step)
 
 
 def _others_move(values: np.ndarray, column: int, model: GapModel) -> bool:

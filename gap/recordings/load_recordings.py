@@ -144,7 +144,7 @@ def _read(
     if importer:
         listed = _imported(importer, path)
     elif model.logs:
-        listed = model.read_log(path)
+        listed = model.read_log(path, columns)
     else:
         listed = _log(path, columns)
     return ((None, number, trial) for number, trial in enumerate(listed))

@@ -1,13 +1,14 @@
 """The TOML file that describes a model of one's own; see docs/gap_your_robot.md."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bns.errors import BnsError, FormatError, UnknownNameError
+from bns.gap.importers.tables import SENT, TIME, TRIAL
 from bns.storage import reading
 from bns.storage.reading import BEYOND
 from bns.worlds.data.importing import FACTORS, Source
@@ -32,6 +33,7 @@ QUANTITIES = ("joint", "speed", "site", "body")
 """what an observed channel can be: position or speed of a joint, place of a site or
 body"""
 AXES = ("x", "y", "z")
+MARKS = (TIME, TRIAL, SENT)  # columns of a log beside its channels
 WINDOW = 0.1  # [s] between two samples that are compared
 
 
@@ -150,6 +152,32 @@ class OwnConfig:
             log={n: _source(n, s, path) for n, s in _table(given, "log", path).items()},
         )
 
+    def mapped(self, path: str | Path) -> "OwnConfig":
+        """The same with the columns of logs that a map names; [log] says the others.
+
+        Args:
+            path: TOML file as in docs/formats.md, by the channels of this robot.
+
+        Raises:
+            FormatError: no such file, not TOML, or no table `columns`.
+            BnsError: a map of another robot.
+            UnknownNameError: a key or channel that there is not.
+        """
+        path = Path(path)
+        given = reading.read_toml(path)
+        _known(given, ("robot", "columns"), f"key of {path}")
+        if given.get("robot", self.name) != self.name:
+            raise BnsError(
+                f"{path} is of robot {given['robot']!r}, the model of {self.name!r}."
+            )
+        if not given.get("columns"):
+            raise FormatError(f"{path} has no table [columns].")
+        table = _table(given, "columns", path)
+        channels = (item.channel.name for item in (*self.told, *self.seen))
+        _known(table, (*MARKS, *channels), f"channel in {path}")
+        named = {name: _source(name, item, path) for name, item in table.items()}
+        return replace(self, log={**self.log, **named})
+
 
 def _known(given: Mapping[str, Any], allowed: tuple[str, ...], kind: str) -> None:
     for key in given:
@@ -260,7 +288,7 @@ def _source(name: str, item: Any, path: Path) -> Source:
     known = {unit for row in FACTORS.values() for unit in row}
     if "column" not in table or (unit and unit not in known):
         raise FormatError(
-            f"{path}: [log] {name} needs a column and a unit among "
+            f"{path}: {name} needs a column and a unit among "
             f"{', '.join(sorted(known))}."
         )
     return Source(str(table["column"]), unit)

@@ -60,7 +60,8 @@ def channels(table: Table, config: OwnConfig, path: str) -> dict[str, np.ndarray
         if column not in table:
             raise FormatError(
                 f"{path} has no column {column!r} for {name!r}; it has "
-                f"{', '.join(table.names)}. Name it in [log]."
+                f"{', '.join(table.names)}. Name it in [log] or in a map "
+                "(--columns)."
             )
         found[name] = table[column] * _factor(source.unit if source else "")
     for name in (TRIAL, SENT):

@@ -75,9 +75,10 @@ class OwnModel(GapModel):
         """An effect on this model, as a diagnosis writes it."""
         return own_effects.parse(text)
 
-    def read_log(self, path: str) -> list[Trial]:
+    def read_log(self, path: str, columns: str = "") -> list[Trial]:
         """Trials of a log, none longer than the model foresees."""
-        trials = log.read(path, self.config)
+        config = self.config.mapped(columns) if columns else self.config
+        trials = log.read(path, config)
         if self.config.cut:
             return cuts.refined(trials, self.config, self)
         return cuts.foreseen(trials, self.config, self.physics.model, self)

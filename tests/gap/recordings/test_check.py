@@ -143,6 +143,16 @@ def test_what_goes_on_from_where_it_rested_was_held_and_not_stuck(model, resumed
     assert np.isnan(made.observed[30:51]).any() == (not resumed)
 
 
+@pytest.mark.parametrize(("since", "stuck"), [(25, False), (45, True)])
+def test_what_comes_to_rest_and_stays_is_not_stuck(model, since, stuck):
+    there = Commands([[0.1, 0.02], [0.1, 0.1], [0.1, 0.02]], [2.0, 2.0, 4.0])
+    (trial,) = MujocoWorld(reality=[NOISE], threads=1).run([there], seeds=[0])
+    held = trial.observed.copy()
+    held[since:, 2] = held[since, 2]  # while it goes straight, or as it turns again
+    ((_, notes),) = check.without_stuck([trial.replace(observed=held)], model)
+    assert any("yaw is stuck" in note for note in notes) == stuck
+
+
 def test_moments_at_which_commands_began_are_no_lost_samples(model, told):
     (trial,) = MujocoWorld(reality=[NOISE], threads=1).run(told[:1], seeds=[0])
     begun, seen = trial.boundaries[1:-1], trial.observed.copy()
