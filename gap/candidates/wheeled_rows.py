@@ -72,13 +72,14 @@ _SMOOTH: tuple[tuple[str, float, float, float, bool, dict[str, Any]], ...] = (
     ("caster_drag", 0.2, 0, 1, False, {"step": 0.05, "levels": (0.2, 0.5)}),
     ("wheel_backlash", 0.004, 0, 0.03, True, {"step": 1e-3, "levels": (0.005,)}),
 )  # fmt: skip
-# a mass that is carried and its moments about the middle of the axle, and about the top
-# plate
+# a mass that is carried, its moments about the middle of the axle and about the top
+# plate, and its inertia about its own centre (a cube of 0.5 kg and 7 cm: 4e-4 kg m2)
 _LOAD: tuple[tuple[str, float, float, float, str, dict[str, Any]], ...] = (
     ("payload.mass", 0.4, 0.0, 2.0, "kg", {"slack": 0.01, "levels": (0.3, 0.8)}),
     ("payload.mx", 0.015, -0.1, 0.1, "kg m", {"slack": 4e-4}),
     ("payload.my", 0.015, -0.1, 0.1, "kg m", {"slack": 4e-4}),
     ("payload.mz", 0.04, -0.1, 0.3, "kg m", {}),
+    ("payload.inertia", 3e-4, 0.0, 0.01, "kg m2", {}),
 )
 _ROUND = (
     ("floor_slope", 0.03, 0.3, False, ()),

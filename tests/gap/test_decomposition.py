@@ -156,6 +156,17 @@ def test_a_delay_beside_a_gain_is_no_shift_of_the_clock(model, told):
     assert abs(descent.nothing(problem).values[number]) < 0.02
 
 
+def test_a_load_that_is_no_point_is_named_alone(model, told):
+    hidden = ["payload:mass=0.55,inertia=0.0004", NOISE]
+    trials = MujocoWorld(reality=hidden, threads=1).run(told, seeds=range(4))
+    rows = ("payload", "wheel_gain[both]", "wheel_diameter[both]")
+    found = diagnose(trials, model, rows=rows, full=False)
+    assert found.verdict.named == (("payload",),)
+    (load,) = [model.parse(text) for text in found.best.effects]
+    assert load["mass"] == pytest.approx(0.55, rel=0.1)
+    assert load["inertia"] == pytest.approx(4e-4, rel=0.3)
+
+
 @pytest.mark.parametrize(
     ("effects", "one_does"),
     [
@@ -274,6 +285,11 @@ def said(model, rows, *parts, **about):
             "payload",
             {"payload.mass": 0.4, "payload.mx": 0.02, "payload.mz": 0.04},
             "payload = 0.4 kg [0.39, 0.41], x 0.05 m, z 0.17 m (100 % of it)",
+        ),
+        (
+            "payload",
+            {"payload.mass": 0.4, "payload.inertia": 3e-4},
+            "payload = 0.4 kg [0.39, 0.41], inertia 0.0003 kg m2 (100 % of it)",
         ),
     ],
 )

@@ -153,7 +153,10 @@ class Effect(ABC):
 
     def __str__(self) -> str:
         """The effect as text: ``name:parameter=value,...`` (parses back)."""
-        silent = {item.name: item.default for item in self.choices if item.quiet}
+        silent: dict[str, float | str] = {
+            item.name: item.default for item in self.choices if item.quiet
+        }
+        silent |= {item.name: item.nominal for item in self.parameters if item.quiet}
         items = (
             f"{name}={value!r}".removesuffix(".0")
             if isinstance(value, float)

@@ -182,7 +182,7 @@ class Payload(BodyEffect):
     """The robot carries a mass that the model does not know."""
 
     name = "payload"
-    source = "parallel-axis theorem; a point mass is assumed"
+    source = "parallel-axis theorem"
     robots = ("wheeled", "legged")
     parameters = (
         strength(
@@ -201,13 +201,23 @@ class Payload(BodyEffect):
             (0.0, 0.3),
             "above the floor; nominal: the top plate (69 mm)",
         ),
+        strength(
+            "inertia",
+            "kg m2",
+            (0.0, 0.02),
+            "of the load about its own centre, the same about all axes: 0 is a point; "
+            "bounds assumed (a cube of 0.5 kg and 7 cm has 4e-4)",
+            example=2e-4,
+            quiet=True,
+        ),
     )
 
     def _write(self, spec: Any) -> None:
         body = parts.base(spec)
         position = np.array([self["x"], self["y"], self["z"]])
         inertial = parts.Inertial.of(spec, body).plus_point(self["mass"], position)
-        inertial.write(body)
+        whole = inertial.inertia + self["inertia"] * np.eye(3)
+        replace(inertial, inertia=whole).write(body)
 
 
 def _little(name: str, doc: str, example: float) -> Parameter:

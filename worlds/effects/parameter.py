@@ -22,6 +22,7 @@ class Parameter:
         integer: whether only whole numbers make sense.
         scales: whether severity scales it; False for what is no strength but a place
             or kind (a position, a direction), which stays as given.
+        quiet: whether the nominal value is left out of the effect's text.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Parameter:
     example: float
     integer: bool = False
     scales: bool = True
+    quiet: bool = False
 
     def check(self, effect: str, value: object) -> float:
         """The value as a float inside the bounds.
@@ -75,14 +77,15 @@ def strength(
     example: float,
     integer: bool = False,
     scales: bool = True,
+    quiet: bool = False,
 ) -> Parameter:
     """A number that is 0 where the effect changes nothing.
 
     Args:
         bounds: inclusive.
-        name, unit, doc, example, integer, scales: see `Parameter`.
+        name, unit, doc, example, integer, scales, quiet: see `Parameter`.
     """
-    return Parameter(name, unit, 0.0, *bounds, doc, example, integer, scales)
+    return Parameter(name, unit, 0.0, *bounds, doc, example, integer, scales, quiet)
 
 
 def place(

@@ -134,17 +134,18 @@ def carried(values: Mapping[str, float]) -> Effect:
 
     Args:
         values: of its rows: mass [kg]; mx and my about the middle of the axle and mz
-            about the top plate [kg m].
+            about the top plate [kg m]; inertia about its own centre [kg m2].
     """
     about = registry.get("payload").parameters
     mass = float(np.clip(values.get("payload.mass", 0.0), 0.0, about[0].high))
+    own = float(np.clip(values.get("payload.inertia", 0.0), 0.0, about[-1].high))
     if any(value for name, value in values.items() if name != "payload.mass"):
         mass = max(mass, LIGHT)
     place = {}
-    for edge in about[1:]:
+    for edge in about[1:-1]:
         away = values.get(f"payload.m{edge.name}", 0.0) / max(mass, LIGHT)
         place[edge.name] = float(np.clip(edge.nominal + away, edge.low, edge.high))
-    return registry.make("payload", mass=mass, **place)
+    return registry.make("payload", mass=mass, inertia=own, **place)
 
 
 def load(values: Mapping[str, float], robot: str) -> list[Effect]:
@@ -160,7 +161,8 @@ def load(values: Mapping[str, float], robot: str) -> list[Effect]:
     mass = max(float(values.get("payload.mass", 0.0)), 0.0)
     if mass > LIGHT:
         return [carried(values)]
-    made = [registry.make("payload", mass=mass)] if mass else []
+    own = max(float(values.get("payload.inertia", 0.0)), 0.0)
+    made = [registry.make("payload", mass=mass, inertia=own)] if mass or own else []
     moved = {}
     for edge in registry.get("centre_of_mass").parameters:
         moment = values.get(f"payload.m{edge.name[1:]}", 0.0)
