@@ -97,8 +97,8 @@ def decompose(tried: Singles) -> Point:
 
     Started from a tangent at the nominal model, from the best single explanation (a
     strong one looks like several through a tangent), from all at once where several
-    are strong, and from levels of what has no slope at the nominal. Nothing, if they have
-    no more evidence than the best of so many has by chance.
+    are strong, and from levels of what has no slope at the nominal. Nothing, if they
+    have no more evidence than the best of so many has by chance.
 
     Args:
         tried: the recording, the nominal model, and single explanations fitted.
