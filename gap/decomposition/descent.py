@@ -3,6 +3,7 @@ around it."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from bns.gap.decomposition.levels import Level
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.shares import HeldOut
-from bns.gap.decomposition.singles import Single, Singles
+from bns.gap.decomposition.singles import WIDE, Single, Singles
 
 TURNS = 4  # of fitting and searching
 FEW = 2  # explanations that need no other start if they leave little
@@ -109,7 +110,8 @@ def decompose(tried: Singles) -> Point:
     best = start if several else _alone(tried)
     if len(found) == 1:
         best = _followed(problem, start, found)
-    if several and len(found | best.support) > 1:
+    wide = any(len(problem.terms[name]) >= WIDE for name in found)
+    if several and (wide or len(found | best.support) > 1):
         best = _several(tried, found, best)
     for _ in range(ROUNDS):
         level = levels.best(problem, best)
@@ -141,8 +143,9 @@ def _by_itself(problem: Problem, level: Level, known: Noise) -> Point:
 
 
 def _several(tried: Singles, found: Support, best: Point) -> Point:
-    """The best point where a tangent finds several explanations: from a single one, and
-    if that is not enough from those several, and from all where many depart."""
+    """The best point where a tangent finds several explanations, or one of many
+    numbers: from a single one, and if that is not enough from those that it found, and
+    from all where many depart."""
     problem = tried.problem
     points = _simple(tried) + [best] * bool(best.support)
     if not any(enough(point) for point in points):
@@ -167,9 +170,16 @@ def _followed(problem: Problem, start: Point, support: Support) -> Point:
 
 
 def _simple(tried: Singles) -> list[Point]:
-    """Points from the best single explanation, and from it with a level on top."""
+    """Points from the best single explanation, and from it with a level on top; if it
+    has many numbers, which imitate much, from the best one of few, too."""
     problem, start, best = tried.problem, tried.start, tried.fitted[0]
     made = [descend(problem, best.values, {best.name}, start.noise)]
+    if len(problem.terms[best.name]) >= WIDE:
+        narrow = (one for one in tried.fitted if len(problem.terms[one.name]) < WIDE)
+        made += [
+            descend(problem, one.values, {one.name}, start.noise)
+            for one in islice(narrow, 1)
+        ]
     if not enough(made[0]) and (both := _with_level(problem, best, start)):
         made.append(both)
     return made
