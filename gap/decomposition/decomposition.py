@@ -11,7 +11,6 @@ from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.onset import Onset
 from bns.gap.decomposition.problem import Problem
-from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.shares import HeldOut, Part
 from bns.gap.decomposition.singles import Singles
 from bns.gap.recordings import trial_conditions
@@ -118,7 +117,8 @@ class Decomposition:
         """
         if self.broken:
             return True
-        if self.after <= max(self.scatter, Row.inexact**2 * self.moved):
+        exact = self.problem.model.inexact
+        if self.after <= max(self.scatter, exact**2 * self.moved):
             return False
         if self.recurring:
             return self.after > FELT

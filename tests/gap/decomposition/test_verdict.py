@@ -38,6 +38,29 @@ def test_explanations_that_bend(axle, left, strained):
     assert Decomposition.strained.fget(made) is strained
 
 
+@pytest.mark.parametrize(
+    ("exact", "recurs", "scatter", "lasting"),
+    [
+        (0.01, 4.0, 0.0, False),  # the model is believed to a hundredth of the motion
+        (0.005, 4.0, 0.0, True),
+        (0.005, 4.0, 60.0, False),  # repeats differ by as much
+        (0.005, 0.0, 50.0, False),
+    ],
+)
+def test_what_recurs_is_weighed_by_how_exact_a_model_is(
+    exact, recurs, scatter, lasting
+):
+    made = SimpleNamespace(
+        problem=SimpleNamespace(model=SimpleNamespace(inexact=exact), trials=()),
+        broken=False,
+        after=53.0,
+        moved=1e6,
+        scatter=scatter,
+        recurring=recurs > 3,
+    )
+    assert Decomposition.lasting.fget(made) is lasting
+
+
 def test_how_exact_a_fit_is_goes_by_its_least_exact_explanation():
     assert fit.inexact(problem(), np.array([0.9, 0.0])) == 0.01
     assert fit.inexact(problem(), np.array([0.9, 1e-4])) == 0.01
