@@ -199,7 +199,7 @@ def _beyond_chance(problem: Problem, start: Point, found: Point, count: int) -> 
     """A point; the nominal model, if it is no better than the best of `count`
     explanations is by chance."""
     nominal, here = refit.costs(problem, [start, found])
-    return found if here + np.log(count) < nominal else start
+    return found if here + np.log(max(count, 1)) < nominal else start
 
 
 def _with_level(problem: Problem, best: Single, start: Point) -> Point | None:
