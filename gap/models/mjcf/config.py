@@ -173,8 +173,9 @@ class OwnConfig:
         if not given.get("columns"):
             raise FormatError(f"{path} has no table [columns].")
         table = _table(given, "columns", path)
-        channels = (item.channel.name for item in (*self.told, *self.seen))
-        _known(table, (*MARKS, *channels), f"channel in {path}")
+        told = (item.channel.name for item in self.told)
+        seen = (item.channel.name for item in self.seen)
+        _known(table, (*MARKS, *told, *seen), f"channel in {path}")
         named = {name: _source(name, item, path) for name, item in table.items()}
         return replace(self, log={**self.log, **named})
 
