@@ -11,6 +11,7 @@ from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.onset import Onset
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.shares import HeldOut, Part
 from bns.gap.decomposition.singles import Singles
 from bns.gap.recordings import trial_conditions
@@ -117,8 +118,7 @@ class Decomposition:
         """
         if self.broken:
             return True
-        exact = self.problem.model.inexact
-        if self.after <= max(self.scatter, exact**2 * self.moved):
+        if self.after <= max(self.scatter, Row.inexact**2 * self.moved):
             return False
         if self.recurring:
             return self.after > FELT
@@ -148,8 +148,11 @@ class Decomposition:
 
     @property
     def foreign(self) -> bool:
-        """Whether the library lacks what most of the gap comes from."""
+        """Whether the library lacks what most of the gap comes from: of one of which
+        nothing is explained, of what recurs of it."""
         most = self.lasting and self.unexplained > MOST
+        if not self.point.support and self.lasting and self.recurring:
+            most |= self.after - self.scatter > LARGE
         alone = bool(self.unconfirmed) and not self.point.support
         return most or alone or self.failing or self.strained or bool(self.goes)
 

@@ -63,8 +63,6 @@ class GapModel(ABC):
         timed: whether commands last as long as they are told.
         logs: whether `read_log` reads logs.
         memory: order of the autoregression that residuals may have; 0 = none.
-        inexact: share of the motion by which the simulation may be off itself, so that
-            a rest as small is none.
         many: whether fits are also started from all rows at once: where many depart
             at once a tangent at the nominal misleads.
         starts: explanations that are fitted by themselves, by the tangent at the
@@ -91,7 +89,6 @@ class GapModel(ABC):
     timed: bool = True
     logs: bool = False
     memory: int = 0
-    inexact: float = Row.inexact
     many: bool = False
     longest: float = float("inf")
     before: float = 0.0

@@ -36,7 +36,6 @@ class OwnModel(GapModel):
     """
 
     memory = 2
-    inexact = 0.005  # as finely as it is simulated
     many = True
     spread = (0.1, 0.3, 1.0)
     whole = True

@@ -39,26 +39,28 @@ def test_explanations_that_bend(axle, left, strained):
 
 
 @pytest.mark.parametrize(
-    ("exact", "recurs", "scatter", "lasting"),
+    ("recurs", "scatter", "support", "foreign"),
     [
-        (0.01, 4.0, 0.0, False),  # the model is believed to a hundredth of the motion
-        (0.005, 4.0, 0.0, True),
-        (0.005, 4.0, 60.0, False),  # repeats differ by as much
-        (0.005, 0.0, 50.0, False),
+        (3.9, 35.0, (), True),  # repeats differ, and a third of it recurs
+        (3.9, 51.5, (), False),
+        (0.0, 35.0, (), False),
+        (3.9, 35.0, ("axle",), False),
+        (3.9, 20.0, ("axle",), True),
     ],
 )
-def test_what_recurs_is_weighed_by_how_exact_a_model_is(
-    exact, recurs, scatter, lasting
+def test_what_recurs_of_an_unexplained_gap_is_of_no_library(
+    recurs, scatter, support, foreign
 ):
     made = SimpleNamespace(
-        problem=SimpleNamespace(model=SimpleNamespace(inexact=exact), trials=()),
-        broken=False,
-        after=53.0,
-        moved=1e6,
-        scatter=scatter,
+        point=SimpleNamespace(support=support),
+        lasting=True,
         recurring=recurs > 3,
+        after=53.0,
+        scatter=scatter,
+        unexplained=(53.0 - scatter) / 53.0,
+        **dict.fromkeys(("unconfirmed", "failing", "strained", "goes"), ""),
     )
-    assert Decomposition.lasting.fget(made) is lasting
+    assert Decomposition.foreign.fget(made) is foreign
 
 
 def test_how_exact_a_fit_is_goes_by_its_least_exact_explanation():
