@@ -5,6 +5,7 @@ import pytest
 
 from bns.errors import FormatError
 from bns.gap.recordings import check, segments
+from bns.gap.recordings.stuck import without_stuck
 from bns.gap.recordings.trial_conditions import as_number
 from bns.worlds.physics.wheeled_world import MujocoWorld
 from bns.worlds.trial import Commands
@@ -59,7 +60,7 @@ def test_a_robot_that_stands_still_is_no_stuck_channel(model):
     there = Commands([[0.1, 0.1], [0.0, 0.0]], [1.0, 1.0])
     dead = "wheel_gain:wheel=both,factor=0"
     trials = MujocoWorld(reality=[dead], threads=1).run([there])
-    ((_, notes),) = check.without_stuck(trials[:1], model)
+    ((_, notes),) = without_stuck(trials[:1], model)
     assert not notes
 
 
@@ -138,7 +139,7 @@ def test_what_goes_on_from_where_it_rested_was_held_and_not_stuck(model, resumed
     missed = held[50, 2] - held[30, 2]
     held[30:51, 2] = held[30, 2]
     held[51:, 2] -= missed if resumed else 0.0
-    ((made, notes),) = check.without_stuck([trial.replace(observed=held)], model)
+    ((made, notes),) = without_stuck([trial.replace(observed=held)], model)
     assert any("yaw is stuck" in note for note in notes) == (not resumed)
     assert np.isnan(made.observed[30:51]).any() == (not resumed)
 
@@ -149,7 +150,7 @@ def test_what_comes_to_rest_and_stays_is_not_stuck(model, since, stuck):
     (trial,) = MujocoWorld(reality=[NOISE], threads=1).run([there], seeds=[0])
     held = trial.observed.copy()
     held[since:, 2] = held[since, 2]  # while it goes straight, or as it turns again
-    ((_, notes),) = check.without_stuck([trial.replace(observed=held)], model)
+    ((_, notes),) = without_stuck([trial.replace(observed=held)], model)
     assert any("yaw is stuck" in note for note in notes) == stuck
 
 
@@ -182,11 +183,11 @@ def test_what_rests_in_one_trial_is_no_fault_of_a_channel_in_another(
         observed = trial.observed.copy()
         observed[:, 1] = 0.1
         held.append(trial.replace(observed=observed))
-    assert any(notes for _, notes in check.without_stuck(held, model))
+    assert any(notes for _, notes in without_stuck(held, model))
     rests = frozenset({"y"})
     monkeypatch.setattr(
         type(model),
         "at_rest",
         lambda _, trial, __: rests if trial is held[1] else frozenset(),
     )
-    assert not any(notes for _, notes in check.without_stuck(held, model))
+    assert not any(notes for _, notes in without_stuck(held, model))
