@@ -47,7 +47,7 @@ class BodyMass(BodyEffect):
             inertial = Inertial.of(spec, body)
             added = max(self["added"], -0.99 * inertial.mass)
             away = np.array([self["dx"], self["dy"], self["dz"]])
-            inertial.plus_point(added, inertial.centre + away).write(body)
+            inertial.plus(added, inertial.centre + away).write(body)
 
 
 class BodyCentre(BodyEffect):
@@ -215,9 +215,8 @@ class Payload(BodyEffect):
     def _write(self, spec: Any) -> None:
         body = parts.base(spec)
         position = np.array([self["x"], self["y"], self["z"]])
-        inertial = parts.Inertial.of(spec, body).plus_point(self["mass"], position)
-        whole = inertial.inertia + self["inertia"] * np.eye(3)
-        replace(inertial, inertia=whole).write(body)
+        inertial = parts.Inertial.of(spec, body)
+        inertial.plus(self["mass"], position, self["inertia"]).write(body)
 
 
 def _little(name: str, doc: str, example: float) -> Parameter:

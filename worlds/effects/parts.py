@@ -307,16 +307,20 @@ class Inertial:
         inertia = _turned(model.body_inertia[index], model.body_iquat[index])
         return cls(float(model.body_mass[index]), model.body_ipos[index], inertia)
 
-    def plus_point(self, mass: float, position: np.ndarray) -> "Inertial":
-        """With a point mass [kg] added at `position` [m] (parallel-axis theorem)."""
+    def plus(
+        self, mass: float, position: np.ndarray, inertia: float = 0.0
+    ) -> "Inertial":
+        """With a mass [kg] added at `position` [m] (parallel-axis theorem), which has
+        an inertia of its own about all axes [kg m2]; 0 = a point."""
         total = self.mass + mass
         centre = (self.mass * self.centre + mass * position) / total
-        inertia = (
+        whole = (
             self.inertia
             + _point(self.mass, self.centre - centre)
             + _point(mass, position - centre)
+            + inertia * np.eye(3)
         )
-        return Inertial(total, centre, inertia)
+        return Inertial(total, centre, whole)
 
     def write(self, body: Any) -> None:
         """Into a body of an `MjSpec`, in place of what it had."""

@@ -281,28 +281,20 @@ class TestBodies:
         axes = axes.reshape(3, 3)
         assert axes @ np.diag(base.inertia) @ axes.T == pytest.approx(expected)
 
-    def test_payload_that_is_no_point_adds_its_own_inertia(self):
+    @pytest.mark.parametrize("own", [0, 0.005])
+    def test_payload_on_a_body_whose_geoms_give_its_inertia(self, own):
         spec = mujoco.MjSpec()
         body = spec.worldbody.add_body(name="base")
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.1, 0, 0], mass=2)
         body.add_body(name="left_wheel")
-        registry.parse("payload:mass=1,z=0.3,inertia=0.005").edit(spec)
-        ball, parallel = 0.4 * 2 * 0.1**2, 2 * 0.1**2 + 1 * 0.2**2
-        assert sorted(spec.compile().body("base").inertia) == pytest.approx(
-            [ball + 0.005] + 2 * [ball + parallel + 0.005]
-        )
-
-    def test_payload_on_a_body_whose_geoms_give_its_inertia(self):
-        spec = mujoco.MjSpec()
-        body = spec.worldbody.add_body(name="base")
-        body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.1, 0, 0], mass=2)
-        body.add_body(name="left_wheel")
-        registry.parse("payload:mass=1,z=0.3").edit(spec)
+        registry.parse(f"payload:mass=1,z=0.3,inertia={own}").edit(spec)
         base = spec.compile().body("base")
         assert base.mass[0] == pytest.approx(3)
         assert base.ipos == pytest.approx([0, 0, 0.1])
         ball, parallel = 0.4 * 2 * 0.1**2, 2 * 0.1**2 + 1 * 0.2**2
-        assert sorted(base.inertia) == pytest.approx([ball] + 2 * [ball + parallel])
+        assert sorted(base.inertia) == pytest.approx(
+            [ball + own] + 2 * [ball + parallel + own]
+        )
 
     def test_centre_of_mass_moves_and_inertia_stays(self):
         plain, moved = compiled(), compiled("centre_of_mass:dx=0.005,dy=-0.01")
