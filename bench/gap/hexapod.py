@@ -80,7 +80,7 @@ def gap_hexapod(quick: bool) -> Result:
             "among those named": scoring.share(large, _among),
             "alone": scoring.share(large, scoring.right),
             "named as one of several": scoring.share(
-                large, lambda row: row["said"]["verdict"] == "either"
+                large, lambda row: row["said"].get("verdict") == "either"
             ),
             "false alarms": {
                 "n": len(none),
@@ -130,9 +130,10 @@ def _line(row: dict) -> str:
     from bns.gap.bench import scoring
 
     answer, said = row["answer"], row["said"]
+    names = [names[:3] for names in said["named"][:4]]
     return (
         f"{row['seed']}: {', '.join(answer['effects'])} (size {scoring.size(row):.1f}) "
-        f"-> {said['verdict']} {[names[:3] for names in said['named'][:4]]}"
+        f"-> {said.get('verdict', 'error')} {names}"
     )
 
 

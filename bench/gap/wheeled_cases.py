@@ -92,13 +92,7 @@ def one(kind: str, seed: int) -> dict:
         if kind == "pair":
             row["said"]["edit"] = scoring.edited(found, case, model)
     except BnsError as error:
-        said = {"error": str(error)}
-        row = {
-            "kind": kind,
-            "seed": seed,
-            "answer": case.answer.as_dict(),
-            "said": said,
-        }
+        row = scoring.refused(kind, seed, case, str(error))
     row |= watch.read()
     return plain(row)
 

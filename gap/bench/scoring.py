@@ -33,7 +33,7 @@ def row(kind: str, seed: int, case: Case, found: Diagnosis) -> dict[str, Any]:
 
 
 def refused(kind: str, seed: int, case: Case, why: str) -> dict[str, Any]:
-    """A case of which nothing was said: neither right nor named wrongly.
+    """A case of which nothing was said: it has no verdict, and names nothing.
 
     Args:
         kind: of case.
@@ -41,7 +41,7 @@ def refused(kind: str, seed: int, case: Case, why: str) -> dict[str, Any]:
         case: with the true answer.
         why: the error's text.
     """
-    said = {"verdict": "error", "named": [], "sets": [], "parts": [], "error": why}
+    said = {"error": why, "named": [], "sets": [], "parts": []}
     return {"kind": kind, "seed": seed, "answer": case.answer.as_dict(), "said": said}
 
 
@@ -189,7 +189,7 @@ def aliased(row: dict[str, Any]) -> bool:
 
 def claims(row: dict[str, Any]) -> bool:
     """Whether a gap is claimed."""
-    return bool(row["said"]["verdict"] != "no gap")
+    return bool(row["said"].get("verdict") != "no gap")
 
 
 def strange(row: dict[str, Any]) -> bool:

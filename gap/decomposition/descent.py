@@ -3,7 +3,6 @@ around it."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from itertools import islice
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from bns.gap.decomposition.levels import Level
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.shares import HeldOut
-from bns.gap.decomposition.singles import WIDE, Single, Singles
+from bns.gap.decomposition.singles import Single, Singles, wide
 
 TURNS = 4  # of fitting and searching
 FEW = 2  # explanations that need no other start if they leave little
@@ -110,8 +109,8 @@ def decompose(tried: Singles) -> Point:
     best = start if several else _alone(tried)
     if len(found) == 1:
         best = _followed(problem, start, found)
-    wide = any(len(problem.terms[name]) >= WIDE for name in found)
-    if several and (wide or len(found | best.support) > 1):
+    broad = any(wide(problem.terms, name) for name in found)
+    if several and (broad or len(found | best.support) > 1):
         best = _several(tried, found, best)
     for _ in range(ROUNDS):
         level = levels.best(problem, best)
@@ -174,12 +173,10 @@ def _simple(tried: Singles) -> list[Point]:
     has many numbers, which imitate much, from the best one of few, too."""
     problem, start, best = tried.problem, tried.start, tried.fitted[0]
     made = [descend(problem, best.values, {best.name}, start.noise)]
-    if len(problem.terms[best.name]) >= WIDE:
-        narrow = (one for one in tried.fitted if len(problem.terms[one.name]) < WIDE)
-        made += [
-            descend(problem, one.values, {one.name}, start.noise)
-            for one in islice(narrow, 1)
-        ]
+    if wide(problem.terms, best.name):
+        narrow = (one for one in tried.fitted if not wide(problem.terms, one.name))
+        if one := next(narrow, None):
+            made.append(descend(problem, one.values, {one.name}, start.noise))
     if not enough(made[0]) and (both := _with_level(problem, best, start)):
         made.append(both)
     return made

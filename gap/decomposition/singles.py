@@ -1,7 +1,7 @@
 """Explanations by themselves, each fitted to the simulation: through a tangent at the
 nominal a strong one looks like several, or like another."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -70,13 +70,18 @@ class Singles:
         """Values to start from: by the tangent, and by levels and departures."""
         linear, most = self.start.linear, self.problem.model.starts
         order = sorted(linear.free, key=lambda name: linear.cost({name}))
-        wide = [name for name in order if len(linear.terms[name]) >= WIDE]
-        order = [*dict.fromkeys((*order[:most], *wide[: most // 2]))]
+        many = [name for name in order if wide(linear.terms, name)]
+        order = [*dict.fromkeys((*order[:most], *many[: most // 2]))]
         tangent = [
             (name, fit.placed(self.problem, linear, {name}, self.start.values))
             for name in order
         ]
         return tangent + levels.screened(self.problem, self.start, most, only)
+
+
+def wide(terms: Mapping[str, tuple[int, ...]], name: str) -> bool:
+    """Whether an explanation has so many numbers that it imitates much."""
+    return len(terms[name]) >= WIDE
 
 
 def _prior(problem: Problem, values: np.ndarray) -> float:
