@@ -115,28 +115,8 @@ class ColumnMap:
             FormatError: no such file, not TOML, or no table `columns`.
             BnsError: as `of`.
         """
-        given = reading.read_toml(path)
-        for key in given:
-            if key not in ("robot", "columns"):
-                raise UnknownNameError("key of a column map", key, ("robot", "columns"))
-        table = given.get("columns")
-        if not isinstance(table, dict):
-            raise FormatError(f"Column map {path} has no table [columns].")
-        columns, units = {}, {}
-        for name, item in table.items():
-            entry = {"column": item} if isinstance(item, str) else item
-            if not isinstance(entry, dict) or not {"column"} <= set(entry) <= {
-                "column",
-                "unit",
-            }:
-                raise FormatError(
-                    f"Column map {path}: {name} = {item!r}; write "
-                    f'{name} = "column" or {{column = "...", unit = "..."}}.'
-                )
-            columns[name] = str(entry["column"])
-            if "unit" in entry:
-                units[name] = str(entry["unit"])
-        return cls.of(columns, units, str(given.get("robot", "khepera3")))
+        robot, columns, units = read_map(path)
+        return cls.of(columns, units, "khepera3" if robot is None else robot)
 
     @property
     def observed(self) -> tuple[Channel, ...]:
@@ -147,6 +127,42 @@ class ColumnMap:
             Channel(name, UNITS.get(name, self.columns[name].unit))
             for name in (*POSE, *other)
         )
+
+
+def read_map(path: str | Path) -> tuple[str | None, dict[str, str], dict[str, str]]:
+    """What a TOML file says of a log, see the module's docstring.
+
+    Returns:
+        name of the robot, None where none is said; column by channel; unit by channel,
+        where one is said.
+
+    Raises:
+        FormatError: no such file, not TOML, no table `columns`, or what is no column.
+        UnknownNameError: a key that there is not.
+    """
+    given = reading.read_toml(path)
+    for key in given:
+        if key not in ("robot", "columns"):
+            raise UnknownNameError("key of a column map", key, ("robot", "columns"))
+    table = given.get("columns")
+    if not isinstance(table, dict):
+        raise FormatError(f"Column map {path} has no table [columns].")
+    columns, units = {}, {}
+    for name, item in table.items():
+        entry = {"column": item} if isinstance(item, str) else item
+        if not isinstance(entry, dict) or not {"column"} <= set(entry) <= {
+            "column",
+            "unit",
+        }:
+            raise FormatError(
+                f"Column map {path}: {name} = {item!r}; write "
+                f'{name} = "column" or {{column = "...", unit = "..."}}.'
+            )
+        columns[name] = str(entry["column"])
+        if "unit" in entry:
+            units[name] = str(entry["unit"])
+    robot = str(given["robot"]) if "robot" in given else None
+    return robot, columns, units
 
 
 def factor(name: str, unit: str) -> float:

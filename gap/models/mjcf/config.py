@@ -11,7 +11,7 @@ from bns.errors import BnsError, FormatError, UnknownNameError
 from bns.gap.importers.tables import SENT, TIME, TRIAL
 from bns.storage import reading
 from bns.storage.reading import BEYOND
-from bns.worlds.data.importing import FACTORS, Source
+from bns.worlds.data.importing import FACTORS, Source, read_map
 from bns.worlds.trial import Channel
 
 KEYS = (
@@ -164,19 +164,18 @@ class OwnConfig:
             UnknownNameError: a key or channel that there is not.
         """
         path = Path(path)
-        given = reading.read_toml(path)
-        _known(given, ("robot", "columns"), f"key of {path}")
-        if given.get("robot", self.name) != self.name:
-            raise BnsError(
-                f"{path} is of robot {given['robot']!r}, the model of {self.name!r}."
-            )
-        if not given.get("columns"):
-            raise FormatError(f"{path} has no table [columns].")
-        table = _table(given, "columns", path)
+        robot, columns, units = read_map(path)
+        if robot not in (None, self.name):
+            raise BnsError(f"{path} is of robot {robot!r}, the model of {self.name!r}.")
+        if not columns:
+            raise FormatError(f"Column map {path} names no column in [columns].")
         told = (item.channel.name for item in self.told)
         seen = (item.channel.name for item in self.seen)
-        _known(table, (*MARKS, *told, *seen), f"channel in {path}")
-        named = {name: _source(name, item, path) for name, item in table.items()}
+        _known(columns, (*MARKS, *told, *seen), f"channel in {path}")
+        named = {
+            name: _source(name, {"column": column, "unit": units.get(name, "")}, path)
+            for name, column in columns.items()
+        }
         return replace(self, log={**self.log, **named})
 
 
