@@ -20,13 +20,12 @@ from bns.gap.models.mjcf.channels import (
     commands,
     compiled,
     factor,
-    observed,
-    replayed,
     si_unit,
     tolds,
 )
 from bns.gap.models.mjcf.config import WINDOW
 from bns.gap.models.mjcf.log import split
+from bns.gap.models.mjcf.measured import observed, replayed
 from bns.worlds.data.importing import FACTORS
 
 

@@ -15,7 +15,7 @@ from bns.errors import BnsError, UnknownNameError
 from bns.gap.decomposition.row import Row
 from bns.gap.models.mjcf import effects
 from bns.gap.models.mjcf.config import OwnConfig
-from bns.worlds.effects.parts import ALL
+from bns.worlds.effects.parts import ALL, ROUND
 
 RATIOS = (0.4, 0.6, 0.8, 0.9, 1.1, 1.25, 1.6, 2.5)
 SHARES = (0.02, 0.05, 0.12, 0.3, 1.0)  # of the largest value, beyond the nominal
@@ -36,6 +36,8 @@ EXCITE = {
     "body_mass": "motion against gravity, or sudden changes of speed",
     "actuator_gain": "large commands",
     "geom_friction": "sliding",
+    "geom_radius": "rolling, or steps",
+    "geom_compliance": "loads that come and go",
     "command_delay": "steps",
     "command_lag": "steps",
     "command_gain": "large commands",
@@ -77,10 +79,17 @@ USUAL = (
     "command_lag",
     "reading_gain",
     "reading_offset",
+    "geom_radius",
+    "geom_friction",
+    "geom_compliance",
 )
 """considered where the user does not say which, on what the commands move:
-`actuator_kp`, `actuator_kd` and a limit of force of position servos, `actuator_gain`
-and `command_limit` of others, the tilt of what is bolted to the world"""
+`actuator_kp` and `actuator_kd` of position servos, a limit of force of these and of
+servos of speed, `actuator_gain` and `command_limit` of all but position servos, the
+tilt of what is bolted to the world; the radius of wheels and feet, and grip and
+softness of all that touch, where they touch something"""
+TOUCHING = ("geom_radius", "geom_friction", "geom_compliance")
+"""effects that nothing shows where nothing touches"""
 
 
 def candidates(config: OwnConfig, model: mujoco.MjModel) -> tuple[Row, ...]:
@@ -128,13 +137,14 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
     seen = tuple(item.channel.name for item in config.seen)
     affine = model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE
     servos = {n for n in told if affine[n] and model.actuator_biasprm[n][1]}
+    looped = servos | {n for n in told if affine[n] and model.actuator_biasprm[n][2]}
     damped = {number for number in servos if model.actuator_biasprm[number][2]}
     limited = {number for number in told if model.actuator_forcelimited[number]}
     of = {
         "actuator_gain": set(told) - servos,
         "actuator_kp": servos,
         "actuator_kd": damped,
-        "actuator_torque_limit": limited & servos,
+        "actuator_torque_limit": limited & looped,
         "command_limit": [
             item.channel.name
             for item, number in zip(config.told, told, strict=True)
@@ -143,6 +153,7 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
         "reading_gain": seen,
         "reading_offset": seen,
         "body_tilt": _bolted(model, owned),
+        **_surfaces(model, joints=moved),
     }
     made: dict[str, tuple[str, ...]] = {}
     for name in USUAL:
@@ -168,6 +179,26 @@ def _moved(model: mujoco.MjModel, told: Iterable[int]) -> list[int]:
             return list(range(model.njnt))
         roots.add(int(root[model.actuator_trnid[actuator][0]]))
     return [joint for joint in range(model.njnt) if int(root[joint]) in roots]
+
+
+def _surfaces(
+    model: mujoco.MjModel, joints: Iterable[int]
+) -> dict[str, tuple[str, ...]]:
+    """Geoms of the effects on what touches: round ones on what joints carry, and all
+    where any of these can touch."""
+    roots = {int(model.body_rootid[model.jnt_bodyid[joint]]) for joint in joints}
+    able = [
+        number
+        for number in np.flatnonzero(model.geom_contype | model.geom_conaffinity)
+        if int(model.body_rootid[model.geom_bodyid[number]]) in roots
+    ]
+    round_ = [model.geom(n).name for n in able if int(model.geom_type[n]) in ROUND]
+    every = (ALL,) if able else ()
+    return {
+        "geom_radius": tuple(name for name in round_ if name),
+        "geom_friction": every,
+        "geom_compliance": every,
+    }
 
 
 def _bolted(model: mujoco.MjModel, bodies: Iterable[int]) -> list[str]:
@@ -274,11 +305,17 @@ def _of_model(
     name: str, kind: str, part: str, model: mujoco.MjModel
 ) -> tuple[float, float, str]:
     known = _names(model, kind)
+    if kind == "geom" and part == ALL:
+        known.append(ALL)
     if part not in known:
         raise UnknownNameError(f"{kind} in [effects] {name}", part, known)
     at = known.index(part)
     if name == "actuator_torque_limit":
         return LEAST, 3.0, "1"
+    if name == "geom_radius":
+        return 0.7, 1.4, "1"
+    if name == "geom_compliance":
+        return 0.2, 10.0, "1"
     if kind in ("actuator", "geom"):
         return 0.2, 3.0, "1"
     if name == "body_tilt":

@@ -1,12 +1,12 @@
 """Numbers of a model of the user's own that may be off, and how far they may be."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from bns.gap.candidates.mjcf import EXCITE
+from bns.gap.candidates.mjcf import EXCITE, TOUCHING
 from bns.gap.decomposition.row import Row
 from bns.gap.models.mjcf import masses
 from bns.gap.models.mjcf.masses import Body
@@ -20,8 +20,8 @@ LAGS = 1.5  # half steps that a simulation may lead by; a robot that is later is
 STEP = "fine_steps"
 """share of what finer steps change of the motion: 0 = as by the model's own step, 1 =
 as by finer ones; a third more = as by ever finer ones, where errors go with the step"""
-GROUPED = ("joint_damping", "joint_friction", "joint_armature")
-"""effects that may be on all joints alike"""
+GROUPED = ("joint_damping", "joint_friction", "joint_armature", "geom_radius")
+"""effects that may be on all parts alike"""
 LATE = ("command_delay", "command_lag", "reading_delay")
 LATER = 0.01  # [s] for derivatives: a lag has next to none where there is none
 CUT = (0.15, 0.3, 0.5, 0.7, 0.9)  # of what was told at most: levels of a limit of it
@@ -32,7 +32,7 @@ EIGHTH = 0.125  # of the largest value: the plausible one
 OFFSET = 0.0625  # of the span of an offset
 
 # plausible departure and slack of what has no scale of its own (assumed): a gain of a
-# motor is known to 10 %, of a sensor to 3 %, a delay to 40 ms
+# motor is known to 10 %, of a sensor and a tyre to 3 %, a delay to 40 ms
 PLAUSIBLE = {
     "actuator_gain": (0.1, 0.003),
     "actuator_kp": (0.05, 0.003),
@@ -40,6 +40,8 @@ PLAUSIBLE = {
     "command_gain": (0.1, 0.003),
     "reading_gain": (0.03, 0.001),
     "geom_friction": (0.3, 0.0),
+    "geom_radius": (0.03, 0.001),
+    "geom_compliance": (0.5, 0.02),
     "command_delay": (0.04, 8e-4),
     "command_lag": (0.04, 8e-4),
     "reading_delay": (0.04, 8e-4),
@@ -90,7 +92,7 @@ def rows(
 
 
 def grouped(candidates: Sequence[Row]) -> list[Row]:
-    """Further candidates: an effect alike on all joints that are considered singly,
+    """Further candidates: an effect alike on all parts that are considered singly,
     where it has the same unit on all (a slide's damping is no hinge's)."""
     made = []
     for name in GROUPED:
@@ -115,6 +117,21 @@ def grouped(candidates: Sequence[Row]) -> list[Row]:
                 )
             )
     return made
+
+
+def touching(candidates: Sequence[Row], names: Collection[str]) -> tuple[Row, ...]:
+    """Candidates without those on surfaces that touch nothing.
+
+    Args:
+        candidates: of a model, groups included.
+        names: of the geoms that touch something.
+    """
+    whole = {ALL} if names else set()
+    return tuple(
+        item
+        for item in candidates
+        if item.effect not in TOUCHING or item.fixed["part"] in {*names, *whole}
+    )
 
 
 def _of(
@@ -149,13 +166,14 @@ def _of(
         return
     sd, slack = _plausible(item)
     late = item.effect in LATE
+    step = LATER if late else sd if item.effect in TOUCHING else 0.0
     yield row(
         item.name,
         item.nominal,
         sd,
         slack=item.slack or slack,
         levels=(0.15, 0.3) if late else (),
-        step=LATER if late else 0.0,
+        step=step,  # of a small one contacts show their chatter
     )
 
 

@@ -41,6 +41,7 @@ class Decomposition:
         onset: what sets in; None = nothing.
         floor: what measuring scatters.
         before, after: excess over the floor of the nominal model and of `point`.
+        beyond: the same of `point`, less what a simulation is exact to in each feature.
         recurs: standard errors by which what `point` leaves recurs.
         scatter: excess over the floor of what differs between repeats.
         moved: mean square of the recorded motion in units of the floor.
@@ -62,6 +63,7 @@ class Decomposition:
     floor: rest.Floor
     before: float
     after: float
+    beyond: float
     recurs: float
     scatter: float
     moved: float
@@ -118,13 +120,13 @@ class Decomposition:
         """
         if self.broken:
             return True
-        if self.after <= max(self.scatter, Row.inexact**2 * self.moved):
+        if self.after <= self.scatter:
             return False
         if self.recurring:
-            return self.after > FELT
+            return self.beyond > FELT
         if trial_conditions.moments_unknown(self.problem.trials):
             return False  # so do commands that began a little sooner or later
-        return self.after > max(LARGE, SCATTER * self.scatter)
+        return self.beyond > max(LARGE, SCATTER * self.scatter)
 
     @property
     def failing(self) -> bool:
@@ -200,6 +202,9 @@ def decompose(
         floor=known,
         before=size.before,
         after=size.after,
+        beyond=rest.beyond(
+            size.plain, problem.recorded, known, size.inside, Row.inexact
+        ),
         recurs=rest.recurrence(
             problem,
             point.linear.rest(point.linear.solve(point.support)),

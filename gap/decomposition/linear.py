@@ -296,7 +296,11 @@ class Linear:
         off = found[at] - np.clip(found[at], self.low[out], self.high[out])
         if np.isclose(found[at], off).any():
             return np.inf
-        return float(off @ np.linalg.solve(self.covariance(key)[np.ix_(out, out)], off))
+        mine = [row for name in key for row in self.terms[name]]
+        plain = self.spread(frozenset())
+        left_open = plain.uncertain(mine, 1.0 - self.slack[mine] ** 2)
+        places = [mine.index(row) for row in out]
+        return float(off @ np.linalg.solve(left_open[np.ix_(places, places)], off))
 
     def _beyond(self, rows: list[int], found: np.ndarray) -> set[int]:
         """Rows whose most probable values lie beyond their bounds."""

@@ -144,8 +144,34 @@ def excess(rest: np.ndarray, known: Floor, inside: np.ndarray) -> float:
         known: the floor.
         inside: which residuals count, ``(N, C)``.
     """
-    units = np.where(inside, np.nan_to_num(rest) / known.sd, 0.0)
-    return float((units**2).sum() / max(inside.sum(), 1) - 1.0)
+    count = inside.sum(axis=0)
+    return float(_by_feature(rest, known, inside) @ count / max(count.sum(), 1))
+
+
+def beyond(
+    rest: np.ndarray, motion: np.ndarray, known: Floor, inside: np.ndarray, share: float
+) -> float:
+    """The same, beyond a share of what each feature itself moves: that one moves far
+    does not excuse the rest of another.
+
+    Args:
+        rest: residuals, ``(N, C)``.
+        motion: recorded features, ``(N, C)``.
+        known: the floor.
+        inside: which residuals count, ``(N, C)``.
+        share: of the motion.
+    """
+    count = inside.sum(axis=0)
+    allowed = share**2 * np.maximum(_by_feature(motion, known, inside), 1.0)
+    more = np.maximum(_by_feature(rest, known, inside) - allowed, 0.0)
+    return float(more @ count / max(count.sum(), 1))
+
+
+def _by_feature(values: np.ndarray, known: Floor, inside: np.ndarray) -> np.ndarray:
+    """Mean square of each feature in units of the floor, less one, ``(C,)``."""
+    units = np.where(inside, np.nan_to_num(values) / known.sd, 0.0)
+    made: np.ndarray = (units**2).sum(axis=0) / np.maximum(inside.sum(axis=0), 1) - 1.0
+    return made
 
 
 def recurrence(

@@ -78,3 +78,16 @@ class Spread:
         cost = self.cost + 0.5 * np.linalg.slogdet(wider)[1]
         cost -= 0.5 * float((more * pull) @ left)
         return cost, (self.variance[rows] + more) * left
+
+    def uncertain(self, rows: Sequence[int], more: np.ndarray) -> np.ndarray:
+        """Posterior covariance of some rows where the variance of these is another,
+        ``(n, n)``, in units of their priors.
+
+        Args:
+            rows: numbers of the rows.
+            more: added to the variance of each, ``(n,)``.
+        """
+        inner, variance = self.inner[np.ix_(rows, rows)], self.variance[rows] + more
+        seen = np.linalg.solve(np.eye(len(rows)) + inner * more, inner)
+        made: np.ndarray = np.diag(variance) - variance[:, None] * seen * variance
+        return made

@@ -20,11 +20,12 @@ LISTED = 4  # alternatives, or channels, in a sentence
 
 def sized(sizes: Sequence[float] | np.ndarray, channels: Sequence[Channel]) -> str:
     """Sizes of features, ``(C,)``, in units that are read, "1.2 mm forward"; of many
-    the largest."""
+    the largest, none that is 0 beside others."""
     order = sorted(range(len(channels)), key=lambda n: -sizes[n])
+    order = [n for n in order if sizes[n] > 0] or order
     kept = sorted(order[: LISTED if len(order) > LISTED + 1 else None])
     found = [_one(sizes[n], channels[n]) for n in kept]
-    more = len(channels) - len(kept)
+    more = len(order) - len(kept)
     return ", ".join(found) + (f" and less in {more} more" if more else "")
 
 

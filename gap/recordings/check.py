@@ -156,9 +156,7 @@ def _repaired(trial: Trial, label: str, timed: bool) -> tuple[Trial, list[str]]:
         notes.append(f"{label}: {spikes.sum()} spike{many}, dropped")
     lost = ~np.isfinite(observed).all(axis=1)
     observed[lost] = np.nan
-    # a reader adds moments without a sample, at which commands began
-    sampled = np.ones(len(lost), dtype=bool)
-    sampled[trial.boundaries[1:-1]] = False
+    sampled = _sampled(trial, lost)
     count = (lost & sampled & ~dropped).sum()
     if count:
         notes.append(f"{label}: {count} of {sampled.sum()} samples lost, bridged")
@@ -283,10 +281,24 @@ def _span(trial: Trial) -> float:
     return float(trial.times[last] - trial.times[first])
 
 
+def _sampled(trial: Trial, lost: np.ndarray) -> np.ndarray:
+    """Which rows are samples, ``(T,)``: a reader adds moments without one, at which
+    commands began.
+
+    Args:
+        trial: a recording.
+        lost: rows without an observation, ``(T,)``.
+    """
+    made = np.ones(len(lost), dtype=bool)
+    made[trial.boundaries[1:-1]] = False
+    return made | ~lost
+
+
 def _unusable(trial: Trial, wanted: Sequence[str]) -> str:
     seen = np.isfinite(trial.observed).all(axis=1)
-    if seen.mean() < LOST or seen.sum() < 8:
-        return f"only {seen.sum()} of {len(seen)} samples were seen"
+    count = _sampled(trial, ~seen).sum()
+    if seen.sum() < max(LOST * count, 8):
+        return f"only {seen.sum()} of {count} samples were seen"
     values = trial.observed[seen][:, : len(wanted)]
     if (np.ptp(values, axis=0) == 0).all() and np.abs(trial.commands.values).any():
         return "nothing moves although it is told to"

@@ -175,6 +175,62 @@ class GeomFriction(BodyEffect):
             geom.friction = friction
 
 
+class GeomRadius(BodyEffect):
+    """A wheel, a foot or another round geom is larger, or smaller, than the model says.
+
+    Spheres, capsules, cylinders and ellipsoids are round; capsules and cylinders keep
+    their lengths. What the body weighs stays.
+    """
+
+    name = "geom_radius"
+    source = "bounds assumed"
+    robots = ("own",)
+    choices = parts.part("geom")
+    parameter = factor((0.1, 10.0), "radius over the model's", example=1.05)
+
+    def _write(self, spec: Any) -> None:
+        some = parts.geoms(spec, self["part"])
+        chosen = [geom for geom in some if geom.type in parts.ROUND]
+        if not chosen:
+            raise BnsError(
+                f"Geom {self['part']!r} is not round: a radius is of a sphere, a "
+                "capsule, a cylinder or an ellipsoid."
+            )
+        weights = {geom.parent.name: geom.parent for geom in chosen}
+        held = [(body, Inertial.of(spec, body)) for body in weights.values()]
+        for geom in chosen:
+            whole = geom.type == mujoco.mjtGeom.mjGEOM_ELLIPSOID
+            geom.size[: 3 if whole else 1] *= self["factor"]
+        for body, inertial in held:
+            inertial.write(body)
+
+
+def _soften(geom: Any, factor: float) -> None:
+    """Let the contacts of a geom take longer, and sink in more."""
+    if geom.solref[0] > 0:
+        geom.solref[0] *= factor
+    else:  # stiffness and damping of a unit mass, each with its sign changed
+        geom.solref[:] /= [factor**2, factor]
+
+
+class GeomCompliance(BodyEffect):
+    """A surface is softer, or harder, than the model says.
+
+    A contact of two geoms of one priority takes the mean of what both say. It sinks in
+    by about the load's acceleration times the time constant squared.
+    """
+
+    name = "geom_compliance"
+    source = "MuJoCo documentation, Modeling, Solver parameters; bounds assumed"
+    robots = ("own",)
+    choices = parts.part("geom")
+    parameter = factor((0.1, 20.0), "time constant over the model's", example=2.5)
+
+    def _write(self, spec: Any) -> None:
+        for geom in parts.geoms(spec, self["part"]):
+            _soften(geom, self["factor"])
+
+
 ROUND = (-0.065, 0.065)  # m; the Khepera III's body
 
 
@@ -309,4 +365,4 @@ class FloorCompliance(BodyEffect):
     def _write(self, spec: Any) -> None:
         for body in spec.bodies:
             for geom in parts.contact_geoms(body):
-                geom.solref[0] *= self["factor"]
+                _soften(geom, self["factor"])

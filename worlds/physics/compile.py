@@ -32,7 +32,7 @@ def compiled(
         effects: edits, in order.
         step: physics step [s]; 0 = the model's own.
     """
-    spec = models.spec(robot, visuals=False)
+    spec = _nominal(robot).copy()
     if step:
         spec.option.timestep = step
     servo_law.fit(spec, models.robot(robot))
@@ -43,6 +43,12 @@ def compiled(
         spec.memory = ARENA
     model = mjcf.compiled(spec, f"the model of {robot}")
     return Compiled(model, hidden=model.nu - own)
+
+
+@lru_cache(maxsize=8)
+def _nominal(robot: str) -> Any:
+    """The robot's scene as a `mujoco.MjSpec` to be copied: its files are read once."""
+    return models.spec(robot, visuals=False)
 
 
 @lru_cache(maxsize=256)

@@ -1,6 +1,6 @@
-"""Which column of a log is told to which actuator, or seen of which part of a model."""
+"""Which column of a log is told to which actuator of a model."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,15 +12,12 @@ from bns.gap.importers import tables
 from bns.gap.importers.tables import Column, Table
 from bns.gap.models.mjcf import guesses, matching, prepared, rehearsal
 from bns.gap.models.mjcf.config import OwnConfig, Told
-from bns.gap.models.mjcf.rehearsal import Fit, Part
+from bns.gap.models.mjcf.rehearsal import Part
 from bns.worlds.data.importing import FACTORS
 from bns.worlds.trial import Channel
 
-REHEARSED = 5.0  # [s] of the first trial that the nominal model moves along
-AGREES = 0.5  # score from which on a column moves as the model says
 GOAL = {"goal", "des", "desired", "target"}
 """words for a position that a joint is told"""
-ALIKE = 0.1  # two parts whose scores are nearer cannot be told apart
 
 
 @dataclass(eq=False)
@@ -220,161 +217,3 @@ def factor(unit: str) -> float:
 def si_unit(unit: str) -> str:
     """The SI unit that goes with a unit; an unknown unit as it is."""
     return next((si for si, row in FACTORS.items() if unit in row), unit)
-
-
-def observed(work: Work, seen: list[Column]) -> None:
-    """Which part each measurement is of: by name, then by how the model moves."""
-    effort = [c for c in seen if matching.quantity(c) == tables.EFFORT]
-    seen = [c for c in seen if c not in effort]
-    if effort:
-        work.guessed.append(
-            f"left out, for no torque is compared: {', '.join(c.name for c in effort)}"
-        )
-    model = work.model
-    driven = [joint_of(model, model.actuator(a).id) for _, a, _ in work.told]
-    driven = [joint for joint in joints(model) if joint in driven]
-    found: dict[str, Part] = {}
-    why: dict[str, str] = {}
-    places = {
-        kind: [getattr(model, kind)(n).name for n in range(count)]
-        for kind, count in (("site", model.nsite), ("body", model.nbody))
-    }
-    speeds = [c for c in seen if matching.quantity(c) == tables.SPEED]
-    others = [c for c in seen if c not in speeds]
-    named = matching.by_place(others, places)
-    for kind, group in (("joint", others), ("speed", speeds)):
-        rest = [c for c in group if c.name not in named or c.name in joints(model)]
-        for parts in (joints(model), driven):
-            left = [c for c in rest if c.name not in found]
-            free = [p for p in parts if Part(kind, p) not in found.values()]
-            hits, reasons = matching.match(left, free)
-            found |= {name: Part(kind, part) for name, part in hits.items()}
-            why |= reasons
-    _rehearsed(work, seen, found, why, named)
-
-
-def _rehearsed(
-    work: Work,
-    seen: Sequence[Column],
-    found: dict[str, Part],
-    why: Mapping[str, str],
-    named: Mapping[str, tuple[str, str, str]],
-) -> None:
-    """Fill in what names do not tell by the nominal motion, units too."""
-    rows = _first(work)
-    moved = _moved(work, rows, found)
-    for column in seen:
-        values = column.values[rows]
-        if column.name in found:
-            options = [found[column.name]]
-        elif column.name in named:
-            kind, part, axis = named[column.name]
-            options = [Part(kind, part, a) for a in (axis or "xyz")]
-        elif matching.quantity(column) == tables.SPEED:
-            options = []
-        else:
-            taken = set(found.values())
-            options = [p for p in moved if p.quantity != "speed" and p not in taken]
-        fits = {
-            part: rehearsal.fit(
-                values,
-                moved[part],
-                _units(work.model, part, column),
-                joint=part.quantity == "joint",
-            )
-            for part in options
-        }
-        _chosen(work, column, fits, found, why, column.name in named)
-    if not work.seen:
-        raise BnsError(
-            f"No column of {work.log} is a joint, site or body of {work.path}; call "
-            f"them as its joints ({', '.join(joints(work.model))})."
-        )
-
-
-def _units(model: mujoco.MjModel, part: Part, column: Column) -> dict[str, float]:
-    known = dict(rehearsal.factors(model, part))
-    said = matching.unit(column.name)
-    return {said: known[said]} if said in known else known
-
-
-def _chosen(
-    work: Work,
-    column: Column,
-    fits: Mapping[Part, Fit],
-    found: dict[str, Part],
-    why: Mapping[str, str],
-    named: bool,
-) -> None:
-    if not fits:
-        work.unsure.append(f"{column.name}: of no part of the model, left out")
-        return
-    best = max(fits, key=lambda part: fits[part].score)
-    fit = fits[best]
-    if column.name not in found and fit.score < AGREES:
-        work.unsure.append(f"{column.name}: moves as no part of the model, left out")
-        return
-    reason = why.get(column.name, "by its name" if named else "for it moves so")
-    found[column.name] = best
-    axis = f" along {best.axis}" if best.axis else ""
-    line = f"{column.name}: {best.quantity} {best.name!r}{axis} in {fit.unit}, {reason}"
-    work.seen.append((column, best, fit.unit))
-    near = [
-        part
-        for part, other in fits.items()
-        if part != best and other.score > fit.score - ALIKE
-    ]
-    if near and best.quantity != "joint":
-        line += "; moves alike: " + ", ".join(
-            f"{p.quantity} {p.name}" for p in near[:2]
-        )
-    sure = fit.score > AGREES and reason not in ("by order", "for it moves so")
-    if fit.correlation < -AGREES:
-        line += "; it moves against the model: is its sign another?"
-        sure = False
-    elif fit.score <= AGREES:
-        line += "; it hardly moves as the model does"
-    (work.guessed if sure else work.unsure).append(line)
-
-
-def _first(work: Work) -> np.ndarray:
-    """Rows of the trial whose commands move most, from its start on."""
-    told = [c.values for c, _, _ in work.told]
-    rows = max(work.rows, key=lambda r: sum(np.ptp(v[r]) for v in told))
-    return rows[work.times[rows] <= work.times[rows[0]] + REHEARSED]
-
-
-def _moved(
-    work: Work, rows: np.ndarray, found: Mapping[str, Part]
-) -> dict[Part, np.ndarray]:
-    model, data = work.model, mujoco.MjData(work.model)
-    if model.nkey:
-        mujoco.mj_resetDataKeyframe(model, data, 0)
-    columns = {column.name: column.values for column in work.table.columns}
-    for name, part in found.items():
-        if part.quantity == "joint":
-            values = columns[name][rows]
-            first = values[np.isfinite(values)][:1]
-            span = np.abs(values[np.isfinite(values)]).max(initial=0.0)
-            if len(first) and span <= 2 * np.pi:
-                data.joint(part.name).qpos[0] = first[0]
-    return replayed(work, rows, data)
-
-
-def replayed(
-    work: Work, rows: np.ndarray, data: mujoco.MjData
-) -> dict[Part, np.ndarray]:
-    """What the model does of itself under the commands of some samples.
-
-    Args:
-        work: what is known of the log.
-        rows: numbers of the samples, ``(T,)``.
-        data: the model's state at the first of them; is changed.
-
-    Returns:
-        positions of all joints, named sites and bodies, each ``(T,)``.
-    """
-    told = np.stack([c.values[rows] * factor(unit) for c, _, unit in work.told], axis=1)
-    actuators = [work.model.actuator(name).id for _, name, _ in work.told]
-    times = work.times[rows] - work.times[rows[0]]
-    return rehearsal.motions(work.model, data, actuators, times, np.nan_to_num(told))

@@ -61,6 +61,8 @@ class OwnModel(GapModel):
             if item.effect == "body_mass"
         }
         self._limits = any(i.effect == "actuator_torque_limit" for i in self.listed)
+        self._surfaces = any(item.effect in mjcf.TOUCHING for item in self.listed)
+        self._tried = {item.effect for item in self.listed}
         self._terms = {
             item.name: item for item in (*self.listed, *mjcf_rows.grouped(self.listed))
         }
@@ -94,7 +96,7 @@ class OwnModel(GapModel):
         From then on fine paths are simulated as finely as these trials need.
         """
         self._parts = self.physics.needed(trials)
-        items = tuple(self._terms.values())
+        items = self._felt(trials)
         return mjcf_rows.rows(
             items,
             trials,
@@ -104,9 +106,19 @@ class OwnModel(GapModel):
             forces=self.physics.forces(trials) if self._limits else {},
         )
 
+    def _felt(self, trials: Sequence[Trial]) -> tuple[Row, ...]:
+        """Candidates without those on surfaces that touch nothing, unless the user
+        asked for these."""
+        items = tuple(self._terms.values())
+        if self.config.effects is None and self._surfaces:
+            touching = self.physics.touching(trials)
+            items = mjcf_rows.touching(items, touching)
+        self._tried = {item.effect for item in items}
+        return items
+
     def untried(self) -> tuple[str, ...]:
         """See `GapModel.untried`."""
-        tried = {item.effect for item in self.listed}
+        tried = self._tried
         return tuple(name for name in sorted(own_effects.CLASSES) if name not in tried)
 
     def effect(self, term: str, values: Mapping[str, float]) -> Effect | None:

@@ -2,7 +2,7 @@
 
 import math
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import mujoco
@@ -28,8 +28,8 @@ FINE = 0.005  # [s] between kept states; the step if that is longer
 FINEST, CUT = 0.0025, 4  # [s] longer steps are cut, shorter ones in so many parts
 EXACT = 0.2  # of the noise: predictions that differ by less are alike
 BY_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
-TRIED = 4  # trials on which steps are compared, and forces looked at
-LOOKED = 500  # moments of a trial at which forces are looked at
+TRIED = 4  # trials on which steps are compared, and forces and contacts looked at
+LOOKED = 500  # moments of a trial at which these are looked at
 
 
 class Simulation:
@@ -141,8 +141,32 @@ class Simulation:
             trials: recorded.
         """
         model = self.model
+        seen = [np.abs(data.actuator_force) for data in self._moments(trials)]
+        most = np.abs(model.actuator_forcerange).max(axis=1)
+        if not seen:  # it diverged at once
+            return {}
+        return {
+            model.actuator(number).name: np.array(seen)[:, number] / most[number]
+            for number in np.flatnonzero(model.actuator_forcelimited).tolist()
+        }
+
+    def touching(self, trials: Sequence[Trial]) -> set[str]:
+        """Names of the geoms that touch something in the nominal motion, at moments of
+        some of the trials.
+
+        Args:
+            trials: recorded.
+        """
+        found: set[int] = set()
+        for data in self._moments(trials):
+            found |= set(data.contact.geom.ravel().tolist())
+        return {self.model.geom(number).name for number in found}
+
+    def _moments(self, trials: Sequence[Trial]) -> Iterator[mujoco.MjData]:
+        """Moments of some trials of the nominal motion, all quantities computed; each
+        is overwritten by the next."""
+        model = self.model
         data = mujoco.MjData(model)
-        seen = []
         for trial in trials[:: max(len(trials) // TRIED, 1)]:
             job = self._job(trial, (), 1)
             (motion,) = self._pool.map([job])
@@ -154,14 +178,7 @@ class Simulation:
                     mujoco.mj_setState(model, data, state, STATE)
                     data.ctrl[:] = ctrl
                     mujoco.mj_forward(model, data)
-                    seen.append(np.abs(data.actuator_force))
-        most = np.abs(model.actuator_forcerange).max(axis=1)
-        if not seen:  # it diverged at once
-            return {}
-        return {
-            model.actuator(number).name: np.array(seen)[:, number] / most[number]
-            for number in np.flatnonzero(model.actuator_forcelimited).tolist()
-        }
+                    yield data
 
     def predicted(
         self,

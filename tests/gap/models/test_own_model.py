@@ -207,10 +207,15 @@ def test_effects_are_considered_where_none_are_listed(arm):
     } < names
 
 
-PARTS = {"joint": "elbow", "body": "forearm", "actuator": "elbow_servo"}
+PARTS = {
+    "joint": "elbow",
+    "body": "forearm",
+    "actuator": "elbow_servo",
+    "geom": "forearm",
+}
 
 
-@pytest.mark.parametrize("name", sorted(set(CLASSES) - {"geom_friction"}))
+@pytest.mark.parametrize("name", sorted(CLASSES))
 def test_every_effect_can_be_a_candidate(arm, name):
     channel = "elbow" if name.startswith("reading") else "elbow_goal"
     part = PARTS.get(OWNERS.get(name, ""), channel)
@@ -239,7 +244,7 @@ def test_geared_joints_may_have_ten_times_what_is_looked_for_first(arm, name):
     assert made.high == max(made.levels) == 0.1
 
 
-UNFELT = {"geom_friction", "actuator_torque_limit"}  # no contact, no limit to scale
+UNFELT = {*mjcf.TOUCHING, "actuator_torque_limit"}  # no contact, no limit to scale
 
 
 @pytest.mark.parametrize("name", sorted(set(CLASSES) - UNFELT))

@@ -166,6 +166,25 @@ def test_moments_at_which_commands_began_are_no_lost_samples(model, told):
     assert f"1 of {len(seen) - len(begun)} samples lost" in " ".join(notes)
 
 
+def test_a_trial_of_more_commands_than_samples_is_used(model, told):
+    (trial,) = MujocoWorld(reality=[NOISE], threads=1).run(told[:1], seeds=[0])
+    inner = np.arange(1, len(trial.times) - 1)
+    begun = np.array([0, *inner[inner % 3 > 0], len(trial.times) - 1])
+    which = np.searchsorted(trial.boundaries, begun[:-1], side="right") - 1
+    commands = Commands(
+        trial.commands.values[which],
+        np.diff(trial.times[begun]),
+        trial.commands.channels,
+    )
+    seen = trial.observed.copy()
+    seen[begun[1:-1]] = np.nan
+    streamed = trial.replace(
+        observed=seen, commands=commands, boundaries=begun, handled=()
+    )
+    kept, notes = check.check([streamed], model)
+    assert len(kept) == 1 and "left out" not in " ".join(notes)
+
+
 def test_a_robot_that_stays_has_no_places():
     noise = np.random.default_rng(0).normal(0, 1e-3, (50, 3))
     coarse = segments.coarse(noise + np.array([0.4, -0.2, 3.1]))

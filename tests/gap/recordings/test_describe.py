@@ -255,3 +255,26 @@ def test_what_commands_cannot_move_has_no_effects(tmp_path):
     names = [row.name for row in OwnModel.read(tmp_path / "own.toml").listed]
     assert "body_mass[lower]" in names and "command_limit[calf]" in names
     assert not any("ball" in name for name in names)
+
+
+def test_a_place_that_one_trial_does_not_move_is_found_in_another(tmp_path):
+    """The calf alone, farthest: the toe stays in its plane. Then the hip, less far."""
+    model = mujoco.MjModel.from_xml_string(ARM.replace("ACTUATORS", SERVOS))
+    rng, rows = np.random.default_rng(2), []
+    for trial, size in enumerate(([0.0, 0.8], [0.3, 0.0])):
+        data = mujoco.MjData(model)
+        for time in np.arange(0, 4, 0.01):
+            data.ctrl[:] = np.sin(3 * time) * np.array(size)
+            mujoco.mj_forward(model, data)
+            seen = np.append(data.qpos, data.site_xpos[0, :2])
+            seen = seen + rng.normal(0, 1e-3, 4)
+            rows.append([time, trial, *data.ctrl, *seen])
+            mujoco.mj_step(model, data, 2)
+    head = "time,trial,hip_goal,calf_goal,hip,calf,toe_x,toe_y"
+    log = tmp_path / "log.csv"
+    np.savetxt(log, rows, delimiter=",", header=head, comments="", fmt="%.6f")
+    robot = tmp_path / "arm.xml"
+    robot.write_text(ARM.replace("ACTUATORS", SERVOS))
+    describe(robot, log, out=tmp_path / "own.toml").write(tmp_path / "own.toml")
+    seen = OwnModel.read(tmp_path / "own.toml", threads=1).config.seen
+    assert [(item.part, item.axis) for item in seen[2:]] == [("toe", 0), ("toe", 1)]

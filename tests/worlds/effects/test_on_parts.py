@@ -153,6 +153,50 @@ class TestBodies:
         assert model.geom_friction[:, 0] == pytest.approx(0.5)  # of 1
 
 
+ROLLER = """
+<mujoco><option timestep="0.001" integrator="implicitfast"/><worldbody>
+<geom name="floor" type="plane" size="5 5 0.1"/>
+<body name="cart" pos="0 0 0.05"><joint type="slide" axis="1 0 0"/>
+  <joint type="slide" axis="0 0 1"/><geom type="box" size="0.1 0.05 0.01" mass="1"
+  contype="0" conaffinity="0"/><body name="wheel"><joint name="axle" axis="0 1 0"/>
+  <geom name="tyre" type="{}" mass="0.2" zaxis="0 1 0"/></body></body></worldbody>
+<actuator><velocity name="motor" joint="axle" kv="5"/></actuator></mujoco>
+"""
+"""A cart on one wheel of 50 mm, which cannot fall over."""
+TYRES = (
+    'cylinder" size="0.05 0.01',
+    'sphere" size="0.05',
+    'ellipsoid" size=".05 .05 .05',
+)
+
+
+class TestSurfaces:
+    @pytest.mark.parametrize("tyre", TYRES)
+    def test_a_larger_wheel_rolls_farther_and_weighs_the_same(self, tyre):
+        xml = ROLLER.format(tyre)
+        plain, large = compiled(xml=xml), compiled("geom_radius:factor=1.2", xml=xml)
+        assert large.body_mass == pytest.approx(plain.body_mass)
+        for one, other in zip(large.body_inertia, plain.body_inertia, strict=True):
+            assert sorted(one) == pytest.approx(sorted(other))
+        speeds = [at_rest(model, (2.0,)).qvel[0] for model in (plain, large)]
+        assert speeds == pytest.approx([0.05 * 2.0, 0.06 * 2.0], rel=0.02)
+
+    def test_a_box_has_no_radius(self):
+        xml = ROLLER.format('box" size="0.05 0.05 0.05')
+        with pytest.raises(BnsError, match="not round"):
+            compiled("geom_radius:part=tyre,factor=1.2", xml=xml)
+
+    def test_a_soft_floor_lets_sink_in(self):
+        depths = []
+        for solref in ("0.02 1", "-2500 -100"):  # the same, written in two ways
+            xml = ROLLER.format(f'sphere" size="0.05" solref="{solref}')
+            xml = xml.replace('0.1"/>', f'0.1" solref="{solref}"/>')
+            for texts in ([], ["geom_compliance:factor=2"]):
+                depths.append(-at_rest(compiled(*texts, xml=xml), (0.0,)).qpos[1])
+        assert depths[2:] == pytest.approx(depths[:2])
+        assert 2 < depths[1] / depths[0] < 4  # the contact stiffens as it sinks in
+
+
 class TestActuators:
     def test_a_softer_servo_gives_way_more(self):
         droop = [

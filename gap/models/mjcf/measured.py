@@ -1,0 +1,241 @@
+"""Which part of a model a column of a log is seen of: by name, then by its motion."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+
+from bns.errors import BnsError
+from bns.gap.importers import tables
+from bns.gap.importers.tables import Column
+from bns.gap.models.mjcf import matching, rehearsal
+from bns.gap.models.mjcf.channels import Work, factor, joint_of, joints
+from bns.gap.models.mjcf.rehearsal import Fit, Part
+
+REHEARSED = 5.0  # [s] of a trial that the nominal model moves along
+AGREES = 0.5  # score from which on a column moves as the model says
+ALIKE = 0.1  # two parts whose scores are nearer cannot be told apart
+
+
+def observed(work: Work, seen: list[Column]) -> None:
+    """Which part each measurement is of: by name, then by how the model moves."""
+    effort = [c for c in seen if matching.quantity(c) == tables.EFFORT]
+    seen = [c for c in seen if c not in effort]
+    if effort:
+        work.guessed.append(
+            f"left out, for no torque is compared: {', '.join(c.name for c in effort)}"
+        )
+    model = work.model
+    driven = [joint_of(model, model.actuator(a).id) for _, a, _ in work.told]
+    driven = [joint for joint in joints(model) if joint in driven]
+    found: dict[str, Part] = {}
+    why: dict[str, str] = {}
+    places = {
+        kind: [getattr(model, kind)(n).name for n in range(count)]
+        for kind, count in (("site", model.nsite), ("body", model.nbody))
+    }
+    speeds = [c for c in seen if matching.quantity(c) == tables.SPEED]
+    others = [c for c in seen if c not in speeds]
+    named = matching.by_place(others, places)
+    for kind, group in (("joint", others), ("speed", speeds)):
+        rest = [c for c in group if c.name not in named or c.name in joints(model)]
+        for parts in (joints(model), driven):
+            left = [c for c in rest if c.name not in found]
+            free = [p for p in parts if Part(kind, p) not in found.values()]
+            hits, reasons = matching.match(left, free)
+            found |= {name: Part(kind, part) for name, part in hits.items()}
+            why |= reasons
+    _rehearsed(work, seen, found, why, named)
+
+
+def _rehearsed(
+    work: Work,
+    seen: Sequence[Column],
+    found: dict[str, Part],
+    why: Mapping[str, str],
+    named: Mapping[str, tuple[str, str, str]],
+) -> None:
+    """Fill in what names do not tell by the nominal motion, units too."""
+    drives = Drives(work, found)
+    fitted = {
+        column.name: drives.fits(column, _called(column, found, named))
+        for column in seen
+        if column.name in found or column.name in named
+    }
+    for column in seen:
+        if column.name not in fitted and matching.quantity(column) != tables.SPEED:
+            fitted[column.name] = drives.fits(column, drives.free())
+        _chosen(work, column, fitted, found, why, named.get(column.name))
+    if not work.seen:
+        raise BnsError(
+            f"No column of {work.log} is a joint, site or body of {work.path}; call "
+            f"them as its joints ({', '.join(joints(work.model))})."
+        )
+
+
+def _called(
+    column: Column,
+    found: Mapping[str, Part],
+    named: Mapping[str, tuple[str, str, str]],
+) -> list[Part]:
+    """Parts that a column may be of by its name."""
+    if column.name in found:
+        return [found[column.name]]
+    kind, part, axis = named[column.name]
+    return [Part(kind, part, a) for a in (axis or "xyz")]
+
+
+def _units(model: mujoco.MjModel, part: Part, column: Column) -> dict[str, float]:
+    known = dict(rehearsal.factors(model, part))
+    said = matching.unit(column.name)
+    return {said: known[said]} if said in known else known
+
+
+def _chosen(
+    work: Work,
+    column: Column,
+    fitted: Mapping[str, Mapping[Part, Fit]],
+    found: dict[str, Part],
+    why: Mapping[str, str],
+    named: tuple[str, str, str] | None,
+) -> None:
+    fits = fitted.get(column.name, {})
+    if not fits:
+        work.unsure.append(f"{column.name}: of no part of the model, left out")
+        return
+    best = max(fits, key=lambda part: fits[part].score)
+    fit = fits[best]
+    called = column.name in found or (named is not None and bool(named[2]))
+    if not called and fit.score < AGREES:
+        work.unsure.append(f"{column.name}: moves as no part of the model, left out")
+        return
+    unit = fit.unit
+    if fit.score < AGREES and best.axis:
+        unit = _beside(best, fitted) or unit
+    reason = why.get(column.name, "by its name" if named else "for it moves so")
+    found[column.name] = best
+    axis = f" along {best.axis}" if best.axis else ""
+    line = f"{column.name}: {best.quantity} {best.name!r}{axis} in {unit}, {reason}"
+    work.seen.append((column, best, unit))
+    near = [
+        part
+        for part, other in fits.items()
+        if part != best and other.score > fit.score - ALIKE
+    ]
+    if near and best.quantity != "joint":
+        line += "; moves alike: " + ", ".join(
+            f"{p.quantity} {p.name}" for p in near[:2]
+        )
+    sure = fit.score > AGREES and reason not in ("by order", "for it moves so")
+    if fit.correlation < -AGREES:
+        line += "; it moves against the model: is its sign another?"
+        sure = False
+    elif fit.score <= AGREES:
+        line += "; it hardly moves as the model does"
+    (work.guessed if sure else work.unsure).append(line)
+
+
+def _beside(place: Part, fitted: Mapping[str, Mapping[Part, Fit]]) -> str:
+    """The unit of the other axes of a place, if one moves as the model does."""
+    others = [
+        fit
+        for fits in fitted.values()
+        for part, fit in fits.items()
+        if part[:2] == place[:2] and fit.score >= AGREES
+    ]
+    return max(others, key=lambda fit: fit.score).unit if others else ""
+
+
+@dataclass(frozen=True, eq=False)
+class Drives:
+    """The nominal motion in some trials, to tell columns by it.
+
+    Attributes:
+        work: what is known of the log.
+        found: which part each column is of, as far as that is known.
+        moved: of each part, by first row of the trial.
+    """
+
+    work: Work
+    found: dict[str, Part]
+    moved: dict[int, dict[Part, np.ndarray]] = field(default_factory=dict)
+
+    def free(self) -> list[Part]:
+        """Joints and places that no column is of yet."""
+        taken = set(self.found.values())
+        every = self._moved(self._trial([c.values for c, _, _ in self.work.told]))
+        return [p for p in every if p.quantity != "speed" and p not in taken]
+
+    def fits(self, column: Column, options: Sequence[Part]) -> dict[Part, Fit]:
+        """How well a column agrees with parts: in the trial whose commands move most,
+        and where none of these moves there, in the one in which the column does."""
+        told = [c.values for c, _, _ in self.work.told]
+        found: dict[Part, Fit] = {}
+        for rows in (self._trial(told), self._trial([column.values])):
+            moved = self._moved(rows)
+            found = {
+                part: rehearsal.fit(
+                    column.values[rows],
+                    moved[part],
+                    _units(self.work.model, part, column),
+                    joint=part.quantity == "joint",
+                )
+                for part in options
+            }
+            if any(np.isfinite(fit.score) for fit in found.values()):
+                break
+        return found
+
+    def _trial(self, values: Sequence[np.ndarray]) -> np.ndarray:
+        """Rows of the trial in which values move most, from its start on."""
+
+        def spread(rows: np.ndarray) -> float:
+            seen = (v[rows][np.isfinite(v[rows])] for v in values)
+            return sum(float(np.ptp(v)) for v in seen if len(v))
+
+        work = self.work
+        rows = max(work.rows, key=spread)
+        return rows[work.times[rows] <= work.times[rows[0]] + REHEARSED]
+
+    def _moved(self, rows: np.ndarray) -> dict[Part, np.ndarray]:
+        first = int(rows[0])
+        if first not in self.moved:
+            self.moved[first] = _from_start(self.work, rows, self.found)
+        return self.moved[first]
+
+
+def _from_start(
+    work: Work, rows: np.ndarray, found: Mapping[str, Part]
+) -> dict[Part, np.ndarray]:
+    model, data = work.model, mujoco.MjData(work.model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    columns = {column.name: column.values for column in work.table.columns}
+    for name, part in found.items():
+        if part.quantity == "joint":
+            values = columns[name][rows]
+            first = values[np.isfinite(values)][:1]
+            span = np.abs(values[np.isfinite(values)]).max(initial=0.0)
+            if len(first) and span <= 2 * np.pi:
+                data.joint(part.name).qpos[0] = first[0]
+    return replayed(work, rows, data)
+
+
+def replayed(
+    work: Work, rows: np.ndarray, data: mujoco.MjData
+) -> dict[Part, np.ndarray]:
+    """What the model does of itself under the commands of some samples.
+
+    Args:
+        work: what is known of the log.
+        rows: numbers of the samples, ``(T,)``.
+        data: the model's state at the first of them; is changed.
+
+    Returns:
+        positions of all joints, named sites and bodies, each ``(T,)``.
+    """
+    told = np.stack([c.values[rows] * factor(unit) for c, _, unit in work.told], axis=1)
+    actuators = [work.model.actuator(name).id for _, name, _ in work.told]
+    times = work.times[rows] - work.times[rows[0]]
+    return rehearsal.motions(work.model, data, actuators, times, np.nan_to_num(told))
