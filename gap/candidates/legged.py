@@ -28,8 +28,7 @@ _SERVOS: tuple[tuple[str, str, float, float, float, dict[str, Any]], ...] = (
     ("servo_armature", "inertia", 0.02, 0, 0.1, {}),
     ("servo_delay", "delay", 0.06, 0, 0.4, {"step": 0.012}),
     ("servo_lag", "time_constant", 0.08, 0, 0.5, {"step": 0.012}),
-    ("servo_duty_limit", "factor", 0.3, 0.02, 1, {"smooth": False,
-     "levels": (0.08, 0.2, 0.4, 0.7)}),
+    ("servo_duty_limit", "factor", 0.3, 0.02, 1, {"levels": (0.08, 0.2, 0.4, 0.7)}),
     ("servo_offset", "angle", 0.1, -0.3, 0.3, {}),
 )  # fmt: skip
 HIDDEN = ("servo_offset",)

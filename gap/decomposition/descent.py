@@ -1,7 +1,8 @@
 """From a start to a set of explanations that stays when the problem is made linear
 around it."""
 
-from collections.abc import Iterable, Mapping
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from bns.gap.decomposition.singles import Single, Singles, wide
 TURNS = 4  # of fitting and searching
 FEW = 2  # explanations that need no other start if they leave little
 ENOUGH = 1.2  # times what all explanations leave: little more
+NEARLY = 1.5  # the same where these, all together, only describe the recording
 ROUNDS = 2  # of levels
 MARGIN = 1.02  # of the held-out error that an autoregression may cost
 WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
@@ -147,7 +149,7 @@ def _several(tried: Singles, found: Support, best: Point) -> Point:
     from all where many depart."""
     problem = tried.problem
     points = _simple(tried) + [best] * bool(best.support)
-    if not any(enough(point) for point in points):
+    if not any(enough(problem, point) for point in points):
         if not best.support:
             points.append(_followed(problem, tried.start, found))
         if problem.model.many:
@@ -155,11 +157,30 @@ def _several(tried: Singles, found: Support, best: Point) -> Point:
     return refit.better(problem, points)
 
 
-def enough(point: Point) -> bool:
-    """Whether few explanations leave little more than all together do."""
-    linear, support = point.linear, point.support
+def enough(problem: Problem, point: Point, few: int = FEW) -> bool:
+    """Whether few explanations leave little more than all together do.
+
+    Where many depart, it does for the strongest few (what is weak beside them needs no
+    other start), and for somewhat more where all together, a hundred numbers, foretell
+    motion that was not fitted no better.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+        few: how many.
+    """
+    linear, support = point.linear, sorted(point.support)
     whole = linear.squares(linear.free)
-    return len(support) <= FEW and linear.squares(support) < ENOUGH * whole
+    if not problem.model.many:
+        left = linear.squares(support)
+        return len(support) <= few and left < ENOUGH * whole
+    sets = itertools.combinations(support, min(few, len(support)))
+    best = min(sets, key=linear.squares)
+    left = linear.squares(best)
+    if left < ENOUGH * whole:
+        return True
+    errors = [linear.held_out(some).sum() for some in (best, linear.free)]
+    return left < NEARLY * whole and bool(errors[0] < errors[1])
 
 
 def _followed(problem: Problem, start: Point, support: Support) -> Point:
@@ -170,16 +191,35 @@ def _followed(problem: Problem, start: Point, support: Support) -> Point:
 
 def _simple(tried: Singles) -> list[Point]:
     """Points from the best single explanation, and from it with a level on top; if it
-    has many numbers, which imitate much, from the best one of few, too."""
-    problem, start, best = tried.problem, tried.start, tried.fitted[0]
-    made = [descend(problem, best.values, {best.name}, start.noise)]
-    if wide(problem.terms, best.name):
-        narrow = (one for one in tried.fitted if not wide(problem.terms, one.name))
-        if one := next(narrow, None):
-            made.append(descend(problem, one.values, {one.name}, start.noise))
-    if not enough(made[0]) and (both := _with_level(problem, best, start)):
-        made.append(both)
-    return made
+    has many numbers, which imitate much, from the best one of few, too.
+
+    Where many depart, what the tangent finds does if it is enough by itself."""
+    problem, start = tried.problem, tried.start
+    made: dict[Single, Point] = {}
+    if problem.model.many:
+        made = _from(tried, _leading(problem, tried.by_tangent))
+        if any(enough(problem, point, 1) for point in made.values()):
+            return list(made.values())
+    leading = _leading(problem, tried.fitted)
+    made |= _from(tried, [one for one in leading if one not in made])
+    points = [made[one] for one in leading]
+    if not enough(problem, points[0]):
+        points += _with_level(problem, leading[0], start)
+    return points
+
+
+def _leading(problem: Problem, singles: Sequence[Single]) -> list[Single]:
+    """The best of some single explanations, and the best one of few numbers."""
+    narrow = [one for one in singles if not wide(problem.terms, one.name)]
+    return [*dict.fromkeys((*singles[:1], *narrow[:1]))]
+
+
+def _from(tried: Singles, singles: Iterable[Single]) -> dict[Single, Point]:
+    """A point from each of some single explanations."""
+    known = tried.start.noise
+    return {
+        one: descend(tried.problem, one.values, {one.name}, known) for one in singles
+    }
 
 
 def _alone(tried: Singles) -> Point:
@@ -199,14 +239,14 @@ def _beyond_chance(problem: Problem, start: Point, found: Point, count: int) -> 
     return found if here + np.log(max(count, 1)) < nominal else start
 
 
-def _with_level(problem: Problem, best: Single, start: Point) -> Point | None:
-    """A point from a single explanation and a level on top of it: through a tangent
-    that lacks the level, the rest of it looks like several others."""
+def _with_level(problem: Problem, best: Single, start: Point) -> list[Point]:
+    """A point from a single explanation and a level on top of it, if there is one:
+    through a tangent that lacks the level, the rest of it looks like several others."""
     single = refit.fitted_at(problem, replace(start, values=best.values), {best.name})
     level = levels.best(problem, single)
     if level is None or level.cost > single.cost - WORTH:
-        return None
-    return descend(problem, level.values, level.support, single.noise)
+        return []
+    return [descend(problem, level.values, level.support, single.noise)]
 
 
 def _from_all(problem: Problem, start: Point) -> Point:

@@ -356,6 +356,11 @@ class Linear:
         """Weighted square of what a set leaves, the others exactly nominal."""
         return self.left(self.solve(support, slack=False))
 
+    def left_of(self, number: int, values: np.ndarray) -> float:
+        """Weighted square of what values of all rows, ``(K,)``, leave of a stretch."""
+        change = values @ self.normal[number] @ values
+        return float(self.square[number] - 2 * self.slope[number] @ values + change)
+
     def left(self, values: np.ndarray) -> float:
         """Weighted square of what values of all rows leave.
 
@@ -378,16 +383,12 @@ class Linear:
 
     def held_out(self, support: Iterable[str]) -> np.ndarray:
         """Weighted square of each stretch, the rows fitted to the others, ``(B,)``."""
-        support = tuple(support)
-        made = np.empty(len(self.square))
-        for number in range(len(made)):
-            values = self.solve(support, slack=False, without=number)
-            made[number] = (
-                self.square[number]
-                - 2 * self.slope[number] @ values
-                + values @ self.normal[number] @ values
-            )
-        return made
+        some = tuple(support)
+        made = [
+            self.left_of(number, self.solve(some, slack=False, without=number))
+            for number in range(len(self.square))
+        ]
+        return np.array(made)
 
     def scores(self, values: np.ndarray) -> np.ndarray:
         """Derivative of half the weighted square by stretch, ``(B, K)``."""

@@ -19,7 +19,7 @@ from bns.gap.where.compared import Compared
 
 SINGLES = 8  # explanations whose share alone is reported
 HALF = 0.5  # of a gap: what is left where most is within the model's own doubts
-SCATTERED = "That does not recur: the robot scatters it, or the camera."
+SCATTERED = "That does not recur: the robot or its measurement scatters it."
 UNSURE = (
     "The nominal model is unsure by as much, of its timing first: a shift of some "
     "milliseconds, gains by thousandths."

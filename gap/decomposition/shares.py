@@ -165,15 +165,11 @@ class HeldOut:
     def error(self, support: Iterable[str]) -> np.ndarray:
         """Squared error of each stretch, the rows fitted to the others, ``(B,)``."""
         linear, plain, fitted = self._levelled(support)
-        made = np.empty(len(plain.square))
-        for number in range(len(made)):
-            values = linear.solve(fitted, slack=False, without=number)
-            made[number] = (
-                plain.square[number]
-                - 2 * plain.slope[number] @ values
-                + values @ plain.normal[number] @ values
-            )
-        return made
+        made = [
+            plain.left_of(number, linear.solve(fitted, slack=False, without=number))
+            for number in range(len(plain.square))
+        ]
+        return np.array(made)
 
     def loss(self, support: Support) -> float:
         """Squared error of all stretches, and what nuisances pay for it."""

@@ -1,7 +1,7 @@
 """Explanations by themselves, each fitted to the simulation: through a tangent at the
 nominal a strong one looks like several, or like another."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -46,17 +46,47 @@ class Singles:
     @cached_property
     def fitted(self) -> tuple[Single, ...]:
         """The fit of each explanation that is tried, the best first."""
-        problem, start = self.problem, self.start
-        only = self._looked_at
-        best: dict[str, Single] = {}
-        for name, values in self._starts(only):
+        problem, only = self.problem, self._looked_at
+        most = problem.model.starts
+        screened = levels.screened(problem, self.start, most, only)
+        return self._best((*self._tangent, *self._fits(screened)))
+
+    @cached_property
+    def by_tangent(self) -> tuple[Single, ...]:
+        """Those of them that were found by the tangent at the nominal alone."""
+        return self._best(self._tangent)
+
+    @cached_property
+    def _tangent(self) -> tuple[Single, ...]:
+        linear, most = self.start.linear, self.problem.model.starts
+        order = sorted(linear.free, key=lambda name: linear.cost({name}))
+        many = [name for name in order if wide(linear.terms, name)]
+        order = [*dict.fromkeys((*order[:most], *many[: most // 2]))]
+        return self._fits(
+            (name, fit.placed(self.problem, linear, {name}, self.start.values))
+            for name in order
+        )
+
+    def _fits(self, starts: Iterable[tuple[str, np.ndarray]]) -> tuple[Single, ...]:
+        """Fits from starts: names, and values of all rows ``(R,)``."""
+        problem, known, only = self.problem, self.start.noise, self._looked_at
+        made = []
+        for name, begun in starts:
             wanted = {name} | fit.nuisances(problem)
             values, rest = fit.newton(
-                problem, values, wanted, start.noise, turns=TURNS, only=only
+                problem, begun, wanted, known, turns=TURNS, only=only
             )
-            height = start.noise.loss(rest) / start.noise.lam + _prior(problem, values)
-            if name not in best or height < best[name].height:
-                best[name] = Single(name, values, height)
+            height = known.loss(rest) / known.lam + _prior(problem, values)
+            made.append(Single(name, values, height))
+        return tuple(made)
+
+    @staticmethod
+    def _best(fits: Iterable[Single]) -> tuple[Single, ...]:
+        """The best fit of each explanation, the best first."""
+        best: dict[str, Single] = {}
+        for one in fits:
+            if one.name not in best or one.height < best[one.name].height:
+                best[one.name] = one
         return tuple(sorted(best.values(), key=lambda one: (one.height, one.name)))
 
     @property
@@ -65,18 +95,6 @@ class Singles:
         few = self.problem.sample(fit.ROUGH)
         whole = self.problem.model.singly or len(few) == len(self.problem.trials)
         return None if whole else few
-
-    def _starts(self, only: list[int] | None) -> Sequence[tuple[str, np.ndarray]]:
-        """Values to start from: by the tangent, and by levels and departures."""
-        linear, most = self.start.linear, self.problem.model.starts
-        order = sorted(linear.free, key=lambda name: linear.cost({name}))
-        many = [name for name in order if wide(linear.terms, name)]
-        order = [*dict.fromkeys((*order[:most], *many[: most // 2]))]
-        tangent = [
-            (name, fit.placed(self.problem, linear, {name}, self.start.values))
-            for name in order
-        ]
-        return tangent + levels.screened(self.problem, self.start, most, only)
 
 
 def wide(terms: Mapping[str, tuple[int, ...]], name: str) -> bool:

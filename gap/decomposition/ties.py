@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bns.gap.decomposition import levels, refit
+from bns.gap.decomposition import descent, levels, refit
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.problem import Problem
@@ -47,8 +47,10 @@ def _refitted(
     bent = problem.model.singly or problem.model.many
     if len(point.support) > 1 or problem.onset or not bent:
         return []
-    most = tried.fitted[0].height + 2 * (TIED + MARGIN)
-    near = [one for one in tried.fitted if one.height < most]
+    clear = problem.model.many and descent.enough(problem, point, 1)
+    fitted = tried.by_tangent if clear else tried.fitted
+    most = fitted[0].height + 2 * (TIED + MARGIN)
+    near = [one for one in fitted if one.height < most]
     rivals = [one for one in near if one.name not in point.support][:KEPT]
     if not rivals:
         return []

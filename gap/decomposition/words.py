@@ -121,7 +121,7 @@ def left(share: float, lasting: bool, recurs: bool, sizes: str, goes: str) -> st
             "no effect, predicts trials that it has not seen better."
         )
     if not lasting:
-        return "What is left does not recur: the robot scatters it, or the camera."
+        return "What is left does not recur: the robot or its measurement scatters it."
     how = "recurs" if recurs else "is more than a sound robot scatters"
     return (
         f"What is left, {_percent(share)} of the gap, {how} and is explained by no "

@@ -23,7 +23,7 @@ from bns.worlds.physics.rollout import STATE, Compiled, Job, Pool, Segment
 from bns.worlds.trial import Trial
 
 LEAD = 1.0  # [s] of rest before a trial, so that what is late has something before it
-KEPT, MODELS = 20_000, 2000  # simulated trials and compiled models kept in memory
+KEPT, MODELS = 20_000, 300  # simulated trials and compiled models kept in memory
 FINE = 0.005  # [s] between kept states; the step if that is longer
 FINEST, CUT = 0.0025, 4  # [s] longer steps are cut, shorter ones in so many parts
 EXACT = 0.2  # of the noise: predictions that differ by less are alike
@@ -117,6 +117,7 @@ class Simulation:
             self._compiled[key] = Compiled(model)
             while len(self._compiled) > MODELS:
                 self._compiled.popitem(last=False)
+        self._compiled.move_to_end(key)
         return self._compiled[key]
 
     def needed(self, trials: Sequence[Trial]) -> int:
