@@ -15,7 +15,7 @@ from bns.errors import BnsError, UnknownNameError
 from bns.gap.decomposition.row import Row
 from bns.gap.models.mjcf import effects
 from bns.gap.models.mjcf.config import OwnConfig
-from bns.worlds.effects.parts import ALL, ROUND
+from bns.worlds.effects.parts import ALL, ROUND_GEOMS
 
 RATIOS = (0.4, 0.6, 0.8, 0.9, 1.1, 1.25, 1.6, 2.5)
 SHARES = (0.02, 0.05, 0.12, 0.3, 1.0)  # of the largest value, beyond the nominal
@@ -192,7 +192,9 @@ def _surfaces(
         for number in np.flatnonzero(model.geom_contype | model.geom_conaffinity)
         if int(model.body_rootid[model.geom_bodyid[number]]) in roots
     ]
-    round_ = [model.geom(n).name for n in able if int(model.geom_type[n]) in ROUND]
+    round_ = [
+        model.geom(n).name for n in able if int(model.geom_type[n]) in ROUND_GEOMS
+    ]
     every = (ALL,) if able else ()
     return {
         "geom_radius": tuple(name for name in round_ if name),

@@ -169,18 +169,18 @@ def enough(problem: Problem, point: Point, few: int = FEW) -> bool:
         point: a fitted set.
         few: how many.
     """
-    linear, support = point.linear, sorted(point.support)
-    whole = linear.squares(linear.free)
-    if not problem.model.many:
-        left = linear.squares(support)
-        return len(support) <= few and left < ENOUGH * whole
+    linear, support, many = point.linear, sorted(point.support), problem.model.many
+    if len(support) > few and not many:
+        return False
     sets = itertools.combinations(support, min(few, len(support)))
     best = min(sets, key=linear.squares)
-    left = linear.squares(best)
-    if left < ENOUGH * whole:
-        return True
-    errors = [linear.held_out(some).sum() for some in (best, linear.free)]
-    return left < NEARLY * whole and bool(errors[0] < errors[1])
+    left, whole = linear.squares(best), linear.squares(linear.free)
+    if left < ENOUGH * whole or not many:
+        return left < ENOUGH * whole
+    if left >= NEARLY * whole:
+        return False
+    some, every = (linear.held_out(names).sum() for names in (best, linear.free))
+    return bool(some < every)
 
 
 def _followed(problem: Problem, start: Point, support: Support) -> Point:

@@ -356,11 +356,6 @@ class Linear:
         """Weighted square of what a set leaves, the others exactly nominal."""
         return self.left(self.solve(support, slack=False))
 
-    def left_of(self, number: int, values: np.ndarray) -> float:
-        """Weighted square of what values of all rows, ``(K,)``, leave of a stretch."""
-        change = values @ self.normal[number] @ values
-        return float(self.square[number] - 2 * self.slope[number] @ values + change)
-
     def left(self, values: np.ndarray) -> float:
         """Weighted square of what values of all rows leave.
 
@@ -381,14 +376,25 @@ class Linear:
         normal = self._total()[0][np.ix_(rows, rows)]
         return float(values[rows] @ normal @ values[rows])
 
-    def held_out(self, support: Iterable[str]) -> np.ndarray:
-        """Weighted square of each stretch, the rows fitted to the others, ``(B,)``."""
-        some = tuple(support)
-        made = [
-            self.left_of(number, self.solve(some, slack=False, without=number))
-            for number in range(len(self.square))
-        ]
-        return np.array(made)
+    def held_out(
+        self, support: Iterable[str], under: "Linear | None" = None
+    ) -> np.ndarray:
+        """Weighted square of each stretch, the rows fitted to the others, ``(B,)``.
+
+        Args:
+            support: the set.
+            under: the model whose weights count, of the same stretches; None = this.
+        """
+        some, told = tuple(support), under or self
+        made = np.empty(len(told.square))
+        for number in range(len(made)):
+            values = self.solve(some, slack=False, without=number)
+            made[number] = (
+                told.square[number]
+                - 2 * told.slope[number] @ values
+                + values @ told.normal[number] @ values
+            )
+        return made
 
     def scores(self, values: np.ndarray) -> np.ndarray:
         """Derivative of half the weighted square by stretch, ``(B, K)``."""

@@ -165,11 +165,7 @@ class HeldOut:
     def error(self, support: Iterable[str]) -> np.ndarray:
         """Squared error of each stretch, the rows fitted to the others, ``(B,)``."""
         linear, plain, fitted = self._levelled(support)
-        made = [
-            plain.left_of(number, linear.solve(fitted, slack=False, without=number))
-            for number in range(len(plain.square))
-        ]
-        return np.array(made)
+        return linear.held_out(fitted, plain)
 
     def loss(self, support: Support) -> float:
         """Squared error of all stretches, and what nuisances pay for it."""

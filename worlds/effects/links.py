@@ -190,7 +190,7 @@ class GeomRadius(BodyEffect):
 
     def _write(self, spec: Any) -> None:
         some = parts.geoms(spec, self["part"])
-        chosen = [geom for geom in some if geom.type in parts.ROUND]
+        chosen = [geom for geom in some if geom.type in parts.ROUND_GEOMS]
         if not chosen:
             raise BnsError(
                 f"Geom {self['part']!r} is not round: a radius is of a sphere, a "

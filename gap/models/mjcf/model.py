@@ -11,7 +11,7 @@ from bns.gap.models.base import GapModel, Windows
 from bns.gap.models.mjcf import cuts, log, masses, start
 from bns.gap.models.mjcf import effects as own_effects
 from bns.gap.models.mjcf.config import OwnConfig
-from bns.gap.models.mjcf.simulation import Simulation
+from bns.gap.models.mjcf.simulation import Loads, Simulation
 from bns.gap.recordings import segments
 from bns.storage import files
 from bns.worlds.effects.base import Effect
@@ -60,8 +60,6 @@ class OwnModel(GapModel):
             for item in self.listed
             if item.effect == "body_mass"
         }
-        self._limits = any(i.effect == "actuator_torque_limit" for i in self.listed)
-        self._surfaces = any(item.effect in mjcf.TOUCHING for item in self.listed)
         self._tried = {item.effect for item in self.listed}
         self._terms = {
             item.name: item for item in (*self.listed, *mjcf_rows.grouped(self.listed))
@@ -96,25 +94,22 @@ class OwnModel(GapModel):
         From then on fine paths are simulated as finely as these trials need.
         """
         self._parts = self.physics.needed(trials)
-        items = self._felt(trials)
+        usual = self.config.effects is None
+        loaded = {"actuator_torque_limit", *(mjcf.TOUCHING if usual else ())}
+        wanted = any(item.effect in loaded for item in self.listed)
+        loads = self.physics.loads(trials) if wanted else Loads()
+        items = tuple(self._terms.values())
+        if usual:  # what the user asked for stays
+            items = mjcf_rows.touching(items, loads.touching)
+        self._tried = {item.effect for item in items}
         return mjcf_rows.rows(
             items,
             trials,
             self.dt,
             self._bodies,
             stepped=self._parts > 1,
-            forces=self.physics.forces(trials) if self._limits else {},
+            forces=loads.forces,
         )
-
-    def _felt(self, trials: Sequence[Trial]) -> tuple[Row, ...]:
-        """Candidates without those on surfaces that touch nothing, unless the user
-        asked for these."""
-        items = tuple(self._terms.values())
-        if self.config.effects is None and self._surfaces:
-            touching = self.physics.touching(trials)
-            items = mjcf_rows.touching(items, touching)
-        self._tried = {item.effect for item in items}
-        return items
 
     def untried(self) -> tuple[str, ...]:
         """See `GapModel.untried`."""

@@ -2,8 +2,9 @@
 
 import math
 from collections import OrderedDict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -30,6 +31,18 @@ EXACT = 0.2  # of the noise: predictions that differ by less are alike
 BY_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
 TRIED = 4  # trials on which steps are compared, and forces and contacts looked at
 LOOKED = 500  # moments of a trial at which these are looked at
+
+
+class Loads(NamedTuple):
+    """What the nominal motion takes.
+
+    Attributes:
+        forces: of each actuator that has a limit, over that, by name, ``(n,)``.
+        touching: names of the geoms that touch something.
+    """
+
+    forces: Mapping[str, np.ndarray] = {}
+    touching: frozenset[str] = frozenset()
 
 
 class Simulation:
@@ -134,34 +147,27 @@ class Simulation:
             parts, made = min(2 * parts, self.finest), finer
         return parts
 
-    def forces(self, trials: Sequence[Trial]) -> dict[str, np.ndarray]:
-        """How large forces are in the nominal motion, over the limit of each actuator
-        that has one, by name: ``(n,)``, at moments of some of the trials.
+    def loads(self, trials: Sequence[Trial]) -> Loads:
+        """Forces and contacts at moments of some of the trials, as the nominal model
+        moves.
 
         Args:
             trials: recorded.
         """
-        model = self.model
-        seen = [np.abs(data.actuator_force) for data in self._moments(trials)]
-        most = np.abs(model.actuator_forcerange).max(axis=1)
-        if not seen:  # it diverged at once
-            return {}
-        return {
-            model.actuator(number).name: np.array(seen)[:, number] / most[number]
-            for number in np.flatnonzero(model.actuator_forcelimited).tolist()
-        }
-
-    def touching(self, trials: Sequence[Trial]) -> set[str]:
-        """Names of the geoms that touch something in the nominal motion, at moments of
-        some of the trials.
-
-        Args:
-            trials: recorded.
-        """
-        found: set[int] = set()
+        model, seen, touching = self.model, [], set[int]()
         for data in self._moments(trials):
-            found |= set(data.contact.geom.ravel().tolist())
-        return {self.model.geom(number).name for number in found}
+            seen.append(np.abs(data.actuator_force))
+            touching |= set(data.contact.geom.ravel().tolist())
+        most = np.abs(model.actuator_forcerange).max(axis=1)
+        limited = np.flatnonzero(model.actuator_forcelimited).tolist()
+        return Loads(
+            {
+                model.actuator(number).name: np.array(seen)[:, number] / most[number]
+                for number in limited
+                if seen  # else it diverged at once
+            },
+            frozenset(model.geom(number).name for number in touching),
+        )
 
     def _moments(self, trials: Sequence[Trial]) -> Iterator[mujoco.MjData]:
         """Moments of some trials of the nominal motion, all quantities computed; each

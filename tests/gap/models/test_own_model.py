@@ -329,7 +329,7 @@ def test_limits_of_force_that_are_tried_lie_among_the_forces(
 ):
     model = limited(tmp_path, most)
     trials = mjcf_cases.record(model, told, [])
-    taken = model.physics.forces(trials)["shoulder_servo"] * most
+    taken = model.physics.loads(trials).forces["shoulder_servo"] * most
     levels = np.array(model.rows(trials)[0].levels) * most
     assert (taken.max() == pytest.approx(most)) == (levels.max() > most) == reached
     cut = [np.mean(taken > level) for level in levels[levels < most]]
