@@ -263,7 +263,7 @@ class Linear:
         for name, parts in self.joins.items():
             if name in key and parts <= key:  # the parts alone can be all that it is
                 return self.cost(key - {name}) + KAPPA
-        rows = [row for name in key for row in self.terms[name]]
+        rows = self._rows(key)
         plain = self.spread(frozenset())
         value, found = plain.changed(rows, 1.0 - self.slack[rows] ** 2)
         far = self._beyond(rows, found)
@@ -296,7 +296,7 @@ class Linear:
         off = found[at] - np.clip(found[at], self.low[out], self.high[out])
         if np.isclose(found[at], off).any():
             return np.inf
-        mine = [row for name in key for row in self.terms[name]]
+        mine = self._rows(key)
         plain = self.spread(frozenset())
         left_open = plain.uncertain(mine, 1.0 - self.slack[mine] ** 2)
         places = [mine.index(row) for row in out]
@@ -317,6 +317,11 @@ class Linear:
                 edges |= {r for r in mine if 0.0 in (self.low[r], self.high[r])}
         return edges
 
+    def _rows(self, names: Iterable[str]) -> list[int]:
+        """Rows of some explanations, in one order: sums in the order of a set differ in
+        the last bit from run to run."""
+        return sorted(row for name in names for row in self.terms[name])
+
     def spread(self, support: Support) -> Spread:
         """What was recorded, as it may spread under a set's prior; kept for none."""
         if "none" in self._sums and not support:
@@ -330,7 +335,7 @@ class Linear:
     def paid(self, support: Support) -> float:
         """What a set costs: each family once, its dearest member."""
         most: dict[str, float] = {}
-        for name in support:
+        for name in sorted(support):
             family = self.family.get(name, name)
             most[family] = max(most.get(family, 0.0), self.penalty[name])
         return sum(most.values())
@@ -372,7 +377,7 @@ class Linear:
             values: in units of their priors, ``(K,)``.
             names: explanations.
         """
-        rows = [row for name in names for row in self.terms[name]]
+        rows = self._rows(names)
         normal = self._total()[0][np.ix_(rows, rows)]
         return float(values[rows] @ normal @ values[rows])
 

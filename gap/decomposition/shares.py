@@ -66,7 +66,7 @@ def parts(problem: Problem, point: Point, *, lasting: bool = True) -> list[Part]
     left = _height(linear, support)
     whole = max(none - (every if lasting else left), 1e-9)
     made = []
-    for name in support:
+    for name in sorted(support):
         values, low, high = _values(problem, point, name, spread)
         made.append(
             Part(
@@ -176,7 +176,7 @@ class HeldOut:
     def _levelled(self, support: Iterable[str]) -> tuple[Linear, Linear, list[str]]:
         """Both models without what levels of a set change, and the rest of the set."""
         linear, plain, fitted = self.linear, self.plain, []
-        for name in support:
+        for name in sorted(support):
             if name in self.fixed:
                 linear = linear.moved(self.fixed[name][0])
                 plain = plain.moved(self.fixed[name][1])

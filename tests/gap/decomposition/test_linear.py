@@ -1,5 +1,8 @@
 """Known answers of the linear fit: what is planted is found, what is not is not."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -11,6 +14,7 @@ from bns.gap.decomposition.fit import Noise, Point
 from bns.gap.decomposition.linear import KAPPA, Linear, inflation, tail
 from bns.gap.decomposition.noise import Memory, Starts, correlated, scale, weights
 from bns.gap.decomposition.spread import Spread
+from tests.sources import ROOT
 
 NAMES = ("a", "b", "c", "d", "e", "f")
 BLOCKS, EACH = 8, 60
@@ -64,6 +68,31 @@ def test_what_is_planted_is_found_and_nothing_else(effects):
     values = linear.solve(found)
     for name, value in effects.items():
         assert values[NAMES.index(name)] == pytest.approx(value, abs=0.15)
+
+
+COSTS = """
+import itertools
+import numpy as np
+from tests.gap.decomposition.test_linear import NAMES, Rows, planted
+rng = np.random.default_rng(0)
+problem = Rows(rng)
+linear = problem.linear(planted(rng, problem, a=0.5, c=-0.3, e=1.0))
+for size in range(7):
+    for some in itertools.combinations(NAMES, size):
+        print(linear.cost(frozenset(some)).hex())
+"""
+
+
+def test_costs_do_not_depend_on_the_order_of_a_set():
+    """Sets of names are gone through in another order in each process."""
+    said = {
+        subprocess.run(
+            [sys.executable, "-c", COSTS], check=True, capture_output=True, cwd=ROOT,
+            env={**os.environ, "PYTHONHASHSEED": str(seed)},
+        ).stdout
+        for seed in (1, 2, 3)
+    }  # fmt: skip
+    assert len(said) == 1
 
 
 def test_nothing_gives_nothing_nineteen_times_in_twenty():
