@@ -161,7 +161,9 @@ POPULATION, PHYSICS = 3000, 30  # controllers a call: 30 runs of 100, one of eac
 def rollouts(quick: bool) -> Result:
     """The same random controllers in both, one thread each, interleaved."""
     repeats = 3 if quick else 15
-    evaluator, population, theta = _population()
+    torch.set_num_threads(1)
+    evaluator = in_network()
+    population, theta = drawn(evaluator)
     compiled = torch.compile(evaluator.judge, dynamic=False)
     world, commands = _world(evaluator, population)
     durations = population.genes[..., 2].sum().item()
@@ -191,20 +193,26 @@ def rollouts(quick: bool) -> Result:
     )
 
 
-def _population() -> tuple[Any, Any, Any]:
-    from bns.draws import Draws
+def in_network(device: str = "cpu") -> Any:
+    """What judges controllers inside the default network, on a torch device."""
     from bns.evolution.chromosome import Encoding
-    from bns.experiment.config import RunConfig
     from bns.learners.bns.navigation import Evaluator
     from bns.snn.network import Scaling, Shape
     from bns.tasks.navigation import Route
 
-    torch.set_num_threads(1)
-    config, draws = RunConfig(), Draws(0)
-    encoding, shape = Encoding.of(config.controller), Shape.of(config.snn)
-    evaluator = Evaluator(encoding, Scaling.of(encoding), shape, Route.of(config.task))
-    population = encoding.random(PHYSICS, POPULATION // PHYSICS, draws)
-    return evaluator, population, shape.random(PHYSICS, draws)
+    config = RunConfig()
+    encoding, shape = Encoding.of(config.controller, device), Shape.of(config.snn)
+    route = Route.of(config.task, device)
+    return Evaluator(encoding, Scaling.of(encoding), shape, route)
+
+
+def drawn(evaluator: Any) -> tuple[Any, Any]:
+    """Random controllers of thirty runs, and each run's weights, on the processor."""
+    from bns.draws import Draws
+
+    draws = Draws(0)
+    population = evaluator.encoding.random(PHYSICS, POPULATION // PHYSICS, draws)
+    return population, evaluator.shape.random(PHYSICS, draws)
 
 
 def _world(evaluator: Any, population: Any) -> tuple[Any, list]:

@@ -1,0 +1,105 @@
+"""The learner on a GPU beside the same learner on the processor."""
+
+import time
+from dataclasses import replace
+from statistics import median
+from typing import Any
+
+import torch
+
+from bench.result import Result, bench
+from bench.speed.learners import drawn, in_network
+from bns import presets
+from bns.errors import BnsError
+from bns.evolution.chromosome import Population
+from bns.experiment.config import RunConfig
+
+CARD = "cuda"
+TASKS = ("khepera-simple", "khepera-light", "hexapod-walk")
+SIZES = (30, 300)  # runs a batch
+WARM, COUNTED = 3, 6  # trials
+CLOSE = 1e-3  # of costs, relative; float32
+
+
+@bench(
+    "seconds of learning a trial, processor over GPU, least of three tasks, 30 runs",
+    bar="none: printed",
+)
+def learner_device(quick: bool) -> Result:
+    """Three presets on all cores of the processor and on the GPU beside it.
+
+    Before anything is timed, the same controllers in the same networks have to cost
+    the same on both. quick: `khepera-simple` alone.
+    """
+    if not torch.cuda.is_available():
+        raise BnsError(f"learner-device needs a GPU: torch here has no {CARD!r}")
+    details: dict[str, Any] = {
+        "GPU": torch.cuda.get_device_name(),
+        "threads of the processor": torch.get_num_threads(),
+        "costs apart, relative": apart(),
+    }
+    if details["costs apart, relative"] > CLOSE:
+        raise BnsError(f"the two devices do not agree: {details}")
+    ratios = []
+    for name in TASKS[:1] if quick else TASKS:
+        for size in SIZES[:1] if quick else SIZES:
+            taken = {
+                device: learning(presets.load(name), size, device)
+                for device in ("cpu", CARD)
+            }
+            details[f"{name}, {size} runs [s a trial]"] = taken
+            if size == SIZES[0]:
+                ratios.append(taken["cpu"] / taken[CARD])
+    return Result(
+        figure=round(min(ratios), 3),
+        unit="x",
+        holds=None,
+        n=COUNTED * len(details),
+        details=details,
+    )
+
+
+def learning(config: RunConfig, size: int, device: str) -> float:
+    """Seconds that evolution and training of a trial take, median; the world's are not
+    counted.
+
+    Args:
+        config: what is learned.
+        size: runs in the batch.
+        device: torch device of the learner.
+    """
+    from bns.experiment.batch import Batch, resolve
+    from bns.experiment.world_factory import make_world
+
+    threads = torch.get_num_threads()
+    config = replace(config, replicates=size, device=device, threads=threads)
+    config, _ = resolve(config)
+    batch = Batch([config], [make_world(config)])
+    seconds = []
+    for trial in range(WARM + COUNTED):
+        marks = [_now(device)]
+        proposal = batch.learner.propose(trial)
+        marks.append(_now(device))
+        seen = batch._execute(proposal.tried, trial, "world")
+        marks.append(_now(device))
+        batch.learner.observe(trial, seen, None)
+        marks.append(_now(device))
+        seconds.append(marks[1] - marks[0] + marks[3] - marks[2])
+    return round(median(seconds[WARM:]), 4)
+
+
+def _now(device: str) -> float:
+    """Time after all that the device was given is done [s]."""
+    if device == CARD:
+        torch.cuda.synchronize()
+    return time.perf_counter()
+
+
+def apart() -> float:
+    """Largest difference of the costs of one population, relative to the largest."""
+    here, there = in_network(), in_network(CARD)
+    population, theta = drawn(here)
+    genes, lengths = population.genes.to(CARD), population.lengths.to(CARD)
+    ours = here.cost(theta, population)
+    theirs = there.cost(theta.to(CARD), Population(genes, lengths)).cpu()
+    return float((ours - theirs).abs().max() / ours.abs().max())
