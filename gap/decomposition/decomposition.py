@@ -260,7 +260,7 @@ def _steady(
     """A recording without trials that may go anywhere, and with what changes nothing in
     it; the nominal model, the floor, and the windows ``(N,)`` of these trials."""
     start = descent.nothing(problem)
-    known = rest.floor(problem, start.noise.starts, seed=seed)
+    known = rest.floor(problem, start.noise.latent, seed=seed)
     unstable = rest.unstable(problem, start.slopes, known)
     if unstable.any() and not unstable.all():
         problem = problem.without(unstable)

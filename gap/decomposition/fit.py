@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bns.gap.decomposition import noise
+from bns.gap.decomposition.latent import Latent
 from bns.gap.decomposition.linear import Linear, Support, inflation, tail
-from bns.gap.decomposition.noise import Memory, Starts
+from bns.gap.decomposition.noise import Memory
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
 
@@ -25,20 +26,21 @@ class Noise:
     """What the residuals scatter.
 
     Attributes:
-        sd: of each, ``(N, C)``, once starts and memory are taken out.
-        starts: what the states in which trials began may make of them.
+        sd: of each, ``(N, C)``, once the latent numbers and memory are taken out.
+        latent: what is not known of each trial, and what it may make of them.
         memory: their autoregression.
         lam: how many count as one.
     """
 
     sd: np.ndarray
-    starts: Starts
+    latent: Latent
     memory: Memory
     lam: float
 
     def innovations(self, values: np.ndarray) -> np.ndarray:
-        """Residuals or slopes ``(N, C)`` without what starts and memory explain."""
-        return self.memory(self.starts(values))
+        """Residuals or slopes ``(N, C)`` without what the latent numbers and memory
+        explain."""
+        return self.memory(self.latent(values))
 
     @property
     def order(self) -> int:
@@ -161,10 +163,10 @@ def first_noise(problem: Problem, rest: np.ndarray, motion: np.ndarray) -> Noise
         motion: predicted features, with whose motion noise may grow, ``(N, C)``.
     """
     memory = Memory.none(problem.trial, rest.shape[1])
-    starts = Starts.of(problem, problem.nominal)
-    left = np.where(problem.seen, starts(np.nan_to_num(rest)), np.nan)
+    latent = Latent.of(problem, problem.nominal)
+    left = np.where(problem.seen, latent(np.nan_to_num(rest)), np.nan)
     sd = noise.scale(left, problem.model.motion(motion), problem.model.least)
-    return Noise(sd, starts, memory, 2.0)
+    return Noise(sd, latent, memory, 2.0)
 
 
 def linearised(
@@ -192,7 +194,7 @@ def linearised(
     wanted = smooth(problem, values)
     if slopes is None or any(k not in slopes for k in wanted):
         slopes = columns(problem, values)
-        known = replace(known, starts=Starts.of(problem, values))
+        known = replace(known, latent=Latent.of(problem, values))
     whole = target(problem, values, rest, slopes)
     predicted = np.where(problem.seen, problem.recorded, 0.0) - np.nan_to_num(rest)
     motion = problem.model.motion(predicted)
@@ -204,7 +206,7 @@ def linearised(
         found = made.solve(made.free)
         left = whole - _summed(problem, values, slopes, made, found)
         if order and turn < MEASURED - 1:
-            memory = Memory.of(known.starts(left), problem.trial, order)
+            memory = Memory.of(known.latent(left), problem.trial, order)
             known = replace(known, memory=memory)
         seen = np.where(problem.seen, known.innovations(left), np.nan)
         change = np.abs(known.innovations(moved))

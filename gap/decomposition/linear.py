@@ -271,13 +271,36 @@ class Linear:
             rows = [row for row in rows if row not in edges]
             value, found = plain.changed(rows, 1.0 - self.slack[rows] ** 2)
             far = self._beyond(rows, found)
-        value += self.paid(key) + tail(found)
+        value += self.paid(key) + tail(found) + self._nuisances_beyond(key, rows)
         if far and (off := self._at_bounds(key, rows, found, far)) < AT:
             value, far = value + 0.5 * off, set()
         if far:
             out = {name for name in key if far & set(self.terms[name])}
             value = max(value, self.cost(key - out) + KAPPA * len(out))
         return float(value)
+
+    def _nuisances_beyond(self, key: Support, rows: list[int]) -> float:
+        """What it costs that nuisances are held to their bounds, in nats: half their
+        squared deviations from there, by what the data leave open. Else a lead of the
+        motion, which may be a thousandth of a second, would be a delay of a tenth.
+
+        Args:
+            key: explanations that are in.
+            rows: of these, those that are not held to nominal.
+        """
+        all_rows = [*rows, *np.flatnonzero(self.always)]
+        plain = self.spread(frozenset())
+        more = np.r_[1.0 - self.slack[rows] ** 2, np.zeros(len(all_rows) - len(rows))]
+        _, found = plain.changed(all_rows, more)
+        wanted = found[len(rows) :]
+        out = np.flatnonzero(self.always)
+        off = wanted - np.clip(wanted, self.low[out], self.high[out])
+        far = np.flatnonzero(np.abs(off) > 1e-6)
+        if not len(far):
+            return 0.0
+        places = len(rows) + far
+        left_open = plain.uncertain(all_rows, more)[np.ix_(places, places)]
+        return 0.5 * float(off[far] @ np.linalg.solve(left_open, off[far]))
 
     def _at_bounds(
         self, key: Support, rows: list[int], found: np.ndarray, far: set[int]

@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from bns.gap.decomposition import moments
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, Windows
 from bns.gap.recordings import segments, trial_conditions
@@ -176,6 +177,27 @@ class Problem:
         _, made = self.model.started(self.trials, known, fine=False)
         base, *moved = (self._features(paths) for paths in made)
         return np.nan_to_num(np.stack(moved) - base)
+
+    @cached_property
+    def late(self) -> list[np.ndarray]:
+        """What a standard deviation of when each command began changes of the features
+        of its trial by the nominal model, where a log tells it to a sample only: by
+        trial ``(K, n, C)``."""
+        sooner = [moments.sooner(trial, self.model.dt) for trial in self.trials]
+        trials = [*self.trials, *(item.trial for row in sooner for item in row)]
+        made = []
+        if len(trials) > len(self.trials):
+            (paths,) = self.model.paths(trials, [[{}] * len(trials)], fine=False)
+            bases, moved = paths[: len(sooner)], iter(paths[len(sooner) :])
+        for number, row in enumerate(sooner):
+            trial, windows = self.trials[number], self.windows[number]
+            found = [np.zeros((0, len(windows), len(self.channels)))]
+            for item in row:
+                pair = np.stack([bases[number], next(moved)])
+                base, path = self.model.compare(trial, pair, windows)
+                found.append(item.directions(path - base, windows))
+            made.append(np.concatenate(found))
+        return made
 
     def _features(self, paths: Sequence[np.ndarray]) -> np.ndarray:
         """Features of a path of each trial, ``(N, C)``."""

@@ -67,7 +67,7 @@ def costs(problem: Problem, points: Sequence[Point]) -> list[float]:
     for point in points:
         known = replace(point.noise, lam=lam)
         cost = relinearised(problem, point, known).cost(point.support)
-        size = (np.log(known.sd[problem.seen]).sum() + known.starts.size) / lam
+        size = (np.log(known.sd[problem.seen]).sum() + known.latent.size) / lam
         found.append(float(cost + size))
     return found
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns import seeding
-from bns.gap.decomposition.noise import Starts
+from bns.gap.decomposition.latent import Latent
 from bns.gap.decomposition.problem import Problem
 
 THIRD = np.sqrt(20.0)  # third differences of noise: 1 + 9 + 9 + 1
@@ -37,15 +37,15 @@ class Floor:
     sd: np.ndarray
 
 
-def floor(problem: Problem, starts: Starts, *, seed: int = 0) -> Floor:
+def floor(problem: Problem, latent: Latent, *, seed: int = 0) -> Floor:
     """The measurement's scatter, from third differences of the recording.
 
     What moves slowly against the sampling drops out of these, jitter of the time stamps
-    does not. To it comes what is not known of how trials began.
+    does not. To it comes what is not known of trials.
 
     Args:
         problem: the recording.
-        starts: of its trials.
+        latent: what is not known of its trials.
         seed: of the noise that is drawn.
     """
     count = len(problem.model.channels)
@@ -66,7 +66,7 @@ def floor(problem: Problem, starts: Starts, *, seed: int = 0) -> Floor:
         squares += (np.concatenate(parts) - problem.recorded) ** 2
     mean = np.nanmean(squares / DRAWS, axis=0)
     sd = np.sqrt(np.broadcast_to(mean, squares.shape))
-    sd = np.hypot(np.maximum(sd, problem.model.least), starts.spread)
+    sd = np.hypot(np.maximum(sd, problem.model.least), latent.spread)
     return Floor(sigma, sd)
 
 

@@ -10,8 +10,10 @@ from bns.gap.importers.tables import SENT, TIME, TRIAL, Column, Table
 from bns.gap.models.mjcf import cuts
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.worlds.data import dataset_checks as checks
-from bns.worlds.data.importing import FACTORS
+from bns.worlds.data.importing import FACTORS, MOMENTS
 from bns.worlds.trial import Commands, Trial
+
+HELD = 2  # samples: who tells anew at each sample logs what it tells
 
 
 def read(path: str, config: OwnConfig) -> list[Trial]:
@@ -19,8 +21,9 @@ def read(path: str, config: OwnConfig) -> list[Trial]:
 
     Columns are named like the channels, beside `time` [s] and, if there are,
     `trial` and `command_time` [s]; [log] in the description names others. A stretch of
-    equal commands becomes one command, which begins with its first row, or at its
-    `command_time`. Empty cells are lost samples. With `cut` in [start] each trial
+    equal commands becomes one command, which begins at its `command_time`, else with its
+    first row; commands that are held for several rows may then have begun since the row
+    before. Empty cells are lost samples. With `cut` in [start] each trial
     becomes several.
 
     Raises:
@@ -94,6 +97,7 @@ def _trials(
 
 
 def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> Trial:
+    exact = SENT in columns
     columns = _exact(columns, config, where)
     times = columns[TIME] - columns[TIME][:1]
     if len(times) < 2 or not (np.diff(times) >= 0).all():
@@ -107,6 +111,7 @@ def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> 
     begins = np.concatenate([[0], np.flatnonzero(change) + 1])
     begins = begins[np.diff(times[np.append(begins, len(times) - 1)]) > 0]
     bounds = np.append(begins, len(times) - 1)
+    exact |= bool(np.median(np.diff(bounds)) < HELD)
     kinds = tuple(item.channel for item in config.told)
     made = Trial(
         commands=Commands(told[begins], np.diff(times[bounds]), kinds),
@@ -116,6 +121,7 @@ def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> 
         channels=tuple(item.channel for item in config.seen),
         robot=config.name,
         world="imported",
+        conditions={} if exact else {MOMENTS: "sampled"},
     )
     checks.plausible(made, where)
     return made

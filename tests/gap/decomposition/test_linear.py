@@ -11,8 +11,9 @@ import pytest
 
 from bns.gap.decomposition import refit, search, shares
 from bns.gap.decomposition.fit import Noise, Point
+from bns.gap.decomposition.latent import Latent
 from bns.gap.decomposition.linear import KAPPA, Linear, inflation, tail
-from bns.gap.decomposition.noise import Memory, Starts, correlated, scale, weights
+from bns.gap.decomposition.noise import Memory, correlated, scale, weights
 from bns.gap.decomposition.spread import Spread
 from tests.sources import ROOT
 
@@ -286,7 +287,7 @@ def test_residuals_that_scatter_explains_weigh_as_what_it_leaves_of_them():
     problem.seen = np.ones((BLOCKS * EACH, 2), dtype=bool)
     one = np.ones_like(problem.columns[0])
     known = Noise(
-        one, Starts(one[0], (), 0 * one), Memory.none(problem.block, 2), lam=1.0
+        one, Latent(one[0], (), 0 * one), Memory.none(problem.block, 2), lam=1.0
     )
     costs = []
     for size in (0.0, 8.0):  # of what the slack of the last row explains

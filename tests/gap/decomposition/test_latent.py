@@ -1,11 +1,11 @@
-"""What is not known of how trials began: taken out, residuals are independent again."""
+"""What is not known of trials: taken out, residuals are independent again."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from bns.gap.decomposition.noise import Starts
+from bns.gap.decomposition.latent import Latent
 
 TRIALS, LENGTH, SD = 3, 20, np.array([0.5, 2.0])
 
@@ -22,6 +22,7 @@ def problem():
         trials=(None,) * TRIALS,
         trial=np.repeat(np.arange(TRIALS), LENGTH),
         begun=lambda values: moved,
+        late=[np.zeros((0, LENGTH, 2))] * TRIALS,
     )
 
 
@@ -32,15 +33,15 @@ def covariance(problem, trial):
     return np.eye(flat.shape[1]) + flat.T @ flat
 
 
-def test_residuals_are_independent_without_what_starts_make_of_them(problem):
-    starts = Starts.of(problem, np.zeros(0))
+def test_residuals_are_independent_without_what_is_unknown_of_trials(problem):
+    latent = Latent.of(problem, np.zeros(0))
     for trial in range(TRIALS):
         rows = problem.trial == trial
         columns = []
         for unit in np.eye(rows.sum() * 2):
             values = np.zeros((len(rows), 2))
             values[rows] = unit.reshape(-1, 2) * SD
-            columns.append((starts(values)[rows] / SD).ravel())
+            columns.append((latent(values)[rows] / SD).ravel())
         whitening = np.array(columns)
         found = whitening @ covariance(problem, trial) @ whitening.T
         assert found == pytest.approx(np.eye(len(found)), abs=2e-2)
@@ -48,12 +49,12 @@ def test_residuals_are_independent_without_what_starts_make_of_them(problem):
 
 def test_their_size_is_half_the_log_of_the_determinant(problem):
     wanted = sum(np.linalg.slogdet(covariance(problem, t))[1] for t in range(TRIALS))
-    assert Starts.of(problem, np.zeros(0)).size == pytest.approx(wanted / 2, rel=1e-3)
+    assert Latent.of(problem, np.zeros(0)).size == pytest.approx(wanted / 2, rel=1e-3)
 
 
-def test_known_starts_change_nothing(problem):
+def test_known_starts_and_moments_change_nothing(problem):
     problem.begun = lambda values: np.zeros((0, TRIALS * LENGTH, 2))
-    starts = Starts.of(problem, np.zeros(0))
+    latent = Latent.of(problem, np.zeros(0))
     values = np.random.default_rng(1).normal(size=(TRIALS * LENGTH, 2))
-    assert starts(values) is values
-    assert starts.size == 0 and not starts.spread.any()
+    assert latent(values) is values
+    assert latent.size == 0 and not latent.spread.any()

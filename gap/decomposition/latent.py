@@ -1,0 +1,78 @@
+"""What is not known of each trial: the state in which it began, and when its commands
+did.
+
+A trial that is cut from a recording begins in motion, in a state that the data tell to
+within their noise. A log that tells commands at its samples alone leaves open when,
+since the sample before, each of them began. An error there grows or dies with the
+motion, so that residuals of one trial go together, in all channels: their covariance is
+that of the measurement plus one direction for each such number. Residuals are made
+independent again by shrinking what lies in these directions (Woodbury's identity).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bns.gap.decomposition.problem import Problem
+
+FELT = 0.1  # deviations of a residual's noise: less is not felt
+
+
+@dataclass(frozen=True, eq=False)
+class Latent:
+    """Directions of the unknown numbers of each trial.
+
+    Attributes:
+        sd: of the measurement by feature, ``(C,)``.
+        parts: of each trial that has some: its windows, orthonormal directions
+            ``(n * C, k)``, and what is left of a residual in each ``(k,)``.
+        spread: standard deviation that they give each feature, ``(N, C)``.
+    """
+
+    sd: np.ndarray
+    parts: tuple[tuple[np.ndarray, np.ndarray, np.ndarray], ...]
+    spread: np.ndarray
+
+    @classmethod
+    def of(cls, problem: Problem, values: np.ndarray) -> "Latent":
+        """Directions by differences.
+
+        Args:
+            problem: the recording.
+            values: of all rows, ``(R,)``, for what starts change; when commands began
+                changes what it does to the nominal model.
+        """
+        sd, seen = problem.model.least, problem.seen
+        begun, late = problem.begun(values), problem.late
+        square = (begun**2).sum(axis=0)
+        parts = []
+        for number in range(len(problem.trials)):
+            rows = np.flatnonzero(problem.trial == number)
+            moved = np.concatenate([begun[:, rows], late[number]])
+            square[rows] += (late[number] ** 2).sum(axis=0)
+            if not len(moved):
+                continue
+            units = np.where(seen[rows], moved / sd, 0.0)
+            way, size, _ = np.linalg.svd(
+                units.reshape(len(units), -1).T, full_matrices=False
+            )
+            way, size = way[:, size > FELT], size[size > FELT]
+            if len(size):
+                parts.append((rows, way, 1 / np.sqrt(1 + size**2)))
+        return cls(sd, tuple(parts), np.sqrt(square))
+
+    @property
+    def size(self) -> float:
+        """By how much they widen what may have been recorded, in log volume."""
+        return float(-sum(np.log(left).sum() for _, _, left in self.parts))
+
+    def __call__(self, values: np.ndarray) -> np.ndarray:
+        """Features or residuals ``(N, C)`` without what they may explain of these."""
+        if not self.parts:
+            return values
+        made = values.copy()
+        for rows, way, left in self.parts:
+            units = (values[rows] / self.sd).ravel()
+            units = units + way @ ((left - 1) * (way.T @ units))
+            made[rows] = units.reshape(len(rows), -1) * self.sd
+        return made
