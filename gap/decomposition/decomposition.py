@@ -14,7 +14,6 @@ from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.shares import HeldOut, Part
 from bns.gap.decomposition.singles import Singles
-from bns.gap.recordings import trial_conditions
 from bns.progress import Tell, unheard
 
 MOST = 0.5  # share of the gap beyond which what is left is most of it
@@ -124,8 +123,6 @@ class Decomposition:
             return False
         if self.recurring:
             return self.beyond > FELT
-        if trial_conditions.moments_unknown(self.problem.trials):
-            return False  # so do commands that began a little sooner or later
         return self.beyond > max(LARGE, SCATTER * self.scatter)
 
     @property

@@ -40,9 +40,8 @@ class Sooner:
         Returns:
             ``(K, n, C)``.
         """
-        times = self.trial.times
-        first, last = times[windows.first], times[windows.last]
-        felt = (last > self.begin[:, None]) & (first < self.end[:, None])
+        last = self.trial.times[windows.last]
+        felt = (last > self.begin[:, None]) & (last <= self.end[:, None])
         return felt[..., None] * np.nan_to_num(change / self.size)
 
 

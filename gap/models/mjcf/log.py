@@ -21,10 +21,10 @@ def read(path: str, config: OwnConfig) -> list[Trial]:
 
     Columns are named like the channels, beside `time` [s] and, if there are,
     `trial` and `command_time` [s]; [log] in the description names others. A stretch of
-    equal commands becomes one command, which begins at its `command_time`, else with its
-    first row; commands that are held for several rows may then have begun since the row
-    before. Empty cells are lost samples. With `cut` in [start] each trial
-    becomes several.
+    equal commands becomes one command, which begins at its `command_time`, else with
+    its first row; commands that are held for several rows may then have begun since the
+    row before. Empty cells are lost samples. With `cut` in [start] each trial becomes
+    several.
 
     Raises:
         FormatError: no such file, a column missing, or time going backwards.
