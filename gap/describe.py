@@ -14,7 +14,7 @@ import numpy as np
 from bns.errors import BnsError, FormatError
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column
-from bns.gap.models.mjcf import guesses, matching
+from bns.gap.models.mjcf import guesses, matching, start
 from bns.gap.models.mjcf.channels import (
     Work,
     commands,
@@ -216,12 +216,22 @@ def _begin(work: Work) -> None:
     pose, settle = guesses.rests(work.model, first, tolerance)
     if settle and not _settled(work, longest, pose or ""):
         settle = 0.0
-    if span > guesses.LONG and guesses.curved(told[longest]):
+    loose = bool(start.free(work.model))
+    if span > guesses.LONG and guesses.curved(told[longest]) and not loose:
         work.start = {"recorded": True, "cut": guesses.CUT}
         work.start |= {"keyframe": pose} if pose else {}
         work.guessed.append(
             f"start: one long recording, cut into pieces of {guesses.CUT:g} s that "
             "begin with the positions and speeds of the data"
+        )
+    elif pose is None and loose:
+        pose = guesses.nearest(work.model, first)
+        work.start = {"recorded": True, "settle": guesses.SETTLE}
+        work.start |= {"keyframe": pose} if pose else {}
+        work.unsure.append(
+            "start: the robot is free and trials begin in no pose of the model, so "
+            "each begins where its joints were recorded, settling on the floor for "
+            f"{guesses.SETTLE:g} s; give a keyframe for the rest"
         )
     elif pose is None:
         work.start = {"recorded": True}
@@ -253,8 +263,9 @@ def toml(work: Work, out: Path) -> str:
     ]
     steps = np.diff(work.times[max(work.rows, key=len)])
     step = float(np.median(steps[steps > 0]))
-    if 2 * step > WINDOW:
-        lines.append(f"window = {2 * step:.4g}")
+    window = _window(work, step)
+    if window != WINDOW:
+        lines.append(f"window = {window:.4g}")
     for item in tolds(work):
         lines += _table(
             f"commands.{_text(item.channel.name)}",
@@ -280,6 +291,20 @@ def toml(work: Work, out: Path) -> str:
     if work.start:
         lines += _table("start", work.start)
     return "\n".join([*lines, *_log(work)]) + "\n"
+
+
+def _window(work: Work, step: float) -> float:
+    """Time between comparisons [s]: the usual one, or as long as commands are held.
+
+    Args:
+        work: what was found.
+        step: time between samples [s].
+    """
+    rows = max(work.rows, key=len)
+    told = np.stack([c.values[rows] for c, _, _ in work.told], axis=1)
+    changes = np.flatnonzero((np.diff(told, axis=0) != 0).any(axis=1))
+    held = float(np.median(np.diff(changes))) * step if len(changes) > 1 else WINDOW
+    return max(2 * step, min(held, WINDOW) if held >= 2 * step else WINDOW)
 
 
 def _log(work: Work) -> list[str]:

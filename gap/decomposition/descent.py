@@ -2,7 +2,7 @@
 around it."""
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,13 +31,13 @@ def nothing(problem: Problem) -> Point:
     first = fit.first_noise(problem, rest, made)
     values, rest = newton(problem, values, fit.nuisances(problem), first)
     linear, known, slopes = linearised(problem, values, rest, first)
-    plain = Point(values, frozenset(), rest, linear, slopes, known)
+    plain = Point(values, frozenset(), rest, linear, slopes, known, values)
     if not problem.model.memory:
         return plain
     linear, known, slopes = linearised(
         problem, values, rest, first, slopes, problem.model.memory
     )
-    remembering = Point(values, frozenset(), rest, linear, slopes, known)
+    remembering = Point(values, frozenset(), rest, linear, slopes, known, values)
     worse = _held_out(problem, remembering) > MARGIN * _held_out(problem, plain)
     return plain if worse else remembering
 
@@ -51,7 +51,11 @@ def _held_out(problem: Problem, point: Point) -> float:
 
 
 def descend(
-    problem: Problem, values: np.ndarray, support: Iterable[str], known: Noise
+    problem: Problem,
+    values: np.ndarray,
+    support: Iterable[str],
+    known: Noise,
+    near: Point | None = None,
 ) -> Point:
     """Fit a set, make the problem linear there, search again, until the set stays.
 
@@ -60,13 +64,14 @@ def descend(
         values: of all rows to start from, ``(R,)``.
         support: explanations to start from.
         known: noise to start from.
+        near: a point whose derivatives may serve where many may depart, see
+            `fit.lasting`.
 
     Returns:
         the point of highest evidence on the way, after `TURNS` searches at most: around
         a strong effect a linear model may lead away from it.
     """
-    support, at = frozenset(support), None
-    slopes: Mapping[int, np.ndarray] = {}
+    support, near = frozenset(support), near if problem.model.many else None
     passed: list[Point] = []
     for _ in range(TURNS):
         most = 3 if problem.model.singly else refit.STEPS
@@ -74,15 +79,15 @@ def descend(
             problem, values, set(support) | fit.nuisances(problem), known, turns=most
         )
         values, rest = levels.zoomed(problem, values, rest, support, known)
-        near = at is not None and np.abs((values - at) / problem.sd).max() <= fit.FAR
-        at = at if near else values.copy()
-        kept = slopes if near else None
+        kept = fit.lasting(problem, near, support, values) if near else None
         linear, known, slopes = linearised(problem, values, rest, known, kept)
+        at = values if kept is None or near is None else near.at
+        inside = support & set(linear.terms)  # without what came back to nominal
+        near = Point(values, inside, rest, linear, slopes, known, at)
         found = search.best(linear, start=support, backward=not problem.model.singly)[1]
         if found == support:
             break
-        inside = support & set(linear.terms)  # without what came back to nominal
-        passed.append(Point(values, inside, rest, linear, slopes, known))
+        passed.append(near)
         support = found
         values = placed(problem, linear, support, values)
     # the last fit was under the noise of the point before
@@ -90,7 +95,7 @@ def descend(
     values, rest = newton(
         problem, values, set(support) | fit.nuisances(problem), known, turns=most
     )
-    last = Point(values, support, rest, linear, slopes, known)
+    last = Point(values, support, rest, linear, slopes, known, at)
     return refit.better(problem, [last, *passed])
 
 
@@ -118,13 +123,15 @@ def decompose(tried: Singles) -> Point:
         level = levels.best(problem, best)
         if level is None or level.cost > best.cost - WORTH:
             break
-        others = [descend(problem, level.values, level.support, best.noise)]
+        others = [descend(problem, level.values, level.support, best.noise, best)]
         if several and level.support > {level.name}:
-            others.append(_by_itself(problem, level, best.noise))
+            others.append(_by_itself(problem, level, best))
         chosen = refit.better(problem, [best, *others])
         if chosen is best:
             break
         best = chosen
+    if problem.model.many:
+        best = _renewed(problem, best)
     best = simpler.narrowed(problem, best)
     best = (
         simpler.swapped(problem, best)
@@ -134,13 +141,34 @@ def decompose(tried: Singles) -> Point:
     return _beyond_chance(problem, start, best, len(start.linear.free))
 
 
-def _by_itself(problem: Problem, level: Level, known: Noise) -> Point:
-    """A point from the explanation of a level alone: what was found before it may have
-    stood in its place."""
+def _renewed(problem: Problem, best: Point) -> Point:
+    """A point with all derivatives taken there; where these lead to another set, the
+    better of both."""
+    for _ in range(ROUNDS):
+        if (best.values == best.at).all():
+            return best
+        linear, known, slopes = linearised(problem, best.values, best.rest, best.noise)
+        inside, values = best.support & set(linear.terms), best.values
+        here = Point(values, inside, best.rest, linear, slopes, known, values)
+        found = search.best(linear, start=inside)[1]
+        if found == inside:
+            return here
+        values = placed(problem, linear, found, values)
+        best = refit.better(
+            problem, [here, descend(problem, values, found, known, here)]
+        )
+        if best is here:
+            return here
+    return best
+
+
+def _by_itself(problem: Problem, level: Level, best: Point) -> Point:
+    """A point from the explanation of a level alone: what was found before it, `best`,
+    may have stood in its place."""
     values = problem.nominal.copy()
     rows = list(problem.terms[level.name])
     values[rows] = level.values[rows]
-    return descend(problem, values, {level.name}, known)
+    return descend(problem, values, {level.name}, best.noise, best)
 
 
 def _several(tried: Singles, found: Support, best: Point) -> Point:
@@ -186,7 +214,7 @@ def enough(problem: Problem, point: Point, few: int = FEW) -> bool:
 def _followed(problem: Problem, start: Point, support: Support) -> Point:
     """A point from a set found by the tangent at the nominal model."""
     values = placed(problem, start.linear, support, start.values)
-    return descend(problem, values, support, start.noise)
+    return descend(problem, values, support, start.noise, start)
 
 
 def _simple(tried: Singles) -> list[Point]:
@@ -216,9 +244,10 @@ def _leading(problem: Problem, singles: Sequence[Single]) -> list[Single]:
 
 def _from(tried: Singles, singles: Iterable[Single]) -> dict[Single, Point]:
     """A point from each of some single explanations."""
-    known = tried.start.noise
+    problem, start = tried.problem, tried.start
     return {
-        one: descend(tried.problem, one.values, {one.name}, known) for one in singles
+        one: descend(problem, one.values, {one.name}, start.noise, start)
+        for one in singles
     }
 
 
@@ -246,17 +275,22 @@ def _with_level(problem: Problem, best: Single, start: Point) -> list[Point]:
     level = levels.best(problem, single)
     if level is None or level.cost > single.cost - WORTH:
         return []
-    return [descend(problem, level.values, level.support, single.noise)]
+    return [descend(problem, level.values, level.support, single.noise, single)]
 
 
 def _from_all(problem: Problem, start: Point) -> Point:
     """From everything at once: a step of the fit, linear again there, and so on; the
     derivatives of all rows are what costs time."""
-    linear, known, values = start.linear, start.noise, start.values
-    everything = set(linear.free) | fit.nuisances(problem)
+    everything, point = set(start.linear.free) | fit.nuisances(problem), start
     for _ in range(refit.STEPS):
-        values, rest = newton(problem, values, everything, known, turns=1)
-        linear, known, _ = linearised(problem, values, rest, known)
-    found = search.best(linear)[1]
-    values = placed(problem, linear, found, values)
-    return descend(problem, values, found, known)
+        at, slopes = point.values, point.slopes
+        values, rest = newton(
+            problem, at, everything, point.noise, turns=1, slopes=slopes
+        )
+        linear, known, slopes = linearised(problem, values, rest, point.noise)
+        point = Point(values, frozenset(), rest, linear, slopes, known, values)
+        if np.abs((values - at) / problem.sd).max() <= fit.FAR:
+            break
+    found = search.best(point.linear)[1]
+    values = placed(problem, point.linear, found, point.values)
+    return descend(problem, values, found, point.noise, point)

@@ -16,6 +16,7 @@ DAMPING = (0.0, 2.0, 20.0, 200.0)  # added to the curvature, in units of the pri
 LONGEST = 4.0  # prior standard deviations of one step
 STILL = 0.02  # prior standard deviations below which a fit has converged
 FAR = 0.3  # prior standard deviations beyond which slopes are taken anew
+MOVED = 0.5  # the same for what is not in, where many may depart
 APART = 0.25  # plausible departures from which it counts how exact a row is simulated
 MEASURED = 4  # times that noise is measured from what it leaves
 ROUGH = 20.0  # [s] of recording for comparing these
@@ -67,6 +68,7 @@ class Point:
         linear: the problem made linear there.
         slopes: derivatives by row, ``(N, C)`` each.
         noise: what it leaves.
+        at: values at which most derivatives were taken, ``(R,)``.
     """
 
     values: np.ndarray
@@ -75,6 +77,7 @@ class Point:
     linear: Linear
     slopes: Mapping[int, np.ndarray]
     noise: Noise
+    at: np.ndarray
 
     @property
     def cost(self) -> float:
@@ -93,17 +96,19 @@ def smooth(problem: Problem, values: np.ndarray) -> list[int]:
     ]
 
 
-def columns(problem: Problem, values: np.ndarray) -> dict[int, np.ndarray]:
+def columns(
+    problem: Problem, values: np.ndarray, wanted: Sequence[int]
+) -> dict[int, np.ndarray]:
     """Columns of the linear model; a row set to a level has its secant from nominal.
 
     Args:
         problem: the recording.
         values: of all rows, ``(R,)``.
+        wanted: numbers of the rows, of those that `smooth` gives.
 
     Returns:
         by number of the row, each ``(N, C)``.
     """
-    wanted = smooth(problem, values)
     made = problem.slopes(values, [k for k in wanted if problem.rows[k].smooth])
     for number in wanted:
         if not problem.rows[number].smooth:
@@ -184,7 +189,8 @@ def linearised(
         values: of all rows.
         rest: residuals there.
         known: noise to start from.
-        slopes: derivatives from before, None = taken anew.
+        slopes: derivatives from before, those that lack are taken; None = all are
+            taken anew.
         order: of the autoregression, None = as in the noise.
 
     Returns:
@@ -192,17 +198,20 @@ def linearised(
     """
     order = known.order if order is None else order
     wanted = smooth(problem, values)
-    if slopes is None or any(k not in slopes for k in wanted):
-        slopes = columns(problem, values)
+    if slopes is None:
         known = replace(known, latent=Latent.of(problem, values))
+    kept = {k: slopes[k] for k in wanted if k in slopes} if slopes else {}
+    lacking = [k for k in wanted if k not in kept]
+    slopes = kept | (columns(problem, values, lacking) if lacking else {})
     whole = target(problem, values, rest, slopes)
+    told = dict(zip(slopes, known.latent(np.stack([*slopes.values()])), strict=True))
     predicted = np.where(problem.seen, problem.recorded, 0.0) - np.nan_to_num(rest)
     motion = problem.model.motion(predicted)
     moved = np.nan_to_num(problem.gap - rest)
     exact = inexact(problem, values)
     left = rest
     for turn in range(MEASURED):
-        made = _linear(problem, values, slopes, whole, known, left)
+        made = _linear(problem, values, told, whole, known, left)
         found = made.solve(made.free)
         left = whole - _summed(problem, values, slopes, made, found)
         if order and turn < MEASURED - 1:
@@ -213,7 +222,7 @@ def linearised(
         felt = None if problem.model.many else change
         sd = noise.scale(seen, motion, problem.model.least, felt)
         known = replace(known, sd=np.hypot(sd, exact * change), lam=1.0)
-    made = _linear(problem, values, slopes, whole, known, left)
+    made = _linear(problem, values, told, whole, known, left)
     found = made.solve(made.free)
     whitened = np.sqrt(made.weight) * made.rest(found)
     lam = max(noise.correlated(whitened, problem.trial), inflation(made, found))
@@ -232,12 +241,12 @@ def inexact(problem: Problem, values: np.ndarray) -> float:
 def _linear(
     problem: Problem,
     values: np.ndarray,
-    slopes: Mapping[int, np.ndarray],
+    told: Mapping[int, np.ndarray],
     whole: np.ndarray,
     known: Noise,
     left: np.ndarray,
 ) -> Linear:
-    design = {number: known.innovations(slope) for number, slope in slopes.items()}
+    design = {number: known.memory(slope) for number, slope in told.items()}
     weight = known.weights(left, problem.seen)
     return Linear.of(
         problem, design, units(problem, values), known.innovations(whole), weight
@@ -266,6 +275,7 @@ def newton(
     *,
     turns: int = 3,
     only: list[int] | None = None,
+    slopes: Mapping[int, np.ndarray] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Most probable values of the rows of a set, the others as they are.
 
@@ -279,6 +289,7 @@ def newton(
         known: noise.
         turns: steps at most.
         only: trials that count, None = all; the others' residuals are left out.
+        slopes: derivatives at these values, for the first step; None = taken.
 
     Returns:
         values, and residuals there ``(N, C)``.
@@ -295,7 +306,10 @@ def newton(
         ]
         if not which:
             break
-        moved = _step(part, values, rest, which, known, only)
+        if slopes is None or any(k not in slopes for k in which):
+            slopes = part.slopes(values, which, only=only)
+        moved = _step(part, values, rest, which, known, slopes, only)
+        slopes = None
         if moved is None:
             break
         change = np.abs((moved[0] - values)[which] / part.sd[which]).max()
@@ -323,11 +337,11 @@ def _step(
     rest: np.ndarray,
     chosen: Sequence[int],
     known: Noise,
+    slopes: Mapping[int, np.ndarray],
     only: list[int] | None,
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """One damped step that lowers the loss; None if there is none."""
     which = np.array(chosen)
-    slopes = problem.slopes(values, chosen, only=only)
     weight = known.weights(rest, problem.seen).ravel()
     design = np.stack([known.innovations(slopes[k]).ravel() for k in which], axis=-1)
     design = design * problem.sd[which]
@@ -384,6 +398,28 @@ def placed(
         elif not row.smooth and row.term in support:
             made[number] = values[number]
     return np.clip(made, *problem.bounds)
+
+
+def lasting(
+    problem: Problem, point: Point, support: Iterable[str], values: np.ndarray
+) -> Mapping[int, np.ndarray] | None:
+    """A point's derivatives that are kept at other values: all if these are next to
+    where they were taken; where many may depart those of what is not in, if they are
+    not far, since taking all of them is what costs time. None = none are kept.
+
+    Args:
+        problem: the recording.
+        point: whose derivatives.
+        support: explanations that are in at the other values.
+        values: of all rows, ``(R,)``.
+    """
+    away = np.abs((values - point.at) / problem.sd).max()
+    if away <= FAR:
+        return point.slopes
+    if not problem.model.many or away > MOVED:
+        return None
+    inside = {k for n in {*support, *nuisances(problem)} for k in problem.terms[n]}
+    return {k: slope for k, slope in point.slopes.items() if k not in inside}
 
 
 def nuisances(problem: Problem) -> set[str]:

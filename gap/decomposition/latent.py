@@ -52,12 +52,12 @@ class Latent:
             square[rows] += (late[number] ** 2).sum(axis=0)
             if not len(moved):
                 continue
-            units = np.where(seen[rows], moved / sd, 0.0)
-            way, size, _ = np.linalg.svd(
-                units.reshape(len(units), -1).T, full_matrices=False
-            )
-            way, size = way[:, size > FELT], size[size > FELT]
+            units = np.where(seen[rows], moved / sd, 0.0).reshape(len(moved), -1)
+            square_of, mixed = np.linalg.eigh(units @ units.T)
+            felt = square_of > FELT**2
+            size = np.sqrt(square_of[felt])
             if len(size):
+                way = units.T @ (mixed[:, felt] / size)
                 parts.append((rows, way, 1 / np.sqrt(1 + size**2)))
         return cls(sd, tuple(parts), np.sqrt(square))
 
@@ -67,12 +67,14 @@ class Latent:
         return float(-sum(np.log(left).sum() for _, _, left in self.parts))
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
-        """Features or residuals ``(N, C)`` without what they may explain of these."""
+        """Features or residuals ``(..., N, C)`` without what these may explain of
+        them."""
         if not self.parts:
             return values
         made = values.copy()
         for rows, way, left in self.parts:
-            units = (values[rows] / self.sd).ravel()
-            units = units + way @ ((left - 1) * (way.T @ units))
-            made[rows] = units.reshape(len(rows), -1) * self.sd
+            part = values[..., rows, :] / self.sd
+            units = part.reshape(*part.shape[:-2], -1)
+            units = units + ((units @ way) * (left - 1)) @ way.T
+            made[..., rows, :] = units.reshape(part.shape) * self.sd
         return made

@@ -48,8 +48,12 @@ def fitted_at(
     values, rest = newton(problem, point.values, fitted, point.noise, turns=most)
     values, rest = levels.zoomed(problem, values, rest, support, point.noise)
     kept = point.slopes if near else None
+    if problem.model.many and not near:
+        kept = fit.lasting(problem, point, support, values)
     linear, known, slopes = linearised(problem, values, rest, point.noise, kept)
-    return Point(values, support & set(linear.terms), rest, linear, slopes, known)
+    at = values if kept is None else point.at
+    inside = support & set(linear.terms)
+    return Point(values, inside, rest, linear, slopes, known, at)
 
 
 def better(problem: Problem, points: Sequence[Point]) -> Point:
@@ -86,7 +90,8 @@ def relinearised(problem: Problem, point: Point, known: Noise) -> Linear:
     whole = known.innovations(
         fit.target(problem, point.values, point.rest, point.slopes)
     )
-    design = {k: known.innovations(slope) for k, slope in point.slopes.items()}
+    told = known.latent(np.stack([*point.slopes.values()]))
+    design = {k: known.memory(t) for k, t in zip(point.slopes, told, strict=True)}
     units = fit.units(problem, point.values)
     weight = known.weights(point.rest, problem.seen)
     for _ in range(REWEIGHED):

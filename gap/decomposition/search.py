@@ -77,25 +77,29 @@ def _weakest(linear: Linear, kept: Support) -> set[str]:
 
 
 def _improved(linear: Linear, support: Support, merge: bool) -> tuple[float, Support]:
+    """A set that no move makes better: one is added or dropped while that helps, then
+    one swapped, then two merged, since there are many more of these to weigh."""
     best = linear.cost(support)
-    while True:
-        moves = list(_moves(linear, support, merge))
-        costs = [linear.cost(item) for item in moves]
-        if not costs or min(costs) >= best - 1e-9:
-            return best, support
-        at = int(np.argmin(costs))
-        best, support = costs[at], moves[at]
+    better = True
+    while better:
+        better = False
+        for moves in _moves(linear, support, merge):
+            costs = [linear.cost(item) for item in moves]
+            if costs and min(costs) < best - 1e-9:
+                at = int(np.argmin(costs))
+                best, support, better = costs[at], moves[at], True
+                break
+    return best, support
 
 
-def _moves(linear: Linear, support: Support, merge: bool) -> Iterator[Support]:
+def _moves(linear: Linear, support: Support, merge: bool) -> Iterator[list[Support]]:
     inside, outside = sorted(support), [n for n in linear.free if n not in support]
-    yield from (support - {name} for name in inside)
-    yield from (support | {name} for name in outside)
-    for name in inside:
-        yield from ((support - {name}) | {other} for other in outside)
+    drops = [support - {name} for name in inside]
+    yield drops + [support | {name} for name in outside]
+    yield [(support - {name}) | {other} for name in inside for other in outside]
     if merge and len(support) <= MERGED:
-        for pair in itertools.combinations(inside, 2):
-            yield from ((support - set(pair)) | {other} for other in outside)
+        pairs = itertools.combinations(inside, 2)
+        yield [(support - {*pair}) | {other} for pair in pairs for other in outside]
 
 
 def _weigh(linear: Linear) -> None:

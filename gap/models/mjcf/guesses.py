@@ -88,6 +88,23 @@ def rests(
     return None, 0.0
 
 
+def nearest(model: mujoco.MjModel, first: Mapping[str, float]) -> str:
+    """The keyframe whose joints are nearest to where they were at the start of a trial;
+    "" = the model's own pose.
+
+    Args:
+        model: that is recorded.
+        first: where each joint was.
+    """
+    names = ["", *(model.key(k).name for k in range(model.nkey) if model.key(k).name)]
+
+    def away(name: str) -> float:
+        data = posed(model, name, 0.0)
+        return sum(abs(float(data.joint(j).qpos[0]) - at) for j, at in first.items())
+
+    return min(names, key=away)
+
+
 def posed(model: mujoco.MjModel, pose: str, settle: float) -> mujoco.MjData:
     """A model that has settled in a pose.
 

@@ -18,6 +18,8 @@ from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Trial
 
 LEAST = 0.3  # of the noise that is told: the smallest that is believed
+LEVEL, PLACES = (0, 1), ("site", "body")  # axes and quantities of places over the floor
+STRIDE = 0.5  # [s] over which those of a free body are compared
 
 
 class OwnModel(GapModel):
@@ -60,6 +62,12 @@ class OwnModel(GapModel):
             for item in self.listed
             if item.effect == "body_mass"
         }
+        carried = start.free(self.physics.model)
+        self._carried = [
+            column
+            for column, item in enumerate(config.seen)
+            if item.part in carried and item.axis in LEVEL and item.quantity in PLACES
+        ]
         self._tried = {item.effect for item in self.listed}
         self._terms = {
             item.name: item for item in (*self.listed, *mjcf_rows.grouped(self.listed))
@@ -206,8 +214,17 @@ class OwnModel(GapModel):
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
-        """See `GapModel.compare`: what is observed at the end of each window."""
-        return observed[..., windows.last, :]
+        """See `GapModel.compare`: what is observed at the end of each window; of what
+        a free body carries, how far it came over the floor in the last `STRIDE`. Where
+        it began is not the robot's, and what it slipped long ago is no error anew."""
+        made = observed[..., windows.last, :]
+        if len(self._carried):
+            seen = np.flatnonzero(np.isfinite(trial.observed).all(axis=1))
+            begin = trial.times[windows.last] - STRIDE
+            at = np.searchsorted(trial.times[seen], begin, side="right") - 1
+            before = observed[..., seen[np.maximum(at, 0)], :]
+            made[..., self._carried] -= before[..., self._carried]
+        return made
 
     def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
         """Commands, their changes, time, and the predicted readings and their speed,

@@ -294,7 +294,8 @@ def test_residuals_that_scatter_explains_weigh_as_what_it_leaves_of_them():
         rest = planted(np.random.default_rng(5), problem, f=size)
         linear = problem.linear(rest)
         slopes = dict(enumerate(problem.columns))
-        at = Point(problem.nominal, frozenset(), rest, linear, slopes, known)
+        nominal = problem.nominal
+        at = Point(nominal, frozenset(), rest, linear, slopes, known, nominal)
         costs.append(refit.relinearised(problem, at, known).cost(()))
     assert costs[1] == pytest.approx(costs[0], abs=1.0)
 
