@@ -7,7 +7,7 @@ one, to share the work.
 import sys
 from typing import Any
 
-from bench.gap.kept_cases import Cases, Stopwatch
+from bench.gap.kept_cases import Cases, Stopwatch, made
 from bench.result import Result, bench
 
 COUNTS = {"large": 56, "none": 32, "lost": 16}
@@ -67,6 +67,7 @@ def gap_hexapod(quick: bool) -> Result:
     busy = sorted(row["cpu"] for row in found)
     figure = scoring.share(large, right)
     return Result(
+        **made(found),
         figure=figure,
         unit="share",
         holds=figure >= 0.9 and busy[-1] <= SLOWEST,

@@ -1,4 +1,9 @@
-"""Cases of a gap bench, by kind and seed: diagnosed once, kept as JSON lines."""
+"""Cases of a gap bench, by kind and seed: diagnosed once, kept as JSON lines.
+
+What is diagnosed is kept in `runs/bench/`. A round that takes longer than a machine is
+there goes on elsewhere: rows that lie in `bench/results/rounds/` as well are not made
+again. Each row says of which commit it is.
+"""
 
 import json
 import time
@@ -6,9 +11,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from bench.versions import ROOT
+from bench.versions import ROOT, commit
 
 DIRECTORY = ROOT / "runs" / "bench"
+ROUNDS = ROOT / "bench" / "results" / "rounds"
 
 Case = tuple[str, int]
 """kind and seed"""
@@ -42,13 +48,22 @@ def mixed(counts: Mapping[str, int], seed: Callable[[str, int], int]) -> list[Ca
 
 
 def kept(file: str) -> dict[Case, dict[str, Any]]:
-    """All results so far in `runs/bench/<file>_<part>.jsonl`."""
+    """All results so far, in `<file>_<part>.jsonl` of both directories."""
     found = {}
-    for path in sorted(DIRECTORY.glob(f"{file}_*.jsonl")):
+    for path in (
+        each for d in (ROUNDS, DIRECTORY) for each in sorted(d.glob(f"{file}_*.jsonl"))
+    ):
         for line in path.read_text().splitlines():
             row = json.loads(line)
             found[row["kind"], row["seed"]] = row
     return found
+
+
+def made(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """What a bench's result says of when its rows were made: commits and seconds."""
+    commits = tuple(sorted({row["commit"] for row in rows if "commit" in row}))
+    seconds = sum(row.get("seconds", 0.0) for row in rows)
+    return {"commits": commits, "seconds": round(seconds, 2)} if commits else {}
 
 
 def produce(
@@ -72,7 +87,7 @@ def produce(
     DIRECTORY.mkdir(parents=True, exist_ok=True)
     for case in cases:
         if case not in done:
-            done[case] = one(*case)
+            done[case] = one(*case) | {"commit": commit().replace("-dirty", "+")}
             with (DIRECTORY / f"{file}_{part}.jsonl").open("a") as out:
                 out.write(json.dumps(done[case]) + "\n")
     return [done[case] for case in cases]

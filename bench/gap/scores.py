@@ -2,6 +2,7 @@
 
 from statistics import median
 
+from bench.gap.kept_cases import made
 from bench.gap.wheeled_cases import ensure
 from bench.result import Result, bench
 from bns.gap.bench import scoring
@@ -18,6 +19,7 @@ def gap_synthetic(quick: bool) -> Result:
     large = scoring.of(rows, "single", scoring.LARGE)
     figure = scoring.share(large, scoring.right)
     return Result(
+        **made(rows),
         figure=figure,
         unit="share",
         holds=figure >= 0.95,
@@ -45,6 +47,7 @@ def gap_pairs(quick: bool) -> Result:
     pairs = scoring.of(rows, "pair")
     figure = scoring.share(pairs, scoring.right)
     return Result(
+        **made(rows),
         figure=figure,
         unit="share",
         holds=figure >= 0.75,
@@ -67,6 +70,7 @@ def gap_alias(quick: bool) -> Result:
         rows, lambda r: r["said"]["verdict"] == "either" and scoring.listed(r)
     )
     return Result(
+        **made(rows),
         figure=figure,
         unit="share",
         holds=figure >= 0.95,
@@ -87,6 +91,7 @@ def gap_off_library(quick: bool) -> Result:
     known = scoring.of(rows, "single", scoring.LARGE)
     figure = scoring.share(strange, scoring.strange)
     return Result(
+        **made(rows),
         figure=figure,
         unit="share",
         holds=figure >= 0.75,
@@ -118,6 +123,7 @@ def gap_false_alarm(quick: bool) -> Result:
     figure = scoring.share(nothing, scoring.claims)
     found = scoring.share(large, scoring.claims)
     return Result(
+        **made(rows),
         figure=figure,
         unit="share",
         holds=figure <= 0.03 and not found < 0.95,
@@ -158,6 +164,7 @@ def gap_closed(quick: bool) -> Result:
     shares = sorted(row["said"]["closed"] for row in said)
     figure = median(shares) if shares else float("nan")
     return Result(
+        **made(rows),
         figure=figure,
         unit="share",
         holds=figure >= 0.90,
@@ -177,6 +184,7 @@ def gap_edit(quick: bool) -> Result:
     ratios = sorted(edit["ours"] / edit["oracle"] for edit in edits)
     figure = median(ratios) if ratios else float("nan")
     return Result(
+        **made(rows),
         figure=figure,
         unit="x",
         holds=figure <= 1.5,

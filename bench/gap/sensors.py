@@ -10,7 +10,7 @@ one, to share the work.
 import sys
 from typing import Any
 
-from bench.gap.kept_cases import Cases, Stopwatch
+from bench.gap.kept_cases import Cases, Stopwatch, made
 from bench.result import Result, bench
 
 COUNTS = {"single": 160, "none": 60, "motion": 12, "off-library": 40}
@@ -78,6 +78,7 @@ def gap_sensors(quick: bool) -> Result:
     none, off = scoring.of(found, "none"), scoring.of(found, "off-library")
     figure = scoring.share(large, scoring.right)
     return Result(
+        **made(found),
         figure=figure,
         unit="share",
         holds=figure >= 0.95,

@@ -5,6 +5,7 @@ of their own. The details have the rates by size, and those of the pairs of the 
 benches.
 """
 
+from bench.gap.kept_cases import made
 from bench.gap.wheeled_cases import ensure, produce, rows
 from bench.result import Result, bench
 from bns.gap.bench import scoring
@@ -26,6 +27,7 @@ def gap_sets(quick: bool) -> Result:
     figure = scoring.share(said, scoring.covered)
     mean = _mean(scoring.merged(row) for row in said)
     return Result(
+        **made(fresh),
         figure=figure,
         unit="share",
         holds=0.87 <= figure <= 0.93 and mean <= 1.6,
@@ -90,6 +92,7 @@ def gap_intervals(quick: bool) -> Result:
     figures = scoring.parameter(named)
     figure = figures["intervals that hold"]
     return Result(
+        **made(found),
         figure=figure,
         unit="share",
         holds=0.85 <= figure <= 0.95 if named else None,
