@@ -133,11 +133,12 @@ def _told_unit(
     )
     number = names.index(actuator) if actuator in names else -1
     joint = joint_of(model, number) if number >= 0 else actuator
-    servo = work.loop or (number >= 0 and model.actuator_biasprm[number][1] < 0)
-    if not servo:
-        _no_loop(work, column, seen)
+    bias = model.actuator_biasprm[number] if number >= 0 else np.zeros(3)
+    if not (work.loop or bias[1] < 0):
+        if bias[2] >= 0:  # nor a loop of speed
+            _no_loop(work, column, seen)
         return "1"
-    if not joint or int(model.joint(joint).type[0]) != int(mujoco.mjtJoint.mjJNT_HINGE):
+    if not _turns(model, [joint] if joint else _wound(model, number)):
         units = {u: 1 / f for u, f in FACTORS["m"].items()}
     else:
         units = dict(rehearsal.ANGLE)
@@ -148,6 +149,24 @@ def _told_unit(
     largest = _widest(model, number, joint)
     size = float(np.nanmax(np.abs(column.values)))
     return next((u for u, f in units.items() if size / f <= 1.05 * largest), "rad")
+
+
+def _turns(model: mujoco.MjModel, names: Sequence[str]) -> bool:
+    """Whether some joints are hinges, all of them, and there is one."""
+    kinds = {int(model.joint(name).type[0]) for name in names}
+    return kinds == {int(mujoco.mjtJoint.mjJNT_HINGE)}
+
+
+def _wound(model: mujoco.MjModel, actuator: int) -> list[str]:
+    """Joints of the fixed tendon that an actuator pulls; none for other actuators."""
+    if int(model.actuator_trntype[actuator]) != int(mujoco.mjtTrn.mjTRN_TENDON):
+        return []
+    tendon = int(model.actuator_trnid[actuator][0])
+    first, count = int(model.tendon_adr[tendon]), int(model.tendon_num[tendon])
+    wraps = range(first, first + count)
+    if any(int(model.wrap_type[w]) != int(mujoco.mjtWrap.mjWRAP_JOINT) for w in wraps):
+        return []
+    return [model.joint(int(model.wrap_objid[w])).name for w in wraps]
 
 
 def _widest(model: mujoco.MjModel, number: int, joint: str) -> float:

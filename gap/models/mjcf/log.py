@@ -13,6 +13,7 @@ from bns.worlds.data import dataset_checks as checks
 from bns.worlds.data.importing import FACTORS, MOMENTS
 from bns.worlds.trial import Commands, Trial
 
+LATE = 0.5  # samples by which a command may be sent after its first row
 HELD = 2  # samples: who tells anew at each sample logs what it tells
 
 
@@ -142,9 +143,8 @@ def _exact(
     times, sent = columns[TIME], columns[SENT]
     rows = np.append(0, np.flatnonzero((np.diff(told, axis=0) != 0).any(axis=1)) + 1)
     moments = np.append(times[0], sent[rows[1:]])
-    wrong = (moments > times[rows] + tables.SAME) | (
-        np.diff(moments, prepend=-np.inf) < 0
-    )
+    late = LATE * float(np.median(np.diff(times)))  # of stamps that jitter
+    wrong = (moments > times[rows] + late) | (np.diff(moments, prepend=-np.inf) < 0)
     if wrong.any() or not np.isfinite(moments).all():
         row = int(rows[np.argmax(wrong | ~np.isfinite(moments))])
         raise FormatError(

@@ -47,6 +47,7 @@ TRIALS = _set("trial run episode episode_index rep repetition")
 SENT = _set("command_time sent cmd_time sent_time t_sent t_cmd time_sent")
 COUNTS = _set("frame index frame_index seq sequence task_index step row")
 AXES = ("x", "y", "z")
+QUATERNION = _set("qw qx qy qz quat quaternion")
 
 
 def words(name: str) -> list[str]:
@@ -234,6 +235,17 @@ def _ends(one: str, other: str) -> bool:
     return len(short) > 2 and not short.isdigit() and long.endswith(short)
 
 
+def oriented(columns: Sequence[Column]) -> list[Column]:
+    """Columns of a quaternion: how something is turned in space."""
+    return [c for c in columns if set(words(c.name)[-2:]) & QUATERNION]
+
+
+def _one(stem: str, parts: Sequence[str]) -> str:
+    """The part that is called as a stem, or alone so without words for what it is."""
+    alike = [part for part in parts if part and core(stem) == core(part)]
+    return stem if stem in parts else alike[0] if len(alike) == 1 else ""
+
+
 def by_place(
     columns: Sequence[Column], table: Mapping[str, Sequence[str]]
 ) -> dict[str, tuple[str, str, str]]:
@@ -253,6 +265,6 @@ def by_place(
         for kind, parts in table.items():
             if name in parts:
                 found.setdefault(column.name, (kind, name, axis))
-            elif last in AXES and stem in parts:
-                found.setdefault(column.name, (kind, stem, last))
+            elif last in AXES and (called := _one(stem, parts)):
+                found.setdefault(column.name, (kind, called, last))
     return found

@@ -26,6 +26,11 @@ def observed(work: Work, seen: list[Column]) -> None:
         work.guessed.append(
             f"left out, for no torque is compared: {', '.join(c.name for c in effort)}"
         )
+    turned = matching.oriented(seen)
+    seen = [c for c in seen if c not in turned]
+    if turned:
+        listed = ", ".join(c.name for c in turned)
+        work.guessed.append(f"left out, for no orientation is compared: {listed}")
     model = work.model
     driven = [joint_of(model, model.actuator(a).id) for _, a, _ in work.told]
     driven = [joint for joint in joints(model) if joint in driven]
@@ -111,8 +116,8 @@ def _chosen(
         work.unsure.append(f"{column.name}: moves as no part of the model, left out")
         return
     unit = fit.unit
-    if fit.score < AGREES and best.axis:
-        unit = _beside(best, fitted) or unit
+    if fit.score < AGREES:
+        unit = _usual(best, _units(work.model, best, column), fitted)
     reason = why.get(column.name, "by its name" if named else "for it moves so")
     found[column.name] = best
     axis = f" along {best.axis}" if best.axis else ""
@@ -136,15 +141,26 @@ def _chosen(
     (work.guessed if sure else work.unsure).append(line)
 
 
-def _beside(place: Part, fitted: Mapping[str, Mapping[Part, Fit]]) -> str:
-    """The unit of the other axes of a place, if one moves as the model does."""
+def _usual(
+    part: Part,
+    units: Mapping[str, float],
+    fitted: Mapping[str, Mapping[Part, Fit]],
+) -> str:
+    """The unit of a part that hardly moves: that of other columns that move as the
+    model does, of the same part if there are such; else that of SI.
+
+    Args:
+        part: of the model.
+        units: that it may be in, SI first.
+        fitted: fits of all columns.
+    """
     others = [
-        fit
+        (other[:2] == part[:2], fit.score, fit.unit)
         for fits in fitted.values()
-        for part, fit in fits.items()
-        if part[:2] == place[:2] and fit.score >= AGREES
+        for other, fit in fits.items()
+        if fit.score >= AGREES and fit.unit in units
     ]
-    return max(others, key=lambda fit: fit.score).unit if others else ""
+    return max(others)[2] if others else next(iter(units))
 
 
 @dataclass(frozen=True, eq=False)

@@ -278,3 +278,64 @@ def test_a_place_that_one_trial_does_not_move_is_found_in_another(tmp_path):
     describe(robot, log, out=tmp_path / "own.toml").write(tmp_path / "own.toml")
     seen = OwnModel.read(tmp_path / "own.toml", threads=1).config.seen
     assert [(item.part, item.axis) for item in seen[2:]] == [("toe", 0), ("toe", 1)]
+
+
+def written(folder, servos, head, columns):
+    """A description of the arm with other actuators, from a short log."""
+    (folder / "arm.xml").write_text(ARM.replace("ACTUATORS", servos))
+    table = np.column_stack([np.arange(len(columns[0])) * 0.01, *columns])
+    np.savetxt(folder / "log.csv", table, delimiter=",", header=head, comments="")
+    return describe(folder / "arm.xml", folder / "log.csv")
+
+
+SWAY = np.sin(np.arange(0, 4, 0.01))
+
+
+def test_a_goal_told_to_a_loop_of_speed_needs_no_gains(tmp_path):
+    servos = '<velocity name="hip" joint="FL_hip_joint" kv="5"/>'
+    found = written(tmp_path, servos, "time,hip_goal,hip,calf", [SWAY, SWAY, 0 * SWAY])
+    assert "told to actuator 'hip' in 1" in " ".join(found.guessed)
+
+
+def test_the_goal_of_a_tendon_of_hinges_is_an_angle(tmp_path):
+    both = "".join(
+        f'<joint joint="FL_{name}_joint" coef="1"/>' for name in ("hip", "calf")
+    )
+    tendon = f'<tendon><fixed name="both">{both}</fixed></tendon>'
+    servos = '<position name="pull" tendon="both" kp="9"/></actuator>' + tendon
+    head = "time,pull_goal,hip,calf"
+    servos += "<actuator>"
+    found = written(tmp_path, servos, head, [SWAY, SWAY, 0 * SWAY])
+    assert "told to actuator 'pull' in rad" in " ".join(found.guessed)
+
+
+def test_a_joint_that_is_stuck_has_the_unit_of_the_others(tmp_path):
+    (tmp_path / "arm.xml").write_text(ARM.replace("ACTUATORS", SERVOS))
+    log = recorded(tmp_path / "log.csv", seconds=4, unit=np.pi / 180)
+    table = np.genfromtxt(log, delimiter=",", names=True)
+    table["calf"] = 0.3
+    head = ",".join(table.dtype.names)
+    np.savetxt(log, np.array(table.tolist()), delimiter=",", header=head, comments="")
+    said = describe(tmp_path / "arm.xml", log).unsure
+    assert any("calf: joint 'FL_calf_joint' in deg" in line for line in said)
+
+
+def test_stamps_that_jitter_are_no_command_before_its_time(tmp_path):
+    times = np.arange(0, 2, 0.1)
+    told = np.where(times < 0.55, 0.0, 0.4)
+    for late, good in ((0.04, True), (0.06, False)):
+        sent = np.where(times < 0.55, 0.0, 0.6 + late)
+        table = np.column_stack([times, told, told, sent, 0 * times, 0 * times])
+        head = "time,hip_goal,calf_goal,command_time,hip,calf"
+        log = tmp_path / "a.csv"
+        np.savetxt(log, table, delimiter=",", header=head, comments="")
+        (tmp_path / "arm.xml").write_text(ARM.replace("ACTUATORS", SERVOS))
+        out = tmp_path / f"{good}.toml"
+        describe(tmp_path / "arm.xml", log, out=out).write(out)
+        model = OwnModel.read(out, threads=1)
+        if good:
+            (trial,) = model.read_log(str(log))
+            assert trial.commands.durations[0] == pytest.approx(0.6 + late)
+        else:
+            with pytest.raises(FormatError, match="a command is sent before its row"):
+                model.read_log(str(log))
