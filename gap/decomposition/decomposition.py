@@ -8,6 +8,7 @@ import numpy as np
 
 from bns.gap.decomposition import descent, flexible, onset, refit, rest, shares, ties
 from bns.gap.decomposition.fit import Point
+from bns.gap.decomposition.latent import Latent
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.onset import Onset
 from bns.gap.decomposition.problem import Problem
@@ -24,6 +25,7 @@ SILENT = 1e-3  # weighted square of what a plausible departure changes: no evide
 FELT = 0.02  # of the floor's variance: a gap below shows in no picture
 LARGE = 2.0  # variances of the floor: more than heavy tails of any camera's noise
 SCATTER = 3.0  # times what differs between repeats
+BEYOND_LATE = 25.0  # variances of the floor: five times as large as all it scatters
 BROKEN = 0.05  # of its motion: no sound robot scatters by as much (assumed)
 
 
@@ -256,13 +258,28 @@ def _steady(
 ) -> tuple[Problem, Point, rest.Floor, np.ndarray]:
     """A recording without trials that may go anywhere, and with what changes nothing in
     it; the nominal model, the floor, and the windows ``(N,)`` of these trials."""
-    start = descent.nothing(problem)
-    known = rest.floor(problem, start.noise.latent, seed=seed)
+    problem, start, known = _begun(problem, seed)
     unstable = rest.unstable(problem, start.slopes, known)
     if unstable.any() and not unstable.all():
         problem = problem.without(unstable)
         start = descent.nothing(problem)
     return replace(problem, silent=silent(problem, start)), start, known, unstable
+
+
+def _begun(problem: Problem, seed: int) -> tuple[Problem, Point, rest.Floor]:
+    """A recording whose commands began where its log tells them, or since the sample
+    before where it leaves that open and the gap is not far beyond what that may make
+    of the motion: in a large one it is lost among what else a model lacks. The nominal
+    model, and the floor, which holds what late commands change."""
+    exact = replace(problem, dated=True)
+    start = descent.nothing(exact)
+    late, latent = any(map(len, problem.late)), start.noise.latent
+    if late:
+        latent = Latent.of(problem, start.values, problem.model.least)
+    known = rest.floor(problem, latent, seed=seed)
+    if not late or rest.excess(start.rest, known, problem.seen) > BEYOND_LATE:
+        return exact, start, known
+    return problem, descent.nothing(problem, start), known
 
 
 def silent(problem: Problem, start: Point) -> frozenset[str]:

@@ -11,6 +11,7 @@ from bns.gap.decomposition import fit, levels, refit, search, simpler
 from bns.gap.decomposition.fit import Noise, Point, linearised, newton, placed
 from bns.gap.decomposition.levels import Level
 from bns.gap.decomposition.linear import Support
+from bns.gap.decomposition.noise import Memory
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.shares import HeldOut
 from bns.gap.decomposition.singles import Single, Singles, wide
@@ -24,13 +25,22 @@ MARGIN = 1.02  # of the held-out error that an autoregression may cost
 WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
 
 
-def nothing(problem: Problem) -> Point:
-    """The nominal model, its nuisances fitted."""
-    values = problem.nominal.copy()
-    rest, made = problem.residual(values)
-    first = fit.first_noise(problem, rest, made)
-    values, rest = newton(problem, values, fit.nuisances(problem), first)
-    linear, known, slopes = linearised(problem, values, rest, first)
+def nothing(problem: Problem, near: Point | None = None) -> Point:
+    """The nominal model, its nuisances fitted.
+
+    Args:
+        problem: the recording.
+        near: the same beside another noise, whose values and derivatives are taken.
+    """
+    if near is None:
+        values = problem.nominal.copy()
+        rest, made = problem.residual(values)
+        first, slopes = fit.first_noise(problem, rest, made), None
+        values, rest = newton(problem, values, fit.nuisances(problem), first)
+    else:
+        values, rest, slopes = near.values, near.rest, near.slopes
+        first = replace(near.noise, memory=Memory.none(problem.trial, rest.shape[1]))
+    linear, known, slopes = linearised(problem, values, rest, first, slopes)
     plain = Point(values, frozenset(), rest, linear, slopes, known, values)
     if not problem.model.memory:
         return plain

@@ -168,7 +168,7 @@ def first_noise(problem: Problem, rest: np.ndarray, motion: np.ndarray) -> Noise
         motion: predicted features, with whose motion noise may grow, ``(N, C)``.
     """
     memory = Memory.none(problem.trial, rest.shape[1])
-    latent = Latent.of(problem, problem.nominal)
+    latent = Latent.of(problem, problem.nominal, noise.level(rest))
     left = np.where(problem.seen, latent(np.nan_to_num(rest)), np.nan)
     sd = noise.scale(left, problem.model.motion(motion), problem.model.least)
     return Noise(sd, latent, memory, 2.0)
@@ -199,18 +199,23 @@ def linearised(
     order = known.order if order is None else order
     wanted = smooth(problem, values)
     if slopes is None:
-        known = replace(known, latent=Latent.of(problem, values))
+        latent = Latent.of(problem, values, noise.level(rest))
+        known = replace(known, latent=latent)
     kept = {k: slopes[k] for k in wanted if k in slopes} if slopes else {}
     lacking = [k for k in wanted if k not in kept]
     slopes = kept | (columns(problem, values, lacking) if lacking else {})
     whole = target(problem, values, rest, slopes)
-    told = dict(zip(slopes, known.latent(np.stack([*slopes.values()])), strict=True))
     predicted = np.where(problem.seen, problem.recorded, 0.0) - np.nan_to_num(rest)
     motion = problem.model.motion(predicted)
     moved = np.nan_to_num(problem.gap - rest)
     exact = inexact(problem, values)
-    left = rest
+    left, stack = rest, np.stack([*slopes.values()])
     for turn in range(MEASURED):
+        level = noise.level(
+            np.where(problem.seen, known.latent(np.nan_to_num(left)), np.nan)
+        )
+        known = replace(known, latent=known.latent.beside(problem, level))
+        told = dict(zip(slopes, known.latent(stack), strict=True))
         made = _linear(problem, values, told, whole, known, left)
         found = made.solve(made.free)
         left = whole - _summed(problem, values, slopes, made, found)

@@ -27,29 +27,51 @@ class Latent:
         parts: of each trial that has some: its windows, orthonormal directions
             ``(n * C, k)``, and what is left of a residual in each ``(k,)``.
         spread: standard deviation that they give each feature, ``(N, C)``.
+        begun: what starts change, see `Problem.begun`.
+        late: whether moments of commands are among them.
     """
 
     sd: np.ndarray
     parts: tuple[tuple[np.ndarray, np.ndarray, np.ndarray], ...]
     spread: np.ndarray
+    begun: np.ndarray
+    late: bool = False
 
     @classmethod
-    def of(cls, problem: Problem, values: np.ndarray) -> "Latent":
+    def of(cls, problem: Problem, values: np.ndarray, noise: np.ndarray) -> "Latent":
         """Directions by differences.
 
         Args:
             problem: the recording.
             values: of all rows, ``(R,)``, for what starts change; when commands began
                 changes what it does to the nominal model.
+            noise: standard deviation of each feature's residuals, ``(C,)``, see
+                `beside`.
         """
+        return cls._made(problem, problem.begun(values), noise)
+
+    def beside(self, problem: Problem, noise: np.ndarray) -> "Latent":
+        """The same beside another noise: moments of commands that change less than
+        what else is left are not what is left.
+
+        Args:
+            problem: the recording.
+            noise: standard deviation of each feature's residuals, ``(C,)``.
+        """
+        if not (self.late or any(map(len, problem.late))):
+            return self
+        return self._made(problem, self.begun, noise)
+
+    @classmethod
+    def _made(cls, problem: Problem, begun: np.ndarray, noise: np.ndarray) -> "Latent":
         sd, seen = problem.model.least, problem.seen
-        begun, late = problem.begun(values), problem.late
+        share = sd / np.maximum(noise, sd)
         square = (begun**2).sum(axis=0)
         parts = []
-        for number in range(len(problem.trials)):
+        for number, sooner in enumerate(problem.late):
             rows = np.flatnonzero(problem.trial == number)
-            moved = np.concatenate([begun[:, rows], late[number]])
-            square[rows] += (late[number] ** 2).sum(axis=0)
+            moved = np.concatenate([begun[:, rows], share * sooner])
+            square[rows] += (sooner**2).sum(axis=0)
             if not len(moved):
                 continue
             units = np.where(seen[rows], moved / sd, 0.0).reshape(len(moved), -1)
@@ -59,7 +81,8 @@ class Latent:
             if len(size):
                 way = units.T @ (mixed[:, felt] / size)
                 parts.append((rows, way, 1 / np.sqrt(1 + size**2)))
-        return cls(sd, tuple(parts), np.sqrt(square))
+        late = any(map(len, problem.late))
+        return cls(sd, tuple(parts), np.sqrt(square), begun, late)
 
     @property
     def size(self) -> float:

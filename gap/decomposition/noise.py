@@ -64,6 +64,12 @@ def _variance(error: np.ndarray, parts: np.ndarray) -> np.ndarray:
     return 1.02 * variance
 
 
+def level(rest: np.ndarray) -> np.ndarray:
+    """Robust standard deviation of each column of residuals ``(N, C)``, ``(C,)``; 0
+    where none was seen (NaN)."""
+    return np.nan_to_num(NORMAL * np.nanmedian(np.abs(rest), axis=0))
+
+
 def loss(rest: np.ndarray, sd: np.ndarray) -> float:
     """Pseudo-Huber loss of residuals ``(N, C)`` with standard deviations ``(N, C)``:
     their weighted square where they are small."""

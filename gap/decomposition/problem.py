@@ -43,6 +43,8 @@ class Problem:
     """first trial of the rows that set in later, by name"""
     silent: frozenset[str] = frozenset()
     """names of rows that change nothing here, whose derivatives are 0"""
+    dated: bool = False
+    """whether commands are taken to have begun where the log tells them"""
 
     @classmethod
     def of(cls, trials: Sequence[Trial], model: GapModel) -> "Problem":
@@ -183,7 +185,8 @@ class Problem:
         """What a standard deviation of when each command began changes of the features
         of its trial by the nominal model, where a log tells it to a sample only: by
         trial ``(K, n, C)``."""
-        sooner = [moments.sooner(trial, self.model.dt) for trial in self.trials]
+        dt = self.model.dt
+        sooner = [[] if self.dated else moments.sooner(t, dt) for t in self.trials]
         trials = [*self.trials, *(item.trial for row in sooner for item in row)]
         made = []
         if len(trials) > len(self.trials):

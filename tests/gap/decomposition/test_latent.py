@@ -34,7 +34,7 @@ def covariance(problem, trial):
 
 
 def test_residuals_are_independent_without_what_is_unknown_of_trials(problem):
-    latent = Latent.of(problem, np.zeros(0))
+    latent = Latent.of(problem, np.zeros(0), SD)
     for trial in range(TRIALS):
         rows = problem.trial == trial
         columns = []
@@ -49,12 +49,14 @@ def test_residuals_are_independent_without_what_is_unknown_of_trials(problem):
 
 def test_their_size_is_half_the_log_of_the_determinant(problem):
     wanted = sum(np.linalg.slogdet(covariance(problem, t))[1] for t in range(TRIALS))
-    assert Latent.of(problem, np.zeros(0)).size == pytest.approx(wanted / 2, rel=1e-3)
+    assert Latent.of(problem, np.zeros(0), SD).size == pytest.approx(
+        wanted / 2, rel=1e-3
+    )
 
 
 def test_known_starts_and_moments_change_nothing(problem):
     problem.begun = lambda values: np.zeros((0, TRIALS * LENGTH, 2))
-    latent = Latent.of(problem, np.zeros(0))
+    latent = Latent.of(problem, np.zeros(0), SD)
     values = np.random.default_rng(1).normal(size=(TRIALS * LENGTH, 2))
     assert latent(values) is values
     assert latent.size == 0 and not latent.spread.any()

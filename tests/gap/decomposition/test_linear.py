@@ -287,7 +287,10 @@ def test_residuals_that_scatter_explains_weigh_as_what_it_leaves_of_them():
     problem.seen = np.ones((BLOCKS * EACH, 2), dtype=bool)
     one = np.ones_like(problem.columns[0])
     known = Noise(
-        one, Latent(one[0], (), 0 * one), Memory.none(problem.block, 2), lam=1.0
+        one,
+        Latent(one[0], (), 0 * one, one[:0]),
+        Memory.none(problem.block, 2),
+        lam=1.0,
     )
     costs = []
     for size in (0.0, 8.0):  # of what the slack of the last row explains
