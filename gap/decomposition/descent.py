@@ -152,10 +152,10 @@ def decompose(tried: Singles) -> Point:
 
 
 def _renewed(problem: Problem, best: Point) -> Point:
-    """A point with all derivatives taken there; where these lead to another set, the
+    """A point with all derivatives taken near it; where these lead to another set, the
     better of both."""
     for _ in range(ROUNDS):
-        if (best.values == best.at).all():
+        if np.abs((best.values - best.at) / problem.sd).max() <= fit.FAR:
             return best
         linear, known, slopes = linearised(problem, best.values, best.rest, best.noise)
         inside, values = best.support & set(linear.terms), best.values

@@ -9,6 +9,7 @@ from bns.gap.recordings import trial_conditions
 from bns.worlds.trial import Commands, Trial
 
 AFTER = 0.3  # [s] until it is felt no more that a command began sooner; assumed
+LONGEST = 1000  # commands of a trial; of more, all are taken to begin where logged
 MOST = 12  # simulations of a trial, each with every so manieth command moved
 
 
@@ -52,11 +53,12 @@ def sooner(trial: Trial, dt: float) -> list[Sooner]:
     anywhere with the same chance. The first of a trial begins with it.
 
     Args:
-        trial: recorded; none are made where it is known when its commands began.
+        trial: recorded; none are made where it is known when its commands began, nor
+            of more than `LONGEST`.
         dt: physics step [s], in whole numbers of which commands are moved; 0 = any.
     """
     count = len(trial.commands)
-    if count < 2 or not trial_conditions.moments_sampled([trial]):
+    if not 2 <= count <= LONGEST or not trial_conditions.moments_sampled([trial]):
         return []
     step = float(np.median(np.diff(trial.times)))
     move = step / 2 if dt == 0 else max(1, round(step / 2 / dt)) * dt
