@@ -14,7 +14,8 @@ from bns.worlds.data.importing import FACTORS, MOMENTS
 from bns.worlds.trial import Commands, Trial
 
 LATE = 0.5  # samples by which a command may be sent after its first row
-HELD = 2  # samples: who tells anew at each sample logs what it tells
+HELD = 2, 10  # samples that a loop of its own holds its commands: who tells anew at
+# each sample logs what it tells, as does a list of steps that are held for long
 
 
 def read(path: str, config: OwnConfig) -> list[Trial]:
@@ -23,7 +24,7 @@ def read(path: str, config: OwnConfig) -> list[Trial]:
     Columns are named like the channels, beside `time` [s] and, if there are,
     `trial` and `command_time` [s]; [log] in the description names others. A stretch of
     equal commands becomes one command, which begins at its `command_time`, else with
-    its first row; commands that are held for several rows may then have begun since the
+    its first row; commands that are held for a few rows may then have begun since the
     row before. Empty cells are lost samples. With `cut` in [start] each trial becomes
     several.
 
@@ -112,7 +113,7 @@ def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> 
     begins = np.concatenate([[0], np.flatnonzero(change) + 1])
     begins = begins[np.diff(times[np.append(begins, len(times) - 1)]) > 0]
     bounds = np.append(begins, len(times) - 1)
-    exact |= bool(np.median(np.diff(bounds)) < HELD)
+    exact |= not HELD[0] <= np.median(np.diff(bounds)) <= HELD[1]
     kinds = tuple(item.channel for item in config.told)
     made = Trial(
         commands=Commands(told[begins], np.diff(times[bounds]), kinds),

@@ -112,12 +112,13 @@ def test_a_trial_whose_moments_are_known_has_none(arm):
 
 
 @pytest.mark.parametrize(
-    ("held", "sent", "unknown"), [(4, False, True), (1, False, False), (4, True, False)]
+    ("held", "sent", "unknown"),
+    [(4, False, True), (1, False, False), (20, False, False), (4, True, False)],
 )
 def test_a_log_without_command_time_tells_them_to_a_sample(
     arm, tmp_path, held, sent, unknown
 ):
-    """But not where each sample has a command of its own."""
+    """But not where each sample has a command of its own, or commands are steps."""
     names = ["time", "shoulder_goal", "elbow_goal", "shoulder", "elbow"]
     count = 40
     times = np.arange(count) * SAMPLE
