@@ -302,7 +302,7 @@ def _window(work: Work, step: float) -> float:
     """
     rows = max(work.rows, key=len)
     told = np.stack([c.values[rows] for c, _, _ in work.told], axis=1)
-    changes = np.flatnonzero((np.diff(told, axis=0) != 0).any(axis=1))
+    changes = np.flatnonzero(guesses.changed(told))
     held = float(np.median(np.diff(changes))) * step if len(changes) > 1 else WINDOW
     return max(2 * step, min(held, WINDOW) if held >= 2 * step else WINDOW)
 

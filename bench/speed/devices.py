@@ -8,7 +8,7 @@ from typing import Any
 import torch
 
 from bench.result import Result, bench
-from bench.speed.learners import drawn, in_network
+from bench.speed.learners import by_trial, drawn, in_network
 from bns import presets
 from bns.errors import BnsError
 from bns.evolution.chromosome import Population
@@ -76,24 +76,14 @@ def learning(config: RunConfig, size: int, device: str) -> float:
     config = replace(config, replicates=size, device=device, threads=threads)
     config, _ = resolve(config)
     batch = Batch([config], [make_world(config)])
-    seconds = []
-    for trial in range(WARM + COUNTED):
-        marks = [_now(device)]
-        proposal = batch.learner.propose(trial)
-        marks.append(_now(device))
-        seen = batch._execute(proposal.tried, trial, "world")
-        marks.append(_now(device))
-        batch.learner.observe(trial, seen, None)
-        marks.append(_now(device))
-        seconds.append(marks[1] - marks[0] + marks[3] - marks[2])
-    return round(median(seconds[WARM:]), 4)
 
+    def now() -> float:
+        if device == CARD:
+            torch.cuda.synchronize()  # after all that the device was given is done
+        return time.perf_counter()
 
-def _now(device: str) -> float:
-    """Time after all that the device was given is done [s]."""
-    if device == CARD:
-        torch.cuda.synchronize()
-    return time.perf_counter()
+    taken = list(by_trial(batch, WARM + COUNTED, now))[WARM:]
+    return round(median(evolution + training for evolution, _, training in taken), 4)
 
 
 def apart() -> float:

@@ -1,10 +1,12 @@
 """What learners cost: a trial, a batch, a run that walks, robot time inside the SNN."""
 
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from statistics import median
 from typing import Any
 
+import numpy as np
 import torch
 
 from bench.result import Result, bench
@@ -308,20 +310,35 @@ def processor_times(config: RunConfig) -> dict[str, float]:
     begun, wall = time.process_time(), time.perf_counter()
     config, mode = resolve(config)
     batch = Batch([config], [make_world(config)])
-    learner, kind = batch.learner, {"evolution": 0.0, "world": 0.0, "training": 0.0}
-    for trial in range(config.trials):
-        marks = [time.process_time()]
-        proposal = learner.propose(trial)
-        marks.append(time.process_time())
-        seen = batch._execute(proposal.tried, trial, "world")
-        marks.append(time.process_time())
-        learner.observe(trial, seen, None)
-        marks.append(time.process_time())
-        for name, a, b in zip(kind, marks, marks[1:], strict=False):
-            kind[name] += b - a
+    taken = list(by_trial(batch, config.trials, time.process_time))
+    kinds = zip(
+        ("evolution", "world", "training"), zip(*taken, strict=True), strict=True
+    )
     return {
-        **{f"{name} [s]": round(seconds, 2) for name, seconds in kind.items()},
+        **{f"{kind} [s]": round(sum(seconds), 2) for kind, seconds in kinds},
         "processor [s]": round(time.process_time() - begun, 2),
         "wall [s]": round(time.perf_counter() - wall, 2),
         "compiled": mode == "compiled",
     }
+
+
+def by_trial(
+    batch: Any, trials: int, clock: Callable[[], float]
+) -> Iterator[tuple[float, float, float]]:
+    """Time that evolution, the world and training take, trial by trial.
+
+    Args:
+        batch: whose learner; no step of it is recorded.
+        trials: how many.
+        clock: what is read between them.
+    """
+    for trial in range(trials):
+        marks = [clock()]
+        proposal = batch.learner.propose(trial)
+        marks.append(clock())
+        seen = batch._execute(proposal.tried, trial, "world")
+        marks.append(clock())
+        batch.learner.observe(trial, seen, None)
+        marks.append(clock())
+        evolution, world, training = np.diff(marks).tolist()
+        yield evolution, world, training

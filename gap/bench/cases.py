@@ -18,9 +18,10 @@ import numpy as np
 from bns import seeding
 from bns.errors import BnsError
 from bns.gap.bench.faults import faulty
-from bns.gap.decomposition import descent, fit, levels
+from bns.gap.decomposition import descent, levels
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import KAPPA
+from bns.gap.decomposition.newton import newton
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.singles import Singles
@@ -413,7 +414,7 @@ def alike(problem: Problem, point: Point, item: Hidden) -> tuple[str, ...]:
     linear = point.linear.moved(point.linear.target - change)
     found = {item.term, *_always(problem, item.term)}
     for one in Singles(clean, replace(point, linear=linear)).fitted[:NEAREST]:
-        values, rest = fit.newton(clean, one.values, {one.name}, point.noise)
+        values, rest = newton(clean, one.values, {one.name}, point.noise)
         values, rest = levels.zoomed(clean, values, rest, {one.name}, point.noise)
         if point.noise.loss(rest) / point.noise.lam < ALIKE**2:
             found.add(one.name)

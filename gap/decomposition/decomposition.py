@@ -8,7 +8,6 @@ import numpy as np
 
 from bns.gap.decomposition import descent, flexible, onset, refit, rest, shares, ties
 from bns.gap.decomposition.fit import Point
-from bns.gap.decomposition.latent import Latent
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.onset import Onset
 from bns.gap.decomposition.problem import Problem
@@ -273,11 +272,10 @@ def _begun(problem: Problem, seed: int) -> tuple[Problem, Point, rest.Floor]:
     model, and the floor, which holds what late commands change."""
     exact = replace(problem, dated=True)
     start = descent.nothing(exact)
-    late, latent = any(map(len, problem.late)), start.noise.latent
-    if late:
-        latent = Latent.of(problem, start.values, problem.model.least)
+    latent = start.noise.latent.beside(problem, start.rest)
     known = rest.floor(problem, latent, seed=seed)
-    if not late or rest.excess(start.rest, known, problem.seen) > BEYOND_LATE:
+    large = rest.excess(start.rest, known, problem.seen) > BEYOND_LATE
+    if large or not problem.open_moments:
         return exact, start, known
     return problem, descent.nothing(problem, start), known
 

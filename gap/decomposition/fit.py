@@ -1,4 +1,4 @@
-"""The nonlinear fit: damped Gauss-Newton, linear models around it, and its starts."""
+"""Points of the fit: the problem made linear around values, and the noise there."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -7,14 +7,11 @@ import numpy as np
 
 from bns.gap.decomposition import noise
 from bns.gap.decomposition.latent import Latent
-from bns.gap.decomposition.linear import Linear, Support, inflation, tail
+from bns.gap.decomposition.linear import Linear, Support
 from bns.gap.decomposition.noise import Memory
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
 
-DAMPING = (0.0, 2.0, 20.0, 200.0)  # added to the curvature, in units of the prior
-LONGEST = 4.0  # prior standard deviations of one step
-STILL = 0.02  # prior standard deviations below which a fit has converged
 FAR = 0.3  # prior standard deviations beyond which slopes are taken anew
 MOVED = 0.5  # the same for what is not in, where many may depart
 APART = 0.25  # plausible departures from which it counts how exact a row is simulated
@@ -168,7 +165,7 @@ def first_noise(problem: Problem, rest: np.ndarray, motion: np.ndarray) -> Noise
         motion: predicted features, with whose motion noise may grow, ``(N, C)``.
     """
     memory = Memory.none(problem.trial, rest.shape[1])
-    latent = Latent.of(problem, problem.nominal, noise.level(rest))
+    latent = Latent.of(problem, problem.nominal, rest)
     left = np.where(problem.seen, latent(np.nan_to_num(rest)), np.nan)
     sd = noise.scale(left, problem.model.motion(motion), problem.model.least)
     return Noise(sd, latent, memory, 2.0)
@@ -199,8 +196,7 @@ def linearised(
     order = known.order if order is None else order
     wanted = smooth(problem, values)
     if slopes is None:
-        latent = Latent.of(problem, values, noise.level(rest))
-        known = replace(known, latent=latent)
+        known = replace(known, latent=Latent.of(problem, values, rest))
     kept = {k: slopes[k] for k in wanted if k in slopes} if slopes else {}
     lacking = [k for k in wanted if k not in kept]
     slopes = kept | (columns(problem, values, lacking) if lacking else {})
@@ -209,13 +205,11 @@ def linearised(
     motion = problem.model.motion(predicted)
     moved = np.nan_to_num(problem.gap - rest)
     exact = inexact(problem, values)
-    left, stack = rest, np.stack([*slopes.values()])
+    left, told = rest, known.latent.of_each(slopes)
     for turn in range(MEASURED):
-        level = noise.level(
-            np.where(problem.seen, known.latent(np.nan_to_num(left)), np.nan)
-        )
-        known = replace(known, latent=known.latent.beside(problem, level))
-        told = dict(zip(slopes, known.latent(stack), strict=True))
+        latent = known.latent.beside(problem, left)
+        if latent is not known.latent:
+            known, told = replace(known, latent=latent), latent.of_each(slopes)
         made = _linear(problem, values, told, whole, known, left)
         found = made.solve(made.free)
         left = whole - _summed(problem, values, slopes, made, found)
@@ -230,7 +224,7 @@ def linearised(
     made = _linear(problem, values, told, whole, known, left)
     found = made.solve(made.free)
     whitened = np.sqrt(made.weight) * made.rest(found)
-    lam = max(noise.correlated(whitened, problem.trial), inflation(made, found))
+    lam = max(noise.correlated(whitened, problem.trial), noise.inflation(made, found))
     return made.correlated(lam), replace(known, lam=lam), slopes
 
 
@@ -270,116 +264,6 @@ def _summed(
     for number, value in zip(made.columns, found, strict=True):
         total += slopes[number] * sizes[number] * value
     return total
-
-
-def newton(
-    problem: Problem,
-    values: np.ndarray,
-    support: Iterable[str],
-    known: Noise,
-    *,
-    turns: int = 3,
-    only: list[int] | None = None,
-    slopes: Mapping[int, np.ndarray] | None = None,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Most probable values of the rows of a set, the others as they are.
-
-    Gauss-Newton on the pseudo-Huber loss with the priors, with Levenberg's damping in
-    their units, within bounds.
-
-    Args:
-        problem: the recording.
-        values: to start from, ``(R,)``.
-        support: explanations that are fitted (nuisances are not, beside these).
-        known: noise.
-        turns: steps at most.
-        only: trials that count, None = all; the others' residuals are left out.
-        slopes: derivatives at these values, for the first step; None = taken.
-
-    Returns:
-        values, and residuals there ``(N, C)``.
-    """
-    part = problem if only is None else replace(problem, recorded=_kept(problem, only))
-    names = [k for name in sorted(support) for k in problem.terms[name]]
-    rest = _rest(part, values, only)
-    for _ in range(turns):
-        which = [
-            k
-            for k in names
-            if (part.rows[k].smooth or values[k] != part.nominal[k])
-            and not part.rows[k].stepped
-        ]
-        if not which:
-            break
-        if slopes is None or any(k not in slopes for k in which):
-            slopes = part.slopes(values, which, only=only)
-        moved = _step(part, values, rest, which, known, slopes, only)
-        slopes = None
-        if moved is None:
-            break
-        change = np.abs((moved[0] - values)[which] / part.sd[which]).max()
-        values, rest = moved
-        if change < STILL:
-            break
-    return values, rest
-
-
-def _kept(problem: Problem, only: list[int]) -> np.ndarray:
-    inside = np.isin(problem.trial, only)
-    return np.where(inside[:, None], problem.recorded, np.nan)
-
-
-def _rest(problem: Problem, values: np.ndarray, only: list[int] | None) -> np.ndarray:
-    if only is None:
-        return problem.residual(values)[0]
-    (made,) = problem.predict([values], only=only)
-    return np.where(problem.seen, problem.recorded - np.nan_to_num(made, nan=1e3), 0.0)
-
-
-def _step(
-    problem: Problem,
-    values: np.ndarray,
-    rest: np.ndarray,
-    chosen: Sequence[int],
-    known: Noise,
-    slopes: Mapping[int, np.ndarray],
-    only: list[int] | None,
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """One damped step that lowers the loss; None if there is none."""
-    which = np.array(chosen)
-    weight = known.weights(rest, problem.seen).ravel()
-    design = np.stack([known.innovations(slopes[k]).ravel() for k in which], axis=-1)
-    design = design * problem.sd[which]
-    # what was found by its level has a flat prior
-    flat = np.array([1.0 if problem.rows[k].smooth else 0.2 for k in which])
-    free = np.array([not problem.rows[k].nuisance for k in which])
-
-    def departure(at: np.ndarray) -> np.ndarray:
-        return flat * (at[which] - problem.nominal[which]) / problem.sd[which]
-
-    def height(at: np.ndarray, left: np.ndarray) -> float:
-        far = departure(at)
-        prior = float((far**2).sum()) + 2 * tail(far[free])
-        return known.loss(left) / known.lam + prior
-
-    wider = np.where(free, np.maximum(np.abs(departure(values)), 1.0), 1.0)
-    held = (flat / wider) ** 2  # by their priors, see `tail`
-    heavy = design * weight[:, None]
-    curvature = heavy.T @ design / known.lam + np.diag(held)
-    pull = heavy.T @ known.innovations(np.nan_to_num(rest)).ravel() / known.lam
-    pull -= held * departure(values) / flat
-    now = height(values, rest)
-    low, high = problem.bounds
-    for damping in DAMPING:
-        step = np.linalg.solve(curvature + damping * np.eye(len(which)), pull)
-        step *= min(1.0, LONGEST / (np.abs(step).max() + 1e-30))
-        there = values.copy()
-        there[which] += step * problem.sd[which]
-        there = np.clip(there, low, high)
-        left = _rest(problem, there, only)
-        if height(there, left) <= now + 1e-6:
-            return there, left
-    return None
 
 
 def placed(

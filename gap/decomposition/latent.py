@@ -9,10 +9,12 @@ that of the measurement plus one direction for each such number. Residuals are m
 independent again by shrinking what lies in these directions (Woodbury's identity).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from bns.gap.decomposition import noise
 from bns.gap.decomposition.problem import Problem
 
 FELT = 0.1  # deviations of a residual's noise: less is not felt
@@ -28,44 +30,42 @@ class Latent:
             ``(n * C, k)``, and what is left of a residual in each ``(k,)``.
         spread: standard deviation that they give each feature, ``(N, C)``.
         begun: what starts change, see `Problem.begun`.
-        late: whether moments of commands are among them.
     """
 
     sd: np.ndarray
     parts: tuple[tuple[np.ndarray, np.ndarray, np.ndarray], ...]
     spread: np.ndarray
     begun: np.ndarray
-    late: bool = False
 
     @classmethod
-    def of(cls, problem: Problem, values: np.ndarray, noise: np.ndarray) -> "Latent":
+    def of(cls, problem: Problem, values: np.ndarray, rest: np.ndarray) -> "Latent":
         """Directions by differences.
 
         Args:
             problem: the recording.
             values: of all rows, ``(R,)``, for what starts change; when commands began
                 changes what it does to the nominal model.
-            noise: standard deviation of each feature's residuals, ``(C,)``, see
-                `beside`.
+            rest: residuals there, ``(N, C)``, see `beside`.
         """
-        return cls._made(problem, problem.begun(values), noise)
+        return cls._made(problem, problem.begun(values), rest)
 
-    def beside(self, problem: Problem, noise: np.ndarray) -> "Latent":
-        """The same beside another noise: moments of commands that change less than
+    def beside(self, problem: Problem, rest: np.ndarray) -> "Latent":
+        """The same beside other residuals: moments of commands that change less than
         what else is left are not what is left.
 
         Args:
             problem: the recording.
-            noise: standard deviation of each feature's residuals, ``(C,)``.
+            rest: residuals, ``(N, C)``.
         """
-        if not (self.late or any(map(len, problem.late))):
+        if not problem.open_moments:
             return self
-        return self._made(problem, self.begun, noise)
+        left = self(np.nan_to_num(rest))
+        return self._made(problem, self.begun, np.where(problem.seen, left, np.nan))
 
     @classmethod
-    def _made(cls, problem: Problem, begun: np.ndarray, noise: np.ndarray) -> "Latent":
+    def _made(cls, problem: Problem, begun: np.ndarray, rest: np.ndarray) -> "Latent":
         sd, seen = problem.model.least, problem.seen
-        share = sd / np.maximum(noise, sd)
+        share = sd / np.maximum(noise.level(rest), sd) if problem.open_moments else 1.0
         square = (begun**2).sum(axis=0)
         parts = []
         for number, sooner in enumerate(problem.late):
@@ -81,8 +81,7 @@ class Latent:
             if len(size):
                 way = units.T @ (mixed[:, felt] / size)
                 parts.append((rows, way, 1 / np.sqrt(1 + size**2)))
-        late = any(map(len, problem.late))
-        return cls(sd, tuple(parts), np.sqrt(square), begun, late)
+        return cls(sd, tuple(parts), np.sqrt(square), begun)
 
     @property
     def size(self) -> float:
@@ -101,3 +100,7 @@ class Latent:
             units = units + ((units @ way) * (left - 1)) @ way.T
             made[..., rows, :] = units.reshape(part.shape) * self.sd
         return made
+
+    def of_each(self, slopes: Mapping[int, np.ndarray]) -> dict[int, np.ndarray]:
+        """Derivatives ``(N, C)`` by number of the row, all at once."""
+        return dict(zip(slopes, self(np.stack([*slopes.values()])), strict=True))

@@ -288,19 +288,15 @@ class Linear:
             key: explanations that are in.
             rows: of these, those that are not held to nominal.
         """
-        all_rows = [*rows, *np.flatnonzero(self.always)]
-        plain = self.spread(frozenset())
-        more = np.r_[1.0 - self.slack[rows] ** 2, np.zeros(len(all_rows) - len(rows))]
-        _, found = plain.changed(all_rows, more)
-        wanted = found[len(rows) :]
         out = np.flatnonzero(self.always)
+        every, places = [*rows, *out], len(rows) + np.arange(len(out))
+        more = np.r_[1.0 - self.slack[rows] ** 2, np.zeros(len(out))]
+        wanted = self.spread(frozenset()).changed(every, more)[1][places]
         off = wanted - np.clip(wanted, self.low[out], self.high[out])
-        far = np.flatnonzero(np.abs(off) > 1e-6)
-        if not len(far):
+        far = np.abs(off) > 1e-6
+        if not far.any():
             return 0.0
-        places = len(rows) + far
-        left_open = plain.uncertain(all_rows, more)[np.ix_(places, places)]
-        return 0.5 * float(off[far] @ np.linalg.solve(left_open, off[far]))
+        return 0.5 * self._squared(off[far], every, more, places[far])
 
     def _at_bounds(
         self, key: Support, rows: list[int], found: np.ndarray, far: set[int]
@@ -320,9 +316,21 @@ class Linear:
         if np.isclose(found[at], off).any():
             return np.inf
         mine = self._rows(key)
-        plain = self.spread(frozenset())
-        left_open = plain.uncertain(mine, 1.0 - self.slack[mine] ** 2)
-        places = [mine.index(row) for row in out]
+        places = np.array([mine.index(row) for row in out])
+        return self._squared(off, mine, 1.0 - self.slack[mine] ** 2, places)
+
+    def _squared(
+        self, off: np.ndarray, rows: list[int], more: np.ndarray, places: np.ndarray
+    ) -> float:
+        """Squared deviations ``(n,)``, by what the data leave open.
+
+        Args:
+            off: deviations of some rows.
+            rows: that may move.
+            more: added to the variance of each of these.
+            places: of the deviations among them, ``(n,)``.
+        """
+        left_open = self.spread(frozenset()).uncertain(rows, more)
         return float(off @ np.linalg.solve(left_open[np.ix_(places, places)], off))
 
     def _beyond(self, rows: list[int], found: np.ndarray) -> set[int]:
@@ -471,21 +479,6 @@ def tail(values: np.ndarray) -> float:
     """
     far = np.maximum(np.abs(values), 1.0)
     return float((0.5 + np.log(far) - far**2 / 2).sum())
-
-
-def inflation(linear: Linear, values: np.ndarray) -> float:
-    """Variance of the stretches' scores over that of independent residuals.
-
-    The cluster-robust variance (Liang and Zeger, Biometrika 73, 1986) sees windows that
-    overlap, correlation of either sign and repeats; median over rows.
-    """
-    sums = (linear.scores(values) ** 2).sum(axis=0)
-    size = np.diagonal(linear.normal.sum(axis=0))
-    told = size > 1.0
-    count = len(linear.square)
-    if not told.any():
-        return 1.0
-    return float(np.median(sums[told] / size[told])) * count / max(count - 1, 1)
 
 
 def stretches(count: int, kept: Iterable[int]) -> np.ndarray:

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
+from bns.gap.decomposition.linear import Linear
+
 NORMAL = 1.4826  # standard deviation over the median of |x| of a normal
 CLIP = 3.5  # robust deviations beyond which squares are cut
 HUBER = 2.5  # deviations at which residuals begin to count linearly
@@ -113,6 +115,21 @@ def correlated(whitened: np.ndarray, trial: np.ndarray) -> float:
         run = ends[0] if len(ends) else LAGS
         found.append(1 + 2 * rho[1:run].sum())
     return max(1.0, float(np.mean(found)))
+
+
+def inflation(linear: Linear, values: np.ndarray) -> float:
+    """Variance of the stretches' scores over that of independent residuals.
+
+    The cluster-robust variance (Liang and Zeger, Biometrika 73, 1986) sees windows that
+    overlap, correlation of either sign and repeats; median over rows.
+    """
+    sums = (linear.scores(values) ** 2).sum(axis=0)
+    size = np.diagonal(linear.normal.sum(axis=0))
+    told = size > 1.0
+    count = len(linear.square)
+    if not told.any():
+        return 1.0
+    return float(np.median(sums[told] / size[told])) * count / max(count - 1, 1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -202,6 +202,11 @@ class Problem:
             made.append(np.concatenate(found))
         return made
 
+    @property
+    def open_moments(self) -> bool:
+        """Whether it is left open when some command began."""
+        return any(map(len, self.late))
+
     def _features(self, paths: Sequence[np.ndarray]) -> np.ndarray:
         """Features of a path of each trial, ``(N, C)``."""
         parts = zip(self.trials, paths, self.windows, strict=True)

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from bns.gap.decomposition import fit, levels, noise
-from bns.gap.decomposition.fit import Noise, Point, linearised, newton, placed
+from bns.gap.decomposition.fit import Noise, Point, linearised, placed
 from bns.gap.decomposition.linear import Linear, Support
+from bns.gap.decomposition.newton import newton
 from bns.gap.decomposition.problem import Problem
 
 STEPS = 5  # of a fit; a walker, whose contacts make steps dear, takes fewer
@@ -90,8 +91,8 @@ def relinearised(problem: Problem, point: Point, known: Noise) -> Linear:
     whole = known.innovations(
         fit.target(problem, point.values, point.rest, point.slopes)
     )
-    told = known.latent(np.stack([*point.slopes.values()]))
-    design = {k: known.memory(t) for k, t in zip(point.slopes, told, strict=True)}
+    told = known.latent.of_each(point.slopes)
+    design = {number: known.memory(slope) for number, slope in told.items()}
     units = fit.units(problem, point.values)
     weight = known.weights(point.rest, problem.seen)
     for _ in range(REWEIGHED):

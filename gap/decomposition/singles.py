@@ -9,6 +9,7 @@ import numpy as np
 
 from bns.gap.decomposition import fit, levels
 from bns.gap.decomposition.fit import Point
+from bns.gap.decomposition.newton import newton
 from bns.gap.decomposition.problem import Problem
 
 WIDE = 3  # numbers of an explanation from which its tangent tells little of it
@@ -73,9 +74,7 @@ class Singles:
         made = []
         for name, begun in starts:
             wanted = {name} | fit.nuisances(problem)
-            values, rest = fit.newton(
-                problem, begun, wanted, known, turns=TURNS, only=only
-            )
+            values, rest = newton(problem, begun, wanted, known, turns=TURNS, only=only)
             height = known.loss(rest) / known.lam + _prior(problem, values)
             made.append(Single(name, values, height))
         return tuple(made)

@@ -138,7 +138,8 @@ def _told_unit(
         if bias[2] >= 0:  # nor a loop of speed
             _no_loop(work, column, seen)
         return "1"
-    if not _turns(model, [joint] if joint else _wound(model, number)):
+    moved = [joint] if joint else _wound(model, number)
+    if not (moved and all(rehearsal.turns(model, name) for name in moved)):
         units = {u: 1 / f for u, f in FACTORS["m"].items()}
     else:
         units = dict(rehearsal.ANGLE)
@@ -149,12 +150,6 @@ def _told_unit(
     largest = _widest(model, number, joint)
     size = float(np.nanmax(np.abs(column.values)))
     return next((u for u, f in units.items() if size / f <= 1.05 * largest), "rad")
-
-
-def _turns(model: mujoco.MjModel, names: Sequence[str]) -> bool:
-    """Whether some joints are hinges, all of them, and there is one."""
-    kinds = {int(model.joint(name).type[0]) for name in names}
-    return kinds == {int(mujoco.mjtJoint.mjJNT_HINGE)}
 
 
 def _wound(model: mujoco.MjModel, actuator: int) -> list[str]:

@@ -59,7 +59,12 @@ def limits(told: np.ndarray, allowed: tuple[float, float]) -> tuple[float, float
 
 def curved(told: np.ndarray) -> bool:
     """Whether commands, ``(T, C)``, change all the time."""
-    return bool((np.diff(told, axis=0) != 0).any(axis=1).mean() > ANEW)
+    return bool(changed(told).mean() > ANEW)
+
+
+def changed(told: np.ndarray) -> np.ndarray:
+    """After which samples commands ``(T, C)`` are others, ``(T - 1,)``."""
+    return (np.diff(told, axis=0) != 0).any(axis=1)
 
 
 def rests(
@@ -75,9 +80,8 @@ def rests(
     Returns:
         the keyframe ("" = the model's own pose), None = none fits; settling time [s].
     """
-    names = ["", *(model.key(k).name for k in range(model.nkey) if model.key(k).name)]
     for settle in (0.0, SETTLE):
-        for name in reversed(names):  # keyframes before the model's own pose
+        for name in reversed(_poses(model)):  # keyframes before the model's own pose
             data = posed(model, name, settle)
             off = [
                 abs(float(data.joint(joint).qpos[0]) - at) <= tolerance[joint]
@@ -96,13 +100,17 @@ def nearest(model: mujoco.MjModel, first: Mapping[str, float]) -> str:
         model: that is recorded.
         first: where each joint was.
     """
-    names = ["", *(model.key(k).name for k in range(model.nkey) if model.key(k).name)]
 
     def away(name: str) -> float:
         data = posed(model, name, 0.0)
         return sum(abs(float(data.joint(j).qpos[0]) - at) for j, at in first.items())
 
-    return min(names, key=away)
+    return min(_poses(model), key=away)
+
+
+def _poses(model: mujoco.MjModel) -> list[str]:
+    """Names of the keyframes, after "" for the model's own pose."""
+    return ["", *(model.key(k).name for k in range(model.nkey) if model.key(k).name)]
 
 
 def posed(model: mujoco.MjModel, pose: str, settle: float) -> mujoco.MjData:

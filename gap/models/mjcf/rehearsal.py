@@ -99,13 +99,14 @@ def _by_part(model: mujoco.MjModel, table: np.ndarray) -> dict[Part, np.ndarray]
 def factors(model: mujoco.MjModel, part: Part) -> Mapping[str, float]:
     """What a part may be measured in, and how much of it makes one SI unit."""
     if part.quantity == SPEED:
-        return {"rad/s" if _turns(model, part.name) else "m/s": 1.0}
-    if part.quantity == JOINT and _turns(model, part.name):
+        return {"rad/s" if turns(model, part.name) else "m/s": 1.0}
+    if part.quantity == JOINT and turns(model, part.name):
         return ANGLE
     return LENGTH
 
 
-def _turns(model: mujoco.MjModel, joint: str) -> bool:
+def turns(model: mujoco.MjModel, joint: str) -> bool:
+    """Whether a joint is a hinge."""
     return int(model.joint(joint).type[0]) == int(mujoco.mjtJoint.mjJNT_HINGE)
 
 

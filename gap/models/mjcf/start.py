@@ -91,19 +91,11 @@ class View:
 
 def free(model: mujoco.MjModel) -> frozenset[str]:
     """Names of the bodies and sites that a free joint carries."""
-    roots = {int(model.jnt_bodyid[j]) for j in range(model.njnt) if _is_free(model, j)}
-    carried = [int(model.body_rootid[b]) in roots for b in range(model.nbody)]
-    bodies = {model.body(b).name for b in range(model.nbody) if carried[b]}
-    sites = {
-        model.site(s).name
-        for s in range(model.nsite)
-        if carried[int(model.site_bodyid[s])]
-    }
-    return frozenset(bodies | sites)
-
-
-def _is_free(model: mujoco.MjModel, joint: int) -> bool:
-    return bool(model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE)
+    free_joints = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
+    carried = np.isin(model.body_rootid, model.jnt_bodyid[free_joints])
+    bodies = {model.body(b).name for b in np.flatnonzero(carried)}
+    sites = np.flatnonzero(carried[model.site_bodyid])
+    return frozenset(bodies | {model.site(s).name for s in sites})
 
 
 def place(data: mujoco.MjData, trial: Trial, view: View) -> None:

@@ -8,6 +8,7 @@ import pytest
 from bns.gap.decomposition.latent import Latent
 
 TRIALS, LENGTH, SD = 3, 20, np.array([0.5, 2.0])
+REST = np.zeros((TRIALS * LENGTH, 2))
 
 
 @pytest.fixture
@@ -23,6 +24,7 @@ def problem():
         trial=np.repeat(np.arange(TRIALS), LENGTH),
         begun=lambda values: moved,
         late=[np.zeros((0, LENGTH, 2))] * TRIALS,
+        open_moments=False,
     )
 
 
@@ -34,7 +36,7 @@ def covariance(problem, trial):
 
 
 def test_residuals_are_independent_without_what_is_unknown_of_trials(problem):
-    latent = Latent.of(problem, np.zeros(0), SD)
+    latent = Latent.of(problem, np.zeros(0), REST)
     for trial in range(TRIALS):
         rows = problem.trial == trial
         columns = []
@@ -49,14 +51,14 @@ def test_residuals_are_independent_without_what_is_unknown_of_trials(problem):
 
 def test_their_size_is_half_the_log_of_the_determinant(problem):
     wanted = sum(np.linalg.slogdet(covariance(problem, t))[1] for t in range(TRIALS))
-    assert Latent.of(problem, np.zeros(0), SD).size == pytest.approx(
+    assert Latent.of(problem, np.zeros(0), REST).size == pytest.approx(
         wanted / 2, rel=1e-3
     )
 
 
 def test_known_starts_and_moments_change_nothing(problem):
     problem.begun = lambda values: np.zeros((0, TRIALS * LENGTH, 2))
-    latent = Latent.of(problem, np.zeros(0), SD)
+    latent = Latent.of(problem, np.zeros(0), REST)
     values = np.random.default_rng(1).normal(size=(TRIALS * LENGTH, 2))
     assert latent(values) is values
     assert latent.size == 0 and not latent.spread.any()

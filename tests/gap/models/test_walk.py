@@ -7,6 +7,7 @@ from bns.gap.bench import cases, walk_cases
 from bns.gap.bench.walk_cases import WalkStand
 from bns.gap.candidates import legged
 from bns.gap.decomposition import descent, diagnosis, fit, levels
+from bns.gap.decomposition.newton import newton
 from bns.gap.decomposition.problem import Problem
 from bns.gap.diagnose import diagnose
 from bns.gap.models.legged import scatter, signs
@@ -111,7 +112,7 @@ def test_walks_of_unequal_length_are_compared(model):
     trials = walk_cases.record(told, [registry.parse("leg_raised:legs=1,blend=1")], 1)
     problem = Problem.of(trials, model)
     assert len(problem.windows[0]) != len(problem.windows[1])
-    rest, _ = fit.newton(
+    rest, _ = newton(
         problem,
         problem.nominal.copy(),
         fit.nuisances(problem),
@@ -146,7 +147,7 @@ def test_a_soft_floor_is_named_which_a_tangent_misses(model, told):
     start = descent.nothing(problem)
     first, values = levels.screened(problem, start, 3)[0]
     assert first == "floor_compliance"
-    assert fit.newton(problem, values, {first}, start.noise)[0][
+    assert newton(problem, values, {first}, start.noise)[0][
         problem.terms[first][0]
     ] == pytest.approx(3.0, abs=0.3)
 
