@@ -20,6 +20,7 @@ LEAD = "step_lead"
 REASON = 4.0  # standard deviations by which a nuisance may be off: beyond is an effect
 BANDS = 10  # widths of a dead band that are tried
 WAYS = ("forward", "backward", "commanded")
+STUCK = (0.02, 0.06, 0.2, 0.5, 1.0)  # how far a wheel may be stuck, tried
 
 EXCITE = {
     "floor_slope": "long drives in several headings",
@@ -69,7 +70,7 @@ _SMOOTH: tuple[tuple[str, float, float, float, bool, dict[str, Any]], ...] = (
     ("battery_sag.per_metre", 0.08, 0, 2, False, {}),
     ("battery_fade", 0.01, 0, 0.2, False, {"per_trial": True}),
     ("dead_zone", 0.015, 0, 0.1, True, {}),
-    ("caster_drag", 0.2, 0, 1, False, {"step": 0.05, "levels": (0.2, 0.5)}),
+    ("caster_drag", 0.2, 0, 1, False, {"step": 0.02, "levels": (0.05, 0.2, 0.5)}),
     ("wheel_backlash", 0.004, 0, 0.03, True, {"step": 1e-3, "levels": (0.005,)}),
 )  # fmt: skip
 # a mass that is carried, its moments about the middle of the axle and about the top
@@ -210,7 +211,7 @@ def _rough(side: str, trials: Sequence[Trial]) -> list[Row]:
     for kind in ("wheel_stuck_max", "wheel_stuck_min"):
         made += [
             Row(f"{kind}[{side}]@{way}", 0.0, 1.0, 0.0, 1.0, smooth=False,
-                levels=(0.3, 1.0), group=f"{kind}[{side}]", excite="any drive")
+                levels=STUCK, group=f"{kind}[{side}]", excite="any drive")
             for way in WAYS
         ]  # fmt: skip
     return made
@@ -231,6 +232,6 @@ def _limits(speeds: np.ndarray) -> tuple[float, ...]:
     """Limits that cut a part of the speeds told."""
     if not len(speeds):
         return ()
-    share = np.array([0.15, 0.3, 0.45, 0.6, 0.75, 0.9])
+    share = np.array([0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 0.97])
     found = np.quantile(speeds, share) if len(speeds) > 5 else speeds
     return tuple(np.unique(found * 0.98).tolist())

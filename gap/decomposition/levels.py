@@ -20,6 +20,7 @@ SEARCHED = 6  # levels whose sets are searched
 EACH = 2  # levels of one row among these
 AT_ONCE = 60  # levels in one batch, which bounds the memory
 PARTS = 6  # between two levels in a search for the best value
+TRIALS = 2  # in which an explanation is felt most, for a first look
 GAIN = 0.5  # of the loss that a new value has to bring
 
 
@@ -209,6 +210,55 @@ def _scored(
         costs = [linear.cost(_in(linear, s)) for s in (point.support, frozenset())]
         found.append((min(costs), which, linear))
     return sorted(found, key=lambda item: (item[0], item[1]))
+
+
+def felt(problem: Problem, point: Point, bare: np.ndarray) -> list[int]:
+    """Trials in which an explanation is felt most."""
+    here, there = problem.predict([point.values, bare], fine=False)
+    squares = (point.linear.weight * np.nan_to_num(here - there) ** 2).sum(axis=1)
+    sums = np.bincount(problem.trial, squares, minlength=len(problem.trials))
+    order = np.argsort(-sums)[:TRIALS]
+    return sorted(int(n) for n in order if sums[n] > FELT)
+
+
+def others(problem: Problem, point: Point, bare: np.ndarray) -> list[np.ndarray]:
+    """Values with a level of another explanation, all of them."""
+    made = []
+    for number, row in enumerate(problem.rows):
+        if row.smooth or row.term in point.support:
+            continue
+        for value in row.levels:
+            moved = bare.copy()
+            moved[number] = value
+            made.append(moved)
+    return made
+
+
+def compared(
+    problem: Problem, point: Point, sets: Sequence[np.ndarray], only: list[int] | None
+) -> list[tuple[float, str, np.ndarray]]:
+    """Nats that sets of values cost beyond the point's, the best of each explanation,
+    with that and the values; the best first."""
+    if not sets or only == []:
+        return []
+    base, *made = problem.predict([point.values, *sets], fine=False, only=only)
+    here = point.noise.loss(point.rest)
+    best: dict[str, tuple[float, str, np.ndarray]] = {}
+    for values, path in zip(sets, made, strict=True):
+        if not np.isfinite(path[problem.seen]).all():
+            continue
+        cost = point.noise.loss(point.rest - (path - base)) - here
+        cost = float(cost / (2 * point.noise.lam))
+        term = _moved(problem, point, values)
+        if term not in best or cost < best[term][0]:
+            best[term] = (cost, term, values)
+    return sorted(best.values(), key=lambda item: item[:2])
+
+
+def _moved(problem: Problem, point: Point, values: np.ndarray) -> str:
+    """Name of the explanation that stands in."""
+    moved = np.flatnonzero((values != problem.nominal) & (values != point.values))
+    return problem.rows[moved[0]].term
 
 
 def zoomed(

@@ -4,13 +4,14 @@ one, and none that the others do as well."""
 from collections.abc import Iterator
 from dataclasses import replace
 
-from bns.gap.decomposition import refit
+from bns.gap.decomposition import levels, refit
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.problem import Problem
 
 WEAK = 0.05  # of what a set explains: so little may be left to the others
 TRIED = 3  # of these, the weakest first
 SWAPPED = 30.0  # nats that another set may be worse by the linear model, to be fitted
+UNITED = 2  # levels that are fitted in place of two explanations
 SLIGHT = 0.25  # of a plausible departure: next to none
 ALIKE = 0.4  # cosine of what two explanations change, from which one may undo the other
 
@@ -64,7 +65,7 @@ def pruned(problem: Problem, point: Point) -> Point:
         problem: the recording.
         point: a fitted set.
     """
-    point = parted(problem, joined(problem, point))
+    point = united(problem, parted(problem, joined(problem, point)))
     while len(point.support) > 1:
         linear, support = point.linear, point.support
         whole = max(linear.squares(()) - linear.squares(support), 1e-9)
@@ -124,6 +125,33 @@ def parted(problem: Problem, point: Point) -> Point:
         half = refit.fitted_at(problem, replace(point, values=values), support)
         if _as_good(problem, half, point):
             return half
+    return point
+
+
+def united(problem: Problem, point: Point) -> Point:
+    """A point with a level of another explanation for a level and one beside it that
+    changes alike: a wheel stuck at its least speed for one stuck at its highest and a
+    lower gain.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+    """
+    rough = {row.term for row in problem.rows if not row.smooth} & point.support
+    for name in sorted(rough):
+        for other in sorted(point.support - {name}):
+            if point.linear.alike(name, other) < ALIKE:
+                continue
+            bare = point.values.copy()
+            numbers = [*problem.terms[name], *problem.terms[other]]
+            bare[numbers] = problem.nominal[numbers]
+            hit = levels.felt(problem, point, bare)
+            sets = levels.others(problem, point, bare)
+            for _, term, values in levels.compared(problem, point, sets, hit)[:UNITED]:
+                support = (point.support - {name, other}) | {term}
+                one = refit.fitted_at(problem, replace(point, values=values), support)
+                if _as_good(problem, one, point):
+                    return one
     return point
 
 

@@ -1,6 +1,5 @@
 """Sets of explanations that the data can hardly tell from the one that was found."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,6 @@ from bns.gap.decomposition.singles import Singles
 
 TIED = 3.0  # nats within which explanations tie: odds of 20 to 1
 SEVERAL = 2  # explanations up to which levels are tried in place of one
-TRIALS = 2  # in which an explanation is felt most, for a first look
 KEPT = 3  # rivals that are looked at in full
 MARGIN = 10.0  # nats that a first look may be worse
 
@@ -31,6 +29,7 @@ def tied(problem: Problem, point: Point, tried: Singles) -> list[Support]:
     found: dict[Support, float] = {}
     for cost, swapped in (
         *_smooth(point),
+        *_covering(point),
         *_levels(problem, point),
         *_refitted(problem, point, tried),
     ):
@@ -80,6 +79,21 @@ def _smooth(point: Point) -> list[tuple[float, Support]]:
     ]
 
 
+def _covering(point: Point) -> list[tuple[float, Support]]:
+    """An explanation in place of those that it can be, if it leaves as little: that it
+    has more numbers is no reason against a load where a centre of mass is off."""
+    linear, support = point.linear, point.support
+    here, found = linear.squares(support), []
+    for name, covered in linear.covers.items():
+        if name in support or not covered & support:
+            continue
+        swapped = (support - covered) | {name}
+        cost = max(linear.squares(swapped) - here, 0.0) / 2
+        if cost < TIED:
+            found.append((float(cost), swapped))
+    return found
+
+
 def _levels(problem: Problem, point: Point) -> list[tuple[float, Support]]:
     """Swaps of a level for one of another explanation, simulated: a dead band that was
     felt once may as well be a wheel that stopped once."""
@@ -91,65 +105,18 @@ def _levels(problem: Problem, point: Point) -> list[tuple[float, Support]]:
         bare = point.values.copy()
         for number in problem.terms[name]:
             bare[number] = problem.nominal[number]
-        hit = _felt(problem, point, bare)
-        rivals = _scored(problem, point, _others(problem, point, bare), hit)
+        hit = levels.felt(problem, point, bare)
+        rivals = levels.compared(
+            problem, point, levels.others(problem, point, bare), hit
+        )
         rivals = [item for item in rivals if item[0] < TIED + MARGIN][:KEPT]
         again = [values for _, _, values in rivals]
-        for cost, term, values in _scored(problem, point, again, None):
+        for cost, term, values in levels.compared(problem, point, again, None):
             cost = _zoomed(problem, point, term, values) if cost >= TIED else cost
             swapped = (point.support - {name}) | {term}
             if cost < min(TIED, found.get(swapped, np.inf)):
                 found[swapped] = cost
     return [(cost, swapped) for swapped, cost in found.items()]
-
-
-def _felt(problem: Problem, point: Point, bare: np.ndarray) -> list[int]:
-    """Trials in which an explanation is felt most."""
-    here, there = problem.predict([point.values, bare], fine=False)
-    squares = (point.linear.weight * np.nan_to_num(here - there) ** 2).sum(axis=1)
-    sums = np.bincount(problem.trial, squares, minlength=len(problem.trials))
-    order = np.argsort(-sums)[:TRIALS]
-    return sorted(int(n) for n in order if sums[n] > levels.FELT)
-
-
-def _others(problem: Problem, point: Point, bare: np.ndarray) -> list[np.ndarray]:
-    """Values with a level of another explanation, all of them."""
-    made = []
-    for number, row in enumerate(problem.rows):
-        if row.smooth or row.term in point.support:
-            continue
-        for value in row.levels:
-            moved = bare.copy()
-            moved[number] = value
-            made.append(moved)
-    return made
-
-
-def _scored(
-    problem: Problem, point: Point, sets: Sequence[np.ndarray], only: list[int] | None
-) -> list[tuple[float, str, np.ndarray]]:
-    """Nats that sets of values cost beyond the point's, the best of each explanation,
-    with that and the values; the best first."""
-    if not sets or only == []:
-        return []
-    base, *made = problem.predict([point.values, *sets], fine=False, only=only)
-    here = point.noise.loss(point.rest)
-    best: dict[str, tuple[float, str, np.ndarray]] = {}
-    for values, path in zip(sets, made, strict=True):
-        if not np.isfinite(path[problem.seen]).all():
-            continue
-        cost = point.noise.loss(point.rest - (path - base)) - here
-        cost = float(cost / (2 * point.noise.lam))
-        term = _level(problem, point, values)
-        if term not in best or cost < best[term][0]:
-            best[term] = (cost, term, values)
-    return sorted(best.values(), key=lambda item: item[:2])
-
-
-def _level(problem: Problem, point: Point, values: np.ndarray) -> str:
-    """Name of the explanation that stands in."""
-    moved = np.flatnonzero((values != problem.nominal) & (values != point.values))
-    return problem.rows[moved[0]].term
 
 
 def _zoomed(problem: Problem, point: Point, term: str, values: np.ndarray) -> float:

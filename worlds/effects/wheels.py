@@ -177,7 +177,12 @@ class WheelEccentricity(BodyEffect):
 
 
 class CasterDrag(BodyEffect):
-    """The casters drag on the floor instead of rolling."""
+    """The casters drag on the floor instead of rolling.
+
+    Friction is the same in all directions (an elliptic cone): a pyramid of four sides,
+    which may do for wheels that roll, turns a robot of dragging casters by a third more
+    or less, depending on how it stands in the world.
+    """
 
     name = "caster_drag"
     source = "dry friction; the nominal casters have none; bounds assumed"
@@ -195,6 +200,8 @@ class CasterDrag(BodyEffect):
         Raises:
             BnsError: the robot rests on its wheels alone.
         """
+        import mujoco
+
         base = parts.base(spec)
         casters = list(parts.contact_geoms(base))
         if not casters:
@@ -202,6 +209,7 @@ class CasterDrag(BodyEffect):
         for geom in casters:
             geom.condim = max(geom.condim, 3)  # 1 has no friction
             geom.friction[0] += self["friction"]
+        spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
 
 
 class MotorLag(ActuatorEffect):

@@ -238,13 +238,25 @@ class TestBodies:
         assert abs(other) < 0.05 * offset
 
     def test_a_dragging_caster_costs_its_friction(self):
-        turning = [
-            driven(compiled(*texts)).joint("left_wheel_joint").qvel[0]
-            for texts in ([], ["caster_drag:friction=0.1"])
-        ]
+        turning = []  # [rad/s] in the mean: the caster chatters
+        for texts in ([], ["caster_drag:friction=0.1"]):
+            ends = [driven(compiled(*texts), seconds=end) for end in (2.0, 4.0)]
+            turned = [data.joint("left_wheel_joint").qpos[0] for data in ends]
+            turning.append(np.diff(turned)[0] / 2.0)
         load = 0.69 * 9.81 * 0.011 / 0.0449  # [N] on the caster
         slower = 0.1 * load * RADIUS / (2 * KV)  # [rad/s]
         assert turning[0] - turning[1] == pytest.approx(slower, rel=0.03)
+
+    def test_a_dragging_caster_turns_a_robot_alike_at_every_heading(self):
+        model = compiled("caster_drag:friction=0.1")
+        turned = []
+        for heading in (0.0, np.pi / 8, np.pi / 4):
+            data = mujoco.MjData(model)
+            data.qpos[3:7] = [np.cos(heading / 2), 0, 0, np.sin(heading / 2)]
+            data.ctrl[:] = (2.0, 4.0)
+            mujoco.mj_step(model, data, nstep=round(1.0 / model.opt.timestep))
+            turned.append(2 * np.arctan2(data.qpos[6], data.qpos[3]) - heading)
+        assert turned == pytest.approx([turned[0]] * 3, rel=0.01)
 
     def test_wheel_diameter_moves_the_axle_with_the_radius(self):
         model = compiled("wheel_diameter:wheel=left,factor=1.1")
