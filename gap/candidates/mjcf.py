@@ -26,6 +26,7 @@ EIGHTH = 0.125  # of a range: a plausible departure where nothing else is known
 # inertia for the links that they move; assumed.
 WIDER = 10.0
 LEAST = 0.002  # of a limit in the model, which may be far beyond the robot's
+SHORT = 1e-6  # [m] no length
 TILT = 0.5  # [rad] largest tilt of a body
 PLAY = 0.3  # [rad or m] largest play, or offset of an encoder
 EXCITE = {
@@ -88,6 +89,9 @@ USUAL = (
 servos of speed, `actuator_gain` and `command_limit` of all but position servos, the
 tilt of what is bolted to the world; the radius of wheels and feet, and grip and
 softness of all that touch, where they touch something"""
+FEW = 6  # joints up to which `RARER` are considered, too
+RARER = ("joint_backlash", "body_length")
+"""the same of a model of few joints: many would cost more than they tell"""
 TOUCHING = ("geom_radius", "geom_friction", "geom_compliance")
 """effects that nothing shows where nothing touches"""
 
@@ -153,10 +157,11 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
         "reading_gain": seen,
         "reading_offset": seen,
         "body_tilt": _bolted(model, owned),
+        "body_length": _long(model, sorted(owned)),
         **_surfaces(model, joints=moved),
     }
     made: dict[str, tuple[str, ...]] = {}
-    for name in USUAL:
+    for name in (*USUAL, *(RARER if len(moved) <= FEW else ())):
         kind = effects.OWNERS.get(name)
         if kind == "actuator":
             made[name] = tuple(model.actuator(n).name for n in told if n in of[name])
@@ -167,6 +172,18 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
         else:
             made[name] = tuple(of.get(name, (ALL,)))
     return {name: parts for name, parts in made.items() if parts}
+
+
+def _long(model: mujoco.MjModel, bodies: Iterable[int]) -> list[str]:
+    """Names of the bodies that turn and have a length: from their joint to the one body
+    that they carry, or to their centre of mass."""
+    found = []
+    for body in bodies:
+        carried = np.flatnonzero(model.body_parentid == body)
+        end = model.body_pos[carried[0]] if len(carried) == 1 else model.body_ipos[body]
+        if np.linalg.norm(end) > SHORT and model.body(body).name:
+            found.append(model.body(body).name)
+    return found
 
 
 def _moved(model: mujoco.MjModel, told: Iterable[int]) -> list[int]:

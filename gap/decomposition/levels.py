@@ -212,17 +212,32 @@ def _scored(
     return sorted(found, key=lambda item: (item[0], item[1]))
 
 
-def felt(problem: Problem, point: Point, bare: np.ndarray) -> list[int]:
-    """Trials in which an explanation is felt most."""
+def felt(
+    problem: Problem, point: Point, bare: np.ndarray, most: int = TRIALS
+) -> list[int]:
+    """Trials in which an explanation is felt most.
+
+    Args:
+        problem: the recording.
+        point: the fit.
+        bare: values without the explanation, ``(R,)``.
+        most: how many.
+    """
     here, there = problem.predict([point.values, bare], fine=False)
     squares = (point.linear.weight * np.nan_to_num(here - there) ** 2).sum(axis=1)
     sums = np.bincount(problem.trial, squares, minlength=len(problem.trials))
-    order = np.argsort(-sums)[:TRIALS]
+    order = np.argsort(-sums)[:most]
     return sorted(int(n) for n in order if sums[n] > FELT)
 
 
 def others(problem: Problem, point: Point, bare: np.ndarray) -> list[np.ndarray]:
-    """Values with a level of another explanation, all of them."""
+    """Values with a level of another explanation, all of them, ``(R,)`` each.
+
+    Args:
+        problem: the recording.
+        point: the fit; what is in it is left out.
+        bare: values that a level is set in, ``(R,)``.
+    """
     made = []
     for number, row in enumerate(problem.rows):
         if row.smooth or row.term in point.support:
@@ -238,7 +253,14 @@ def compared(
     problem: Problem, point: Point, sets: Sequence[np.ndarray], only: list[int] | None
 ) -> list[tuple[float, str, np.ndarray]]:
     """Nats that sets of values cost beyond the point's, the best of each explanation,
-    with that and the values; the best first."""
+    with that and the values; the best first.
+
+    Args:
+        problem: the recording.
+        point: the fit.
+        sets: values of all rows, ``(R,)`` each, as `others` gives them.
+        only: trials that are looked at, None = all.
+    """
     if not sets or only == []:
         return []
     base, *made = problem.predict([point.values, *sets], fine=False, only=only)

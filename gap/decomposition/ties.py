@@ -95,17 +95,20 @@ def _covering(point: Point) -> list[tuple[float, Support]]:
 
 
 def _levels(problem: Problem, point: Point) -> list[tuple[float, Support]]:
-    """Swaps of a level for one of another explanation, simulated: a dead band that was
-    felt once may as well be a wheel that stopped once."""
+    """Swaps of a level, or of a single explanation, for a level of another one,
+    simulated: a dead band that was felt once may as well be a wheel that stopped once,
+    and a tangent at a gain tells nothing of a wheel that is stuck."""
     rough = {row.term for row in problem.rows if not row.smooth} & point.support
-    if len(point.support) > SEVERAL or not rough:
+    names = point.support if len(point.support) == 1 else rough
+    if len(point.support) > SEVERAL or not names:
         return []
     found: dict[Support, float] = {}
-    for name in sorted(rough):
+    for name in sorted(names):
         bare = point.values.copy()
         for number in problem.terms[name]:
             bare[number] = problem.nominal[number]
-        hit = levels.felt(problem, point, bare)
+        most = levels.TRIALS if name in rough else 1
+        hit = levels.felt(problem, point, bare, most)
         rivals = levels.compared(
             problem, point, levels.others(problem, point, bare), hit
         )

@@ -117,6 +117,7 @@ def corrections(found: Diagnosis) -> tuple[str, ...]:
 
 RECORDED, NOMINAL, CORRECTED = style.BLACK, style.VERMILION, style.BLUE
 LISTED = 7  # single effects in the figure of what closes the gap
+FEW = 3  # effects from which on a bar's label counts them
 ROUND = {"m": ("mm", 1e3), "rad": ("mrad", 1e3)}
 """units in which small residuals are read"""
 
@@ -143,7 +144,7 @@ def shares(found: Diagnosis) -> "Figure":
         axes.set_xlim(left=min(0.0, *last, *alone))
         axes.grid(axis="y", visible=False)
         axes.set_xlabel("share of the gap that goes [%]")
-        axes.legend(loc="best")
+        figure.legend(loc="outside lower center", ncols=2)
     return figure
 
 
@@ -152,10 +153,13 @@ def closing(found: Diagnosis) -> "Figure":
     closed = found.closed
     singles = sorted(closed["singles"].items(), key=lambda row: row[1])[:LISTED]
     rows = [("nominal model", closed["before"], NOMINAL)]
-    named = " + ".join(found.best.names) if found.verdict.named else ""
+    names = found.best.names if found.verdict.named else ()
+    named = (
+        " + ".join(names) if len(names) < FEW else f"all {len(names)} that are named"
+    )
     rows += [(f"with {n}", value, style.GREY) for n, value in reversed(singles)]
     rows.append(("flexible model (ceiling)", closed["ceiling"], style.ORANGE))
-    if found.verdict.named:
+    if names:
         rows = [row for row in rows if row[0] != f"with {named}"]
         rows.append((f"with {named}", closed["after"], CORRECTED))
     rows = [(name, max(value, 1e-3), colour) for name, value, colour in rows]
@@ -164,9 +168,9 @@ def closing(found: Diagnosis) -> "Figure":
             figsize=(7.0, 0.9 + 0.28 * len(rows)), layout="constrained"
         )
         axes = figure.subplots()
-        names, values, colours = zip(*rows, strict=True)
+        labels, values, colours = zip(*rows, strict=True)
         axes.barh(range(len(rows)), values, color=colours, height=0.62, left=0)
-        axes.set_yticks(range(len(rows)), names)
+        axes.set_yticks(range(len(rows)), labels)
         axes.axvline(closed["floor"], color=style.GREEN, ls="--", lw=1.4)
         axes.set_ylim(len(rows) - 0.4, -0.6)
         style.logarithmic(axes.xaxis, axes.set_xscale)
