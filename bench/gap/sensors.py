@@ -20,8 +20,9 @@ COUNTS = {"single": 160, "none": 60, "motion": 12, "off-library": 40}
 # 70 from 680 000 on, with priors that let damage be of any size: 15 of 18 named.
 # 161 from 780 000 on, with explanations screened at departures.
 # 160 from 880 000 on, with readings' moments known to within a picture.
-# Those from 980 000 on, with weak flickers and shadows among the levels.
-CASES = Cases("gap_sensors11", COUNTS, first=980_000)
+# 272 from 980 000 on, with weak flickers and shadows among the levels: 57 of 65.
+# Those from 1 080 000 on, with the first reading of a trial compared as well.
+CASES = Cases("gap_sensors12", COUNTS, first=1_080_000)
 WHOLE = 16  # single and no-effect cases of which one is diagnosed with motion
 QUICK = {"single": 2, "none": 1}
 

@@ -238,7 +238,7 @@ class Problem:
             which: numbers of the rows.
             only: see `predict`.
         """
-        high = self.bounds[1]
+        low, high = self.bounds
         sets, steps = [values], []
         silent = [number for number in which if self.rows[number].name in self.silent]
         which = [number for number in which if number not in silent]
@@ -246,7 +246,8 @@ class Problem:
         simulated = [number for number in which if number not in joined]
         for number in simulated:
             step = self.rows[number].difference
-            step = step if values[number] + step <= high[number] else -step
+            inside = low[number] <= values[number] + step <= high[number]
+            step = step if inside else -step
             moved = values.copy()
             moved[number] += step
             sets.append(moved)

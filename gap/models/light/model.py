@@ -220,11 +220,14 @@ class SightModel(LibraryModel):
         return (self.reader.samples(reads, effects) + noise - mean) / spread
 
     def windows(self, trial: Trial) -> Windows:
-        """One per reading: from the one before that was not lost."""
-        seen = np.flatnonzero(np.isfinite(trial.observed).all(axis=1))
-        first, last = seen[:-1], seen[1:]
-        begin, end = trial.times[first], trial.times[last]
-        return Windows(first, last, (begin + end) / 2, end - begin)
+        """One per reading: from the one before that was not lost; the first is as long
+        as those after it are in the median."""
+        last = np.flatnonzero(np.isfinite(trial.observed).all(axis=1))
+        first = np.concatenate([last[:1], last[:-1]])
+        end = trial.times[last]
+        begin = np.concatenate([end[:1] - np.median(np.diff(end)), end[:-1]])
+        middle = np.maximum((begin + end) / 2, trial.times[0])
+        return Windows(first, last, middle, end - begin)
 
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows

@@ -105,27 +105,40 @@ class Reader:
         return self._unsure[key]
 
     def samples(self, reads: Reads, effects: Sequence[Effect]) -> np.ndarray:
-        """Draws of what would have been read, ``(T, D, R)`` [counts]."""
-        names = self.sensors.names
+        """Draws of what would have been read, ``(T, D, R)`` [counts].
+
+        A frozen sensor repeats what was read first. That itself is read as if nothing
+        was known of it: a sensor that always reads least did not freeze so.
+        """
         raw = self._raw(reads, effects)
-        count = len(reads.times)
-        if any(effect.name == "sensor_frozen" for effect in effects):
+        changed = [item for item in effects if isinstance(item, SensorEffect)]
+        begun = raw[:1].copy()
+        frozen = any(effect.name == "sensor_frozen" for effect in changed)
+        if frozen:
             raw[0] += self._known(reads, raw[0])
+        raw = self._changed(reads.times, raw, changed)
+        if frozen:
+            raw[:1] = self._changed(reads.times[:1], begun, changed)
+        return raw if self.singles else self.sensors.virtual(raw)
+
+    def _changed(
+        self, times: np.ndarray, raw: np.ndarray, effects: Sequence[SensorEffect]
+    ) -> np.ndarray:
+        """Draws of readings, ``(T, D, S)``, with effects on readings themselves."""
+        names, count = self.sensors.names, len(times)
         on, rng = np.ones(count, dtype=bool), np.random.default_rng(0)
         for effect in effects:
-            if not isinstance(effect, SensorEffect):
-                continue
             if effect.name == "sensor_swapped":  # finds the twin by its place
                 parts = [
-                    effect.apply(reads.times, raw[:, k], names, on, rng)
+                    effect.apply(times, raw[:, k], names, on, rng)
                     for k in range(self.draws)
                 ]
                 raw = np.stack(parts, axis=1)
             else:  # all draws as sensors side by side
                 flat = raw.reshape(count, -1)
-                made = effect.apply(reads.times, flat, names * self.draws, on, rng)
+                made = effect.apply(times, flat, names * self.draws, on, rng)
                 raw = made.reshape(raw.shape)
-        return raw if self.singles else self.sensors.virtual(raw)
+        return raw
 
     def _known(self, reads: Reads, drawn: np.ndarray) -> np.ndarray:
         """From drawn first readings to the recorded ones, ``(D, S)``."""

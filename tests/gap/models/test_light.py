@@ -85,6 +85,15 @@ def test_nothing_planted_is_no_gap(find):
     assert find().kind == "no gap"
 
 
+def test_a_sensor_that_always_reads_least_did_not_freeze_so():
+    stuck = registry.parse("sensor_stuck_min:sensor=left_90,blend=1")
+    trials = recorded(stuck)
+    sight = SightModel(trials, pose_sd=(1e-3, 1e-3, 8e-3))
+    names = [f"sensor_{name}[left_90]" for name in ("frozen", "gain", "stuck_min")]
+    found = diagnosis.look(trials, sight, single, rows=names, full=False).verdict
+    assert {name for (name,) in found.named} == set(names[1:])
+
+
 def test_a_fit_that_leaves_nothing_at_all_can_be_held_out():
     """In full light all readings are the same, to the count."""
     trials = recorded(singles=False)
