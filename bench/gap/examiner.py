@@ -19,12 +19,13 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from bench.gap import kept_cases
 from bench.result import Result, bench
-from bench.versions import ROOT
+from bench.versions import ROOT, commit
 from bns.errors import BnsError
 
 BAR_VALUE = 0.95
-SEEDS = (101,)  # of development; those of the score are given on the command line
+SEEDS = (49,)  # diagnosed once; others can be given on the command line
 VARIABLE = "BNS_EXAMINER"
 _DEFAULT = ROOT.parent / "shared" / "examiner"
 _KEPT = Path(tempfile.gettempdir()) / "bns_examiner"
@@ -71,11 +72,12 @@ def examiner() -> Path:
 
 @bench("an examiner's recordings: wheeled singles named", bar=">= 0.95")
 def gap_examiner(quick: bool) -> Result:
-    """The cases of the development seed; quick takes the first of each kind."""
+    """All cases of a seed that was used once; quick takes the first of each kind."""
     rows = [row for seed in SEEDS for row in scored(seed, quick=quick)]
     figures = table(rows)
     named = figures[("A", "singles named (aliases merged)")]
     return Result(
+        **kept_cases.made(rows),
         figure=round(named[0], 3),
         unit="of cases",
         holds=named[0] >= BAR_VALUE,
@@ -135,7 +137,8 @@ def said(case: Path, out: Path) -> dict[str, Any]:
             words, capture_output=True, text=True, check=False, cwd=case,
             env={**os.environ, "PYTHONPATH": str(ROOT)},
         )  # fmt: skip
-        found: dict[str, Any] = {"seconds": time.perf_counter() - begin}
+        took = time.perf_counter() - begin
+        found: dict[str, Any] = {"seconds": took, "commit": commit()}
         file = Path(scratch) / "out" / "diagnosis.json"
         if done.returncode == 0 and file.is_file():
             found["diagnosis"] = json.loads(file.read_text(encoding="utf-8"))
@@ -147,7 +150,8 @@ def said(case: Path, out: Path) -> dict[str, Any]:
 
 def judged(answer: Mapping[str, Any], found: Mapping[str, Any]) -> dict[str, Any]:
     """An answer beside what was said, as the examiner's `score.py` judges it."""
-    row = {**answer, "seconds": found["seconds"], "error": found.get("error", "")}
+    kept = {key: found[key] for key in ("seconds", "commit") if key in found}
+    row = {**answer, **kept, "error": found.get("error", "")}
     content = found.get("diagnosis")
     if content is None:
         return {**row, "verdict": "error", "named": []}
