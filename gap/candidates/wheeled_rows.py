@@ -20,6 +20,8 @@ LEAD = "step_lead"
 REASON = 4.0  # standard deviations by which a nuisance may be off: beyond is an effect
 BANDS = 10  # widths of a dead band that are tried
 WAYS = ("forward", "backward", "commanded")
+CONES = ("elliptic", "pyramidal")
+DRAGS = (0.007, 0.02, 0.06, 0.2, 0.6)  # friction coefficients of a caster, tried
 STUCK = (0.02, 0.06, 0.2, 0.5, 1.0)  # how far a wheel may be stuck, tried
 
 EXCITE = {
@@ -70,7 +72,6 @@ _SMOOTH: tuple[tuple[str, float, float, float, bool, dict[str, Any]], ...] = (
     ("battery_sag.per_metre", 0.08, 0, 2, False, {}),
     ("battery_fade", 0.01, 0, 0.2, False, {"per_trial": True}),
     ("dead_zone", 0.015, 0, 0.1, True, {}),
-    ("caster_drag", 0.2, 0, 1, False, {"step": 0.02, "levels": (0.05, 0.2, 0.5)}),
     ("wheel_backlash", 0.004, 0, 0.03, True, {"step": 1e-3, "levels": (0.005,)}),
 )  # fmt: skip
 # a mass that is carried, its moments about the middle of the axle and about the top
@@ -99,7 +100,7 @@ def term(name: str) -> str:
         return name.rpartition(".")[0]
     if stem in STICKS:
         return STICKS[stem] + bracket + rest
-    return name.partition("@")[0] if rest else name
+    return name.partition("@")[0]
 
 
 def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
@@ -137,6 +138,11 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
             ]
     for side in SIDES:
         made += _rough(side, trials)
+    made += [
+        Row(f"caster_drag@{cone}", 0.0, 0.2, 0.0, 1.0, smooth=False, levels=DRAGS,
+            group="caster_drag", excite="any drive")
+        for cone in CONES
+    ]  # fmt: skip
     made = [_joining(row) if row.name.endswith("[both]") else row for row in made]
     made.append(
         Row("floor_friction", 1.0, 0.3, 0.01, 3.0, smooth=False,

@@ -97,6 +97,16 @@ def test_a_load_ties_with_the_centre_of_mass_that_it_shifts(model):
     assert found.verdict.named == (("centre_of_mass.dy",), ("payload",))
 
 
+@pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
+def test_a_dragging_caster_is_named_whatever_the_law_of_its_friction(model, cone):
+    trials = driven(f"caster_drag:friction=0.2,cone={cone}")
+    names = ("caster_drag", "payload", "wheel_diameter[both]", "dead_zone[both]")
+    found = diagnose(trials, model, rows=names, full=False)
+    assert found.verdict.named == (("caster_drag",),)
+    assert found.best.magnitudes[0] == pytest.approx(0.2, rel=0.03)
+    assert f"cone={cone}" in found.best.effects[0]
+
+
 def test_damage_that_was_always_there_has_no_date(recorded, model):
     found = kept(recorded[1], model)
     assert found.verdict.named == (("wheel_gain[left]",),)

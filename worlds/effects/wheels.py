@@ -9,6 +9,7 @@ from bns.worlds.effects import parts
 from bns.worlds.effects.base import (
     ActuatorEffect,
     BodyEffect,
+    Choice,
     ControlSignal,
     factor,
     strength,
@@ -176,16 +177,25 @@ class WheelEccentricity(BodyEffect):
                 geom.pos += self["offset"] * way
 
 
+CONE = Choice(
+    "cone",
+    ("elliptic", "pyramidal"),
+    "elliptic",
+    "friction alike in all directions, or MuJoCo's pyramid of four sides",
+)
+
+
 class CasterDrag(BodyEffect):
     """The casters drag on the floor instead of rolling.
 
-    Friction is the same in all directions (an elliptic cone): a pyramid of four sides,
+    Friction is the same in all directions (an elliptic cone). A pyramid of four sides,
     which may do for wheels that roll, turns a robot of dragging casters by a third more
-    or less, depending on how it stands in the world.
+    or less, depending on how it stands in the world; simulations of others have it.
     """
 
     name = "caster_drag"
     source = "dry friction; the nominal casters have none; bounds assumed"
+    choices = (CONE,)
     parameter = strength(
         "friction",
         "1",
@@ -209,7 +219,9 @@ class CasterDrag(BodyEffect):
         for geom in casters:
             geom.condim = max(geom.condim, 3)  # 1 has no friction
             geom.friction[0] += self["friction"]
-        spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+        cones = mujoco.mjtCone
+        round_ = self["cone"] == "elliptic"
+        spec.option.cone = cones.mjCONE_ELLIPTIC if round_ else cones.mjCONE_PYRAMIDAL
 
 
 class MotorLag(ActuatorEffect):
