@@ -21,8 +21,8 @@ from bns.gap.bench.faults import faulty
 from bns.gap.decomposition import descent, levels
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import KAPPA
-from bns.gap.decomposition.newton import newton
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.refit import newton
 from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.singles import Singles
 from bns.gap.models.base import PLANE, GapModel

@@ -9,8 +9,9 @@ import numpy as np
 from bns.gap.decomposition.row import Row
 from bns.gap.recordings import trial_conditions
 from bns.worlds.effects import registry
-from bns.worlds.effects.command import TOP_SPEED
+from bns.worlds.effects.command import DIRECTION, TOP_SPEED
 from bns.worlds.effects.parameter import Parameter
+from bns.worlds.effects.wheels import CONE
 from bns.worlds.trial import Trial
 
 SIDES = ("left", "right", "both")
@@ -19,8 +20,6 @@ LEAD = "step_lead"
 """shift of the simulation in time that no effect is: its own steps lead or lag"""
 REASON = 4.0  # standard deviations by which a nuisance may be off: beyond is an effect
 BANDS = 10  # widths of a dead band that are tried
-WAYS = ("forward", "backward", "commanded")
-CONES = ("elliptic", "pyramidal")
 DRAGS = (0.007, 0.02, 0.06, 0.2, 0.6)  # friction coefficients of a caster, tried
 STUCK = (0.02, 0.06, 0.2, 0.5, 1.0)  # how far a wheel may be stuck, tried
 
@@ -141,7 +140,7 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
     made += [
         Row(f"caster_drag@{cone}", 0.0, 0.2, 0.0, 1.0, smooth=False, levels=DRAGS,
             group="caster_drag", excite="any drive")
-        for cone in CONES
+        for cone in CONE.options
     ]  # fmt: skip
     made = [_joining(row) if row.name.endswith("[both]") else row for row in made]
     made.append(
@@ -181,8 +180,8 @@ def _smooth(
 
 
 def parameter(name: str) -> Parameter:
-    """The parameter that a row's name, without its wheel, stands for."""
-    stem, _, wanted = name.partition(".")
+    """The parameter that a row stands for, by the row's name."""
+    stem, _, wanted = name.partition("[")[0].partition("@")[0].partition(".")
     every = registry.get(stem).parameters
     return next(p for p in every if not wanted or p.name == wanted)
 
@@ -218,7 +217,7 @@ def _rough(side: str, trials: Sequence[Trial]) -> list[Row]:
         made += [
             Row(f"{kind}[{side}]@{way}", 0.0, 1.0, 0.0, 1.0, smooth=False,
                 levels=STUCK, group=f"{kind}[{side}]", excite="any drive")
-            for way in WAYS
+            for way in DIRECTION.options
         ]  # fmt: skip
     return made
 

@@ -11,9 +11,9 @@ from bns.gap.decomposition import fit, levels, refit, search, simpler
 from bns.gap.decomposition.fit import Noise, Point, linearised, placed
 from bns.gap.decomposition.levels import Level
 from bns.gap.decomposition.linear import Support
-from bns.gap.decomposition.newton import newton
 from bns.gap.decomposition.noise import Memory
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.refit import newton
 from bns.gap.decomposition.shares import HeldOut
 from bns.gap.decomposition.singles import Single, Singles, wide
 

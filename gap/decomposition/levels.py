@@ -212,41 +212,39 @@ def _scored(
     return sorted(found, key=lambda item: (item[0], item[1]))
 
 
-def felt(
-    problem: Problem, point: Point, bare: np.ndarray, most: int = TRIALS
-) -> list[int]:
-    """Trials in which an explanation is felt most.
+def instead(
+    problem: Problem, point: Point, gone: Collection[str], most: int = TRIALS
+) -> list[tuple[float, str, np.ndarray]]:
+    """Levels of other explanations in the place of some of a point, by a first look:
+    nats, names and values of all rows, ``(R,)``, as `compared` gives them.
 
     Args:
         problem: the recording.
         point: the fit.
-        bare: values without the explanation, ``(R,)``.
-        most: how many.
+        gone: explanations that they stand for.
+        most: trials that are looked at, those in which these are felt most.
     """
-    here, there = problem.predict([point.values, bare], fine=False)
-    squares = (point.linear.weight * np.nan_to_num(here - there) ** 2).sum(axis=1)
-    sums = np.bincount(problem.trial, squares, minlength=len(problem.trials))
-    order = np.argsort(-sums)[:most]
-    return sorted(int(n) for n in order if sums[n] > FELT)
-
-
-def others(problem: Problem, point: Point, bare: np.ndarray) -> list[np.ndarray]:
-    """Values with a level of another explanation, all of them, ``(R,)`` each.
-
-    Args:
-        problem: the recording.
-        point: the fit; what is in it is left out.
-        bare: values that a level is set in, ``(R,)``.
-    """
-    made = []
+    bare = point.values.copy()
+    numbers = [number for name in gone for number in problem.terms[name]]
+    bare[numbers] = problem.nominal[numbers]
+    sets = []
     for number, row in enumerate(problem.rows):
         if row.smooth or row.term in point.support:
             continue
         for value in row.levels:
             moved = bare.copy()
             moved[number] = value
-            made.append(moved)
-    return made
+            sets.append(moved)
+    return compared(problem, point, sets, _felt(problem, point, bare, most))
+
+
+def _felt(problem: Problem, point: Point, bare: np.ndarray, most: int) -> list[int]:
+    """Trials in which is felt most what values ``(R,)`` lack."""
+    here, there = problem.predict([point.values, bare], fine=False)
+    squares = (point.linear.weight * np.nan_to_num(here - there) ** 2).sum(axis=1)
+    sums = np.bincount(problem.trial, squares, minlength=len(problem.trials))
+    order = np.argsort(-sums)[:most]
+    return sorted(int(n) for n in order if sums[n] > FELT)
 
 
 def compared(
@@ -258,7 +256,7 @@ def compared(
     Args:
         problem: the recording.
         point: the fit.
-        sets: values of all rows, ``(R,)`` each, as `others` gives them.
+        sets: values of all rows, ``(R,)`` each.
         only: trials that are looked at, None = all.
     """
     if not sets or only == []:

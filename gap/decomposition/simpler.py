@@ -142,12 +142,8 @@ def united(problem: Problem, point: Point) -> Point:
         for other in sorted(point.support - {name}):
             if point.linear.alike(name, other) < ALIKE:
                 continue
-            bare = point.values.copy()
-            numbers = [*problem.terms[name], *problem.terms[other]]
-            bare[numbers] = problem.nominal[numbers]
-            hit = levels.felt(problem, point, bare)
-            sets = levels.others(problem, point, bare)
-            for _, term, values in levels.compared(problem, point, sets, hit)[:UNITED]:
+            rivals = levels.instead(problem, point, (name, other))[:UNITED]
+            for _, term, values in rivals:
                 support = (point.support - {name, other}) | {term}
                 one = refit.fitted_at(problem, replace(point, values=values), support)
                 if _as_good(problem, one, point):

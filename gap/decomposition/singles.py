@@ -9,8 +9,8 @@ import numpy as np
 
 from bns.gap.decomposition import fit, levels
 from bns.gap.decomposition.fit import Point
-from bns.gap.decomposition.newton import newton
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.refit import newton
 
 WIDE = 3  # numbers of an explanation from which its tangent tells little of it
 TURNS = 6  # of the fit of each

@@ -104,14 +104,8 @@ def _levels(problem: Problem, point: Point) -> list[tuple[float, Support]]:
         return []
     found: dict[Support, float] = {}
     for name in sorted(names):
-        bare = point.values.copy()
-        for number in problem.terms[name]:
-            bare[number] = problem.nominal[number]
         most = levels.TRIALS if name in rough else 1
-        hit = levels.felt(problem, point, bare, most)
-        rivals = levels.compared(
-            problem, point, levels.others(problem, point, bare), hit
-        )
+        rivals = levels.instead(problem, point, {name}, most)
         rivals = [item for item in rivals if item[0] < TIED + MARGIN][:KEPT]
         again = [values for _, _, values in rivals]
         for cost, term, values in levels.compared(problem, point, again, None):

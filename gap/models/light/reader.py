@@ -112,13 +112,13 @@ class Reader:
         """
         raw = self._raw(reads, effects)
         changed = [item for item in effects if isinstance(item, SensorEffect)]
-        begun = raw[:1].copy()
-        frozen = any(effect.name == "sensor_frozen" for effect in changed)
-        if frozen:
+        if any(effect.name == "sensor_frozen" for effect in changed):
+            begun = self._changed(reads.times[:1], raw[:1], changed)
             raw[0] += self._known(reads, raw[0])
-        raw = self._changed(reads.times, raw, changed)
-        if frozen:
-            raw[:1] = self._changed(reads.times[:1], begun, changed)
+            raw = self._changed(reads.times, raw, changed)
+            raw[:1] = begun
+        else:
+            raw = self._changed(reads.times, raw, changed)
         return raw if self.singles else self.sensors.virtual(raw)
 
     def _changed(

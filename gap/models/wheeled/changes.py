@@ -27,12 +27,6 @@ ORDER = (
     "wheel_backlash",
 )
 """in which effects on commands follow each other, from what is told to the wheel"""
-WAYS = {
-    "wheel_stuck_max": "direction",
-    "wheel_stuck_min": "direction",
-    "caster_drag": "cone",
-}
-"""choices of an effect each of which has a row of its own, named after an "@" """
 LIGHT = 0.03  # [kg] below which a payload's moments do not tell its place
 
 
@@ -128,8 +122,10 @@ def effect(name: str, values: Mapping[str, float]) -> Effect:
     moved = [item for item in values.items() if item[1]] or [*values.items()]
     for row, value in moved if stem in STICKS.values() else moved[:1]:
         if "@" in row:
-            given[WAYS[stem]] = row.partition("@")[2]
-        about = parameter(row.partition("[")[0].partition("@")[0])
+            way = row.partition("@")[2]
+            choices = registry.get(stem).choices
+            given |= {item.name: way for item in choices if way in item.options}
+        about = parameter(row)
         value = min(max(float(value), about.low), about.high)
         given[about.name] = round(value) if about.integer else value
     return registry.make(stem.partition(".")[0], **given)

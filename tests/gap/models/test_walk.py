@@ -7,8 +7,8 @@ from bns.gap.bench import cases, walk_cases
 from bns.gap.bench.walk_cases import WalkStand
 from bns.gap.candidates import legged
 from bns.gap.decomposition import descent, diagnosis, fit, levels
-from bns.gap.decomposition.newton import newton
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.refit import newton
 from bns.gap.diagnose import diagnose
 from bns.gap.models.legged import scatter, signs
 from bns.gap.models.legged.model import READING, WalkModel
