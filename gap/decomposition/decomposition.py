@@ -181,7 +181,7 @@ def decompose(
     problem, start, known, unstable = _steady(problem, seed)
     tell("explanations")
     tried = Singles(problem, start)
-    point = descent.decompose(tried)
+    problem, point = descent.beside(problem, descent.decompose(tried))
     found = onset.dated(problem, start, point)
     late = None
     if found:

@@ -2,7 +2,7 @@
 around it."""
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -143,13 +143,40 @@ def decompose(tried: Singles) -> Point:
         best = chosen
     if problem.model.many:
         best = _renewed(problem, best)
-    best = simpler.narrowed(problem, best)
-    best = (
-        simpler.swapped(problem, best)
-        if problem.model.many
-        else simpler.pruned(problem, best)
-    )
+    best = _simpler(problem, best)
     return _beyond_chance(problem, start, best, len(start.linear.free))
+
+
+def _simpler(problem: Problem, best: Point) -> Point:
+    """A point, or a simpler one that is as good."""
+    best = simpler.narrowed(problem, best)
+    if problem.model.many:
+        return simpler.swapped(problem, best)
+    return simpler.pruned(problem, best)
+
+
+def beside(problem: Problem, point: Point) -> tuple[Problem, Point]:
+    """The explanations once more, with what the model scatters simulated beside them: a
+    robot whose commands come late walks otherwise, and scatters otherwise, than the
+    nominal one. As they are, where that makes no difference to the model.
+
+    Args:
+        problem: the recording.
+        point: what was found with what the nominal model scatters.
+    """
+    for _ in range(ROUNDS):
+        trials, values = problem.trials, point.values
+        known = [problem.changed(values, number) for number in range(len(trials))]
+        model = problem.model.beside(trials, known) if point.support else problem.model
+        if model is problem.model:
+            break
+        problem, support = replace(problem, model=model), point.support
+        bare = [row.nuisance for row in problem.rows]
+        values = np.where(bare, problem.nominal, values)
+        point = _simpler(problem, descend(problem, values, support, point.noise))
+        if point.support == support:
+            break
+    return problem, point
 
 
 def _renewed(problem: Problem, best: Point) -> Point:
@@ -184,16 +211,51 @@ def _by_itself(problem: Problem, level: Level, best: Point) -> Point:
 
 def _several(tried: Singles, found: Support, best: Point) -> Point:
     """The best point where a tangent finds several explanations, or one of many
-    numbers: from a single one, and if that is not enough from those that it found, and
-    from all where many depart."""
-    problem = tried.problem
-    points = _simple(tried) + [best] * bool(best.support)
-    if not any(enough(problem, point) for point in points):
-        if not best.support:
-            points.append(_followed(problem, tried.start, found))
-        if problem.model.many:
-            points.append(_from_all(problem, tried.start))
-    return refit.better(problem, points)
+    numbers: from ever more starts, until one of them is enough."""
+    points = [best] * bool(best.support)
+    for more in _starts(tried, found, points.copy()):
+        points += more
+        if any(enough(tried.problem, point) for point in points):
+            break
+    return refit.better(tried.problem, points)
+
+
+def _starts(
+    tried: Singles, found: Support, followed: list[Point]
+) -> Iterator[list[Point]]:
+    """Points from ever more starts: where many depart from all that the tangent at the
+    nominal finds, and from the single explanations that leave as little; from the best
+    single ones once fitted, and a level on top; where many depart from all at once.
+
+    Args:
+        tried: single explanations.
+        found: what the tangent finds.
+        followed: the point that this led to, where it is known.
+    """
+    problem, start, many = tried.problem, tried.start, tried.problem.model.many
+    made: dict[Single, Point] = {}
+    if many:
+        points = followed or [_followed(problem, start, found)]
+        made = _from(tried, _promising(tried, points))
+        yield [*points, *made.values()]
+    leading = _leading(problem, tried.fitted)
+    made |= _from(tried, [one for one in leading if one not in made])
+    points = [made[one] for one in leading]
+    if not enough(problem, points[0]):
+        points += _with_level(problem, leading[0], start)
+    yield points
+    if many:
+        yield [_from_all(problem, start)]
+    elif not followed:
+        yield [_followed(problem, start, found)]
+
+
+def _promising(tried: Singles, points: Sequence[Point]) -> list[Single]:
+    """The leading single explanations by the tangent that leave little more than points
+    do: what is strong looks like several through a tangent."""
+    leading, known = _leading(tried.problem, tried.by_tangent), tried.start.noise
+    least = min(known.loss(point.rest) / known.lam for point in points)
+    return [one for one in leading if one.height < ENOUGH * least]
 
 
 def enough(problem: Problem, point: Point, few: int = FEW) -> bool:
@@ -226,25 +288,6 @@ def _followed(problem: Problem, start: Point, support: Support) -> Point:
     """A point from a set found by the tangent at the nominal model."""
     values = placed(problem, start.linear, support, start.values)
     return descend(problem, values, support, start.noise, start)
-
-
-def _simple(tried: Singles) -> list[Point]:
-    """Points from the best single explanation, and from it with a level on top; if it
-    has many numbers, which imitate much, from the best one of few, too.
-
-    Where many depart, what the tangent finds does if it is enough by itself."""
-    problem, start = tried.problem, tried.start
-    made: dict[Single, Point] = {}
-    if problem.model.many:
-        made = _from(tried, _leading(problem, tried.by_tangent))
-        if any(enough(problem, point, 1) for point in made.values()):
-            return list(made.values())
-    leading = _leading(problem, tried.fitted)
-    made |= _from(tried, [one for one in leading if one not in made])
-    points = [made[one] for one in leading]
-    if not enough(problem, points[0]):
-        points += _with_level(problem, leading[0], start)
-    return points
 
 
 def _leading(problem: Problem, singles: Sequence[Single]) -> list[Single]:

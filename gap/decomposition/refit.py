@@ -127,15 +127,17 @@ def newton(
         known: noise.
         turns: steps at most.
         only: trials that count, None = all; the others' residuals are left out.
-        slopes: derivatives at these values, for the first step; None = taken.
+        slopes: derivatives at these values, for the first step; None = taken. Where
+            many may depart they are kept over short steps that lower the loss, since
+            taking them is what costs time.
 
     Returns:
         values, and residuals there ``(N, C)``.
     """
     part = problem if only is None else replace(problem, recorded=_kept(problem, only))
     names = [k for name in sorted(support) for k in problem.terms[name]]
-    rest = _rest(part, values, only)
-    for _ in range(turns):
+    rest, first = _rest(part, values, only), slopes
+    while turns:
         which = [
             k
             for k in names
@@ -144,16 +146,23 @@ def newton(
         ]
         if not which:
             break
-        if slopes is None or any(k not in slopes for k in which):
-            slopes = part.slopes(values, which, only=only)
-        moved = _step(part, values, rest, which, known, slopes, only)
+        used = slopes
+        if used is None or any(k not in used for k in which):
+            used = part.slopes(values, which, only=only)
+        kept = used is slopes and slopes is not first
+        moved = _step(part, values, rest, which, known, used, only)
+        turns -= not kept
         slopes = None
-        if moved is None:
+        if moved is None and not kept:
             break
+        if moved is None:
+            continue
         change = np.abs((moved[0] - values)[which] / part.sd[which]).max()
         values, rest = moved
-        if change < STILL:
+        if change < STILL and not kept:
             break
+        if part.model.many and STILL <= change <= fit.FAR:
+            slopes = used
     return values, rest
 
 

@@ -225,6 +225,19 @@ class GapModel(ABC):
         sets = [[{**a, **b} for a, b in zip(known, row, strict=True)] for row in off]
         return names, self.paths(trials, sets, fine=fine)
 
+    def beside(
+        self, trials: Sequence[Trial], known: Sequence[Mapping[str, float]]
+    ) -> "GapModel":
+        """The model with what it scatters simulated beside explanations that were
+        found; itself, where that does not depend on them.
+
+        Args:
+            trials: N recorded trials.
+            known: by trial the values of the rows that are not nominal.
+        """
+        del trials, known
+        return self
+
     def motion(self, features: np.ndarray) -> np.ndarray:
         """How fast each feature moved, ``(N, C)``: noise may grow with it."""
         return np.abs(features)

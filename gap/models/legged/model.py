@@ -5,6 +5,7 @@ compared is each servo's position, which its own loop holds so that errors do no
 up, and the body's motion over short windows, in its own frame.
 """
 
+import copy
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -103,6 +104,18 @@ class WalkModel(LibraryModel):
         for number, trial in enumerate(trials):
             made = np.stack([walk[number] - midst[number] for walk in walks])
             self._walks[_key(trial)] = np.nan_to_num(made)
+
+    def beside(
+        self, trials: Sequence[Trial], known: Sequence[Mapping[str, float]]
+    ) -> "WalkModel":
+        """See `GapModel.beside`: a robot whose commands come late, or that slips, puts
+        its feet down elsewhere, and so do the walks that it may do as well."""
+        made = copy.copy(self)
+        made._walks = {}
+        for trial, values in zip(trials, known, strict=True):
+            own = {n: v for n, v in values.items() if scatter.number(n) < 0}
+            made._scatter([trial], self._effects(own))
+        return made
 
     def paths(
         self,

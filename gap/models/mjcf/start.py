@@ -9,7 +9,6 @@ import numpy as np
 
 from bns.gap.models.mjcf import prepared
 from bns.gap.models.mjcf.config import OwnConfig
-from bns.worlds.physics.rollout import STATE as FULL
 from bns.worlds.trial import Trial
 
 STATE = "start"
@@ -32,7 +31,7 @@ class View:
     Attributes:
         config: the description.
         columns: per channel the column of the full physics state, -1 = kinematics.
-        parts: per channel the number of the site or body, -1 = a joint.
+        parts: per channel the number of the site or body, -1 = it has a column.
     """
 
     config: OwnConfig
@@ -55,6 +54,8 @@ class View:
                 at = 1 + int(model.jnt_qposadr[number])
             elif item.quantity == "speed":
                 at = 1 + model.nq + int(model.jnt_dofadr[number])
+            elif item.quantity == "body":
+                at = _floating(model, number, item.axis)
             columns.append(at)
             parts.append(-1 if at >= 0 else number)
         return cls(config, tuple(columns), tuple(parts))
@@ -69,24 +70,30 @@ class View:
         if not placed:
             return made
         data = mujoco.MjData(model)
-        for row, state in enumerate(states):
-            if not np.isfinite(state).all():
-                made[row, placed] = np.nan
-                continue
-            mujoco.mj_setState(model, data, state, FULL)
+        seen = [(self.config.seen[channel], self.parts[channel]) for channel in placed]
+        where = {"site": data.site_xpos, "body": data.xpos}
+        found = [where[item.quantity][part, item.axis :][:1] for item, part in seen]
+        made[:, placed] = np.nan
+        for row in np.flatnonzero(np.isfinite(states).all(axis=1)):
+            data.qpos[:] = states[row, 1 : 1 + model.nq]
             mujoco.mj_kinematics(model, data)
-            for channel in placed:
-                item = self.config.seen[channel]
-                where = data.site_xpos if item.quantity == "site" else data.xpos
-                made[row, channel] = where[self.parts[channel], item.axis]
+            made[row, placed] = np.concatenate(found)
         return made
 
     def place(self, data: mujoco.MjData, seen: np.ndarray) -> None:
         """Set the observed joints to what was recorded, ``(C,)``."""
-        nq = data.model.nq
-        for channel, column in enumerate(self.columns):
-            if 0 < column <= nq:
-                data.qpos[column - 1] = seen[channel]
+        for channel, item in enumerate(self.config.seen):
+            if item.quantity == "joint":
+                data.qpos[self.columns[channel] - 1] = seen[channel]
+
+
+def _floating(model: mujoco.MjModel, body: int, axis: int) -> int:
+    """Column of the full physics state that holds the place of a body on a free joint;
+    -1 = it has none."""
+    first = int(model.body_jntadr[body])
+    if first < 0 or model.jnt_type[first] != mujoco.mjtJoint.mjJNT_FREE:
+        return -1
+    return 1 + int(model.jnt_qposadr[first]) + axis
 
 
 def free(model: mujoco.MjModel) -> frozenset[str]:
