@@ -21,7 +21,8 @@ TURNS = 4  # of fitting and searching
 FEW = 2  # explanations that need no other start if they leave little
 ENOUGH = 1.2  # times what all explanations leave: little more
 NEARLY = 1.5  # the same where these, all together, only describe the recording
-ROUNDS = 2  # of levels
+ROUNDS = 2  # of levels, and of what walkers scatter
+MOST = 0.5  # of the gap: what leaves less explains most of it by itself
 MARGIN = 1.02  # of the held-out error that an autoregression may cost
 WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
 
@@ -90,7 +91,7 @@ def descend(
             problem, values, set(support) | fit.nuisances(problem), known, turns=most
         )
         values, rest = levels.zoomed(problem, values, rest, support, known)
-        kept = fit.lasting(problem, near, support, values) if near else None
+        kept = fit.lasting(problem, near, support, values, rest) if near else None
         linear, known, slopes = linearised(problem, values, rest, known, kept)
         at = values if kept is None or near is None else near.at
         inside = support & set(linear.terms)  # without what came back to nominal
@@ -223,9 +224,9 @@ def _several(tried: Singles, found: Support, best: Point) -> Point:
 def _starts(
     tried: Singles, found: Support, followed: list[Point]
 ) -> Iterator[list[Point]]:
-    """Points from ever more starts: where many depart from all that the tangent at the
-    nominal finds, and from the single explanations that leave as little; from the best
-    single ones once fitted, and a level on top; where many depart from all at once.
+    """Points from ever more starts: where many depart from single explanations of most
+    of the gap and from all that the tangent at the nominal finds; from the best single
+    ones once fitted, and a level on top; where many depart from all at once.
 
     Args:
         tried: single explanations.
@@ -235,9 +236,12 @@ def _starts(
     problem, start, many = tried.problem, tried.start, tried.problem.model.many
     made: dict[Single, Point] = {}
     if many:
-        points = followed or [_followed(problem, start, found)]
-        made = _from(tried, _promising(tried, points))
-        yield [*points, *made.values()]
+        most = MOST * start.noise.loss(start.rest) / start.noise.lam
+        leading = _leading(problem, tried.by_tangent)
+        made = _from(tried, [one for one in leading if one.height < most])
+        yield [*made.values()]
+    if many and not followed:
+        yield [_followed(problem, start, found)]
     leading = _leading(problem, tried.fitted)
     made |= _from(tried, [one for one in leading if one not in made])
     points = [made[one] for one in leading]
@@ -248,14 +252,6 @@ def _starts(
         yield [_from_all(problem, start)]
     elif not followed:
         yield [_followed(problem, start, found)]
-
-
-def _promising(tried: Singles, points: Sequence[Point]) -> list[Single]:
-    """The leading single explanations by the tangent that leave little more than points
-    do: what is strong looks like several through a tangent."""
-    leading, known = _leading(tried.problem, tried.by_tangent), tried.start.noise
-    least = min(known.loss(point.rest) / known.lam for point in points)
-    return [one for one in leading if one.height < ENOUGH * least]
 
 
 def enough(problem: Problem, point: Point, few: int = FEW) -> bool:

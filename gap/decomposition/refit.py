@@ -53,7 +53,7 @@ def fitted_at(
     values, rest = levels.zoomed(problem, values, rest, support, point.noise)
     kept = point.slopes if near else None
     if problem.model.many and not near:
-        kept = fit.lasting(problem, point, support, values)
+        kept = fit.lasting(problem, point, support, values, rest)
     linear, known, slopes = linearised(problem, values, rest, point.noise, kept)
     at = values if kept is None else point.at
     inside = support & set(linear.terms)
