@@ -157,23 +157,26 @@ def _simpler(problem: Problem, best: Point) -> Point:
 
 
 def beside(problem: Problem, point: Point) -> tuple[Problem, Point]:
-    """The explanations once more, with what the model scatters simulated beside them: a
-    robot whose commands come late walks otherwise, and scatters otherwise, than the
-    nominal one. As they are, where that makes no difference to the model.
+    """The explanations once more, with what a model does otherwise beside them: a robot
+    whose commands come late walks otherwise, and scatters otherwise, than the nominal
+    one; starts that were fitted to the nominal motion are not those of theirs. As they
+    are, where nothing is otherwise.
 
     Args:
         problem: the recording.
-        point: what was found with what the nominal model scatters.
+        point: what was found beside the nominal model.
     """
-    for _ in range(ROUNDS):
-        trials, values = problem.trials, point.values
-        known = [problem.changed(values, number) for number in range(len(trials))]
-        model = problem.model.beside(trials, known) if point.support else problem.model
-        if model is problem.model:
+    for _ in range(ROUNDS if point.support else 0):
+        trials, support = problem.trials, point.support
+        known = [problem.changed(point.values, n) for n in range(len(trials))]
+        model, begun = problem.model.beside(trials, known)
+        same = all(one is other for one, other in zip(begun, trials, strict=True))
+        if model is problem.model and same:
             break
-        problem, support = replace(problem, model=model), point.support
-        bare = [row.nuisance for row in problem.rows]
-        values = np.where(bare, problem.nominal, values)
+        other = np.array([row.nuisance for row in problem.rows])
+        other &= model is not problem.model
+        values = np.where(other, problem.nominal, point.values)
+        problem = replace(problem, model=model, trials=tuple(begun))
         point = _simpler(problem, descend(problem, values, support, point.noise))
         if point.support == support:
             break

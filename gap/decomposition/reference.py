@@ -5,6 +5,7 @@ nominal ones, and how far they remain unsure takes the slack's place (a discrepa
 learnt from no-change data, after Kennedy and O'Hagan 2001).
 """
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -41,7 +42,8 @@ class Corrected(GapModel):
     def of(cls, trials: Sequence[Trial], model: GapModel) -> "Corrected":
         """From checked recordings in which nothing was changed."""
         problem = Problem.of(trials, model)
-        point = descent.decompose(Singles(problem, descent.nothing(problem)))
+        tried = Singles(problem, descent.nothing(problem))
+        problem, point = descent.beside(problem, descent.decompose(tried))
         support = shares.guarded(problem, point)
         values = fit.placed(problem, point.linear, support, point.values)
         linear = point.linear
@@ -86,21 +88,25 @@ class Corrected(GapModel):
         fine: bool = True,
     ) -> list[list[np.ndarray]]:
         """See `GapModel.paths`: departures on top of those that are there anyway."""
-        known = {n: off for n, off in self.moved.items() if n in self._nominal}
-        changed = [
-            [
-                {
-                    **values,
-                    **{
-                        name: values.get(name, self._nominal[name]) + off
-                        for name, off in known.items()
-                    },
-                }
-                for values in row
-            ]
-            for row in sets
-        ]
+        changed = [[self._whole(values) for values in row] for row in sets]
         return self.model.paths(trials, changed, fine=fine)
+
+    def _whole(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Values of the model as it was, of those of this one."""
+        known = {n: off for n, off in self.moved.items() if n in self._nominal}
+        there = {n: values.get(n, self._nominal[n]) + off for n, off in known.items()}
+        return {**values, **there}
+
+    def beside(
+        self, trials: Sequence[Trial], known: Sequence[Mapping[str, float]]
+    ) -> tuple[GapModel, Sequence[Trial]]:
+        """See `GapModel.beside`."""
+        model, begun = self.model.beside(trials, [self._whole(row) for row in known])
+        if model is self.model:
+            return self, begun
+        made = copy.copy(self)
+        made.model = model
+        return made, begun
 
     def compare(
         self, trial: Trial, observed: np.ndarray, windows: Windows

@@ -227,16 +227,17 @@ class GapModel(ABC):
 
     def beside(
         self, trials: Sequence[Trial], known: Sequence[Mapping[str, float]]
-    ) -> "GapModel":
-        """The model with what it scatters simulated beside explanations that were
-        found; itself, where that does not depend on them.
+    ) -> tuple["GapModel", Sequence[Trial]]:
+        """The model and the trials beside explanations that were found: what the
+        nominal model scatters, or starts that were fitted to its motion, may be
+        otherwise beside them. The same ones, where nothing is.
 
         Args:
             trials: N recorded trials.
             known: by trial the values of the rows that are not nominal.
         """
-        del trials, known
-        return self
+        del known
+        return self, trials
 
     def motion(self, features: np.ndarray) -> np.ndarray:
         """How fast each feature moved, ``(N, C)``: noise may grow with it."""

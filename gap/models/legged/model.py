@@ -107,7 +107,7 @@ class WalkModel(LibraryModel):
 
     def beside(
         self, trials: Sequence[Trial], known: Sequence[Mapping[str, float]]
-    ) -> "WalkModel":
+    ) -> tuple["WalkModel", Sequence[Trial]]:
         """See `GapModel.beside`: a robot whose commands come late, or that slips, puts
         its feet down elsewhere, and so do the walks that it may do as well."""
         made = copy.copy(self)
@@ -115,7 +115,7 @@ class WalkModel(LibraryModel):
         for trial, values in zip(trials, known, strict=True):
             own = {n: v for n, v in values.items() if scatter.number(n) < 0}
             made._scatter([trial], self._effects(own))
-        return made
+        return made, trials
 
     def paths(
         self,

@@ -11,7 +11,7 @@ the start was off. Compared all along, it would say nothing but that; compared o
 pieces that begin in the states of the data, it is a robot like others.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -28,7 +28,8 @@ HALF = 0.03  # [s] on each side of a start, of the samples that tell its state
 LEAST = 4  # samples on each side at least
 BEFORE = 0.5  # [s] of commands before a piece
 GRID = 0.005  # [s] between them
-REFINED = 2  # times that starts are fitted to the nominal motion
+REFINED = 2  # times that starts are fitted to a motion
+ASTRAY = 3.0  # standard deviations of a number of a start: then it was fitted wrongly
 
 
 def pieces(trial: Trial, config: OwnConfig) -> list[Trial]:
@@ -67,21 +68,57 @@ def refined(trials: Sequence[Trial], config: OwnConfig, model: GapModel) -> list
         config: of the robot.
         model: the nominal model.
     """
+    return _refined(trials, config, model, [{} for _ in trials])[0]
+
+
+def restarted(
+    trials: Sequence[Trial],
+    config: OwnConfig,
+    model: GapModel,
+    known: Sequence[Mapping[str, float]],
+) -> list[Trial]:
+    """Trials whose starts are those from which explanations come nearest to what was
+    seen; as they are, where none of them was far off.
+
+    From a start that makes up for what the nominal model lacks, the motion that lacks
+    nothing goes astray, and not in proportion to it.
+
+    Args:
+        trials: pieces whose starts were fitted to the nominal motion.
+        config: of the robot.
+        model: the nominal model.
+        known: by trial the values of the rows that are not nominal.
+    """
+    found, farthest = _refined(trials, config, model, known)
+    return found if farthest > ASTRAY else list(trials)
+
+
+def _refined(
+    trials: Sequence[Trial],
+    config: OwnConfig,
+    model: GapModel,
+    known: Sequence[Mapping[str, float]],
+) -> tuple[list[Trial], float]:
+    """Trials with starts that were fitted, and by how many standard deviations the
+    farthest number of them moved."""
     joints = [k for k, item in enumerate(config.seen) if item.quantity == "joint"]
     made, noise = list(trials), np.array([config.seen[k].noise for k in joints])
+    total = np.zeros(0)
     for _ in range(REFINED):
-        names, (base, *ways) = model.started(made, [{} for _ in made])
+        names, (base, *ways) = model.started(made, known)
         if not names:
-            return made
-        for number, (trial, known) in enumerate(zip(made, base, strict=True)):
-            change = np.stack([way[number] - known for way in ways])[..., joints]
-            units = (trial.observed - known)[:, joints] / noise
-            size = _nearest(units, change / noise)
+            break
+        moved = np.zeros((len(made), len(names)))
+        for number, (trial, path) in enumerate(zip(made, base, strict=True)):
+            change = np.stack([way[number] - path for way in ways])[..., joints]
+            units = (trial.observed - path)[:, joints] / noise
+            moved[number] = _nearest(units, change / noise)
             sds = start.unsure(trial, config)
-            found = zip(names, size, strict=True)
+            found = zip(names, moved[number], strict=True)
             off = {n: float(z) * sds[n] for n, z in found if n in sds}
             made[number] = start.moved(trial, off, config) if off else trial
-    return made
+        total = moved if not total.size else total + moved
+    return made, float(np.abs(total).max(initial=0.0))
 
 
 def _nearest(units: np.ndarray, change: np.ndarray) -> np.ndarray:

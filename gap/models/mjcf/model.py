@@ -91,6 +91,12 @@ class OwnModel(GapModel):
             return cuts.refined(trials, self.config, self)
         return cuts.foreseen(trials, self.config, self.physics.model, self)
 
+    def beside(
+        self, trials: Sequence[Trial], known: Sequence[Mapping[str, float]]
+    ) -> tuple[GapModel, Sequence[Trial]]:
+        """See `GapModel.beside`: starts that were fitted to the nominal motion."""
+        return self, cuts.restarted(trials, self.config, self, known)
+
     @property
     def least(self) -> np.ndarray:
         """Smallest believed standard deviation of each feature."""
