@@ -235,8 +235,9 @@ SHORTEST = 0.4  # [s] of a piece
 def foreseen(
     trials: Sequence[Trial], config: OwnConfig, physics: mujoco.MjModel, model: GapModel
 ) -> list[Trial]:
-    """Trials, cut into pieces that begin in the states of the data if any of them is
-    not foreseen to its end and all that moves is observed.
+    """Trials in the pieces of the description; in shorter ones that begin in the states
+    of the data, if any of them is not foreseen to its end and all that moves is
+    observed.
 
     Args:
         trials: of a log, not cut.
@@ -244,14 +245,16 @@ def foreseen(
         physics: its MJCF, compiled.
         model: the nominal model.
     """
-    if not _observed(config, physics):
-        return list(trials)
-    length = min(_lengths(trials, config, model), default=np.inf)
-    if np.isinf(length):
-        return list(trials)
-    cut = replace(config, cut=max(length, SHORTEST))
-    made = [one for trial in trials for one in pieces(trial, cut)]
-    return refined(made, config, model)
+    made, cut = list(trials), config
+    if config.cut:
+        made = [one for trial in trials for one in pieces(trial, config)]
+    length = np.inf
+    if _observed(config, physics):
+        length = min(_lengths(made, config, model), default=np.inf)
+    if np.isfinite(length):
+        cut = replace(config, cut=max(length, SHORTEST))
+        made = [one for trial in trials for one in pieces(trial, cut)]
+    return refined(made, config, model) if cut.cut else made
 
 
 def _observed(config: OwnConfig, model: mujoco.MjModel) -> bool:

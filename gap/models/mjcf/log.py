@@ -7,7 +7,6 @@ import numpy as np
 from bns.errors import FormatError
 from bns.gap.importers import tables
 from bns.gap.importers.tables import SENT, TIME, TRIAL, Column, Table
-from bns.gap.models.mjcf import cuts
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.worlds.data import dataset_checks as checks
 from bns.worlds.data.importing import FACTORS, MOMENTS
@@ -25,8 +24,7 @@ def read(path: str, config: OwnConfig) -> list[Trial]:
     `trial` and `command_time` [s]; [log] in the description names others. A stretch of
     equal commands becomes one command, which begins at its `command_time`, else with
     its first row; commands that are held for a few rows may then have begun since the
-    row before. Empty cells are lost samples. With `cut` in [start] each trial becomes
-    several.
+    row before. Empty cells are lost samples.
 
     Raises:
         FormatError: no such file, a column missing, or time going backwards.
@@ -34,11 +32,10 @@ def read(path: str, config: OwnConfig) -> list[Trial]:
     table = tables.read(path)
     columns = channels(table, config, path)
     return [
-        piece
-        for number, rows in enumerate(split(columns[TRIAL]))
-        for piece in _trials(
+        _trial(
             {n: v[rows] for n, v in columns.items()}, config, f"{path}, trial {number}"
         )
+        for number, rows in enumerate(split(columns[TRIAL]))
     ]
 
 
@@ -89,13 +86,6 @@ def _factor(unit: str) -> float:
         if unit in row:
             return row[unit]
     return 1.0
-
-
-def _trials(
-    columns: Mapping[str, np.ndarray], config: OwnConfig, where: str
-) -> list[Trial]:
-    trial = _trial(columns, config, where)
-    return cuts.pieces(trial, config) if config.cut else [trial]
 
 
 def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> Trial:

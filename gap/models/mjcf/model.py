@@ -87,8 +87,6 @@ class OwnModel(GapModel):
         """Trials of a log, none longer than the model foresees."""
         config = self.config.mapped(columns) if columns else self.config
         trials = log.read(path, config)
-        if self.config.cut:
-            return cuts.refined(trials, self.config, self)
         return cuts.foreseen(trials, self.config, self.physics.model, self)
 
     def beside(
