@@ -28,7 +28,9 @@ HALF = 0.03  # [s] on each side of a start, of the samples that tell its state
 LEAST = 4  # samples on each side at least
 BEFORE = 0.5  # [s] of commands before a piece
 GRID = 0.005  # [s] between them
-REFINED = 2  # times that starts are fitted to a motion
+REFINED = 2  # times that starts are fitted to the nominal motion, which may be wrong
+RESTARTED = 6  # the same, at most, to the motion that was found
+STILL = 0.1  # standard deviations of a start: it stays
 ASTRAY = 3.0  # standard deviations of a number of a start: then it was fitted wrongly
 
 
@@ -68,7 +70,7 @@ def refined(trials: Sequence[Trial], config: OwnConfig, model: GapModel) -> list
         config: of the robot.
         model: the nominal model.
     """
-    return _refined(trials, config, model, [{} for _ in trials])[0]
+    return _refined(trials, config, model, [{} for _ in trials], REFINED)[0]
 
 
 def restarted(
@@ -89,7 +91,7 @@ def restarted(
         model: the nominal model.
         known: by trial the values of the rows that are not nominal.
     """
-    found, farthest = _refined(trials, config, model, known)
+    found, farthest = _refined(trials, config, model, known, RESTARTED)
     return found if farthest > ASTRAY else list(trials)
 
 
@@ -98,13 +100,14 @@ def _refined(
     config: OwnConfig,
     model: GapModel,
     known: Sequence[Mapping[str, float]],
+    turns: int,
 ) -> tuple[list[Trial], float]:
-    """Trials with starts that were fitted, and by how many standard deviations the
-    farthest number of them moved."""
+    """Trials with starts that were fitted in so many turns, fewer if they stay, and by
+    how many standard deviations the farthest number of them moved."""
     joints = [k for k, item in enumerate(config.seen) if item.quantity == "joint"]
     made, noise = list(trials), np.array([config.seen[k].noise for k in joints])
     total = np.zeros(0)
-    for _ in range(REFINED):
+    for _ in range(turns):
         names, (base, *ways) = model.started(made, known)
         if not names:
             break
@@ -118,6 +121,8 @@ def _refined(
             off = {n: float(z) * sds[n] for n, z in found if n in sds}
             made[number] = start.moved(trial, off, config) if off else trial
         total = moved if not total.size else total + moved
+        if np.abs(moved).max() < STILL:
+            break
     return made, float(np.abs(total).max(initial=0.0))
 
 

@@ -10,7 +10,8 @@ from bns.gap.decomposition.reference import Corrected
 from bns.gap.describe import describe
 from bns.gap.diagnose import diagnose
 from bns.gap.models.base import GapModel
-from bns.gap.models.mjcf import cuts, prepared
+from bns.gap.models.mjcf import cuts, log, prepared
+from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.models.mjcf.model import OwnModel
 
 CART = """<mujoco model="cart"><option timestep="0.01" integrator="RK4"/>
@@ -32,11 +33,12 @@ CART = """<mujoco model="cart"><option timestep="0.01" integrator="RK4"/>
 NOISE, RATE = 5e-4, 50
 
 
-def recorded(path, friction=0.0, trials=5, seconds=3.0):
+def recorded(path, friction=0.0, trials=5, seconds=3.0, gain=1.0):
     """A log at 50 Hz of a cart with dry friction [N], simulated at 1 ms."""
     model = mujoco.MjModel.from_xml_string(CART)
     model.opt.timestep = 0.001
     model.dof_frictionloss[0] = friction
+    model.actuator_gainprm[0, 0] *= gain
     rng, lines = np.random.default_rng(3), ["time,push_cmd,rail,pivot,trial"]
     for trial in range(trials):
         data, goal = mujoco.MjData(model), 0.0
@@ -77,6 +79,46 @@ def test_friction_of_an_unstable_robot_is_named(said):
     _, found, _ = said(0.4)
     assert found.verdict.named[0] == ("joint_friction[rail]",)
     assert found.best.magnitudes[0] == pytest.approx(0.4, abs=0.02)
+
+
+@pytest.fixture
+def weak(tmp_path):
+    """One long recording of a cart whose motor pushes four fifths; its model."""
+    (tmp_path / "cart.xml").write_text(CART)
+    recorded(tmp_path / "log.csv", trials=1, seconds=12.0, gain=0.8)
+    own = tmp_path / "own.toml"
+    describe(tmp_path / "cart.xml", tmp_path / "log.csv", out=own).write(own)
+    model = OwnModel(replace(OwnConfig.read(own), cut=3.0), threads=1)
+    return model, model.read_log(str(tmp_path / "log.csv"))
+
+
+def test_pieces_of_a_long_recording_are_no_longer_than_what_is_foreseen(weak, tmp_path):
+    model, trials = weak
+    (whole,) = log.read(str(tmp_path / "log.csv"), model.config)
+    assert len(cuts.pieces(whole, model.config)) == 4 < len(trials)
+
+
+def test_starts_are_those_of_the_motion_that_was_found(weak):
+    """Fitted to the nominal motion, they make up for what a weak motor lacks."""
+    model, trials = weak
+    known = {"actuator_gain[push]": 0.8}
+    model.rows(trials)
+    same, begun = model.beside(trials, [known] * len(trials))
+    assert same is model
+    away = [_rest(model, some, known) for some in (trials, begun)]
+    assert away[1] < 0.5 * away[0]
+    again = model.beside(begun, [known] * len(trials))[1]
+    assert all(one is other for one, other in zip(again, begun, strict=True))
+    found = diagnose(trials, model, full=False)
+    assert found.verdict.named == (("actuator_gain[push]",),)
+    assert found.best.magnitudes[0] == pytest.approx(0.8, abs=0.02)
+
+
+def _rest(model, trials, known):
+    """Mean square of what a cart's place departs by at the end of each piece [m2]."""
+    (paths,) = model.paths(trials, [[known] * len(trials)])
+    ends = [(t.observed[-1] - p[-1])[0] for t, p in zip(trials, paths, strict=True)]
+    return float(np.mean(np.square(ends)))
 
 
 def test_recordings_without_a_change_keep_all_that_the_model_can(said):

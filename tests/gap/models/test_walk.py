@@ -105,6 +105,21 @@ def test_what_walking_scatters_is_found_by_walking(model, told):
     assert ((units - columns @ found) ** 2).mean() < 0.6 * (units**2).mean()
 
 
+def test_what_walking_scatters_is_otherwise_beside_what_was_found(model, told):
+    trials = walk_cases.record(told[:1], [], 1)
+    share = {row.name: 1.0 for row in model.rows(trials) if row.nuisance}
+    one = dict(list(share.items())[:1])
+    late = {"command_latency": 0.06}
+    other, begun = model.beside(trials, [late | one] * len(trials))
+    assert begun is trials and other is not model
+    changed = []
+    for some in (model, other):
+        bare, shared = some.paths(trials, [[late], [late | one]])
+        changed.append(shared[0] - bare[0])
+    assert np.abs(changed[1]).max() > 1e-3
+    assert np.abs(changed[1] - changed[0]).max() > 1e-3
+
+
 def test_walks_of_unequal_length_are_compared(model):
     """Commands last until the robot rests: no two trials are as long."""
     told = walk_cases.commands(np.random.default_rng(2), model)
