@@ -217,24 +217,27 @@ def _several(tried: Singles, found: Support, best: Point) -> Point:
     """The best point where a tangent finds several explanations, or one of many
     numbers: from ever more starts, until one of them is enough."""
     points = [best] * bool(best.support)
-    for more in _starts(tried, found, points.copy()):
+    for more, few in _starts(tried, found, bool(points)):
         points += more
-        if any(enough(tried.problem, point) for point in points):
+        if any(enough(tried.problem, point, few) for point in points):
             break
     return refit.better(tried.problem, points)
 
 
 def _starts(
-    tried: Singles, found: Support, followed: list[Point]
-) -> Iterator[list[Point]]:
-    """Points from ever more starts: where many depart from single explanations of most
-    of the gap and from all that the tangent at the nominal finds; from the best single
-    ones once fitted, and a level on top; where many depart from all at once.
+    tried: Singles, found: Support, followed: bool
+) -> Iterator[tuple[list[Point], int]]:
+    """Points from ever more starts, with the number of explanations of which one of
+    them may be enough.
+
+    Where many depart, from the single explanations of most of the gap that the tangent
+    at the nominal shows; from the best single ones once fitted, and a level on top;
+    from all that the tangent finds; where many depart from all at once.
 
     Args:
         tried: single explanations.
         found: what the tangent finds.
-        followed: the point that this led to, where it is known.
+        followed: whether that was followed before.
     """
     problem, start, many = tried.problem, tried.start, tried.problem.model.many
     made: dict[Single, Point] = {}
@@ -242,19 +245,17 @@ def _starts(
         most = MOST * start.noise.loss(start.rest) / start.noise.lam
         leading = _leading(problem, tried.by_tangent)
         made = _from(tried, [one for one in leading if one.height < most])
-        yield [*made.values()]
-    if many and not followed:
-        yield [_followed(problem, start, found)]
+        yield [*made.values()], 1
     leading = _leading(problem, tried.fitted)
     made |= _from(tried, [one for one in leading if one not in made])
     points = [made[one] for one in leading]
     if not enough(problem, points[0]):
         points += _with_level(problem, leading[0], start)
-    yield points
+    yield points, FEW
+    if not followed:
+        yield [_followed(problem, start, found)], FEW
     if many:
-        yield [_from_all(problem, start)]
-    elif not followed:
-        yield [_followed(problem, start, found)]
+        yield [_from_all(problem, start)], FEW
 
 
 def enough(problem: Problem, point: Point, few: int = FEW) -> bool:
