@@ -2,7 +2,7 @@
 around it."""
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +22,6 @@ FEW = 2  # explanations that need no other start if they leave little
 ENOUGH = 1.2  # times what all explanations leave: little more
 NEARLY = 1.5  # the same where these, all together, only describe the recording
 ROUNDS = 2  # of levels, and of what walkers scatter
-MOST = 0.5  # of the gap: what leaves less explains most of it by itself
 MARGIN = 1.02  # of the held-out error that an autoregression may cost
 WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
 
@@ -91,7 +90,7 @@ def descend(
             problem, values, set(support) | fit.nuisances(problem), known, turns=most
         )
         values, rest = levels.zoomed(problem, values, rest, support, known)
-        kept = fit.lasting(problem, near, support, values, rest) if near else None
+        kept = fit.lasting(problem, near, support, values) if near else None
         linear, known, slopes = linearised(problem, values, rest, known, kept)
         at = values if kept is None or near is None else near.at
         inside = support & set(linear.terms)  # without what came back to nominal
@@ -215,47 +214,16 @@ def _by_itself(problem: Problem, level: Level, best: Point) -> Point:
 
 def _several(tried: Singles, found: Support, best: Point) -> Point:
     """The best point where a tangent finds several explanations, or one of many
-    numbers: from ever more starts, until one of them is enough."""
-    points = [best] * bool(best.support)
-    for more, few in _starts(tried, found, bool(points)):
-        points += more
-        if any(enough(tried.problem, point, few) for point in points):
-            break
-    return refit.better(tried.problem, points)
-
-
-def _starts(
-    tried: Singles, found: Support, followed: bool
-) -> Iterator[tuple[list[Point], int]]:
-    """Points from ever more starts, with the number of explanations of which one of
-    them may be enough.
-
-    Where many depart, from the single explanations of most of the gap that the tangent
-    at the nominal shows; from the best single ones once fitted, and a level on top;
-    from all that the tangent finds; where many depart from all at once.
-
-    Args:
-        tried: single explanations.
-        found: what the tangent finds.
-        followed: whether that was followed before.
-    """
-    problem, start, many = tried.problem, tried.start, tried.problem.model.many
-    made: dict[Single, Point] = {}
-    if many:
-        most = MOST * start.noise.loss(start.rest) / start.noise.lam
-        leading = _leading(problem, tried.by_tangent)
-        made = _from(tried, [one for one in leading if one.height < most])
-        yield [*made.values()], 1
-    leading = _leading(problem, tried.fitted)
-    made |= _from(tried, [one for one in leading if one not in made])
-    points = [made[one] for one in leading]
-    if not enough(problem, points[0]):
-        points += _with_level(problem, leading[0], start)
-    yield points, FEW
-    if not followed:
-        yield [_followed(problem, start, found)], FEW
-    if many:
-        yield [_from_all(problem, start)], FEW
+    numbers: from a single one, and if that is not enough from those that it found, and
+    from all where many depart."""
+    problem = tried.problem
+    points = _simple(tried) + [best] * bool(best.support)
+    if not any(enough(problem, point) for point in points):
+        if not best.support:
+            points.append(_followed(problem, tried.start, found))
+        if problem.model.many:
+            points.append(_from_all(problem, tried.start))
+    return refit.better(problem, points)
 
 
 def enough(problem: Problem, point: Point, few: int = FEW) -> bool:
@@ -288,6 +256,25 @@ def _followed(problem: Problem, start: Point, support: Support) -> Point:
     """A point from a set found by the tangent at the nominal model."""
     values = placed(problem, start.linear, support, start.values)
     return descend(problem, values, support, start.noise, start)
+
+
+def _simple(tried: Singles) -> list[Point]:
+    """Points from the best single explanation, and from it with a level on top; if it
+    has many numbers, which imitate much, from the best one of few, too.
+
+    Where many depart, what the tangent finds does if it is enough by itself."""
+    problem, start = tried.problem, tried.start
+    made: dict[Single, Point] = {}
+    if problem.model.many:
+        made = _from(tried, _leading(problem, tried.by_tangent))
+        if any(enough(problem, point, 1) for point in made.values()):
+            return list(made.values())
+    leading = _leading(problem, tried.fitted)
+    made |= _from(tried, [one for one in leading if one not in made])
+    points = [made[one] for one in leading]
+    if not enough(problem, points[0]):
+        points += _with_level(problem, leading[0], start)
+    return points
 
 
 def _leading(problem: Problem, singles: Sequence[Single]) -> list[Single]:

@@ -14,7 +14,6 @@ from bns.gap.decomposition.row import Row
 
 FAR = 0.3  # prior standard deviations beyond which slopes are taken anew
 MOVED = 0.5  # the same for what is not in, where many may depart
-PROMISING = 15  # explanations of which they are taken anew beyond that
 APART = 0.25  # plausible departures from which it counts how exact a row is simulated
 MEASURED = 4  # times that noise is measured from what it leaves
 ROUGH = 20.0  # [s] of recording for comparing these
@@ -291,36 +290,25 @@ def placed(
 
 
 def lasting(
-    problem: Problem,
-    point: Point,
-    support: Iterable[str],
-    values: np.ndarray,
-    rest: np.ndarray,
-) -> Mapping[int, np.ndarray]:
-    """A point's derivatives that are kept at other values, where many may depart and
-    taking all of them is what costs time: all if these are next to where they were
-    taken; those of what is not in, if they are not far; else those of what does not
-    promise most there.
+    problem: Problem, point: Point, support: Iterable[str], values: np.ndarray
+) -> Mapping[int, np.ndarray] | None:
+    """A point's derivatives that are kept at other values: all if these are next to
+    where they were taken; where many may depart those of what is not in, if they are
+    not far, since taking all of them is what costs time. None = none are kept.
 
     Args:
         problem: the recording.
         point: whose derivatives.
         support: explanations that are in at the other values.
         values: of all rows, ``(R,)``.
-        rest: residuals there, ``(N, C)``.
     """
     away = np.abs((values - point.at) / problem.sd).max()
     if away <= FAR:
         return point.slopes
-    anew = {*support, *nuisances(problem)}
-    if away > MOVED:
-        rough, *_ = linearised(problem, values, rest, point.noise, point.slopes)
-        inside = anew & set(rough.free)
-        others = sorted(set(rough.free) - inside)
-        others.sort(key=lambda name: rough.cost(inside | {name}))
-        anew |= set(others[:PROMISING])
-    rows = {k for name in anew for k in problem.terms[name]}
-    return {k: slope for k, slope in point.slopes.items() if k not in rows}
+    if not problem.model.many or away > MOVED:
+        return None
+    inside = {k for n in {*support, *nuisances(problem)} for k in problem.terms[n]}
+    return {k: slope for k, slope in point.slopes.items() if k not in inside}
 
 
 def nuisances(problem: Problem) -> set[str]:

@@ -53,7 +53,7 @@ def fitted_at(
     values, rest = levels.zoomed(problem, values, rest, support, point.noise)
     kept = point.slopes if near else None
     if problem.model.many and not near:
-        kept = fit.lasting(problem, point, support, values, rest)
+        kept = fit.lasting(problem, point, support, values)
     linear, known, slopes = linearised(problem, values, rest, point.noise, kept)
     at = values if kept is None else point.at
     inside = support & set(linear.terms)
@@ -127,17 +127,15 @@ def newton(
         known: noise.
         turns: steps at most.
         only: trials that count, None = all; the others' residuals are left out.
-        slopes: derivatives at these values, for the first step; None = taken. Where
-            many may depart they are kept over short steps that lower the loss, since
-            taking them is what costs time.
+        slopes: derivatives at these values, for the first step; None = taken.
 
     Returns:
         values, and residuals there ``(N, C)``.
     """
     part = problem if only is None else replace(problem, recorded=_kept(problem, only))
     names = [k for name in sorted(support) for k in problem.terms[name]]
-    rest, first = _rest(part, values, only), slopes
-    while turns:
+    rest = _rest(part, values, only)
+    for _ in range(turns):
         which = [
             k
             for k in names
@@ -146,23 +144,16 @@ def newton(
         ]
         if not which:
             break
-        used = slopes
-        if used is None or any(k not in used for k in which):
-            used = part.slopes(values, which, only=only)
-        kept = used is slopes and slopes is not first
-        moved = _step(part, values, rest, which, known, used, only)
-        turns -= not kept
+        if slopes is None or any(k not in slopes for k in which):
+            slopes = part.slopes(values, which, only=only)
+        moved = _step(part, values, rest, which, known, slopes, only)
         slopes = None
-        if moved is None and not kept:
-            break
         if moved is None:
-            continue
+            break
         change = np.abs((moved[0] - values)[which] / part.sd[which]).max()
         values, rest = moved
-        if change < STILL and not kept:
+        if change < STILL:
             break
-        if part.model.many and STILL <= change <= fit.FAR:
-            slopes = used
     return values, rest
 
 
