@@ -31,7 +31,7 @@ GRID = 0.005  # [s] between them
 REFINED = 2  # times that starts are fitted to the nominal motion, which may be wrong
 RESTARTED = 6  # the same, at most, to the motion that was found
 STILL = 0.1  # standard deviations of a start: it stays
-ASTRAY = 3.0  # standard deviations of a number of a start: then it was fitted wrongly
+BENT = 1.0  # deviations of the noise by which a motion may be out of proportion
 
 
 def pieces(trial: Trial, config: OwnConfig) -> list[Trial]:
@@ -80,10 +80,10 @@ def restarted(
     known: Sequence[Mapping[str, float]],
 ) -> list[Trial]:
     """Trials whose starts are those from which explanations come nearest to what was
-    seen; as they are, where none of them was far off.
+    seen; as they are, where the motion changes in proportion to its start.
 
     From a start that makes up for what the nominal model lacks, the motion that lacks
-    nothing goes astray, and not in proportion to it.
+    nothing goes astray; out of proportion, what starts may change no longer says how.
 
     Args:
         trials: pieces whose starts were fitted to the nominal motion.
@@ -91,8 +91,8 @@ def restarted(
         model: the nominal model.
         known: by trial the values of the rows that are not nominal.
     """
-    found, farthest = _refined(trials, config, model, known, RESTARTED)
-    return found if farthest > ASTRAY else list(trials)
+    found, bent = _refined(trials, config, model, known, RESTARTED)
+    return found if bent > BENT else list(trials)
 
 
 def _refined(
@@ -102,28 +102,34 @@ def _refined(
     known: Sequence[Mapping[str, float]],
     turns: int,
 ) -> tuple[list[Trial], float]:
-    """Trials with starts that were fitted in so many turns, fewer if they stay, and by
-    how many standard deviations the farthest number of them moved."""
+    """Trials with starts that were fitted in so many turns, fewer if they stay, and how
+    far a motion was from one in proportion, in deviations of its noise."""
     joints = [k for k, item in enumerate(config.seen) if item.quantity == "joint"]
     made, noise = list(trials), np.array([config.seen[k].noise for k in joints])
-    total = np.zeros(0)
+    expected: list[np.ndarray] = []
+    bent = 0.0
     for _ in range(turns):
         names, (base, *ways) = model.started(made, known)
         if not names:
             break
-        moved = np.zeros((len(made), len(names)))
+        for path, there in zip(base, expected, strict=False):
+            off = np.nan_to_num((path - there)[:, joints] / noise)
+            bent = max(bent, float(np.sqrt(np.mean(off**2))))
+        expected, farthest = [], 0.0
         for number, (trial, path) in enumerate(zip(made, base, strict=True)):
-            change = np.stack([way[number] - path for way in ways])[..., joints]
+            change = np.stack([way[number] - path for way in ways])
             units = (trial.observed - path)[:, joints] / noise
-            moved[number] = _nearest(units, change / noise)
+            size = _nearest(units, change[..., joints] / noise)
             sds = start.unsure(trial, config)
-            found = zip(names, moved[number], strict=True)
-            off = {n: float(z) * sds[n] for n, z in found if n in sds}
-            made[number] = start.moved(trial, off, config) if off else trial
-        total = moved if not total.size else total + moved
-        if np.abs(moved).max() < STILL:
+            own = np.array([name in sds for name in names])
+            expected.append(path + np.tensordot(size * own, change, axes=1))
+            found = zip(names, size, strict=True)
+            off_by = {n: float(z) * sds[n] for n, z in found if n in sds}
+            made[number] = start.moved(trial, off_by, config) if off_by else trial
+            farthest = max(farthest, float(np.abs(size * own).max()))
+        if farthest < STILL:
             break
-    return made, float(np.abs(total).max(initial=0.0))
+    return made, bent
 
 
 def _nearest(units: np.ndarray, change: np.ndarray) -> np.ndarray:
