@@ -31,7 +31,7 @@ GRID = 0.005  # [s] between them
 REFINED = 2  # times that starts are fitted to the nominal motion, which may be wrong
 RESTARTED = 6  # the same, at most, to the motion that was found
 STILL = 0.1  # standard deviations of a start: it stays
-BENT = 1.0  # deviations of the noise by which a motion may be out of proportion
+BENT = 0.1  # deviations of the noise by which a motion may be out of proportion
 
 
 def pieces(trial: Trial, config: OwnConfig) -> list[Trial]:
