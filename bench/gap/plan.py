@@ -141,7 +141,7 @@ def _hidden(rng, told, model):
     """An explanation's name, its effect as the poor recording shows it, its size."""
     import numpy as np
 
-    from bns.gap.bench.cases import SEEN, drawn
+    from bns.gap.bench.hidden import SEEN, drawn
     from bns.gap.decomposition import descent
     from bns.gap.decomposition.problem import Problem
 

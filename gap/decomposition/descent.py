@@ -143,16 +143,8 @@ def decompose(tried: Singles) -> Point:
         best = chosen
     if problem.model.many:
         best = _renewed(problem, best)
-    best = _simpler(problem, best)
+    best = simpler.simplest(problem, best)
     return _beyond_chance(problem, start, best, len(start.linear.free))
-
-
-def _simpler(problem: Problem, best: Point) -> Point:
-    """A point, or a simpler one that is as good."""
-    best = simpler.narrowed(problem, best)
-    if problem.model.many:
-        return simpler.swapped(problem, best)
-    return simpler.pruned(problem, best)
 
 
 def beside(problem: Problem, point: Point) -> tuple[Problem, Point]:
@@ -167,8 +159,7 @@ def beside(problem: Problem, point: Point) -> tuple[Problem, Point]:
     """
     for _ in range(ROUNDS if point.support else 0):
         trials, support = problem.trials, point.support
-        known = [problem.changed(point.values, n) for n in range(len(trials))]
-        model, begun = problem.model.beside(trials, known)
+        model, begun = problem.model.beside(trials, problem.known(point.values))
         same = all(one is other for one, other in zip(begun, trials, strict=True))
         if model is problem.model and same:
             break
@@ -176,7 +167,8 @@ def beside(problem: Problem, point: Point) -> tuple[Problem, Point]:
         other &= model is not problem.model
         values = np.where(other, problem.nominal, point.values)
         problem = replace(problem, model=model, trials=tuple(begun))
-        point = _simpler(problem, descend(problem, values, support, point.noise))
+        point = descend(problem, values, support, point.noise)
+        point = simpler.simplest(problem, point)
         if point.support == support:
             break
     return problem, point

@@ -155,6 +155,10 @@ class Problem:
             if value != row.nominal and number >= self.onset.get(row.name, 0)
         }
 
+    def known(self, values: np.ndarray) -> list[dict[str, float]]:
+        """Rows of values ``(R,)`` that are not nominal, by trial, see `changed`."""
+        return [self.changed(values, number) for number in range(len(self.trials))]
+
     def residual(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Recorded minus predicted features, and the predicted ones, ``(N, C)``.
 
@@ -175,9 +179,9 @@ class Problem:
         """
         if not any(map(self.model.begun, self.trials)):
             return np.zeros((0, *self.recorded.shape))
-        known = [self.changed(values, number) for number in range(len(self.trials))]
+        known = self.known(values)
         _, made = self.model.started(self.trials, known, fine=False)
-        base, *moved = (self._features(paths) for paths in made)
+        base, *moved = (self.features(paths) for paths in made)
         return np.nan_to_num(np.stack(moved) - base)
 
     @cached_property
@@ -207,8 +211,8 @@ class Problem:
         """Whether it is left open when some command began."""
         return any(map(len, self.late))
 
-    def _features(self, paths: Sequence[np.ndarray]) -> np.ndarray:
-        """Features of a path of each trial, ``(N, C)``."""
+    def features(self, paths: Sequence[np.ndarray]) -> np.ndarray:
+        """Features ``(N, C)`` of a path of each trial."""
         parts = zip(self.trials, paths, self.windows, strict=True)
         return np.concatenate([self.model.compare(*part) for part in parts])
 

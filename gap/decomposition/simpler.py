@@ -16,6 +16,19 @@ SLIGHT = 0.25  # of a plausible departure: next to none
 ALIKE = 0.4  # cosine of what two explanations change, from which one may undo the other
 
 
+def simplest(problem: Problem, point: Point) -> Point:
+    """A point, or a simpler one that is as good.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+    """
+    point = narrowed(problem, point)
+    if problem.model.many:
+        return swapped(problem, point)
+    return pruned(problem, point)
+
+
 def swapped(problem: Problem, point: Point) -> Point:
     """A point with another explanation in the place of one, where that is better once
     it is fitted: a delay for a lag.

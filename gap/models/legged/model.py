@@ -113,8 +113,7 @@ class WalkModel(LibraryModel):
         made = copy.copy(self)
         made._walks = {}
         for trial, values in zip(trials, known, strict=True):
-            own = {n: v for n, v in values.items() if scatter.number(n) < 0}
-            made._scatter([trial], self._effects(own))
+            made._scatter([trial], self._effects(scatter.bare(values)))
         return made, trials
 
     def paths(
@@ -125,10 +124,7 @@ class WalkModel(LibraryModel):
         fine: bool = True,
     ) -> list[list[np.ndarray]]:
         """See `GapModel.paths`: what walks scatter is added to what effects do."""
-        own = [
-            [{n: v for n, v in row.items() if scatter.number(n) < 0} for row in values]
-            for values in sets
-        ]
+        own = [[scatter.bare(values) for values in row] for row in sets]
         made = super().paths(trials, own, fine=fine)
         for paths, values in zip(made, sets, strict=True):
             for at, (trial, row) in enumerate(zip(trials, values, strict=True)):

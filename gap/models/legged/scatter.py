@@ -9,7 +9,7 @@ Robots that lack a leg stumble where whole ones walk, so what a recording has pr
 lost (`likely`) is lost in these walks as well.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -36,6 +36,11 @@ def number(name: str) -> int:
     """Number of the walk that a row stands for; -1 = it is another row."""
     stem, _, rest = name.partition("[")
     return int(rest.rstrip("]")) if stem == "walk" else -1
+
+
+def bare(values: Mapping[str, float]) -> dict[str, float]:
+    """Values of rows, by name, without shares of walks."""
+    return {name: value for name, value in values.items() if number(name) < 0}
 
 
 def without(

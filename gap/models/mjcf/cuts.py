@@ -113,20 +113,19 @@ def _refined(
         if not names:
             break
         for path, there in zip(base, expected, strict=False):
-            off = np.nan_to_num((path - there)[:, joints] / noise)
-            bent = max(bent, float(np.sqrt(np.mean(off**2))))
+            apart = np.nan_to_num((path - there)[:, joints] / noise)
+            bent = max(bent, float(np.sqrt(np.mean(apart**2))))
         expected, farthest = [], 0.0
         for number, (trial, path) in enumerate(zip(made, base, strict=True)):
             change = np.stack([way[number] - path for way in ways])
             units = (trial.observed - path)[:, joints] / noise
             size = _nearest(units, change[..., joints] / noise)
             sds = start.unsure(trial, config)
-            own = np.array([name in sds for name in names])
-            expected.append(path + np.tensordot(size * own, change, axes=1))
+            expected.append(path + np.tensordot(size, change, axes=1))
             found = zip(names, size, strict=True)
-            off_by = {n: float(z) * sds[n] for n, z in found if n in sds}
-            made[number] = start.moved(trial, off_by, config) if off_by else trial
-            farthest = max(farthest, float(np.abs(size * own).max()))
+            off = {n: float(z) * sds[n] for n, z in found if n in sds}
+            made[number] = start.moved(trial, off, config) if off else trial
+            farthest = max(farthest, float(np.abs(size).max()))
         if farthest < STILL:
             break
     return made, bent

@@ -72,7 +72,7 @@ class View:
         data = mujoco.MjData(model)
         seen = [(self.config.seen[channel], self.parts[channel]) for channel in placed]
         where = {"site": data.site_xpos, "body": data.xpos}
-        found = [where[item.quantity][part, item.axis :][:1] for item, part in seen]
+        found = [where[s.quantity][part, s.axis : s.axis + 1] for s, part in seen]
         made[:, placed] = np.nan
         for row in np.flatnonzero(np.isfinite(states).all(axis=1)):
             data.qpos[:] = states[row, 1 : 1 + model.nq]
