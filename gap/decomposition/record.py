@@ -185,12 +185,19 @@ def _over(problem: Problem) -> str:
 
 
 def _sizes(made: Decomposition, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Root mean square by feature, and beyond the floor; without wild points."""
-    inside = made.inside
-    square = np.where(inside, np.nan_to_num(left) ** 2, 0.0).sum(axis=0)
+    """Root mean square by feature, and beyond the floor; without wild points.
+
+    What is beyond is averaged where the floor is low, as the excess of the verdict is:
+    the last windows of an unstable robot's pieces may be anywhere, and would hide it.
+    """
+    inside, floor = made.inside, made.floor.sd**2
+    squares = np.nan_to_num(left) ** 2
+    square = np.where(inside, squares, 0.0).sum(axis=0)
     square /= np.maximum(inside.sum(axis=0), 1)
-    beyond = np.maximum(square - (made.floor.sd**2).mean(axis=0), 0.0)
-    return np.sqrt(square), np.sqrt(beyond)
+    weight = np.where(inside, 1 / floor, 0.0)
+    more = (weight * (squares - floor)).sum(axis=0)
+    beyond = more / np.maximum(weight.sum(axis=0), np.finfo(float).tiny)
+    return np.sqrt(square), np.sqrt(np.clip(beyond, 0.0, square))
 
 
 def _said(made: Decomposition, part: Part) -> str:

@@ -262,7 +262,7 @@ def said(model, rows, *parts, **about):
         "problem": SimpleNamespace(model=model, rows=rows, windows=windows),
         "start": SimpleNamespace(rest=gap),
         "point": SimpleNamespace(rest=0 * gap),
-        "floor": SimpleNamespace(sd=0 * gap),
+        "floor": SimpleNamespace(sd=1e-6 + 0 * gap),
         "inside": gap > 0,
         "parts": parts,
         **{"kind": "effect", "tied": (), "goes": "", "onset": None},
@@ -364,3 +364,12 @@ def test_walkers_keep_what_their_model_is_unsure_by():
     }
     assert told["foot_slippery[all]"].unsure > 10 * told["foot_slippery[all]"].slack
     assert told["centre_of_mass.dy"].unsure == 0
+
+
+def test_windows_that_may_be_anywhere_do_not_hide_a_gap(recorded, model):
+    """The ends of an unstable robot's pieces: half a metre where half may be."""
+    gap, sd = np.full((4, 3), 0.01), np.full((4, 3), 0.001)
+    gap[2:], sd[2:] = 0.5, 0.6
+    floor, start = SimpleNamespace(sd=sd), SimpleNamespace(rest=gap)
+    size, *_ = said(model, model.rows(recorded[0]), floor=floor, start=start)
+    assert "differ by 350 mm" in size and "that is 9.9 mm" in size
