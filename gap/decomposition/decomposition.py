@@ -249,6 +249,9 @@ def _settled(
     if support != point.support:
         point = refit.refitted(problem, point, support)
         size = _Sizes.of(problem, start, point, known)
+    if point.support and size.foretells_worse(problem, start, point):
+        point = refit.refitted(problem, point, frozenset())
+        size = _Sizes.of(problem, start, point, known)
     return problem, point, size, unconfirmed
 
 
@@ -349,6 +352,13 @@ class _Sizes:
     def unexplained(self) -> float:
         """Share of the gap that is left and is not what differs between repeats."""
         return _share(self.after - self.scatter, self.before, self.after)
+
+    def foretells_worse(self, problem: Problem, start: Point, point: Point) -> bool:
+        """Whether explanations foretell motion that was not fitted worse than the
+        nominal model does: they describe the recording, not the robot."""
+        held = HeldOut.of(problem, point, shares.PIECES, self.inside)
+        nominal = held.nominal(start.rest)
+        return bool(held.error(point.support).sum() > nominal)
 
 
 def _share(size: float, before: float, after: float) -> float:

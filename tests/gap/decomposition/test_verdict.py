@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.gap.decomposition import fit
+from bns.gap.decomposition import decomposition, fit
 from bns.gap.decomposition.decomposition import Decomposition
 from bns.gap.decomposition.row import Row
 
@@ -75,3 +75,17 @@ def test_a_shift_in_time_that_is_at_its_bound_can_do_no_more(shift, there):
     made = SimpleNamespace(rows=rows)
     assert fit.smooth(made, np.array([shift, 0.0])) == ([0, 1] if there else [1])
     assert fit.smooth(problem(), np.array([shift, 0.0])) == [0, 1]  # an explanation
+
+
+@pytest.mark.parametrize(("error", "worse"), [(99.0, False), (101.0, True)])
+def test_what_foretells_worse_than_the_nominal_model_explains_nothing(
+    monkeypatch, error, worse
+):
+    held = SimpleNamespace(
+        nominal=lambda rest: 100.0, error=lambda support: np.full(4, error / 4)
+    )
+    monkeypatch.setattr(decomposition.HeldOut, "of", lambda *given: held)
+    start, point = SimpleNamespace(rest=None), SimpleNamespace(support={"axle"})
+    sizes = SimpleNamespace(inside=None)
+    tells = decomposition._Sizes.foretells_worse
+    assert tells(sizes, problem(), start, point) is worse
