@@ -25,6 +25,7 @@ from bns.gap.decomposition.shares import Part
 from bns.gap.diagnose import diagnose
 from bns.gap.models.wheeled import changes, drives
 from bns.gap.recordings import check
+from bns.worlds.physics.rollout import Pool
 from bns.worlds.physics.wheeled_world import MujocoWorld
 from bns.worlds.trial import Commands
 
@@ -245,6 +246,19 @@ def test_between_slow_commands_a_width_of_a_dead_band_is_tried_however_many_are_
 def test_speeds_told_are_averaged_over_a_step():
     told = drives.told(Commands([[0.1, 0.2], [0.0, 0.0]], [0.013, 0.1]), (), 0.01)
     np.testing.assert_allclose(told[:3], [[0.1, 0.2], [0.03, 0.06], [0.0, 0.0]])
+
+
+def test_drives_that_effects_leave_alike_are_simulated_once(recorded, model):
+    """None of these speeds is as low as the dead band, one is as the other."""
+    trial = recorded[0][0]
+    slow = 0.5 * np.abs(trial.commands.values[trial.commands.values != 0]).min()
+    made = drives.Drives(model.name, Pool(1))
+    both = [[{"dead_band[both]": level}] for level in (slow, 0.9 * slow)]
+    (one,), (other,) = made.paths([trial], both)
+    assert len(made._cache) == 1
+    np.testing.assert_array_equal(one, other)
+    assert len(made.paths([trial], [[{"wheel_gain[left]": 0.9}]])[0]) == 1
+    assert len(made._cache) == 2
 
 
 def test_a_row_without_room_is_refused():

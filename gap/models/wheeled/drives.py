@@ -3,6 +3,7 @@
 import hashlib
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -90,12 +91,10 @@ class Drives:
     ) -> list[list[np.ndarray]]:
         starts = [start(trial) for trial in trials]
         drives = [list(zip(trials, row, starts, strict=True)) for row in changes]
-        keys = [[_key(*drive, dt) for drive in row] for row in drives]
+        jobs = [[_Drive.of(*drive, dt) for drive in row] for row in drives]
+        keys = [[job.key for job in row] for row in jobs]
         wanted = {
-            key: drive
-            for names, row in zip(keys, drives, strict=True)
-            for key, drive in zip(names, row, strict=True)
-            if key not in self._cache
+            job.key: job for row in jobs for job in row if job.key not in self._cache
         }
         made = self._run(wanted, dt)
         paths = [
@@ -115,27 +114,33 @@ class Drives:
         self._cache.move_to_end(key)
         return self._cache[key]
 
-    def _run(self, wanted: Mapping[bytes, tuple], dt: float) -> dict[bytes, np.ndarray]:
+    def _run(
+        self, wanted: Mapping[bytes, "_Drive"], dt: float
+    ) -> dict[bytes, np.ndarray]:
         """Poses from the origin every `KEPT` seconds, ``(S, 3)`` by key."""
-        jobs, yaws = [], []
         every = round(KEPT / dt)
-        for trial, changes, begin in wanted.values():
-            compiled = compile.compiled(self.robot, changes.body, dt)
-            yaw = heading(changes, begin)
-            speeds = told(trial.commands, changes.command, dt, changes.late)
-            speeds = speeds * (1 - changes.lost)
-            jobs.append(
-                Job(
-                    begun(self.robot, changes.body, dt, yaw),
-                    (Segment(compiled, speeds * self._per_command),),
-                )
+        jobs = [
+            Job(
+                begun(self.robot, each.body, dt, each.yaw),
+                (
+                    Segment(
+                        compile.compiled(self.robot, each.body, dt),
+                        each.speeds * self._per_command,
+                    ),
+                ),
             )
-            yaws.append(yaw)
+            for each in wanted.values()
+        ]
         place = compile.free_joint(compile.compiled(self.robot, (), dt).model)
         free = slice(1 + place.start, 1 + place.stop)
         made = {
             key: observe.planar(motion.states[:, free], yaw)[::every].copy()
-            for key, motion, yaw in zip(wanted, self._pool.map(jobs), yaws, strict=True)
+            for key, motion, yaw in zip(
+                wanted,
+                self._pool.map(jobs),
+                (each.yaw for each in wanted.values()),
+                strict=True,
+            )
         }
         self._cache.update(made)
         return made
@@ -147,13 +152,42 @@ def heading(changes: Changes, begin: np.ndarray) -> float:
     return round(float(begin[2] - changes.seen.get("marker_mount.yaw", 0.0)), 4)
 
 
-def _key(trial: Trial, changes: Changes, begin: np.ndarray, dt: float) -> bytes:
-    told_as = trial.commands.values.tobytes() + trial.commands.durations.tobytes()
-    words = [*map(str, (*changes.body, *changes.command)), repr(changes.lost)]
-    words += [repr(heading(changes, begin)), repr(dt), repr(changes.late)]
-    digest = hashlib.blake2b(told_as, digest_size=16)
-    digest.update(";".join(words).encode())
-    return digest.digest()
+@dataclass(frozen=True, eq=False)
+class _Drive:
+    """All that a simulated drive depends on: commands that effects leave as they are
+    make no other drive.
+
+    Attributes:
+        body: edits of the model, applied in order.
+        speeds: of both wheels at each physics step, ``(S, 2)`` [m/s].
+        yaw: heading at the start [rad].
+        key: the same for equal drives.
+    """
+
+    body: tuple[ModelEdit, ...]
+    speeds: np.ndarray
+    yaw: float
+    key: bytes
+
+    @classmethod
+    def of(
+        cls, trial: Trial, changes: Changes, begin: np.ndarray, dt: float
+    ) -> "_Drive":
+        """The drive of a trial with some numbers changed.
+
+        Args:
+            trial: recorded trial.
+            changes: the numbers.
+            begin: pose seen at the start, ``(3,)`` [m, m, rad].
+            dt: physics step [s].
+        """
+        yaw = heading(changes, begin)
+        speeds = told(trial.commands, changes.command, dt, changes.late)
+        speeds = speeds * (1 - changes.lost)
+        digest = hashlib.blake2b(speeds.tobytes(), digest_size=16)
+        words = [*map(str, changes.body), repr(yaw), repr(dt)]
+        digest.update(";".join(words).encode())
+        return cls(changes.body, speeds, yaw, digest.digest())
 
 
 def start(trial: Trial) -> np.ndarray:
