@@ -2,6 +2,7 @@
 
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 
 from bns.cli import dispatch
@@ -20,6 +21,7 @@ needed 43 s for what took them more than 120; idle ones lose a tenth."""
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; what a user can cause gives one line and exit code 2."""
     os.environ.setdefault("GOMP_SPINCOUNT", SPINS)  # read when PyTorch is imported
+    warnings.showwarning = _noted
     try:
         return dispatch(list(sys.argv[1:] if argv is None else argv))
     except BnsError as error:
@@ -37,6 +39,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has gone (`bns ... | head`)
         sys.stderr.close()
         return 0
+
+
+def _noted(message: Warning | str, *where: object, **more: object) -> None:
+    """What a library warns of, such as a model's deprecated attribute: a line for who
+    runs a command, without the place in our code."""
+    del where, more
+    print(f"note: {' '.join(str(message).split())}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import re
 import signal
 import sys
 import tomllib
+import warnings
 from functools import reduce
 
 import numpy as np
@@ -78,6 +79,20 @@ def test_threads_that_wait_leave_the_cores_to_others(said, monkeypatch):
     monkeypatch.setenv("GOMP_SPINCOUNT", "7")  # a user's own stays
     said("--version")
     assert os.environ["GOMP_SPINCOUNT"] == "7"
+
+
+def test_what_a_library_warns_of_is_a_line_without_our_code(
+    capsys, monkeypatch, tmp_path
+):
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
+    old = '<mujoco><compiler settotalmass="2"/><worldbody><geom size="1"/></worldbody>'
+    (tmp_path / "old.xml").write_text(old + "</mujoco>")
+    (tmp_path / "log.csv").write_text("time,a\n0,0\n0.1,0\n")
+    words = [str(tmp_path / name) for name in ("old.xml", "log.csv")]
+    assert main(["gap", "describe", *words]) == WRONG_INPUT
+    shown = capsys.readouterr().err.splitlines()
+    assert shown[0].startswith("note: compiler attribute 'settotalmass'")
+    assert all(line.startswith(("note: ", "bns: ")) for line in shown)
 
 
 def test_help_of_a_preset_shows_its_values(capsys):
