@@ -45,6 +45,7 @@ FACTORS = {
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
     "rad": {"rad": 1.0, "deg": np.pi / 180, "turn": 2 * np.pi},
     "m/s": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "khepera-speed": SPEED_UNIT},
+    "rad/s": {"rad/s": 1.0, "deg/s": np.pi / 180, "rpm": np.pi / 30},
 }
 TIMES = ("time", "command_time")
 UNITS = {**dict.fromkeys(TIMES, "s"), **checks.UNITS}

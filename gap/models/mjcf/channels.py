@@ -95,13 +95,20 @@ def commands(work: Work, told: list[Column], seen: list[Column]) -> None:
             work.told.append((column, actuator, unit))
             reason = why[column.name]
             line = f"{column.name}: told to actuator {actuator!r} in {unit}, {reason}"
-            (work.unsure if reason == "by order" else work.guessed).append(line)
+            (work.unsure if reason in matching.UNSURE else work.guessed).append(line)
         else:
             work.unsure.append(f"{column.name}: a command of no actuator, left out")
     if not work.told:
         raise BnsError(
             f"No command ({', '.join(c.name for c in told)}) is of an actuator of "
             f"{work.path} ({', '.join(names) or 'it has none: give --kp and --kd'})."
+        )
+    told_to = {actuator for _, actuator, _ in work.told}
+    if not work.loop:
+        work.unsure.extend(
+            f"actuator {name!r}: told by no column, so taken to be told 0"
+            for name in names
+            if name not in told_to
         )
     work.model = compiled(work.path, tolds(work))
 

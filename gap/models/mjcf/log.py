@@ -92,13 +92,18 @@ def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> 
     exact = SENT in columns
     columns = _exact(columns, config, where)
     times = columns[TIME] - columns[TIME][:1]
+    if not np.isfinite(times).all():
+        row = int(np.flatnonzero(~np.isfinite(times))[0])
+        raise FormatError(f"{where}: no time in its sample {row}.")
     if len(times) < 2 or not (np.diff(times) >= 0).all():
         raise FormatError(f"{where}: fewer than two samples, or time goes backwards.")
     told = np.stack([columns[item.channel.name] for item in config.told], axis=1)
     seen = np.stack([columns[item.channel.name] for item in config.seen], axis=1)
     seen[~np.isfinite(seen).all(axis=1)] = np.nan
     if not np.isfinite(told).all():
-        raise FormatError(f"{where}: a command is missing in some rows.")
+        row, column = np.argwhere(~np.isfinite(told))[0]
+        name = config.told[column].channel.name
+        raise FormatError(f"{where}: {name} is missing in its sample {row}.")
     change = (np.diff(told[:-1], axis=0) != 0).any(axis=1)
     begins = np.concatenate([[0], np.flatnonzero(change) + 1])
     begins = begins[np.diff(times[np.append(begins, len(times) - 1)]) > 0]

@@ -41,7 +41,12 @@ UNITS = {
     "ms": "ms",
     "us": "us",
     "ns": "ns",
+    "dps": "deg/s",
+    "rpm": "rpm",
 }
+BY_WORD, BY_ORDER = "by a word of its name", "by order"
+UNSURE = (BY_WORD, BY_ORDER)
+RATES = _set("rad deg m cm mm")
 TIMES = _set("time t stamp timestamp timestamps secs clock elapsed")
 TRIALS = _set("trial run episode episode_index rep repetition")
 SENT = _set("command_time sent cmd_time sent_time t_sent t_cmd time_sent")
@@ -57,16 +62,22 @@ def words(name: str) -> list[str]:
 
 
 def unit(name: str) -> str:
-    """The unit at the end of a name; "" = none there."""
-    found = words(name)
-    return UNITS.get(found[-1], "") if len(found) > 1 else ""
+    """The unit at the end of a name, "elbow_vel_rad_s"; "" = none there."""
+    return _ending(words(name))[1]
+
+
+def _ending(said: Sequence[str]) -> tuple[int, str]:
+    """How many words of a name are its unit, and the unit."""
+    per = 2 if said[-2:] == ["per", "s"] else 1
+    if len(said) > per + 1 and said[-1] == "s" and said[-1 - per] in RATES:
+        return per + 1, f"{UNITS[said[-1 - per]]}/s"
+    return (1, UNITS[said[-1]]) if len(said) > 1 and said[-1] in UNITS else (0, "")
 
 
 def core(name: str) -> str:
     """What is left of a name without words for what and in which unit it is."""
     said = words(name)
-    if unit(name):
-        said = said[:-1]
+    said = said[: len(said) - _ending(said)[0]]
     dropped = TOLD | SEEN | SPEED | EFFORT | POSITION | DRIVE
     return "".join(word for word in said if word not in dropped)
 
@@ -83,7 +94,8 @@ def quantity(column: Column) -> str:
     said = set(words(column.name))
     if said & EFFORT:
         return tables.EFFORT
-    return tables.SPEED if said & SPEED else tables.POSITION
+    rate = unit(column.name) in ("rpm", *(f"{name}/s" for name in RATES))
+    return tables.SPEED if said & SPEED or rate else tables.POSITION
 
 
 def clock(names: Sequence[str]) -> str:
@@ -181,7 +193,8 @@ def match(
     """Which part each column is of, and how that was found.
 
     By the same name; by the same name without words for what it is; by one name that
-    ends with the other; by order, if as many columns as parts are left.
+    ends with the other; by a word that no other column and part share; by order, if as
+    many columns as parts are left.
 
     Args:
         columns: of one quantity.
@@ -197,6 +210,7 @@ def match(
         ("by its name", lambda c, p: _alike(_bare(c.part or c.name), _bare(p))),
         ("by its name", lambda c, p: _alike(core(c.part or c.name), core(p))),
         ("by the end of its name", lambda c, p: _ends(core(c.part or c.name), core(p))),
+        (BY_WORD, lambda c, p: bool(_telling(c.part or c.name) & _telling(p))),
     )
     for reason, fits in rules:
         _unique(columns, parts, fits, found, why, reason)
@@ -204,7 +218,7 @@ def match(
     free = [part for part in parts if part not in found.values()]
     if left and len(left) == len(free):
         for column, part in zip(left, free, strict=True):
-            found[column.name], why[column.name] = part, "by order"
+            found[column.name], why[column.name] = part, BY_ORDER
     return found, why
 
 
@@ -224,6 +238,14 @@ def _unique(
         others = [c for c in columns if c.name not in found and fits(c, hits[0])]
         if len(others) == 1:
             found[column.name], why[column.name] = hits[0], reason
+
+
+def _telling(name: str) -> frozenset[str]:
+    """Words of a name that may tell one part from others: "left", not "pos" or "mm"."""
+    said = words(name)
+    said = said[: len(said) - _ending(said)[0]]
+    dropped = TOLD | SEEN | SPEED | EFFORT | POSITION | DRIVE
+    return frozenset(word for word in said if len(word) > 2 and word not in dropped)
 
 
 def _alike(one: str, other: str) -> bool:
@@ -260,11 +282,14 @@ def by_place(
     """
     found: dict[str, tuple[str, str, str]] = {}
     for column in columns:
-        name, axis = column.name, ""
+        pieces = column.name.split("_")
+        size = _ending([piece.lower() for piece in pieces])[0]
+        name, axis = "_".join(pieces[: len(pieces) - size]), ""
         stem, _, last = name.rpartition("_")
         for kind, parts in table.items():
-            if name in parts:
-                found.setdefault(column.name, (kind, name, axis))
+            if column.name in parts or name in parts:
+                called = column.name if column.name in parts else name
+                found.setdefault(column.name, (kind, called, axis))
             elif last in AXES and (called := _one(stem, parts)):
                 found.setdefault(column.name, (kind, called, last))
     return found

@@ -94,6 +94,8 @@ def _called(
 def _units(model: mujoco.MjModel, part: Part, column: Column) -> dict[str, float]:
     known = dict(rehearsal.factors(model, part))
     said = matching.unit(column.name)
+    if part.quantity == rehearsal.SPEED and said not in known:
+        said = next(iter(known))  # of SI, unless it is said
     return {said: known[said]} if said in known else known
 
 
@@ -132,7 +134,7 @@ def _chosen(
         line += "; moves alike: " + ", ".join(
             f"{p.quantity} {p.name}" for p in near[:2]
         )
-    sure = fit.score > AGREES and reason not in ("by order", "for it moves so")
+    sure = fit.score > AGREES and reason not in (*matching.UNSURE, "for it moves so")
     if fit.correlation < -AGREES:
         line += "; it moves against the model: is its sign another?"
         sure = False

@@ -221,6 +221,50 @@ def test_commands_are_found_where_no_goal_is(names, told):
     assert [column.name for column in found] == told.split()
 
 
+@pytest.mark.parametrize(
+    ("name", "unit", "quantity"),
+    [
+        ("elbow_vel_rad_s", "rad/s", tables.SPEED),
+        ("elbow velocity [deg/s]", "deg/s", tables.SPEED),
+        ("elbow_deg_per_s", "deg/s", tables.SPEED),
+        ("wheel_rpm", "rpm", tables.SPEED),
+        ("t_s", "s", tables.POSITION),
+        ("elbow_deg", "deg", tables.POSITION),
+    ],
+)
+def test_units_of_speed_are_read_and_are_no_part_of_the_name(name, unit, quantity):
+    assert matching.unit(name) == unit
+    assert matching.quantity(tables.Column(name, np.zeros(2))) == quantity
+    assert matching.core(name) in ("elbow", "wheel", "t")
+
+
+def test_a_word_that_one_part_alone_has_tells_which_it_is():
+    columns = [
+        tables.Column(f"{s} finger (mm)", np.zeros(2)) for s in ("left", "right")
+    ]
+    found, why = matching.match(columns, ["base", "right_slide", "left_slide"])
+    assert found == {
+        "left finger (mm)": "left_slide", "right finger (mm)": "right_slide"
+    }  # fmt: skip
+    assert set(why.values()) == {matching.BY_WORD}
+    assert not matching.match(columns[:1], ["left_a", "left_b"])[0]
+
+
+def test_a_place_may_end_with_its_unit():
+    column = tables.Column("marker_x_mm", np.zeros(2))
+    places = {"site": ["marker"], "body": ["base"]}
+    assert matching.by_place([column], places) == {column.name: ("site", "marker", "x")}
+
+
+def test_an_actuator_that_nothing_tells_is_listed(tmp_path):
+    (tmp_path / "arm.xml").write_text(ARM.replace("ACTUATORS", SERVOS))
+    table = np.column_stack([np.arange(0, 2, 0.1), *np.zeros((3, 20))])
+    head = "time,hip_goal,hip,calf"
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header=head, comments="")
+    found = describe(tmp_path / "arm.xml", tmp_path / "a.csv")
+    assert any("told by no column" in line for line in found.unsure)
+
+
 def test_what_never_changes_is_no_command():
     noise = np.random.default_rng(0).normal(size=60)
     columns = [

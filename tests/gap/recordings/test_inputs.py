@@ -1,5 +1,7 @@
 """What a user gives: models and recordings by name, and what is refused."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -69,6 +71,11 @@ def test_commands_that_the_robot_can_not_be_told_are_refused(model, drive):
     told = Commands(fast, drive.commands.durations)
     with pytest.raises(BnsError, match=r"trial 0: left_speed = -1\.0 m/s"):
         load_recordings.tellable([drive.replace(commands=told)], model)
+    loose = SimpleNamespace(name="own", limits=model.limits, beyond=1.0)
+    more = Commands(drive.commands.values * 5, drive.commands.durations)
+    load_recordings.tellable([drive.replace(commands=more)], loose)
+    with pytest.raises(BnsError, match=r"trial 0: left_speed = -1\.0 m/s"):
+        load_recordings.tellable([drive.replace(commands=told)], loose)
     other = (Channel("forward_speed", "m/s"), Channel("turning_rate", "rad/s"))
     told = Commands(drive.commands.values, drive.commands.durations, other)
     with pytest.raises(BnsError, match="'forward_speed'; model 'khepera3' is told"):
