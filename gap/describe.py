@@ -19,14 +19,12 @@ from bns.gap.models.mjcf.channels import (
     Work,
     commands,
     compiled,
-    factor,
-    si_unit,
     tolds,
 )
 from bns.gap.models.mjcf.config import WINDOW
 from bns.gap.models.mjcf.log import split
 from bns.gap.models.mjcf.measured import observed, replayed
-from bns.worlds.data.importing import FACTORS
+from bns.worlds.data.units import FACTORS, factor, si_unit
 
 
 @dataclass(frozen=True)

@@ -160,11 +160,11 @@ def _start() -> Schema:
 def columns() -> Schema:
     """Schema of the map of a log's columns, for `--columns`."""
     from bns.worlds.data import importing
+    from bns.worlds.data.units import FACTORS
     from bns.worlds.trial import POSE
 
     known = {
-        name: _source(tuple(importing.FACTORS[unit]))
-        for name, unit in importing.UNITS.items()
+        name: _source(tuple(FACTORS[unit])) for name, unit in importing.UNITS.items()
     }
     table = {
         "type": "object",

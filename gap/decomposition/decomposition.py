@@ -82,7 +82,7 @@ class Decomposition:
         if not point.support:
             return 0.0
         held = HeldOut.of(problem, point, shares.PIECES, self.inside)
-        none, some = held.nominal(self.start.rest), held.error(point.support).sum()
+        none, some = held.compared(self.start.rest, point.support)
         least = held.nominal(self.floor.sd)
         if not self.lasting:
             least = held.error(point.linear.free).sum()
@@ -357,8 +357,8 @@ class _Sizes:
         """Whether explanations foretell motion that was not fitted worse than the
         nominal model does: they describe the recording, not the robot."""
         held = HeldOut.of(problem, point, shares.PIECES, self.inside)
-        nominal = held.nominal(start.rest)
-        return bool(held.error(point.support).sum() > nominal)
+        none, some = held.compared(start.rest, point.support)
+        return some > none
 
 
 def _share(size: float, before: float, after: float) -> float:

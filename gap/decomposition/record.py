@@ -148,14 +148,14 @@ def statements(made: Decomposition) -> list[str]:
             for name, number in made.unconfirmed.items()
         )
     )
-    before, beyond = _sizes(made, made.start.rest)
+    before, beyond = rest.sizes(made.start.rest, made.floor, made.inside)
     size = words.size(before, beyond, features, _over(problem))
     if made.kind == "no gap":
         said = ["No gap beyond what the recording scatters by itself." + apart]
         if made.before > LARGE:
             said += [size, UNSURE if made.left < HALF else SCATTERED]
         return said
-    _, left = _sizes(made, made.point.rest)
+    _, left = rest.sizes(made.point.rest, made.floor, made.inside)
     listed = [_said(made, part) for part in made.parts]
     date = ""
     if made.onset:
@@ -182,22 +182,6 @@ def _over(problem: Problem) -> str:
         return f"in trials of {np.median(spans):.2g} s"
     window = np.median(np.concatenate([w.durations for w in problem.windows]))
     return f"over {window:.2g} s"
-
-
-def _sizes(made: Decomposition, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Root mean square by feature, and beyond the floor; without wild points.
-
-    What is beyond is averaged where the floor is low, as the excess of the verdict is:
-    the last windows of an unstable robot's pieces may be anywhere, and would hide it.
-    """
-    inside, floor = made.inside, made.floor.sd**2
-    squares = np.nan_to_num(left) ** 2
-    square = np.where(inside, squares, 0.0).sum(axis=0)
-    square /= np.maximum(inside.sum(axis=0), 1)
-    weight = np.where(inside, 1 / floor, 0.0)
-    more = (weight * (squares - floor)).sum(axis=0)
-    beyond = more / np.maximum(weight.sum(axis=0), np.finfo(float).tiny)
-    return np.sqrt(square), np.sqrt(np.clip(beyond, 0.0, square))
 
 
 def _said(made: Decomposition, part: Part) -> str:

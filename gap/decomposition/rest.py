@@ -167,6 +167,25 @@ def beyond(
     return float(more @ count / max(count.sum(), 1))
 
 
+def sizes(
+    rest: np.ndarray, known: Floor, inside: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Root mean square of each feature, ``(C,)``, and what of it is beyond the floor,
+    ``(C,)``: averaged where the floor is low, as `excess` is. The last windows of an
+    unstable robot's pieces may be anywhere, and would hide it.
+
+    Args:
+        rest: residuals, ``(N, C)``.
+        known: the floor.
+        inside: which residuals count, ``(N, C)``.
+    """
+    count = np.maximum(inside.sum(axis=0), 1)
+    square = np.where(inside, np.nan_to_num(rest) ** 2, 0.0).sum(axis=0) / count
+    weight = np.where(inside, 1 / known.sd**2, 0.0).sum(axis=0) / count
+    beyond = _by_feature(rest, known, inside) / np.maximum(weight, 1e-300)
+    return np.sqrt(square), np.sqrt(np.clip(beyond, 0.0, square))
+
+
 def _by_feature(values: np.ndarray, known: Floor, inside: np.ndarray) -> np.ndarray:
     """Mean square of each feature in units of the floor, less one, ``(C,)``."""
     units = np.where(inside, np.nan_to_num(values) / known.sd, 0.0)

@@ -162,6 +162,10 @@ class HeldOut:
         of what is not smooth."""
         return float((self.weight * np.nan_to_num(rest) ** 2).sum())
 
+    def compared(self, rest: np.ndarray, support: Iterable[str]) -> tuple[float, float]:
+        """Squared error of the nominal model, see `nominal`, and that of a set."""
+        return self.nominal(rest), float(self.error(support).sum())
+
     def error(self, support: Iterable[str]) -> np.ndarray:
         """Squared error of each stretch, the rows fitted to the others, ``(B,)``."""
         linear, plain, fitted = self._levelled(support)

@@ -58,8 +58,8 @@ class GapModel(ABC):
         resolution: smallest standard deviation of the measurement of each observed
             channel that is believed, ``(n_channels,)``.
         limits: lowest and highest command and its unit, by channel; empty = not known.
-        beyond: share of a command's range by which a recording may be told more: where
-            limits are those of plans, not the robot's.
+        leeway: share of a command's range by which a recording may be told more: much
+            where limits are those of plans, not the robot's.
         dt: physics step [s]; 0 = none.
         whole: whether motion is compared since its trial began, not over windows.
         timed: whether commands last as long as they are told.
@@ -86,7 +86,7 @@ class GapModel(ABC):
     process: np.ndarray
     resolution: np.ndarray
     limits: Mapping[str, tuple[float, float, str]] = {}
-    beyond: float = 0.0
+    leeway: float = 1e-6
     dt: float = 0.0
     whole: bool = False
     timed: bool = True

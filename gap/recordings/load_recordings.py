@@ -279,7 +279,7 @@ def tellable(found: Sequence[Trial], model: GapModel) -> None:
                     f"{model.name!r} is told {', '.join(known)}."
                 )
             low, high, unit = known[channel.name]
-            margin = max(model.beyond, 1e-6) * (high - low)
+            margin = model.leeway * (high - low)
             values = trial.commands.values[:, column]
             for value in (float(values.min()), float(values.max())):
                 if not low - margin <= value <= high + margin:

@@ -37,16 +37,9 @@ from bns.errors import BnsError, FormatError, UnknownNameError
 from bns.storage import reading, tables
 from bns.worlds.data import dataset_checks as checks
 from bns.worlds.data.mcap_log import STAMPS
+from bns.worlds.data.units import FACTORS
 from bns.worlds.trial import POSE, WHEEL_CHANNELS, Channel, Commands, Trial
 
-SPEED_UNIT = 1e-3 / 144.01  # [m/s] Khepera III manual 2.2, p. 14 (firmware < 3)
-FACTORS = {
-    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
-    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
-    "rad": {"rad": 1.0, "deg": np.pi / 180, "turn": 2 * np.pi},
-    "m/s": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "khepera-speed": SPEED_UNIT},
-    "rad/s": {"rad/s": 1.0, "deg/s": np.pi / 180, "rpm": np.pi / 30},
-}
 TIMES = ("time", "command_time")
 UNITS = {**dict.fromkeys(TIMES, "s"), **checks.UNITS}
 SPEEDS = tuple(channel.name for channel in WHEEL_CHANNELS)

@@ -13,7 +13,7 @@ from bns.gap.importers.tables import Column, Table
 from bns.gap.models.mjcf import guesses, matching, prepared, rehearsal
 from bns.gap.models.mjcf.config import OwnConfig, Told
 from bns.gap.models.mjcf.rehearsal import Part
-from bns.worlds.data.importing import FACTORS
+from bns.worlds.data.units import factor, per_si, si_unit
 from bns.worlds.trial import Channel
 
 GOAL = {"goal", "des", "desired", "target"}
@@ -147,16 +147,16 @@ def _told_unit(
         return "1"
     moved = [joint] if joint else _wound(model, number)
     if not (moved and all(rehearsal.turns(model, name) for name in moved)):
-        units = {u: 1 / f for u, f in FACTORS["m"].items()}
+        known = per_si("m")
     else:
-        units = dict(rehearsal.ANGLE)
-        units.pop("turn")
+        known = per_si("rad")
+        known.pop("turn")
     said = matching.unit(column.name)
-    if said in units:
+    if said in known:
         return said
     largest = _widest(model, number, joint)
     size = float(np.nanmax(np.abs(column.values)))
-    return next((u for u, f in units.items() if size / f <= 1.05 * largest), "rad")
+    return next((u for u, f in known.items() if size / f <= 1.05 * largest), "rad")
 
 
 def _wound(model: mujoco.MjModel, actuator: int) -> list[str]:
@@ -228,13 +228,3 @@ def tolds(work: Work) -> list[Told]:
         channel = Channel(column.name, si_unit(unit))
         made.append(Told(channel, actuator, low, high, **work.loop))
     return made
-
-
-def factor(unit: str) -> float:
-    """What a value in a unit is multiplied by for SI; 1 for an unknown unit."""
-    return next((row[unit] for row in FACTORS.values() if unit in row), 1.0)
-
-
-def si_unit(unit: str) -> str:
-    """The SI unit that goes with a unit; an unknown unit as it is."""
-    return next((si for si, row in FACTORS.items() if unit in row), unit)

@@ -11,7 +11,8 @@ from bns.errors import BnsError, FormatError, UnknownNameError
 from bns.gap.importers.tables import SENT, TIME, TRIAL
 from bns.storage import reading
 from bns.storage.reading import BEYOND
-from bns.worlds.data.importing import FACTORS, Source, read_map
+from bns.worlds.data.importing import Source, read_map
+from bns.worlds.data.units import FACTORS
 from bns.worlds.trial import Channel
 
 KEYS = (

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from bns.gap.decomposition.rest import NORMAL, THIRD
-from bns.worlds.data.importing import FACTORS
+from bns.worlds.data.units import FACTORS
 
 RATES = (4.0, 5000.0)  # [Hz] of logs
 USUAL = 0.01  # [s] between samples; the unit that comes nearest is taken

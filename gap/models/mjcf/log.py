@@ -9,7 +9,8 @@ from bns.gap.importers import tables
 from bns.gap.importers.tables import SENT, TIME, TRIAL, Column, Table
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.worlds.data import dataset_checks as checks
-from bns.worlds.data.importing import FACTORS, MOMENTS
+from bns.worlds.data.importing import MOMENTS
+from bns.worlds.data.units import factor
 from bns.worlds.trial import Commands, Trial
 
 LATE = 0.5  # samples by which a command may be sent after its first row
@@ -65,12 +66,12 @@ def channels(table: Table, config: OwnConfig, path: str) -> dict[str, np.ndarray
                 f"{', '.join(table.names)}. Name it in [log] or in a map "
                 "(--columns)."
             )
-        found[name] = table[column] * _factor(source.unit if source else "")
+        found[name] = table[column] * factor(source.unit if source else "")
     for name in (TRIAL, SENT):
         source = config.log.get(name)
         column = source.column if source else name
         if column in table:
-            found[name] = table[column] * _factor(source.unit if source else "")
+            found[name] = table[column] * factor(source.unit if source else "")
     found.setdefault(TRIAL, np.zeros(len(found[TIME])))
     return found
 
@@ -79,13 +80,6 @@ def split(marks: np.ndarray) -> list[np.ndarray]:
     """Rows of each trial: a new mark begins a new one."""
     edges = np.flatnonzero(np.diff(marks) != 0) + 1
     return np.split(np.arange(len(marks)), edges)
-
-
-def _factor(unit: str) -> float:
-    for row in FACTORS.values():
-        if unit in row:
-            return row[unit]
-    return 1.0
 
 
 def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> Trial:

@@ -7,6 +7,7 @@ import numpy as np
 
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column
+from bns.worlds.data.units import RATES
 
 
 def _set(words: str) -> frozenset[str]:
@@ -46,7 +47,6 @@ UNITS = {
 }
 BY_WORD, BY_ORDER = "by a word of its name", "by order"
 UNSURE = (BY_WORD, BY_ORDER)
-RATES = _set("rad deg m cm mm")
 TIMES = _set("time t stamp timestamp timestamps secs clock elapsed")
 TRIALS = _set("trial run episode episode_index rep repetition")
 SENT = _set("command_time sent cmd_time sent_time t_sent t_cmd time_sent")
@@ -69,17 +69,24 @@ def unit(name: str) -> str:
 def _ending(said: Sequence[str]) -> tuple[int, str]:
     """How many words of a name are its unit, and the unit."""
     per = 2 if said[-2:] == ["per", "s"] else 1
-    if len(said) > per + 1 and said[-1] == "s" and said[-1 - per] in RATES:
-        return per + 1, f"{UNITS[said[-1 - per]]}/s"
+    if len(said) > per + 1 and said[-1] == "s":
+        rate = f"{UNITS.get(said[-1 - per])}/s"
+        if rate in RATES:
+            return per + 1, rate
     return (1, UNITS[said[-1]]) if len(said) > 1 and said[-1] in UNITS else (0, "")
 
 
 def core(name: str) -> str:
     """What is left of a name without words for what and in which unit it is."""
+    return "".join(_own(name))
+
+
+def _own(name: str) -> list[str]:
+    """The words that `core` joins."""
     said = words(name)
     said = said[: len(said) - _ending(said)[0]]
     dropped = TOLD | SEEN | SPEED | EFFORT | POSITION | DRIVE
-    return "".join(word for word in said if word not in dropped)
+    return [word for word in said if word not in dropped]
 
 
 def _bare(name: str) -> str:
@@ -94,7 +101,7 @@ def quantity(column: Column) -> str:
     said = set(words(column.name))
     if said & EFFORT:
         return tables.EFFORT
-    rate = unit(column.name) in ("rpm", *(f"{name}/s" for name in RATES))
+    rate = unit(column.name) in RATES
     return tables.SPEED if said & SPEED or rate else tables.POSITION
 
 
@@ -242,10 +249,7 @@ def _unique(
 
 def _telling(name: str) -> frozenset[str]:
     """Words of a name that may tell one part from others: "left", not "pos" or "mm"."""
-    said = words(name)
-    said = said[: len(said) - _ending(said)[0]]
-    dropped = TOLD | SEEN | SPEED | EFFORT | POSITION | DRIVE
-    return frozenset(word for word in said if len(word) > 2 and word not in dropped)
+    return frozenset(word for word in _own(name) if len(word) > 2)
 
 
 def _alike(one: str, other: str) -> bool:
@@ -284,12 +288,11 @@ def by_place(
     for column in columns:
         pieces = column.name.split("_")
         size = _ending([piece.lower() for piece in pieces])[0]
-        name, axis = "_".join(pieces[: len(pieces) - size]), ""
-        stem, _, last = name.rpartition("_")
+        plain = "_".join(pieces[: len(pieces) - size])
+        stem, _, last = plain.rpartition("_")
         for kind, parts in table.items():
-            if column.name in parts or name in parts:
-                called = column.name if column.name in parts else name
+            called = next((name for name in (column.name, plain) if name in parts), "")
+            axis = "" if called else last
+            if called or (last in AXES and (called := _one(stem, parts))):
                 found.setdefault(column.name, (kind, called, axis))
-            elif last in AXES and (called := _one(stem, parts)):
-                found.setdefault(column.name, (kind, called, last))
     return found

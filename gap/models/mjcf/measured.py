@@ -10,8 +10,9 @@ from bns.errors import BnsError
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column
 from bns.gap.models.mjcf import matching, rehearsal
-from bns.gap.models.mjcf.channels import Work, factor, joint_of, joints
+from bns.gap.models.mjcf.channels import Work, joint_of, joints
 from bns.gap.models.mjcf.rehearsal import Fit, Part
+from bns.worlds.data.units import factor
 
 REHEARSED = 5.0  # [s] of a trial that the nominal model moves along
 AGREES = 0.5  # score from which on a column moves as the model says

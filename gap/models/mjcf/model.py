@@ -42,7 +42,7 @@ class OwnModel(GapModel):
     spread = (0.1, 0.3, 1.0)
     whole = True
     logs = True
-    beyond = 1.0  # `bns gap describe` has limits from what one log was told
+    leeway = 1.0  # `bns gap describe` has limits from what one log was told
 
     def __init__(self, config: OwnConfig, *, threads: int = 2):
         self.config, self.name = config, config.name

@@ -6,10 +6,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-ANGLE = {"rad": 1.0, "deg": 180 / np.pi, "turn": 0.5 / np.pi}
-LENGTH = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
-TURNING = {"rad/s": 1.0, "deg/s": 180 / np.pi, "rpm": 30 / np.pi}
-MOVING = {f"{unit}/s": size for unit, size in LENGTH.items()}
+from bns.worlds.data.units import per_si
+
 JOINT, SITE, BODY, SPEED = "joint", "site", "body", "speed"
 OWN = 0.03  # by which a joint is preferred to a place that moves alike
 STILL = 1e-6  # [m or rad] less is no motion
@@ -100,11 +98,9 @@ def _by_part(model: mujoco.MjModel, table: np.ndarray) -> dict[Part, np.ndarray]
 
 def factors(model: mujoco.MjModel, part: Part) -> Mapping[str, float]:
     """What a part may be measured in, and how much of it makes one SI unit."""
-    if part.quantity == SPEED:
-        return TURNING if turns(model, part.name) else MOVING
-    if part.quantity == JOINT and turns(model, part.name):
-        return ANGLE
-    return LENGTH
+    turning = part.quantity in (JOINT, SPEED) and turns(model, part.name)
+    name = "rad" if turning else "m"
+    return per_si(f"{name}/s" if part.quantity == SPEED else name)
 
 
 def turns(model: mujoco.MjModel, joint: str) -> bool:

@@ -119,28 +119,17 @@ class Drives:
     ) -> dict[bytes, np.ndarray]:
         """Poses from the origin every `KEPT` seconds, ``(S, 3)`` by key."""
         every = round(KEPT / dt)
-        jobs = [
-            Job(
-                begun(self.robot, each.body, dt, each.yaw),
-                (
-                    Segment(
-                        compile.compiled(self.robot, each.body, dt),
-                        each.speeds * self._per_command,
-                    ),
-                ),
-            )
-            for each in wanted.values()
-        ]
+        jobs = []
+        for drive in wanted.values():
+            compiled = compile.compiled(self.robot, drive.body, dt)
+            state = begun(self.robot, drive.body, dt, drive.yaw)
+            segment = Segment(compiled, drive.speeds * self._per_command)
+            jobs.append(Job(state, (segment,)))
         place = compile.free_joint(compile.compiled(self.robot, (), dt).model)
         free = slice(1 + place.start, 1 + place.stop)
         made = {
-            key: observe.planar(motion.states[:, free], yaw)[::every].copy()
-            for key, motion, yaw in zip(
-                wanted,
-                self._pool.map(jobs),
-                (each.yaw for each in wanted.values()),
-                strict=True,
-            )
+            drive.key: observe.planar(path.states[:, free], drive.yaw)[::every].copy()
+            for drive, path in zip(wanted.values(), self._pool.map(jobs), strict=True)
         }
         self._cache.update(made)
         return made

@@ -81,9 +81,7 @@ def test_a_shift_in_time_that_is_at_its_bound_can_do_no_more(shift, there):
 def test_what_foretells_worse_than_the_nominal_model_explains_nothing(
     monkeypatch, error, worse
 ):
-    held = SimpleNamespace(
-        nominal=lambda rest: 100.0, error=lambda support: np.full(4, error / 4)
-    )
+    held = SimpleNamespace(compared=lambda rest, support: (100.0, error))
     monkeypatch.setattr(decomposition.HeldOut, "of", lambda *given: held)
     start, point = SimpleNamespace(rest=None), SimpleNamespace(support={"axle"})
     sizes = SimpleNamespace(inside=None)

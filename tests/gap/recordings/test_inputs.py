@@ -71,7 +71,7 @@ def test_commands_that_the_robot_can_not_be_told_are_refused(model, drive):
     told = Commands(fast, drive.commands.durations)
     with pytest.raises(BnsError, match=r"trial 0: left_speed = -1\.0 m/s"):
         load_recordings.tellable([drive.replace(commands=told)], model)
-    loose = SimpleNamespace(name="own", limits=model.limits, beyond=1.0)
+    loose = SimpleNamespace(name="own", limits=model.limits, leeway=1.0)
     more = Commands(drive.commands.values * 5, drive.commands.durations)
     load_recordings.tellable([drive.replace(commands=more)], loose)
     with pytest.raises(BnsError, match=r"trial 0: left_speed = -1\.0 m/s"):
