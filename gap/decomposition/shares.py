@@ -163,7 +163,16 @@ class HeldOut:
         return float((self.weight * np.nan_to_num(rest) ** 2).sum())
 
     def compared(self, rest: np.ndarray, support: Iterable[str]) -> tuple[float, float]:
-        """Squared error of the nominal model, see `nominal`, and that of a set."""
+        """Squared error of the nominal model, see `nominal`, and that of a set.
+
+        Args:
+            rest: residuals of the nominal model, ``(N, C)``, in the units of the
+                channels.
+            support: names of the explanations that are added.
+
+        Returns:
+            Both errors, in squares of the noise.
+        """
         return self.nominal(rest), float(self.error(support).sum())
 
     def error(self, support: Iterable[str]) -> np.ndarray:
