@@ -5,6 +5,7 @@ written every `QUIET_SECONDS`, so that a log stays short.
 """
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -202,17 +203,19 @@ def working(
 ) -> Iterator[Tell]:
     """Show work of unknown length: what goes on, how long already, about how long yet.
 
-    Gives a function that says what is done now. Without a terminal nothing is shown.
+    Gives a function that says what is done now. Without a terminal a line is written
+    every `QUIET_SECONDS`.
 
     Args:
         name: of the work.
         shares: of the whole that its stages take as a rule, in order.
         usual: what all of it takes as a rule [s]; 0 = unknown.
     """
-    if not sys.stderr.isatty():
-        yield unheard
-        return
     estimate = Estimate(shares or {}, usual=usual)
+    if not sys.stderr.isatty():
+        with _in_lines(name, estimate) as tell:
+            yield tell
+        return
     shown = _spinner(estimate)
     with shown:
         task = shown.add_task(name, total=None)
@@ -222,6 +225,30 @@ def working(
             shown.update(task, description=f"{name}: {stage}")
 
         yield tell
+
+
+@contextmanager
+def _in_lines(name: str, estimate: Estimate) -> Iterator[Tell]:
+    """The same in lines, by a thread that ends with the work."""
+    over, began, stages = threading.Event(), time.monotonic(), [""]
+
+    def speak() -> None:
+        while not over.wait(QUIET_SECONDS):
+            spent = f"{time.monotonic() - began:.0f} s"
+            said = ", ".join(filter(None, (stages[-1], spent, str(estimate))))
+            print(f"{name}: {said}", file=sys.stderr, flush=True)
+
+    def tell(stage: str) -> None:
+        estimate.enter(stage)
+        stages.append(stage)
+
+    speaker = threading.Thread(target=speak, daemon=True)
+    speaker.start()
+    try:
+        yield tell
+    finally:
+        over.set()
+        speaker.join()
 
 
 def duration(seconds: float) -> str:

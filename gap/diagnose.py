@@ -71,10 +71,14 @@ def single(
         reference: recordings in which nothing was changed.
         checked: whether recordings are as the model compares them.
         tell: is told when a stage begins.
+
+    Raises:
+        BnsError: too few usable trials.
     """
     tell("nominal model")
     usable, faults = (tuple(trials), ()) if checked else check.check(trials, model)
-    _enough(usable)
+    if lacking := too_few(usable):
+        raise BnsError(lacking)
     if reference:
         unchanged = reference if checked else check.check(reference, model)[0]
         model = Corrected.of(unchanged, model)
@@ -83,10 +87,12 @@ def single(
     )
 
 
-def _enough(trials: Sequence[Trial]) -> None:
+def too_few(trials: Sequence[Trial]) -> str:
+    """Why usable trials are too few for a diagnosis, in a sentence; "" = they do."""
     seconds = sum(trial.commands.duration for trial in trials)
-    if len(trials) < LEAST and seconds < FEW * BLOCK:
-        raise BnsError(
-            f"{len(trials)} usable trial: a diagnosis needs {LEAST} at least, or one "
-            f"of {FEW * BLOCK:g} s, to fit on some and test on others; record more."
-        )
+    if len(trials) >= LEAST or seconds >= FEW * BLOCK:
+        return ""
+    return (
+        f"{len(trials)} usable trial: a diagnosis needs {LEAST} at least, or one of "
+        f"{FEW * BLOCK:g} s, to fit on some and test on others; record more."
+    )

@@ -153,17 +153,15 @@ def read_csv(
     return {name: _csv_column(table.column(name), name, path) for name in chosen}
 
 
-def read_csv_numbers(
-    path: Path | str, *, delimiter: str = ","
-) -> dict[str, np.ndarray]:
+def read_csv_numbers(path: Path | str) -> dict[str, np.ndarray]:
     """Columns of numbers and of truth values as doubles; those of text are left out.
 
     A column of which most cells that are filled are numbers is one, and no cell of it
-    may be text.
+    may be text. What parts the names parts the columns: a comma, a semicolon or a tab;
+    beside the latter two numbers may have a decimal comma.
 
     Args:
         path: of the file; one that ends with `.gz` is unpacked.
-        delimiter: between columns.
 
     Returns:
         name -> column, ``(N,)``, N rows; empty cells are NaN.
@@ -175,7 +173,8 @@ def read_csv_numbers(
 
     packed = str(path).lower().endswith(".gz")
     load = reading.read_packed if packed else reading.read_bytes
-    table, names = _parsed(load(path, most=reading.DATA), path, delimiter)
+    data = load(path, most=reading.DATA)
+    table, names = _parsed(data, path, *_separators(data))
     _once(names, names, path)
     found = {}
     for name, column in zip(names, table.columns, strict=True):
@@ -212,7 +211,17 @@ def _reads(cell: str) -> bool:
     return True
 
 
-def _parsed(data: bytes, path: Path | str, delimiter: str) -> tuple[Any, list[str]]:
+def _separators(data: bytes) -> tuple[str, str]:
+    """What parts the columns of the bytes of a file, and its decimal point."""
+    head, _, rows = data.partition(b"\n")
+    delimiter = max(",;\t", key=lambda sign: head.count(sign.encode()))
+    comma = delimiter != "," and b"," in rows
+    return delimiter, "," if comma else "."
+
+
+def _parsed(
+    data: bytes, path: Path | str, delimiter: str, decimal: str = "."
+) -> tuple[Any, list[str]]:
     """The `pyarrow.Table` in the bytes of a file, and the names of its columns.
 
     Raises:
@@ -226,6 +235,7 @@ def _parsed(data: bytes, path: Path | str, delimiter: str) -> tuple[Any, list[st
             pyarrow.BufferReader(data),
             read_options=csv.ReadOptions(use_threads=len(data) > THREADS),
             parse_options=csv.ParseOptions(delimiter=delimiter),
+            convert_options=csv.ConvertOptions(decimal_point=decimal),
         )
         names = table.column_names  # fails where they are not UTF-8
     except (*reading.UNREADABLE, pyarrow.ArrowException) as error:

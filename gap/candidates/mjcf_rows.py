@@ -20,8 +20,17 @@ LAGS = 1.5  # half steps that a simulation may lead by; a robot that is later is
 STEP = "fine_steps"
 """share of what finer steps change of the motion: 0 = as by the model's own step, 1 =
 as by finer ones; a third more = as by ever finer ones, where errors go with the step"""
-GROUPED = ("joint_damping", "joint_friction", "joint_armature", "geom_radius")
-"""effects that may be on all parts alike"""
+GROUPED = (
+    "joint_damping",
+    "joint_friction",
+    "joint_armature",
+    "geom_radius",
+    "actuator_gain",
+    "actuator_kp",
+    "actuator_kd",
+)
+"""effects that may be on all parts alike: one kind of bearing, wheel, motor or
+supply"""
 LATE = ("command_delay", "command_lag", "reading_delay")
 LATER = 0.01  # [s] for derivatives: a lag has next to none where there is none
 CUT = (0.15, 0.3, 0.5, 0.7, 0.9)  # of what was told at most: levels of a limit of it

@@ -250,8 +250,8 @@ class Problem:
         simulated = [number for number in which if number not in joined]
         for number in simulated:
             step = self.rows[number].difference
-            inside = low[number] <= values[number] + step <= high[number]
-            step = step if inside else -step
+            up, down = high[number] - values[number], values[number] - low[number]
+            step = min(step, up) if up >= min(step, down) else -min(step, down)
             moved = values.copy()
             moved[number] += step
             sets.append(moved)

@@ -187,7 +187,15 @@ def _over(problem: Problem) -> str:
 def _said(made: Decomposition, part: Part) -> str:
     """An explanation with its magnitude, interval, further numbers and share."""
     value, (low, high), unit = _magnitude(made.problem, part)
-    return words.part(part, value, low, high, unit, _beside(made.problem, part))
+    return words.part(
+        part,
+        value,
+        low,
+        high,
+        unit,
+        _beside(made.problem, part),
+        several=len(made.parts) > 1,
+    )
 
 
 def _beside(problem: Problem, part: Part) -> list[str]:

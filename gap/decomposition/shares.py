@@ -61,9 +61,13 @@ def parts(problem: Problem, point: Point, *, lasting: bool = True) -> list[Part]
         lasting: whether what it leaves is more than scatter, and so a part of the gap.
     """
     linear, support = point.linear, point.support
+    told = linear
+    if point.noise.order or point.noise.latent.parts:  # shares are of the plain error
+        told = HeldOut.of(problem, point).plain
     spread = NINETY * np.sqrt(np.diagonal(linear.covariance(support)))
-    none, every = _height(linear, frozenset()), _height(linear, frozenset(linear.free))
-    left = _height(linear, support)
+
+    empty, full = frozenset[str](), frozenset(linear.free)
+    none, every, left = (_height(told, names) for names in (empty, full, support))
     whole = max(none - (every if lasting else left), 1e-9)
     made = []
     for name in sorted(support):
@@ -74,8 +78,8 @@ def parts(problem: Problem, point: Point, *, lasting: bool = True) -> list[Part]
                 values=values,
                 low=low,
                 high=high,
-                last=(_height(linear, support - {name}) - left) / whole,
-                alone=(none - _height(linear, frozenset({name}))) / whole,
+                last=(_height(told, support - {name}) - left) / whole,
+                alone=(none - _height(told, frozenset({name}))) / whole,
                 sure=search.inclusion(linear, name),
             )
         )

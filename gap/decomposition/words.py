@@ -14,6 +14,10 @@ from bns.worlds.trial import Channel
 
 WORDS = {"m": ("mm", 1e3), "rad": ("mrad", 1e3)}
 ANY = ("any command", "any drive")  # show it, for what that is worth
+SAME = (
+    "They do the same whatever is commanded: observe another quantity, or measure one "
+    "of them."
+)
 KINDS = 4  # of motion that a further recording is asked for
 LISTED = 4  # alternatives, or channels, in a sentence
 
@@ -65,8 +69,10 @@ def part(
     high: float,
     unit: str,
     beside: Sequence[str] = (),
+    *,
+    several: bool = False,
 ) -> str:
-    """One explanation with its magnitude and share.
+    """One explanation with its magnitude, and its share where it is one of several.
 
     Args:
         found: the explanation.
@@ -74,11 +80,13 @@ def part(
         low, high: 90 % interval of it.
         unit: of the magnitude; "1" = none.
         beside: further numbers of it, in words.
+        several: whether there are others.
     """
+    share = f" ({_percent(found.last)} when added last)" if several else ""
     shown = "" if unit == "1" else f" {unit}"
     return (
-        f"{found.name} = {value:.4g}{shown} [{low:.4g}, {high:.4g}]"
-        f"{''.join(f', {text}' for text in beside)} ({_percent(found.last)} of it)"
+        f"{found.name} = {value:z.4g}{shown} [{low:z.4g}, {high:z.4g}]"
+        f"{''.join(f', {text}' for text in beside)}{share}"
     )
 
 
@@ -150,10 +158,7 @@ def apart(tied: Sequence[Support], rows: Sequence[Row]) -> str:
         return f"A recording with {', '.join(wanted)} may separate them."
     if pieces:
         return "A longer or less noisy recording may separate them."
-    return (
-        "They do the same whatever is commanded: observe another quantity, or measure "
-        "one of them."
-    )
+    return SAME
 
 
 def _exciting(row: Row) -> str:

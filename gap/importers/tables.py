@@ -180,9 +180,7 @@ def stamped(
 
 def _csv(path: Path) -> Table:
     """Columns of numbers; others are left out."""
-    plain = path.with_suffix("") if path.suffix.lower() == PACKED else path
-    tabbed = plain.suffix.lower() == ".tsv"
-    found = tables.read_csv_numbers(path, delimiter="\t" if tabbed else ",")
+    found = tables.read_csv_numbers(path)
     if not found or not len(next(iter(found.values()))):
         raise FormatError(f"{path} is no CSV table of numbers with a line of names.")
     return Table(tuple(Column(n, v) for n, v in found.items()), "CSV table")

@@ -156,7 +156,11 @@ def _log(path: str, columns: str) -> list[Trial]:
     if not Path(path).exists():
         raise FormatError(f"There is no {path}: give a dataset directory or a log.")
     if not columns:
-        raise BnsError(f"{path} is no dataset directory; a log needs --columns FILE.")
+        raise BnsError(
+            f"{path} is no dataset directory. A log of a wheeled robot needs --columns "
+            "FILE; one of a robot of your own needs --model FILE, which `bns gap "
+            f"describe ROBOT.xml {path}` writes."
+        )
     if path.endswith(".mcap"):
         return importing.from_mcap(path, columns)
     return importing.from_csv(path, columns)

@@ -293,17 +293,17 @@ def said(model, rows, *parts, **about):
         (
             "floor_slope",
             {"floor_slope.x": 0.03, "floor_slope.y": 0.04},
-            "floor_slope = 0.05 rad [0.036, 0.064], direction 0.9273 rad (100 % of it)",
+            "floor_slope = 0.05 rad [0.036, 0.064], direction 0.9273 rad",
         ),
         (
             "payload",
             {"payload.mass": 0.4, "payload.mx": 0.02, "payload.mz": 0.04},
-            "payload = 0.4 kg [0.39, 0.41], x 0.05 m, z 0.17 m (100 % of it)",
+            "payload = 0.4 kg [0.39, 0.41], x 0.05 m, z 0.17 m",
         ),
         (
             "payload",
             {"payload.mass": 0.4, "payload.inertia": 3e-4},
-            "payload = 0.4 kg [0.39, 0.41], inertia 0.0003 kg m2 (100 % of it)",
+            "payload = 0.4 kg [0.39, 0.41], inertia 0.0003 kg m2",
         ),
     ],
 )

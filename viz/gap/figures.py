@@ -127,7 +127,7 @@ SIDE = 4  # features that fit side by side
 def shares(found: Diagnosis) -> "Figure":
     """What the gap is made of: the share that each explanation closes, alone and when
     it is added last, and what is left."""
-    parts = found.decomposition["parts"][:LISTED]
+    parts = found.decomposition["parts"]
     names = [part["name"] for part in parts] + ["what is left"]
     last = [100 * part["last"] for part in parts] + [100 * found.decomposition["left"]]
     alone = [100 * part["alone"] for part in parts] + [0.0]
@@ -149,7 +149,7 @@ def shares(found: Diagnosis) -> "Figure":
 
 
 def closing(found: Diagnosis) -> "Figure":
-    """How far the gap shrinks: nominal, each effect alone, the chosen set, floor."""
+    """How far the gap shrinks: nominal, each effect alone, the chosen set, all."""
     closed = found.closed
     singles = sorted(closed["singles"].items(), key=lambda row: row[1])[:LISTED]
     rows = [("nominal model", closed["before"], NOMINAL)]
@@ -158,7 +158,7 @@ def closing(found: Diagnosis) -> "Figure":
         " + ".join(names) if len(names) < FEW else f"all {len(names)} that are named"
     )
     rows += [(f"with {n}", value, style.GREY) for n, value in reversed(singles)]
-    rows.append(("flexible model (ceiling)", closed["ceiling"], style.ORANGE))
+    rows.append(("with all explanations at once", closed["ceiling"], style.ORANGE))
     if names:
         rows = [row for row in rows if row[0] != f"with {named}"]
         rows.append((f"with {named}", closed["after"], CORRECTED))
@@ -178,7 +178,7 @@ def closing(found: Diagnosis) -> "Figure":
         axes.text(
             closed["floor"],
             1.01,
-            "noise floor",
+            "least that is left",
             color=style.GREEN,
             ha="center",
             va="bottom",

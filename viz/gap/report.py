@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from bns.gap.decomposition import words
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel
 from bns.gap.records import Diagnosis, Fit
@@ -28,9 +29,9 @@ CAPTIONS = {
     ),
     "closing": (
         "How far the gap closes",
-        "Loss on trials that were not fitted: of the nominal model, with each effect "
-        "alone, with what the verdict names, and of a flexible model that explains "
-        "nothing but shows how much is predictable at all.",
+        "Loss on motion that was not fitted: of the nominal model, with each effect "
+        "alone, with what the verdict names, and with all explanations of the library "
+        "at once, which describe a recording but foretell seldom better.",
     ),
     "horizons": (
         "Where the gap is",
@@ -94,15 +95,15 @@ def _context(
 
 def _command(found: Diagnosis) -> str:
     about = found.provenance
-    words = ["bns gap diagnose", *about.get("data", ("DATA",))]
-    words.append(f"--model {about.get('model', found.model)}")
+    parts = ["bns gap diagnose", *about.get("data", ("DATA",))]
+    parts.append(f"--model {about.get('model', found.model)}")
     for key in ("importer", "columns", "trials"):
         if about.get(key):
-            words.append(f"--{key} {about[key]}")
+            parts.append(f"--{key} {about[key]}")
     for key in ("only", "reference"):
         if about.get(key):
-            words.append(f"--{key} " + " ".join(about[key]))
-    return " ".join([*words, f"--seed {found.seed}", "--out DIR"])
+            parts.append(f"--{key} " + " ".join(about[key]))
+    return " ".join([*parts, f"--seed {found.seed}", "--out DIR"])
 
 
 def _figures(
@@ -236,7 +237,7 @@ def how_far(found: Diagnosis) -> str:
         share = 100 * closed["closed_by_flexible"]
         if found.verdict.kind == "no gap":
             return "There is nothing to close."
-        return f"A flexible model would close {share:.0f} % of it: so much is there."
+        return f"All explanations at once would close {share:.0f} % of it."
     low, high = closed["closed_interval"]
     text = (
         f"{100 * closed['closed']:.0f} % [{100 * low:.0f}, {100 * high:.0f}] of it is "
@@ -287,7 +288,8 @@ def _row(found: Diagnosis, fit: Fit, nothing: Fit | None, count: float) -> list[
     if fit.condition > 1e4:
         remarks.append("magnitudes trade off")
     share = ""
-    if nothing is not None and found.closed and fit.names:
+    gap = found.verdict.kind != "no gap"
+    if nothing is not None and found.closed and fit.names and gap:
         whole = nothing.held_out / count - found.closed["floor"]
         gone = (nothing.held_out - fit.held_out) / count
         share = f"{100 * min(max(gone / max(whole, 1e-12), -1), 1):z.0f} %"
@@ -313,7 +315,7 @@ def detectable(found: Diagnosis, known: Sequence[Row]) -> dict[str, Any]:
         found: the diagnosis.
         known: rows of its model; none = units are not said.
     """
-    items = {row.term: row for row in known}
+    items = {row.term: row for row in reversed(known)}  # the first of each
     rows = []
     for name, least in found.signatures.get("detectability", {}).items():
         item = items.get(name)
@@ -329,7 +331,7 @@ def detectable(found: Diagnosis, known: Sequence[Row]) -> dict[str, Any]:
 def next_steps(found: Diagnosis, known: Sequence[Row]) -> list[str]:
     """What to do now, one line each; `known` as for `detectable`."""
     steps = [found.verdict.change] if found.verdict.change else []
-    if found.verdict.kind == "either":
+    if found.verdict.kind == "either" and found.verdict.change != words.SAME:
         steps.append("bns gap plan DIR writes the command that separates them best.")
     if found.verdict.named:
         steps.append(
@@ -344,7 +346,7 @@ def next_steps(found: Diagnosis, known: Sequence[Row]) -> list[str]:
 
 
 def _number(value: float) -> str:
-    return f"{value:.4g}" if value is not None and math.isfinite(value) else "-"
+    return f"{value:z.4g}" if value is not None and math.isfinite(value) else "-"
 
 
 def _unit(unit: str) -> str:

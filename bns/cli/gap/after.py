@@ -59,7 +59,7 @@ class Apply:
     user: bool = False
     """keep it for all directories (in the user's own file), not ./worlds.toml"""
     replace: bool = False
-    """replace a kept world of the same name"""
+    """replace a kept world of the same name, or the file of --xml"""
     xml: str = ""
     """for a model of your own: file for the corrected MJCF"""
 
@@ -185,6 +185,11 @@ def _apply(given: Apply) -> int:
             raise BnsError(
                 f"This diagnosis is of {found.model}, a model of your own: give --xml "
                 "FILE for the corrected MJCF, and no --world."
+            )
+        if Path(given.xml).exists() and not given.replace:
+            raise BnsError(
+                f"{given.xml} is there: give another --xml FILE, or --replace to write "
+                "over it."
             )
         left = model.write_corrected(fit.effects, given.xml)
         print(f"model:     {given.xml}")

@@ -103,6 +103,7 @@ def _some(trials: list[Any]) -> list[Any]:
 
 
 def _check(given: Check) -> int:
+    from bns.gap import diagnose
     from bns.gap.recordings import check, load_recordings
 
     model = nominal(given)
@@ -113,6 +114,8 @@ def _check(given: Check) -> int:
     for note in notes:
         print(note)
     print(f"{len(usable)} of {len(moving)} trials can be used.")
+    if lacking := diagnose.too_few(usable):
+        print(lacking)
     return 0
 
 

@@ -16,6 +16,7 @@ from bns.gap.models.mjcf.rehearsal import Part
 from bns.worlds.data.units import factor, per_si, si_unit
 from bns.worlds.trial import Channel
 
+DEGREES = 20.0  # times a joint's range: limits of control in degrees (57), not radians
 GOAL = {"goal", "des", "desired", "target"}
 """words for a position that a joint is told"""
 
@@ -182,6 +183,8 @@ def _widest(model: mujoco.MjModel, number: int, joint: str) -> float:
         and model.jnt_limited[model.joint(joint).id]
     ):
         found.append(float(np.abs(model.joint(joint).range).max()))
+    if len(found) > 1 and found[0] > DEGREES * found[1]:
+        return found[1]  # limits of control that were written in degrees
     return max(found, default=2 * np.pi)
 
 

@@ -1,7 +1,8 @@
 """Logs of a user's own robot: columns of commands and observations by channel."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
+import mujoco
 import numpy as np
 
 from bns.errors import FormatError
@@ -14,6 +15,7 @@ from bns.worlds.data.units import factor
 from bns.worlds.trial import Commands, Trial
 
 LATE = 0.5  # samples by which a command may be sent after its first row
+BEYOND, USUAL = 5.0, 0.9  # times a joint's range, by a quantile of what was seen of it
 HELD = 2, 10  # samples that a loop of its own holds its commands: who tells anew at
 # each sample logs what it tells, as does a list of steps that are held for long
 
@@ -38,6 +40,36 @@ def read(path: str, config: OwnConfig) -> list[Trial]:
         )
         for number, rows in enumerate(split(columns[TRIAL]))
     ]
+
+
+def possible(trials: Sequence[Trial], config: OwnConfig, model: mujoco.MjModel) -> None:
+    """Stop at joints that come far beyond the range that the model gives them.
+
+    Args:
+        trials: of a log.
+        config: the description.
+        model: the nominal model.
+
+    Raises:
+        FormatError: there is one; its column is in another unit.
+    """
+    for column, item in enumerate(config.seen):
+        if item.quantity != "joint" or not model.joint(item.part).id >= 0:
+            continue
+        number = model.joint(item.part).id
+        values = np.concatenate([trial.observed[:, column] for trial in trials])
+        values = values[np.isfinite(values)]
+        if not model.jnt_limited[number] or not len(values):
+            continue
+        most = float(np.abs(model.jnt_range[number]).max())
+        size, name = float(np.quantile(np.abs(values), USUAL)), item.channel.name
+        if size > BEYOND * most:
+            unit = item.channel.unit
+            raise FormatError(
+                f"{name} comes to {size:.3g} {unit}, and joint {item.part!r} of the "
+                f"model no farther than {most:.3g}: give the unit of its column, "
+                f'[log] "{name}" = {{ column = "{name}", unit = "deg" }} or "mm".'
+            )
 
 
 def channels(table: Table, config: OwnConfig, path: str) -> dict[str, np.ndarray]:

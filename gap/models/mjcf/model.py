@@ -1,6 +1,7 @@
 """Any MJCF model, with a TOML file that maps its channels, as a nominal model."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,10 @@ import numpy as np
 from bns.gap.candidates import mjcf, mjcf_rows
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, Windows
-from bns.gap.models.mjcf import cuts, log, masses, start
+from bns.gap.models.mjcf import cuts, log, masses, roughness, start
 from bns.gap.models.mjcf import effects as own_effects
 from bns.gap.models.mjcf.config import OwnConfig
-from bns.gap.models.mjcf.simulation import Loads, Simulation
+from bns.gap.models.mjcf.simulation import Simulation
 from bns.gap.recordings import segments
 from bns.storage import files
 from bns.worlds.effects.base import Effect
@@ -88,6 +89,7 @@ class OwnModel(GapModel):
         """Trials of a log, none longer than the model foresees."""
         config = self.config.mapped(columns) if columns else self.config
         trials = log.read(path, config)
+        log.possible(trials, config, self.physics.model)
         return cuts.foreseen(trials, self.config, self.physics.model, self)
 
     def beside(
@@ -108,14 +110,12 @@ class OwnModel(GapModel):
         """
         self._parts = self.physics.needed(trials)
         usual = self.config.effects is None
-        loaded = {"actuator_torque_limit", *(mjcf.TOUCHING if usual else ())}
-        wanted = any(item.effect in loaded for item in self.listed)
-        loads = self.physics.loads(trials) if wanted else Loads()
+        loads = self.physics.loads(trials)
         items = tuple(self._terms.values())
         if usual:  # what the user asked for stays
             items = mjcf_rows.touching(items, loads.touching)
         self._tried = {item.effect for item in items}
-        return mjcf_rows.rows(
+        made = mjcf_rows.rows(
             items,
             trials,
             self.dt,
@@ -123,6 +123,24 @@ class OwnModel(GapModel):
             stepped=self._parts > 1,
             forces=loads.forces,
         )
+        changed = partial(self._changed, self.physics.some(trials))
+        return roughness.stepped(made, changed) if loads.touching else made
+
+    def _changed(
+        self, trials: Sequence[Trial], sets: Sequence[Mapping[str, float]]
+    ) -> np.ndarray:
+        """What values of rows change of the nominal motion, see `roughness.Changed`."""
+        whole = [[values] * len(trials) for values in ({}, *sets)]
+        base, *others = [
+            np.concatenate(
+                [
+                    self.compare(trial, path, self.windows(trial))
+                    for trial, path in zip(trials, paths, strict=True)
+                ]
+            )
+            for paths in self.paths(trials, whole, fine=False)
+        ]
+        return (np.stack(others) - base) / self.resolution
 
     def untried(self) -> tuple[str, ...]:
         """See `GapModel.untried`."""

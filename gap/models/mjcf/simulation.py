@@ -133,11 +133,16 @@ class Simulation:
         self._compiled.move_to_end(key)
         return self._compiled[key]
 
+    @staticmethod
+    def some(trials: Sequence[Trial]) -> Sequence[Trial]:
+        """A few trials of a recording, spread over it."""
+        return trials[:: max(len(trials) // TRIED, 1)]
+
     def needed(self, trials: Sequence[Trial]) -> int:
         """Into how many parts a step has to be cut for the nominal motion of trials: as
         many as it takes until twice as many change next to nothing."""
         noise = np.array([item.noise for item in self.config.seen])
-        few = [(trial, ()) for trial in trials[:: max(len(trials) // TRIED, 1)]]
+        few = [(trial, ()) for trial in self.some(trials)]
         parts, made = 1, self.predicted(few)
         while parts < self.finest:
             finer = self.predicted(few, min(2 * parts, self.finest))
@@ -174,7 +179,7 @@ class Simulation:
         is overwritten by the next."""
         model = self.model
         data = mujoco.MjData(model)
-        for trial in trials[:: max(len(trials) // TRIED, 1)]:
+        for trial in self.some(trials):
             job = self._job(trial, (), 1)
             (motion,) = self._pool.map([job])
             control = job.segments[0].control

@@ -30,6 +30,14 @@ def test_check_says_how_many_trials_can_be_used(recording, capsys):
     assert "3 trials can be used" in capsys.readouterr().out
 
 
+def test_check_says_that_there_are_too_few(tmp_path, capsys):
+    world = registry.make("mujoco", robot="khepera3", threads=1)
+    made = world.run([Commands(np.full((2, 2), 0.1), [0.4, 0.4])])
+    dataset.write(tmp_path / "drive", made, provenance={"made by": "test"})
+    assert main(["gap", "check", str(tmp_path / "drive")]) == 0
+    assert "a diagnosis needs 2 at least" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

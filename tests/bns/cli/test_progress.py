@@ -2,6 +2,7 @@
 
 import io
 import re
+import time
 
 import pytest
 
@@ -114,7 +115,19 @@ def test_work_without_an_end_fits_the_terminal(monkeypatch, columns):
     assert "about 1 h 23 min left" in lines()[-1]
 
 
-def test_work_without_an_end_is_quiet_where_there_is_no_terminal(capsys):
+def test_short_work_is_quiet_where_there_is_no_terminal(capsys):
     with progress.working("diagnosing") as tell:
         tell("trial 3")
     assert capsys.readouterr() == ("", "")
+
+
+def test_work_without_an_end_tells_lines_where_there_is_no_terminal(
+    monkeypatch, capsys
+):
+    monkeypatch.setattr(progress, "QUIET_SECONDS", 0.01)
+    with progress.working("diagnosing", usual=5000.0) as tell:
+        tell("rivals")
+        time.sleep(0.2)
+    said = capsys.readouterr().err.splitlines()
+    assert said
+    assert said[-1].startswith("diagnosing: rivals, 0 s, about 1 h 23 min left")

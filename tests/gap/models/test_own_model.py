@@ -197,6 +197,32 @@ def test_what_is_wrong_with_a_log_is_said(arm, tmp_path):
         arm.read_log(str(tmp_path / "log.csv"))
 
 
+def test_a_joint_far_beyond_its_range_is_in_another_unit(tmp_path):
+    text = ARM.with_suffix(".xml").read_text()
+    limited = text.replace('name="elbow" axis', 'name="elbow" range="-115 115" axis')
+    (tmp_path / "arm.xml").write_text(limited)
+    (tmp_path / "arm.toml").write_text(ARM.read_text())
+    model = OwnModel.read(tmp_path / "arm.toml", threads=1)
+    head, rows = "time,shoulder_goal,elbow_goal,shoulder,elbow", "{0},0.1,0.2,0.6,{1}"
+    log = tmp_path / "log.csv"
+    for angle in (1.2, 69.0):  # [rad], [deg]
+        log.write_text("\n".join([head, *(rows.format(t, angle) for t in range(9))]))
+        if angle == 1.2:
+            assert len(model.read_log(str(log))) == 1
+    with pytest.raises(FormatError, match="elbow comes to 69 rad, and joint 'elbow'"):
+        model.read_log(str(log))
+
+
+def test_servos_that_are_all_weak_are_told_as_one(arm, told):
+    servos = ("shoulder_servo", "elbow_servo")
+    config = replace(arm.config, effects={"actuator_kp": servos})
+    model = OwnModel(config, threads=1)
+    weak = model.parse("actuator_kp:part=all,factor=0.8")
+    found = diagnose(mjcf_cases.record(model, told, [weak], seed=1), model, full=False)
+    assert found.best.names == ("actuator_kp[all]",)
+    assert found.best.magnitudes[0] == pytest.approx(0.8, abs=0.01)
+
+
 def test_effects_are_considered_where_none_are_listed(arm):
     config = replace(OwnConfig.read(ARM), effects=None)
     names = {item.name for item in OwnModel(config, threads=1).listed}
@@ -416,9 +442,11 @@ def test_a_mass_on_a_link_is_told_with_its_place(arm):
     problem = SimpleNamespace(rows=masses.rows(item, body, "motion"), model=arm)
     values = {KEPT[1]: 0.2, f"{KEPT[1]}.mx": 0.01, f"{KEPT[1]}.my": 0.0}
     part = Part(KEPT[1], values, values, values, last=1.0, alone=1.0, sure=1.0)
-    assert record._said(SimpleNamespace(problem=problem), part) == (
-        "body_mass[forearm] = 0.2 kg [0.2, 0.2], dx 0.05 m (100 % of it)"
-    )
+    told = "body_mass[forearm] = 0.2 kg [0.2, 0.2], dx 0.05 m"
+    alone = SimpleNamespace(problem=problem, parts=[part])
+    assert record._said(alone, part) == told
+    two = SimpleNamespace(problem=problem, parts=[part, part])
+    assert record._said(two, part) == f"{told} (100 % when added last)"
 
 
 @pytest.mark.parametrize("kind", ["effect", "none of the library", "no gap"])

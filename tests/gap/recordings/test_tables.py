@@ -102,6 +102,17 @@ def test_a_csv_keeps_its_numbers_alone(tmp_path):
         table["x"]
 
 
+@pytest.mark.parametrize(
+    "rows",
+    ["t;q\n0;1,5\n1;-0,25\n", "t;q\n0;1.5\n1;-0.25\n", "t\tq\n0\t1,5\n1\t-0,25\n"],
+)
+def test_semicolons_tabs_and_decimal_commas_are_read(rows, tmp_path):
+    (tmp_path / "a.csv").write_text(rows)
+    table = tables.read(tmp_path / "a.csv")
+    assert table.names == ("t", "q")
+    np.testing.assert_array_equal(table["q"], [1.5, -0.25])
+
+
 def test_text_among_numbers_is_named_with_its_line(tmp_path):
     rows = ["0,1.5", "1,", "2,1.7", "3,off", "4,1.9"]
     (tmp_path / "a.csv").write_text("\n".join(["t,q", *rows]) + "\n")

@@ -1,0 +1,65 @@
+"""Steps of derivatives that stand out of what a simulation with contacts does itself.
+
+A wheel on its rim, or a foot that lands a step sooner, moves a body by a little,
+whatever is changed and however little. A derivative by a step that changes no more than
+that is the simulation's, not the robot's, so such a row takes a larger step.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bns.gap.decomposition.row import Row
+
+Changed = Callable[[Sequence[Mapping[str, float]]], np.ndarray]
+"""what each set of values changes of the nominal motion, in units of the noise,
+``(E, N, C)``; values by row"""
+
+TINY = 0.03  # of a row's step: what it changes is roughness, if it is not small
+SHARE = 3.0  # times what it would be in proportion: small
+PROBED = 12  # rows that tell the roughness
+QUANTILE = 0.75  # of theirs: it is of the motion, not of the row; some change nothing
+FELT = 0.05  # of the noise: a roughness below is none
+ABOVE = 5.0  # times the roughness that a step has to change
+ALIKE = 3.0  # times it, by which steps that tell the same derivative may differ
+
+
+def stepped(rows: Sequence[Row], changed: Changed) -> tuple[Row, ...]:
+    """Rows of which those whose step changes less than `ABOVE` times the roughness step
+    as far as they plausibly depart, where the motion is as linear so far; as they are,
+    where there is none.
+
+    Args:
+        rows: of a model.
+        changed: simulates values of rows.
+    """
+    tried = [row for row in rows if row.smooth and not row.nuisance and not row.joins]
+    probed = tried[:: max(len(tried) // PROBED, 1)]
+    tiny = _sizes(changed([_moved(row, TINY * row.difference) for row in probed]))
+    large = _sizes(changed([_moved(row, row.difference) for row in probed]))
+    beyond = np.maximum(tiny - SHARE * TINY * large, 0.0)
+    rough = float(np.quantile(beyond, QUANTILE))
+    small = [row for row in tried if row.difference < row.sd]
+    if rough < FELT or not small:
+        return tuple(rows)
+    near = changed([_moved(row, row.difference) for row in small])
+    lost = np.flatnonzero(_sizes(near) < ABOVE * rough)
+    if not len(lost):
+        return tuple(rows)
+    far = changed([_moved(small[n], small[n].sd) for n in lost])
+    ratio = np.array([small[n].difference / small[n].sd for n in lost])
+    alike = _sizes(near[lost] - far * ratio[:, None, None]) < ALIKE * rough
+    names = {small[n].name for n in lost[alike]}
+    return tuple(replace(r, step=r.sd) if r.name in names else r for r in rows)
+
+
+def _sizes(changes: np.ndarray) -> np.ndarray:
+    """Root mean squares of changes ``(E, N, C)``, ``(E,)``; of what was seen."""
+    return np.sqrt(np.nan_to_num(np.nanmean(changes**2, axis=(1, 2))))
+
+
+def _moved(row: Row, step: float) -> dict[str, float]:
+    """The value a step away, within bounds, by the row's name."""
+    inside = row.nominal + step <= row.high
+    return {row.name: row.nominal + (step if inside else -step)}
