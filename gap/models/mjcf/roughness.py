@@ -17,7 +17,7 @@ Changed = Callable[[Sequence[Mapping[str, float]]], np.ndarray]
 ``(E, N, C)``; values by row"""
 
 MOST = 120
-"""rows of a model that is looked at: of more, slopes that are told better make more sets
+"""rows of a model that is looked at: of more, better slopes make more sets
 that promise something, each of which is followed (a quadruped of 174: the same verdict
 in twice the time)"""
 TINY = 0.03  # of a row's step: what it changes is roughness, if it is not small
