@@ -75,6 +75,13 @@ def _starts(seen: View, chosen: Sequence[int]) -> list[float]:
     return np.concatenate([[0.0], np.cumsum(lengths)[:-1]]).tolist()
 
 
+def _path(root: str, channel: Channel, *names: str) -> str:
+    """An entity's path; the channel's name may have spaces and brackets."""
+    import rerun as rr
+
+    return "/".join([root, rr.escape_entity_path_part(channel.name), *names])
+
+
 def _styles(stream: "RecordingStream", seen: View) -> None:
     import rerun as rr
 
@@ -82,7 +89,7 @@ def _styles(stream: "RecordingStream", seen: View) -> None:
     for feature in seen.problem.model.features:
         for name, colour in colours.items():
             stream.log(
-                f"residuals/{feature.name}/{name}",
+                _path("residuals", feature, name),
                 rr.SeriesLines(
                     names=name.replace("_", " "),
                     colors=style.rgb(colour),
@@ -94,7 +101,7 @@ def _styles(stream: "RecordingStream", seen: View) -> None:
     for channel in seen.trials[0].channels:
         for name, colour in bright.items():
             stream.log(
-                f"observed/{channel.name}/{name}",
+                _path("observed", channel, name),
                 rr.SeriesLines(names=name, colors=style.rgb(colour), widths=1.5),
                 static=True,
             )
@@ -111,7 +118,7 @@ def _residuals(
         shown["corrected"] = seen.left[number]
     for column, feature in enumerate(seen.problem.model.features):
         for name, values in shown.items():
-            path = f"residuals/{feature.name}/{name}"
+            path = _path("residuals", feature, name)
             rrd.send(stream, path, at, values[:, column])
 
 
@@ -124,7 +131,7 @@ def _observed(stream: "RecordingStream", seen: View, number: int, start: float) 
     for name, values in shown.items():
         for column, channel in enumerate(trial.channels):
             fine = np.isfinite(values[:, column])
-            path = f"observed/{channel.name}/{name}"
+            path = _path("observed", channel, name)
             rrd.send(stream, path, at[fine], values[fine, column])
 
 
@@ -154,7 +161,7 @@ def _layout(seen: View, stage: scene.Stage | None, length: float) -> Any:
         return rrb.Vertical(
             *(
                 rrb.TimeSeriesView(
-                    origin=f"{root}/{channel.name}",
+                    origin=_path(root, channel),
                     name=f"{channel.name} [{channel.unit}]{words}",
                     axis_x=rrb.TimeAxis(view_range=span),
                     plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
