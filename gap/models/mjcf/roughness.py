@@ -39,7 +39,7 @@ def stepped(rows: Sequence[Row], changed: Changed) -> tuple[Row, ...]:
         changed: simulates values of rows.
     """
     tried = [row for row in rows if row.smooth and not row.nuisance and not row.joins]
-    if len(rows) > MOST:
+    if not tried or len(rows) > MOST:
         return tuple(rows)
     probed = tried[:: max(len(tried) // PROBED, 1)]
     tiny = _sizes(changed([_moved(row, TINY * row.difference) for row in probed]))

@@ -43,6 +43,13 @@ def test_steps_stand_out_of_the_roughness(rough, bent, share):
     assert {row.difference / row.sd for row in made} == {share}
 
 
+@pytest.mark.parametrize(
+    "rows", [ROWS * 11, (Row("band", 0.0, SD, 0.0, 1.0, smooth=False),)]
+)
+def test_many_rows_and_none_with_a_slope_stay(rows):
+    assert roughness.stepped(rows, motion(rough=0.5, bent=0.0)) == rows
+
+
 def test_nuisances_keep_their_step():
     clock = Row("clock", 0.0, SD, -1.0, 1.0, nuisance=True, step=0.001)
     *_, kept = roughness.stepped((*ROWS, clock), motion(rough=0.5, bent=0.0))
