@@ -169,7 +169,10 @@ def test_shares_are_of_what_is_closed_where_the_rest_does_not_last():
     problem = Rows(rng)
     linear = problem.linear(planted(rng, problem, a=0.5, c=0.5))
     point = SimpleNamespace(
-        linear=linear, support=frozenset({"a"}), values=linear.solve({"a"})
+        linear=linear,
+        support=frozenset({"a"}),
+        values=linear.solve({"a"}),
+        noise=SimpleNamespace(order=0, latent=SimpleNamespace(parts=())),
     )
     (part,) = shares.parts(problem, point, lasting=False)
     assert part.last == part.alone == pytest.approx(1.0)
