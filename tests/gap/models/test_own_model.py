@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from bns.errors import BnsError, FormatError
+from bns.errors import BnsError
 from bns.gap import warnings
 from bns.gap.bench import mjcf_cases
 from bns.gap.candidates import mjcf
@@ -23,7 +23,6 @@ from bns.gap.models.mjcf.effects import CLASSES, OWNERS
 from bns.gap.models.mjcf.masses import Body
 from bns.gap.models.mjcf.model import OwnModel
 from bns.gap.recordings.trial_conditions import moments_unknown
-from bns.worlds.data import dataset
 from bns.worlds.data.importing import MOMENTS
 from tests.sources import ROOT
 
@@ -142,75 +141,6 @@ def test_a_corrected_model_is_written(arm, tmp_path):
     assert left == ["command_delay:part=all,delay=0.1"]
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
     assert model.dof_damping.ravel()[1] == pytest.approx(0.12)
-
-
-def test_logs_and_datasets_give_the_same_trials(arm, told, tmp_path):
-    (trial,) = mjcf_cases.record(arm, told[:1], [])
-    dataset.write(tmp_path / "data", [trial])
-    (kept,) = dataset.read(tmp_path / "data").trials
-    np.testing.assert_array_equal(kept.observed, trial.observed)
-    ends = np.searchsorted(np.cumsum(trial.commands.durations), trial.times, "right")
-    rows = trial.commands.values[np.minimum(ends, len(trial.commands) - 1)]
-    lines = ["time,shoulder_goal,elbow_goal,shoulder,elbow"]
-    for time, goal, seen in zip(trial.times, rows, trial.observed, strict=True):
-        lines.append(",".join(map(repr, map(float, (time, *goal, *seen)))))
-    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
-    (read,) = arm.read_log(str(tmp_path / "log.csv"))
-    np.testing.assert_allclose(read.observed, trial.observed)
-    np.testing.assert_allclose(read.commands.values, trial.commands.values)
-    np.testing.assert_allclose(read.commands.durations, trial.commands.durations)
-
-
-WRONG = {
-    "no file": (("arm.xml", "leg.xml"), "There is no model file"),
-    "no actuator": (("shoulder_servo", "shoulder_motor"), "actuator of the model"),
-    "no joint": (('joint = "elbow"', 'joint = "knee"'), "joint of the model 'knee'"),
-    "no keyframe": (('keyframe = "home"', 'keyframe = "rest"'), "'rest'"),
-    "no part": (
-        ('["upper_arm", "forearm"]', '["hand"]'),
-        "body in .effects. body_mass",
-    ),
-    "no effect": (("joint_friction =", "joint_fiction ="), "Did you mean 'joint_fr"),
-    "unknown key": (("[start]", "[begin]"), "Unknown key"),
-    "no noise": (("noise = 0.002\n", ""), "positive noise"),
-    "limits": (("low = -0.5", "low = 5"), "low < high"),
-}
-
-
-@pytest.mark.parametrize("kind", sorted(WRONG))
-def test_what_is_wrong_with_a_description_is_said(kind, tmp_path):
-    (old, new), said = WRONG[kind]
-    text = ARM.read_text()
-    assert old in text
-    (tmp_path / "arm.toml").write_text(text.replace(old, new))
-    (tmp_path / "arm.xml").write_text(ARM.with_suffix(".xml").read_text())
-    with pytest.raises(BnsError, match=said) as caught:
-        OwnModel.read(tmp_path / "arm.toml", threads=1)
-    assert "\n" not in str(caught.value)
-
-
-def test_what_is_wrong_with_a_log_is_said(arm, tmp_path):
-    (tmp_path / "log.csv").write_text(
-        "time,shoulder_goal,elbow_goal,shoulder\n1,2,3,4\n"
-    )
-    with pytest.raises(FormatError, match="no column 'elbow'"):
-        arm.read_log(str(tmp_path / "log.csv"))
-
-
-def test_a_joint_far_beyond_its_range_is_in_another_unit(tmp_path):
-    text = ARM.with_suffix(".xml").read_text()
-    limited = text.replace('name="elbow" axis', 'name="elbow" range="-115 115" axis')
-    (tmp_path / "arm.xml").write_text(limited)
-    (tmp_path / "arm.toml").write_text(ARM.read_text())
-    model = OwnModel.read(tmp_path / "arm.toml", threads=1)
-    head, rows = "time,shoulder_goal,elbow_goal,shoulder,elbow", "{0},0.1,0.2,0.6,{1}"
-    log = tmp_path / "log.csv"
-    for angle in (1.2, 69.0):  # [rad], [deg]
-        log.write_text("\n".join([head, *(rows.format(t, angle) for t in range(9))]))
-        if angle == 1.2:
-            assert len(model.read_log(str(log))) == 1
-    with pytest.raises(FormatError, match="elbow comes to 69 rad, and joint 'elbow'"):
-        model.read_log(str(log))
 
 
 def test_servos_that_are_all_weak_are_told_as_one(arm, told):
@@ -408,32 +338,6 @@ def test_damping_of_all_joints_changes_what_those_of_each_change_together(arm, t
     alone = problem.slopes(problem.nominal, [every])
     size = np.abs(alone[every]).max()
     np.testing.assert_allclose(summed[every], alone[every], atol=0.02 * size)
-
-
-def test_former_names_in_a_description_are_read(arm):
-    config = replace(
-        OwnConfig.read(ARM),
-        effects={"sensor_gain": ("elbow",)},
-        bounds={"sensor_gain[elbow]": {"high": 1.5}},
-    )
-    (made,) = mjcf.candidates(config, arm.physics.model)
-    assert (made.name, made.high) == ("sensor_gain[elbow]", 1.5)  # as it was written
-    assert str(made.make(1.2)) == "reading_gain:part=elbow,factor=1.2"
-
-
-def test_the_description_in_the_documentation_is_one(tmp_path):
-    page = (ARM.parents[2] / "docs" / "gap_your_robot.md").read_text()
-    (tmp_path / "arm.toml").write_text(page.split("```")[1])
-    (tmp_path / "arm.xml").write_text(ARM.with_suffix(".xml").read_text())
-    text = (tmp_path / "arm.toml").read_text()
-    assert "[log]" in text and "[bounds]" in text
-    elbow = '[commands.elbow_goal]\nactuator = "elbow_servo"\nunit = "rad"\n'
-    (tmp_path / "arm.toml").write_text(text + elbow + "low = 0\nhigh = 2\n")
-    made = OwnModel.read(tmp_path / "arm.toml", threads=1)
-    bounds = {item.name: item for item in made.listed}
-    assert bounds["joint_damping[elbow]"].high == 0.5
-    assert bounds["body_mass[forearm]"].slack == 0.01
-    assert made.config.log["shoulder"] == ("q1", "deg")
 
 
 def test_a_mass_on_a_link_is_told_with_its_place(arm):
