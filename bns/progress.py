@@ -230,17 +230,18 @@ def working(
 @contextmanager
 def _in_lines(name: str, estimate: Estimate) -> Iterator[Tell]:
     """The same in lines, by a thread that ends with the work."""
-    over, began, stages = threading.Event(), time.monotonic(), [""]
+    over, began, now = threading.Event(), time.monotonic(), ""
 
     def speak() -> None:
         while not over.wait(QUIET_SECONDS):
             spent = f"{time.monotonic() - began:.0f} s"
-            said = ", ".join(filter(None, (stages[-1], spent, str(estimate))))
+            said = ", ".join(filter(None, (now, spent, str(estimate))))
             print(f"{name}: {said}", file=sys.stderr, flush=True)
 
     def tell(stage: str) -> None:
+        nonlocal now
         estimate.enter(stage)
-        stages.append(stage)
+        now = stage
 
     speaker = threading.Thread(target=speak, daemon=True)
     speaker.start()

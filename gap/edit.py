@@ -12,7 +12,6 @@ import numpy as np
 from bns.errors import UnknownNameError
 from bns.gap import store
 from bns.gap.decomposition import descent
-from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.problem import Problem
 from bns.gap.models.base import GapModel
 from bns.gap.recordings import check
@@ -108,27 +107,12 @@ def errors(
     made = {}
     paths = model.simulate(problem.trials, list(sets.values()))
     for name, predicted in zip(sets, paths, strict=True):
-        rest = _without_nuisances(problem, start, problem.features(predicted))
+        left = np.nan_to_num(problem.recorded - problem.features(predicted))
+        linear = start.linear
+        linear = linear.moved(linear.target - start.noise.innovations(left))
+        rest = linear.rest(linear.solve((), slack=False))  # but for the nuisances
         made[name] = float(terms((rest / start.noise.sd)[problem.seen]).mean())
     return made
-
-
-def _without_nuisances(
-    problem: Problem, start: Point, predicted: np.ndarray
-) -> np.ndarray:
-    """What the nuisances of a recording, such as a shift of its clock, leave of the
-    residuals of predicted features ``(N, C)``, memory taken out; ``(N, C)``."""
-    known = start.noise
-    rest = known.innovations(np.nan_to_num(problem.recorded - predicted))
-    numbers = [k for k in start.slopes if problem.rows[k].nuisance]
-    if not numbers:
-        return rest
-    told = [known.innovations(start.slopes[k]) * problem.sd[k] for k in numbers]
-    design = np.stack(told, axis=-1).reshape(rest.size, -1)
-    weight = known.weights(rest, problem.seen).ravel()
-    normal = design.T @ (design * weight[:, None]) + np.eye(len(numbers))
-    values = np.linalg.solve(normal, design.T @ (weight * rest.ravel()))
-    return rest - (design @ values).reshape(rest.shape)
 
 
 def _rms(compared: Compared, effects: Sequence[Effect]) -> tuple[float, ...]:

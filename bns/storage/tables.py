@@ -7,6 +7,7 @@ columns of numbers.
 """
 
 import hashlib
+import re
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -215,8 +216,9 @@ def _separators(data: bytes) -> tuple[str, str]:
     """What parts the columns of the bytes of a file, and its decimal point."""
     head, _, rows = data.partition(b"\n")
     delimiter = max(",;\t", key=lambda sign: head.count(sign.encode()))
-    comma = delimiter != "," and b"," in rows
-    return delimiter, "," if comma else "."
+    if delimiter == "," or re.search(rb"\d\.\d", rows):
+        return delimiter, "."
+    return delimiter, "," if re.search(rb"\d,\d", rows) else "."
 
 
 def _parsed(

@@ -29,7 +29,7 @@ GROUPED = (
     "actuator_kp",
 )
 """effects that may be on all parts alike: one kind of bearing, wheel, motor or supply;
-`actuator_kd` of all stood in the place of the damping of all joints of a Go2 leg"""
+a loop's damping, `actuator_kd`, is left to that of all joints"""
 LATE = ("command_delay", "command_lag", "reading_delay")
 LATER = 0.01  # [s] for derivatives: a lag has next to none where there is none
 CUT = (0.15, 0.3, 0.5, 0.7, 0.9)  # of what was told at most: levels of a limit of it

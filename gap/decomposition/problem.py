@@ -62,7 +62,7 @@ class Problem:
         return cls(
             model,
             tuple(trials),
-            model.rows(trials),
+            model.stepped(trials, model.rows(trials)),
             windows,
             np.concatenate(seen),
             np.repeat(np.arange(len(trials)), counts),
@@ -242,16 +242,14 @@ class Problem:
             which: numbers of the rows.
             only: see `predict`.
         """
-        low, high = self.bounds
         sets, steps = [values], []
         silent = [number for number in which if self.rows[number].name in self.silent]
         which = [number for number in which if number not in silent]
         joined = self._joined(which)
         simulated = [number for number in which if number not in joined]
         for number in simulated:
-            step = self.rows[number].difference
-            up, down = high[number] - values[number], values[number] - low[number]
-            step = min(step, up) if up >= min(step, down) else -min(step, down)
+            row = self.rows[number]
+            step = row.inward(values[number], row.difference)
             moved = values.copy()
             moved[number] += step
             sets.append(moved)

@@ -12,7 +12,7 @@ from bns.gap.decomposition import rest, search, shares, words
 from bns.gap.decomposition.decomposition import LARGE, Decomposition
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.problem import Problem
-from bns.gap.decomposition.shares import Part
+from bns.gap.decomposition.shares import Part, Sized
 from bns.gap.records import Diagnosis, Fit, Verdict
 from bns.gap.where import horizons, localised
 from bns.gap.where.compared import Compared
@@ -229,8 +229,8 @@ def _fit(made: Decomposition, support: Support) -> Fit:
     values = point.values
     if support != point.support:
         values = fits.placed(problem, point.linear, support, point.values)
-    parts = shares.parts(problem, replace(point, values=values, support=support))
-    order = {part.name: part for part in parts}
+    sized = shares.sized(problem, replace(point, values=values, support=support))
+    order = {one.name: one for one in sized}
     names = _ordered(made, support)
     shown = [shown_effect(problem, name, order[name]) for name in names]
     errors = point.linear.held_out(support)
@@ -249,13 +249,13 @@ def _fit(made: Decomposition, support: Support) -> Fit:
     )
 
 
-def _at_bound(problem: Problem, part: Part) -> bool:
+def _at_bound(problem: Problem, part: Sized) -> bool:
     rows = {row.name: row for row in problem.rows}
     return any(value in (rows[n].low, rows[n].high) for n, value in part.values.items())
 
 
 def shown_effect(
-    problem: Problem, name: str, part: Part
+    problem: Problem, name: str, part: Sized
 ) -> tuple[str, float, tuple[float, float], str]:
     """Text, magnitude, interval and unit of an explanation.
 
@@ -270,7 +270,7 @@ def shown_effect(
     return str(problem.model.effect(name, part.values)), *_magnitude(problem, part)
 
 
-def _magnitude(problem: Problem, part: Part) -> tuple[float, tuple[float, float], str]:
+def _magnitude(problem: Problem, part: Sized) -> tuple[float, tuple[float, float], str]:
     """Magnitude, interval and unit of an explanation: of the number called as it is, or
     without one of the first; of a size with a direction, the length."""
     rows = {row.name: row for row in problem.rows}

@@ -74,6 +74,10 @@ class Corrected(GapModel):
             for row in found
         )
 
+    def stepped(self, trials: Sequence[Trial], rows: Sequence[Row]) -> tuple[Row, ...]:
+        """See `GapModel.stepped`: by the model as it was."""
+        return self.model.stepped(trials, rows)
+
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:

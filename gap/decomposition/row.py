@@ -96,6 +96,11 @@ class Row:
         given = {**self.fixed, self.parameter: round(value) if whole else value}
         return registry.make(self.effect, **given)
 
+    def inward(self, value: float, step: float) -> float:
+        """A step from a value: the other way, or shorter, where bounds are nearer."""
+        up, down = self.high - value, value - self.low
+        return min(step, up) if up >= min(step, down) else -min(step, down)
+
     @property
     def difference(self) -> float:
         """Step for a derivative."""

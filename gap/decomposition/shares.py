@@ -30,23 +30,32 @@ NINETY = 1.645  # standard deviations of a 90 % interval
 
 
 @dataclass(frozen=True)
-class Part:
-    """One explanation among several.
+class Sized:
+    """An explanation and how large it is.
 
     Attributes:
         name: of the explanation.
         values: of its rows, by name.
         low, high: 90 % intervals of these.
-        last: share of the gap that goes when it is added last. The gap is all that
-            the explanations close, and the rest too where that is more than scatter.
-        alone: share that it closes by itself.
-        sure: posterior probability that it is in.
     """
 
     name: str
     values: dict[str, float]
     low: dict[str, float]
     high: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Part(Sized):
+    """One explanation among several.
+
+    Attributes:
+        last: share of the gap that goes when it is added last. The gap is all that
+            the explanations close, and the rest too where that is more than scatter.
+        alone: share that it closes by itself.
+        sure: posterior probability that it is in.
+    """
+
     last: float
     alone: float
     sure: float
@@ -64,45 +73,44 @@ def parts(problem: Problem, point: Point, *, lasting: bool = True) -> list[Part]
     told = linear
     if point.noise.order or point.noise.latent.parts:  # shares are of the plain error
         told = HeldOut.of(problem, point).plain
-    spread = NINETY * np.sqrt(np.diagonal(linear.covariance(support)))
-
     empty, full = frozenset[str](), frozenset(linear.free)
     none, every, left = (_height(told, names) for names in (empty, full, support))
     whole = max(none - (every if lasting else left), 1e-9)
-    made = []
-    for name in sorted(support):
-        values, low, high = _values(problem, point, name, spread)
-        made.append(
-            Part(
-                name=name,
-                values=values,
-                low=low,
-                high=high,
-                last=(_height(told, support - {name}) - left) / whole,
-                alone=(none - _height(told, frozenset({name}))) / whole,
-                sure=search.inclusion(linear, name),
-            )
+    made = [
+        Part(
+            **vars(one),
+            last=(_height(told, support - {one.name}) - left) / whole,
+            alone=(none - _height(told, frozenset({one.name}))) / whole,
+            sure=search.inclusion(linear, one.name),
         )
+        for one in sized(problem, point)
+    ]
     return sorted(made, key=lambda part: (-part.last, part.name))
 
 
-def _values(
-    problem: Problem, point: Point, name: str, spread: np.ndarray
-) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
-    """Values of the rows of an explanation, and their 90 % intervals, by name."""
+def sized(problem: Problem, point: Point) -> list[Sized]:
+    """Explanations of a point with values and intervals, by name.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+    """
     place = {number: at for at, number in enumerate(point.linear.columns)}
-    values, low, high = {}, {}, {}
-    edges = problem.bounds
-    for number in problem.terms[name]:
-        row, value = problem.rows[number], float(point.values[number])
-        if number not in place:
-            continue
-        unit = row.sd if row.smooth else abs(value - row.nominal) or row.sd
-        width = float(spread[place[number]] * unit)
-        values[row.name] = value
-        low[row.name] = max(value - width, float(edges[0][number]))
-        high[row.name] = min(value + width, float(edges[1][number]))
-    return values, low, high
+    spread = NINETY * np.sqrt(np.diagonal(point.linear.covariance(point.support)))
+    made = []
+    for name in sorted(point.support):
+        one = Sized(name, {}, {}, {})
+        for number in problem.terms[name]:
+            if number not in place:
+                continue
+            row, value = problem.rows[number], float(point.values[number])
+            unit = row.sd if row.smooth else abs(value - row.nominal) or row.sd
+            width = float(spread[place[number]] * unit)
+            one.values[row.name] = value
+            one.low[row.name] = max(value - width, float(row.low))
+            one.high[row.name] = min(value + width, float(row.high))
+        made.append(one)
+    return made
 
 
 @dataclass(frozen=True, eq=False)

@@ -110,6 +110,17 @@ class GapModel(ABC):
         """All numbers that may be off, in a fixed order; they may depend on what was
         told (a dead band is tried between the speeds told)."""
 
+    def stepped(self, trials: Sequence[Trial], rows: Sequence[Row]) -> tuple[Row, ...]:
+        """Rows whose steps for derivatives stand out of what the simulation of these
+        trials does by itself.
+
+        Args:
+            trials: N recorded trials.
+            rows: as `rows` gives them.
+        """
+        del trials
+        return tuple(rows)
+
     @abstractmethod
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]

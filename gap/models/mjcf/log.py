@@ -15,7 +15,8 @@ from bns.worlds.data.units import factor
 from bns.worlds.trial import Commands, Trial
 
 LATE = 0.5  # samples by which a command may be sent after its first row
-BEYOND, USUAL = 5.0, 0.9  # times a joint's range, by a quantile of what was seen of it
+FARTHEST = 5.0  # times a joint's range
+USUAL = 0.9  # quantile of what was seen of a joint: some samples are wild
 HELD = 2, 10  # samples that a loop of its own holds its commands: who tells anew at
 # each sample logs what it tells, as does a list of steps that are held for long
 
@@ -54,17 +55,14 @@ def possible(trials: Sequence[Trial], config: OwnConfig, model: mujoco.MjModel) 
         FormatError: there is one; its column is in another unit.
     """
     for column, item in enumerate(config.seen):
-        if item.quantity != "joint" or not model.joint(item.part).id >= 0:
+        if item.quantity != "joint" or not model.joint(item.part).limited:
             continue
-        number = model.joint(item.part).id
         values = np.concatenate([trial.observed[:, column] for trial in trials])
         values = values[np.isfinite(values)]
-        if not model.jnt_limited[number] or not len(values):
-            continue
-        most = float(np.abs(model.jnt_range[number]).max())
-        size, name = float(np.quantile(np.abs(values), USUAL)), item.channel.name
-        if size > BEYOND * most:
-            unit = item.channel.unit
+        most = float(np.abs(model.joint(item.part).range).max())
+        size = float(np.quantile(np.abs(values), USUAL)) if len(values) else 0.0
+        if size > FARTHEST * most:
+            name, unit = item.channel
             raise FormatError(
                 f"{name} comes to {size:.3g} {unit}, and joint {item.part!r} of the "
                 f"model no farther than {most:.3g}: give the unit of its column, "

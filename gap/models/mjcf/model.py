@@ -58,6 +58,7 @@ class OwnModel(GapModel):
         self.physics = Simulation(config, threads=threads)
         model, self.dt = self.physics.model, self.physics.dt
         self._parts = self.physics.finest
+        self._touches = False
         self.listed = mjcf.candidates(config, model)
         self._bodies = {
             item.fixed["part"]: masses.Body.of(model, item.fixed["part"])
@@ -115,7 +116,8 @@ class OwnModel(GapModel):
         if usual:  # what the user asked for stays
             items = mjcf_rows.touching(items, loads.touching)
         self._tried = {item.effect for item in items}
-        made = mjcf_rows.rows(
+        self._touches = bool(loads.touching)
+        return mjcf_rows.rows(
             items,
             trials,
             self.dt,
@@ -123,23 +125,26 @@ class OwnModel(GapModel):
             stepped=self._parts > 1,
             forces=loads.forces,
         )
-        changed = partial(self._changed, self.physics.some(trials))
-        return roughness.stepped(made, changed) if loads.touching else made
+
+    def stepped(self, trials: Sequence[Trial], rows: Sequence[Row]) -> tuple[Row, ...]:
+        """See `GapModel.stepped`: a simulation is rough where something touches."""
+        if not self._touches:
+            return tuple(rows)
+        return roughness.stepped(
+            rows, partial(self._changed, self.physics.some(trials))
+        )
 
     def _changed(
         self, trials: Sequence[Trial], sets: Sequence[Mapping[str, float]]
     ) -> np.ndarray:
         """What values of rows change of the nominal motion, see `roughness.Changed`."""
         whole = [[values] * len(trials) for values in ({}, *sets)]
-        base, *others = [
-            np.concatenate(
-                [
-                    self.compare(trial, path, self.windows(trial))
-                    for trial, path in zip(trials, paths, strict=True)
-                ]
-            )
-            for paths in self.paths(trials, whole, fine=False)
+        paths = self.paths(trials, whole, fine=False)
+        seen = [
+            self.compare(trial, np.stack(mine), self.windows(trial))
+            for trial, mine in zip(trials, zip(*paths, strict=True), strict=True)
         ]
+        base, *others = np.concatenate(seen, axis=1)
         return (np.stack(others) - base) / self.resolution
 
     def untried(self) -> tuple[str, ...]:

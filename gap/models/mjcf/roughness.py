@@ -17,9 +17,9 @@ Changed = Callable[[Sequence[Mapping[str, float]]], np.ndarray]
 ``(E, N, C)``; values by row"""
 
 MOST = 120
-"""rows of a model that is looked at: of more, better slopes make more sets
-that promise something, each of which is followed (a quadruped of 174: the same verdict
-in twice the time)"""
+"""rows of a model that is looked at: of more, better slopes make more sets that promise
+something, each of which is followed (a quadruped of 174: the same verdict in twice the
+time)"""
 TINY = 0.03  # of a row's step: what it changes is roughness, if it is not small
 SHARE = 3.0  # times what it would be in proportion: small
 PROBED = 12  # rows that tell the roughness
@@ -66,6 +66,5 @@ def _sizes(changes: np.ndarray) -> np.ndarray:
 
 
 def _moved(row: Row, step: float) -> dict[str, float]:
-    """The value a step away, within bounds, by the row's name."""
-    inside = row.nominal + step <= row.high
-    return {row.name: row.nominal + (step if inside else -step)}
+    """The value a step away from the nominal one, by the row's name."""
+    return {row.name: row.nominal + row.inward(row.nominal, step)}

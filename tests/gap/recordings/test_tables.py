@@ -113,6 +113,11 @@ def test_semicolons_tabs_and_decimal_commas_are_read(rows, tmp_path):
     np.testing.assert_array_equal(table["q"], [1.5, -0.25])
 
 
+def test_a_comma_in_a_text_is_no_decimal_one(tmp_path):
+    (tmp_path / "a.tsv").write_text("t\tnote\tq\n0\tslow, 2,5 V\t1.5\n1\t\t-0.25\n")
+    np.testing.assert_array_equal(tables.read(tmp_path / "a.tsv")["q"], [1.5, -0.25])
+
+
 def test_text_among_numbers_is_named_with_its_line(tmp_path):
     rows = ["0,1.5", "1,", "2,1.7", "3,off", "4,1.9"]
     (tmp_path / "a.csv").write_text("\n".join(["t,q", *rows]) + "\n")
