@@ -6,15 +6,16 @@ is unsure about; `bns gap describe` prints the same.
 
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import mujoco
 import numpy as np
 
 from bns.errors import BnsError, FormatError
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column
-from bns.gap.models.mjcf import guesses, matching, start
+from bns.gap.models.mjcf import guesses, matching, prepared, start
 from bns.gap.models.mjcf.channels import (
     Work,
     commands,
@@ -25,6 +26,8 @@ from bns.gap.models.mjcf.config import WINDOW
 from bns.gap.models.mjcf.log import split
 from bns.gap.models.mjcf.measured import observed, replayed
 from bns.worlds.data.units import FACTORS, factor, si_unit
+
+HELD = 0.5  # of the error on the ground, less of which says that a stand holds a robot
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,7 @@ def describe(
     told, seen = _columns(work)
     commands(work, told, seen)
     observed(work, seen)
+    _hold(work)
     _begin(work)
     return Description(
         toml(work, place(model, out)), tuple(work.guessed), tuple(work.unsure)
@@ -177,20 +181,72 @@ def _columns(work: Work) -> tuple[list[Column], list[Column]]:
     return told, seen
 
 
+def _missed(work: Work, rows: np.ndarray, data: mujoco.MjData) -> float:
+    """Squared error of the model from a state on, of the columns' variances, summed."""
+    made = replayed(work, rows, data)
+    return sum(
+        float(
+            np.nanmean((column.values[rows] * factor(unit) - made[part]) ** 2)
+            / np.nanvar(column.values * factor(unit))
+        )
+        for column, part, unit in work.seen
+        if part in made
+    )
+
+
+def _stood(work: Work, rows: np.ndarray) -> mujoco.MjData:
+    """The model after it has settled where its joints were seen first."""
+    first = {
+        part.name: float(column.values[rows][np.isfinite(column.values[rows])][0])
+        * factor(unit)
+        for column, part, unit in work.seen
+        if part.quantity == "joint"
+    }
+    data = guesses.posed(work.model, guesses.nearest(work.model, first), 0.0)
+    for joint, at in first.items():
+        data.joint(joint).qpos[0] = at
+    for column, actuator, unit in work.told:
+        data.actuator(actuator).ctrl[0] = column.values[rows[0]] * factor(unit)
+    mujoco.mj_step(
+        work.model, data, nstep=round(guesses.SETTLE / work.model.opt.timestep)
+    )
+    data.time = 0.0
+    return data
+
+
+def _hold(work: Work) -> None:
+    """Whether a stand holds the robot: there is nothing to stand on, or its joints move
+    much more like that than like those of a robot on the ground."""
+    bodies = tuple(prepared.loose(work.model))
+    carried = start.free(work.model)
+    if not bodies or any(
+        part.axis and part.name in carried for _, part, _ in work.seen
+    ):
+        return
+    held = replace(work, model=compiled(work.path, tolds(work), bodies))
+    why = "the model has nothing to stand on"
+    if prepared.grounded(work.model):
+        why = "its joints move like that, not like those of a robot on the ground"
+        longest = max(work.rows, key=len)
+        rows = longest[work.times[longest] <= work.times[longest[0]] + guesses.CUT]
+        errors = [_missed(each, rows, _stood(each, rows)) for each in (held, work)]
+        if errors[0] > HELD * errors[1]:
+            return
+    work.held, work.model = bodies, held.model
+    work.unsure.append(
+        f"held: a stand holds {' and '.join(map(repr, bodies))} off the ground, for "
+        f"{why}; delete `held` if none does"
+    )
+
+
 def _settled(work: Work, rows: np.ndarray, pose: str) -> bool:
     """Whether a trial begins as a robot does that has come to rest, not as one that was
     let go: by which of the two predicts its first samples better."""
     rows = rows[work.times[rows] <= work.times[rows[0]] + guesses.SETTLE]
-    errors = []
-    for lasting in (guesses.SETTLE, 0.0):
-        made = replayed(work, rows, guesses.posed(work.model, pose, lasting))
-        rest = [
-            np.nanmean((column.values[rows] * factor(unit) - made[part]) ** 2)
-            / np.nanvar(column.values * factor(unit))
-            for column, part, unit in work.seen
-            if part in made
-        ]
-        errors.append(float(np.sum(rest)))
+    errors = [
+        _missed(work, rows, guesses.posed(work.model, pose, lasting))
+        for lasting in (guesses.SETTLE, 0.0)
+    ]
     return errors[0] <= errors[1]
 
 
@@ -261,6 +317,8 @@ def toml(work: Work, out: Path) -> str:
     ]
     steps = np.diff(work.times[max(work.rows, key=len)])
     step = float(np.median(steps[steps > 0]))
+    if work.held:
+        lines.append(f"held = {json.dumps(work.held, ensure_ascii=False)}")
     window = _window(work, step)
     if window != WINDOW:
         lines.append(f"window = {window:.4g}")
@@ -285,7 +343,7 @@ def toml(work: Work, out: Path) -> str:
             "unit": si_unit(unit),
             "noise": noise,
         }
-        lines += _table(f"observed.{_text(column.name)}", given)
+        lines += _table(f"observed.{_text(work.channel(column, unit))}", given)
     if work.start:
         lines += _table("start", work.start)
     return "\n".join([*lines, *_log(work)]) + "\n"
@@ -308,13 +366,12 @@ def _window(work: Work, step: float) -> float:
 def _log(work: Work) -> list[str]:
     """[log]: columns that are called otherwise, or are not in SI units."""
     lines = {}
-    units = {c.name: unit for c, _, unit in (*work.told, *work.seen)}
     for name, (column, unit) in work.sources.items():
         if column != name or unit not in ("", "s"):
             lines[name] = (column, unit)
-    for name, unit in units.items():
+    for item, _, unit in (*work.told, *work.seen):
         if factor(unit) != 1.0:
-            lines[name] = (name, unit)
+            lines[work.channel(item, unit)] = (item.name, unit)
     made = ["", "[log]"] if lines else []
     for name, (column, unit) in lines.items():
         more = f", unit = {_text(unit)}" if unit else ""

@@ -38,14 +38,25 @@ class Work:
     guessed: list[str] = field(default_factory=list)
     unsure: list[str] = field(default_factory=list)
     start: dict[str, object] = field(default_factory=dict)
+    held: tuple[str, ...] = ()
+
+    def channel(self, column: Column, unit: str) -> str:
+        """What the description calls a column: by its name, without a unit there that
+        is none of SI, since channels are in these."""
+        plain = matching.unitless(column.name)
+        taken = plain in self.table.names or factor(unit) == 1.0
+        return column.name if taken else plain
 
 
-def compiled(path: Path, told: Sequence[Told]) -> mujoco.MjModel:
+def compiled(
+    path: Path, told: Sequence[Told], held: tuple[str, ...] = ()
+) -> mujoco.MjModel:
     """The robot's model with the loops of its commands, compiled.
 
     Args:
         path: MJCF file.
         told: commands, with their actuators and gains.
+        held: bodies that a stand holds.
 
     Raises:
         FormatError: there is no such file, or MuJoCo cannot compile it.
@@ -56,7 +67,8 @@ def compiled(path: Path, told: Sequence[Told]) -> mujoco.MjModel:
             "robots` needs no description."
         )
     try:
-        return prepared.spec(OwnConfig(path.stem, path, tuple(told), ())).compile()
+        config = OwnConfig(path.stem, path, tuple(told), (), held)
+        return prepared.spec(config).compile()
     except ValueError as error:
         first = str(error).strip().splitlines()[0]
         raise FormatError(f"{path}: {first}") from None
@@ -134,7 +146,8 @@ def joint_of(model: mujoco.MjModel, actuator: int) -> str:
 def _told_unit(
     work: Work, column: Column, actuator: str, seen: Sequence[Column]
 ) -> str:
-    """The unit of a command: an angle or length for a position loop, else 1."""
+    """The unit of a command: an angle or length for a position loop, a rate for a loop
+    of speed, else 1."""
     model, names = (
         work.model,
         [work.model.actuator(a).name for a in range(work.model.nu)],
@@ -142,22 +155,28 @@ def _told_unit(
     number = names.index(actuator) if actuator in names else -1
     joint = joint_of(model, number) if number >= 0 else actuator
     bias = model.actuator_biasprm[number] if number >= 0 else np.zeros(3)
-    if not (work.loop or bias[1] < 0):
-        if bias[2] >= 0:  # nor a loop of speed
-            _no_loop(work, column, seen)
+    position = bool(work.loop) or bias[1] < 0
+    if not position and bias[2] >= 0:
+        _no_loop(work, column, seen)
         return "1"
     moved = [joint] if joint else _wound(model, number)
-    if not (moved and all(rehearsal.turns(model, name) for name in moved)):
-        known = per_si("m")
-    else:
-        known = per_si("rad")
-        known.pop("turn")
+    turning = moved and all(rehearsal.turns(model, name) for name in moved)
+    known = per_si(("rad" if turning else "m") + "/s" * (not position))
+    for unusual in ("turn", "khepera-speed"):
+        known.pop(unusual, None)
     said = matching.unit(column.name)
     if said in known:
         return said
-    largest = _widest(model, number, joint)
+    largest = _widest(model, number, joint) if position else _fastest(model, number)
     size = float(np.nanmax(np.abs(column.values)))
-    return next((u for u, f in known.items() if size / f <= 1.05 * largest), "rad")
+    fits = (u for u, f in known.items() if size / f <= 1.05 * largest)
+    return next(fits, next(iter(known)))
+
+
+def _fastest(model: mujoco.MjModel, number: int) -> float:
+    """The largest speed that an actuator may be told."""
+    limited = bool(model.actuator_ctrllimited[number])
+    return float(np.abs(model.actuator_ctrlrange[number]).max()) if limited else np.inf
 
 
 def _wound(model: mujoco.MjModel, actuator: int) -> list[str]:
@@ -228,6 +247,6 @@ def tolds(work: Work) -> list[Told]:
                 edges = work.model.actuator_ctrlrange[number]
                 allowed = float(edges[0]), float(edges[1])
         low, high = guesses.limits(values, allowed)
-        channel = Channel(column.name, si_unit(unit))
+        channel = Channel(work.channel(column, unit), si_unit(unit))
         made.append(Told(channel, actuator, low, high, **work.loop))
     return made

@@ -18,6 +18,7 @@ from bns.worlds.trial import Channel
 KEYS = (
     "name",
     "model",
+    "held",
     "window",
     "commands",
     "observed",
@@ -89,6 +90,7 @@ class OwnConfig:
         name: of the robot; recordings carry it.
         model: its MJCF file.
         told, seen: channels.
+        held: bodies on free joints that a stand holds where they are, off the ground.
         keyframe: pose at the start of each trial; "" = the model's own.
         recorded: whether observed joints start where they were recorded.
         settle: how long the robot stands at rest before a trial [s].
@@ -103,6 +105,7 @@ class OwnConfig:
     model: Path
     told: tuple[Told, ...]
     seen: tuple[Seen, ...]
+    held: tuple[str, ...] = ()
     keyframe: str = ""
     recorded: bool = False
     settle: float = 0.0
@@ -141,6 +144,7 @@ class OwnConfig:
             model=path.parent / str(given["model"]),
             told=tuple(_told(n, t, path) for n, t in given["commands"].items()),
             seen=tuple(_seen(n, t, path) for n, t in given["observed"].items()),
+            held=_names(given.get("held", ())),
             keyframe=str(start.get("keyframe", "")),
             recorded=bool(start.get("recorded", False)),
             settle=_number(start.get("settle", 0.0), "settle", path, 0.0, 60.0),

@@ -7,7 +7,7 @@ import numpy as np
 
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column
-from bns.worlds.data.units import RATES
+from bns.worlds.data.units import FACTORS, RATES
 
 
 def _set(words: str) -> frozenset[str]:
@@ -62,8 +62,9 @@ def words(name: str) -> list[str]:
 
 
 def unit(name: str) -> str:
-    """The unit at the end of a name, "elbow_vel_rad_s"; "" = none there."""
-    return _ending(words(name))[1]
+    """The unit at the end of a name, "elbow_vel_rad_s", or before words for that it is
+    told or seen, "elbow_deg_goal"; "" = none there."""
+    return _ending(words(name))[1] or _ending(_unsaid(name))[1]
 
 
 def _ending(said: Sequence[str]) -> tuple[int, str]:
@@ -76,6 +77,18 @@ def _ending(said: Sequence[str]) -> tuple[int, str]:
     return (1, UNITS[said[-1]]) if len(said) > 1 and said[-1] in UNITS else (0, "")
 
 
+def unitless(name: str) -> str:
+    """A name without its unit, see `unit`: "elbow_deg" is "elbow"; as it is, where the
+    unit is not parted from the rest."""
+    count = _ending(words(name))[0]
+    for _ in range(count):
+        name = re.sub(r"[\W_]+[A-Za-z]+[\W_]*$", "", name) or name
+    if not count and (inside := _ending(_unsaid(name))[0]):
+        for word in _unsaid(name)[-inside:]:
+            name = re.sub(rf"[\W_]+{word}(?=[\W_])", "", name, flags=re.IGNORECASE)
+    return name
+
+
 def core(name: str) -> str:
     """What is left of a name without words for what and in which unit it is."""
     return "".join(_own(name))
@@ -84,6 +97,7 @@ def core(name: str) -> str:
 def _own(name: str) -> list[str]:
     """The words that `core` joins."""
     said = words(name)
+    said = said if _ending(said)[0] else _unsaid(name)
     said = said[: len(said) - _ending(said)[0]]
     dropped = TOLD | SEEN | SPEED | EFFORT | POSITION | DRIVE
     return [word for word in said if word not in dropped]
@@ -91,7 +105,12 @@ def _own(name: str) -> list[str]:
 
 def _bare(name: str) -> str:
     """What is left of a name without words for that it is told or seen."""
-    return "".join(word for word in words(name) if word not in TOLD | SEEN)
+    return "".join(_unsaid(name))
+
+
+def _unsaid(name: str) -> list[str]:
+    """The words that `_bare` joins."""
+    return [word for word in words(name) if word not in TOLD | SEEN]
 
 
 def quantity(column: Column) -> str:
@@ -286,6 +305,8 @@ def by_place(
     """
     found: dict[str, tuple[str, str, str]] = {}
     for column in columns:
+        if unit(column.name) in FACTORS["rad"]:
+            continue  # an angle is no place
         pieces = column.name.split("_")
         size = _ending([piece.lower() for piece in pieces])[0]
         plain = "_".join(pieces[: len(pieces) - size])

@@ -112,6 +112,7 @@ class OwnModel(GapModel):
         self._parts = self.physics.needed(trials)
         usual = self.config.effects is None
         loads = self.physics.loads(trials)
+        self.physics.apart(loads)
         items = tuple(self._terms.values())
         if usual:  # what the user asked for stays
             items = mjcf_rows.touching(items, loads.touching)
@@ -281,11 +282,13 @@ class OwnModel(GapModel):
     def write_corrected(self, effects: Sequence[str], path: str | Path) -> list[str]:
         """Write the MJCF with the effects on its parts; gives those it can not hold.
 
+        A body that a stand held is free there again.
+
         Raises:
             BnsError: the file can not be written.
         """
         made = [self.parse(text) for text in effects]
-        spec = self.physics.spec(made)
+        spec = self.physics.spec(made, held=False)
         spec.compile()
         files.write_text(path, spec.to_xml())
         return [str(effect) for effect in made if effect.stage != "body"]

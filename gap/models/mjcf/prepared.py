@@ -21,10 +21,11 @@ def spec(config: OwnConfig) -> mujoco.MjSpec:
 
     Actuators without a name are called as their joint (or tendon, site, body) is.
     Where the description gives the gains of a position loop, the actuator becomes one
-    (what it did before is dropped), or is added to the joint of that name.
+    (what it did before is dropped), or is added to the joint of that name. Bodies that
+    it says are held are fixed where they are, and touch no ground.
 
     Raises:
-        BnsError: a loop on what is no joint.
+        BnsError: a loop on what is no joint, or a body held that is on no free joint.
         ValueError: MuJoCo refuses the file.
     """
     made = mjcf_file.load(config.model)
@@ -32,7 +33,79 @@ def spec(config: OwnConfig) -> mujoco.MjSpec:
     for told in config.told:
         if told.kp:
             _close(made, told)
+    if config.held:
+        _hold(made, config.held)
     return made
+
+
+def loose(model: mujoco.MjModel) -> list[str]:
+    """Names of the bodies on free joints that carry joints which are driven."""
+    kinds = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+    by_joint = np.isin(model.actuator_trntype, [int(kind) for kind in kinds])
+    bodies = model.jnt_bodyid[model.actuator_trnid[by_joint, 0]]
+    roots = [int(root) for root in np.unique(model.body_rootid[bodies])]
+    names = [model.body(root).name for root in roots if free_joint(model, root) >= 0]
+    return [name for name in names if name]
+
+
+def grounded(model: mujoco.MjModel) -> bool:
+    """Whether there is anything fixed that a robot could stand on."""
+    fixed = model.body_weldid[model.geom_bodyid] == 0
+    solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    return bool((fixed & solid).any())
+
+
+def free_joint(model: mujoco.MjModel, body: int) -> int:
+    """Number of a body's free joint, -1 = none."""
+    first = int(model.body_jntadr[body])
+    free = first >= 0 and model.jnt_type[first] == mujoco.mjtJoint.mjJNT_FREE
+    return first if free else -1
+
+
+def _hold(made: mujoco.MjSpec, names: Sequence[str]) -> None:
+    """Fix bodies where they are; poses of the other joints stay as they are."""
+    model = made.compile()
+    joints = {name: free_joint(model, number(model, "body", name)) for name in names}
+    for name, joint in joints.items():
+        if joint < 0:
+            raise BnsError(f"held = {name!r}: this body is on no free joint.")
+    at = [int(model.jnt_qposadr[joint]) for joint in joints.values()]
+    moved = [int(model.jnt_dofadr[joint]) for joint in joints.values()]
+    for name in names:
+        body = made.body(name)
+        for item in body.joints:
+            made.delete(item)
+    for key in made.keys:
+        for numbers, first, count in (("qpos", at, 7), ("qvel", moved, 6)):
+            values = np.array(list(getattr(key, numbers)))
+            if len(values):
+                gone = np.add.outer(first, np.arange(count)).ravel()
+                setattr(key, numbers, np.delete(values, gone))
+    for geom in made.worldbody.geoms:
+        if geom.type in GROUND:
+            geom.contype = geom.conaffinity = 0
+    _excluded(made, model, [number(model, "body", name) for name in names])
+
+
+def _excluded(made: mujoco.MjSpec, model: mujoco.MjModel, held: Sequence[int]) -> None:
+    """Exclude contacts of held bodies with those that joints join to them, which MuJoCo
+    takes for contacts with the world once their parent is fixed.
+
+    Args:
+        made: the spec; written to.
+        model: with these bodies free.
+        held: numbers of the bodies.
+    """
+    welded, solid = model.body_weldid, np.unique(model.geom_bodyid)
+    parents = welded[model.body_parentid[welded]]
+    bodies = {body.id: body for body in made.bodies}
+    for one in solid[np.isin(welded[solid], held)]:
+        joined = (parents[solid] == welded[one]) & (welded[solid] != welded[one])
+        for other in solid[joined]:
+            ends = [bodies[int(one)], bodies[int(other)]]
+            for body in ends:
+                body.name = body.name or f"body_{body.id}"
+            made.add_exclude(bodyname1=ends[0].name, bodyname2=ends[1].name)
 
 
 def name_actuators(made: mujoco.MjSpec) -> list[str]:
@@ -105,6 +178,7 @@ def _padded(values: Sequence[float], count: int) -> list[float]:
     return [*values, *[0.0] * (count - len(values))]
 
 
+GROUND = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
 CLOSE = 1e-9  # by which inertias may differ, of their size
 KINDS = (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SDF)
 

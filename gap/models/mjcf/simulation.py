@@ -3,14 +3,16 @@
 import math
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
+from itertools import zip_longest
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from bns.errors import FormatError
-from bns.gap.models.mjcf import prepared, start
+from bns.gap.models.mjcf import prepared, start, trees
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.models import mjcf as mjcf_file
 from bns.worlds.effects.base import (
@@ -45,6 +47,24 @@ class Loads(NamedTuple):
     touching: frozenset[str] = frozenset()
 
 
+class _Group(NamedTuple):
+    """Simulations of a trial under the same effects on all trees, and what is missing:
+    by tree the pieces by key."""
+
+    trial: Trial
+    common: tuple[Effect, ...]
+    lead: float
+    missing: dict[int, dict[tuple, trees.Piece]]
+
+    def runs(self) -> Iterator[tuple[Trial, tuple[Effect, ...], dict[int, tuple]]]:
+        """Trials to simulate, their effects, and by tree the key of its piece."""
+        pieces = [list(found.values()) for found in self.missing.values()]
+        keys = [[(t, key) for key in found] for t, found in self.missing.items()]
+        runs = trees.together(self.trial, self.common, pieces)
+        for (trial, effects), row in zip(runs, zip_longest(*keys), strict=True):
+            yield trial, effects, dict(item for item in row if item)
+
+
 class Simulation:
     """Runs recorded commands on a described robot again.
 
@@ -67,6 +87,7 @@ class Simulation:
         self._pool = Pool(threads)
         self._compiled: OrderedDict[tuple, Compiled] = OrderedDict()
         self._kept: OrderedDict[tuple, np.ndarray] = OrderedDict()
+        self._trees = trees.Trees.one(config)
         self._starts: dict[tuple, np.ndarray] = {}
         model = self.model
         self.dt = float(model.opt.timestep)
@@ -91,15 +112,20 @@ class Simulation:
             self._views[model.names] = start.View.of(self.config, model)
         return self._views[model.names]
 
-    def spec(self, effects: Sequence[Effect]) -> mujoco.MjSpec:
+    def spec(self, effects: Sequence[Effect], *, held: bool = True) -> mujoco.MjSpec:
         """The model with the effects on its parts written into it.
+
+        Args:
+            effects: of any stage.
+            held: whether bodies that a stand holds are fixed.
 
         Raises:
             FormatError: the MJCF file is missing or MuJoCo refuses it.
         """
         if not self.config.model.exists():
             raise FormatError(f"There is no model file {self.config.model}.")
-        made = prepared.spec(self.config)
+        config = self.config if held else replace(self.config, held=())
+        made = prepared.spec(config)
         model = mjcf_file.compiled(made, self.config.model)
         if effects and made.compiler.inertiafromgeom == BY_GEOMS:
             prepared.weighed(
@@ -174,6 +200,16 @@ class Simulation:
             frozenset(model.geom(number).name for number in touching),
         )
 
+    def apart(self, loads: Loads) -> None:
+        """From now on what trees of the model do is simulated apart, where they can not
+        touch each other.
+
+        Args:
+            loads: of the nominal motion.
+        """
+        if not loads.touching:
+            self._trees = trees.Trees.of(self.config, self.model)
+
     def _moments(self, trials: Sequence[Trial]) -> Iterator[mujoco.MjData]:
         """Moments of some trials of the nominal motion, all quantities computed; each
         is overwritten by the next."""
@@ -206,26 +242,31 @@ class Simulation:
             ahead: seconds by which each motion is ahead of the trial's clock.
         """
         leads = [0.0] * len(pairs) if ahead is None else ahead
-        keys = [
-            (parts, lead, *_key(*pair)) for pair, lead in zip(pairs, leads, strict=True)
-        ]
-        wanted = {
-            key: pair
-            for key, pair in zip(keys, pairs, strict=True)
-            if key not in self._kept
-        }
-        jobs = [self._job(trial, items, parts) for trial, items in wanted.values()]
+        fresh: dict[tuple, np.ndarray] = {}
+        keys, groups = [], dict[tuple, _Group]()
+        for (trial, items), lead in zip(pairs, leads, strict=True):
+            common = self._trees.common(items)
+            which = (parts, lead, *_key(trial, common))
+            group = groups.setdefault(which, _Group(trial, common, lead, {}))
+            pieces = self._trees.pieces(trial, items)
+            keys.append([(*which, *piece.key()) for piece in pieces])
+            for key, piece in zip(keys[-1], pieces, strict=True):
+                if key in self._kept:
+                    fresh[key] = self._kept[key]
+                else:
+                    group.missing.setdefault(piece.tree, {})[key] = piece
+        runs = [(group, *run) for group in groups.values() for run in group.runs()]
+        jobs = [self._job(trial, items, parts) for _, trial, items, _ in runs]
         motions = self._pool.map(jobs) if jobs else []
-        fresh = {}
-        for (key, (trial, items)), motion in zip(wanted.items(), motions, strict=True):
+        for (group, trial, items, made), motion in zip(runs, motions, strict=True):
             states = motion.states[self._lead(self.dt / parts) :]
-            seen = self._samples(trial, items, states, self.dt / parts, key[1])
-            fresh[key] = seen
-        made = [fresh[key] if key in fresh else self._kept[key] for key in keys]
-        self._kept.update(fresh)
+            seen = self._samples(trial, items, states, self.dt / parts, group.lead)
+            for tree, key in made.items():
+                self._kept[key] = fresh[key] = seen[:, self._trees.columns[tree]]
         while len(self._kept) > KEPT:
             self._kept.popitem(last=False)
-        return made
+        order = np.argsort(np.concatenate(self._trees.columns))
+        return [np.hstack([fresh[key] for key in row])[:, order] for row in keys]
 
     def _lead(self, dt: float) -> int:
         return round(self.config.settle / dt)
@@ -323,12 +364,12 @@ def _edit(made: mujoco.MjSpec, effects: Sequence[Effect]) -> None:
 
 
 def _key(trial: Trial, effects: Sequence[Effect]) -> tuple:
+    """What tells simulations apart, but for what each tree needs."""
     told = trial.commands
     return (
         told.values.tobytes(),
         told.durations.tobytes(),
         trial.times.tobytes(),
         trial.observed[:1].tobytes(),
-        str(trial.conditions.get(start.STATE)),
         tuple(str(effect) for effect in effects),
     )

@@ -90,10 +90,8 @@ class View:
 def _floating(model: mujoco.MjModel, body: int, axis: int) -> int:
     """Column of the full physics state that holds the place of a body on a free joint;
     -1 = it has none."""
-    first = int(model.body_jntadr[body])
-    if first < 0 or model.jnt_type[first] != mujoco.mjtJoint.mjJNT_FREE:
-        return -1
-    return 1 + int(model.jnt_qposadr[first]) + axis
+    joint = prepared.free_joint(model, body)
+    return 1 + int(model.jnt_qposadr[joint]) + axis if joint >= 0 else -1
 
 
 def free(model: mujoco.MjModel) -> frozenset[str]:

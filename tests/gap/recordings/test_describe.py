@@ -338,7 +338,45 @@ SWAY = np.sin(np.arange(0, 4, 0.01))
 def test_a_goal_told_to_a_loop_of_speed_needs_no_gains(tmp_path):
     servos = '<velocity name="hip" joint="FL_hip_joint" kv="5"/>'
     found = written(tmp_path, servos, "time,hip_goal,hip,calf", [SWAY, SWAY, 0 * SWAY])
-    assert "told to actuator 'hip' in 1" in " ".join(found.guessed)
+    assert "told to actuator 'hip' in rad/s" in " ".join(found.guessed)
+
+
+def test_a_speed_told_in_turns_a_minute_is_converted_under_a_name_without_them(
+    tmp_path,
+):
+    servos = '<velocity name="hip" joint="FL_hip_joint" kv="5"/>'
+    names = "time,hip_rpm_cmd,hip_deg,calf_rad"
+    found = written(tmp_path, servos, names, [30 * SWAY, 20 * SWAY, 0 * SWAY])
+    assert "hip_rpm_cmd: told to actuator 'hip' in rpm" in " ".join(found.guessed)
+    for line in (
+        '[commands."hip_cmd"]',
+        '[observed."hip"]',
+        '"hip_cmd" = { column = "hip_rpm_cmd", unit = "rpm" }',
+        '"hip" = { column = "hip_deg", unit = "deg" }',
+    ):
+        assert line in found.toml
+    assert '[observed."calf_rad"]' in found.toml
+
+
+def test_an_angle_called_as_a_body_is_no_place(tmp_path):
+    servos = '<velocity name="hip" joint="FL_hip_joint" kv="5"/>'
+    found = written(tmp_path, servos, "time,hip_cmd,upper_deg", [SWAY, 20 * SWAY])
+    assert "body = " not in found.toml and 'joint = "FL_hip_joint"' in found.toml
+
+
+@pytest.mark.parametrize(
+    ("name", "plain"),
+    [
+        ("elbow_deg", "elbow"),
+        ("elbow [deg]", "elbow"),
+        ("left_rpm_cmd", "left_cmd"),
+        ("elbow_vel_rad_s", "elbow_vel"),
+        ("elbow", "elbow"),
+        ("deg", "deg"),
+    ],
+)
+def test_a_name_without_its_unit(name, plain):
+    assert matching.unitless(name) == plain
 
 
 def test_the_goal_of_a_tendon_of_hinges_is_an_angle(tmp_path):

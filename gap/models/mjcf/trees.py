@@ -1,0 +1,161 @@
+"""Parts of a robot that move apart, as legs on a stand or two arms on a table do.
+
+What is off on one of them changes nothing of the others. So one simulation tells of a
+number on each, and what was simulated of one goes with whatever the others do.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+from typing import NamedTuple
+
+import mujoco
+
+from bns.gap.models.mjcf import effects as own_effects
+from bns.gap.models.mjcf import start
+from bns.gap.models.mjcf.config import OwnConfig
+from bns.worlds.effects.base import Effect
+from bns.worlds.trial import Trial
+
+Run = tuple[Trial, tuple[Effect, ...]]
+"""a trial, and the effects under which it is simulated"""
+
+
+class Piece(NamedTuple):
+    """What one tree needs of a simulation.
+
+    Attributes:
+        tree: its number.
+        local: effects on it, before each of those on all trees and after the last.
+        state: of the trial's start, by joint of it, see `start.STATE`.
+    """
+
+    tree: int
+    local: tuple[tuple[Effect, ...], ...]
+    state: Mapping[str, list[float]]
+
+    def key(self) -> tuple:
+        """What tells it from others of the same trial and effects on all."""
+        told = tuple(tuple(map(str, items)) for items in self.local)
+        return self.tree, told, str(self.state)
+
+
+@dataclass(frozen=True, eq=False)
+class Trees:
+    """The kinematic trees of a model.
+
+    Attributes:
+        columns: observed channels that each tree moves; the first has those that
+            nothing moves, too.
+        parts: number of the tree by kind and name of a part, channels included.
+    """
+
+    columns: tuple[tuple[int, ...], ...]
+    parts: Mapping[tuple[str, str], int]
+
+    @classmethod
+    def one(cls, config: OwnConfig) -> "Trees":
+        """All in one tree: nothing is known to move apart."""
+        return cls((tuple(range(len(config.seen))),), {})
+
+    @classmethod
+    def of(cls, config: OwnConfig, model: mujoco.MjModel) -> "Trees":
+        """The trees of a model whose trees do not touch each other; all as one, where
+        tendons or equalities may tie them.
+
+        Args:
+            config: the description.
+            model: the nominal model.
+        """
+        if model.ntree < 2 or model.neq or model.ntendon:
+            return cls.one(config)
+        parts = _parts(model)
+        for told in config.told:
+            parts["channel", told.channel.name] = parts["actuator", told.actuator]
+        columns: list[list[int]] = [[] for _ in range(model.ntree)]
+        for column, seen in enumerate(config.seen):
+            kind = "joint" if seen.quantity == "speed" else seen.quantity
+            on = parts.get((kind, seen.part), -1)
+            columns[max(on, 0)].append(column)
+            parts["channel", seen.channel.name] = on
+        known = {part: on for part, on in parts.items() if on >= 0}
+        return cls(tuple(map(tuple, columns)), known)
+
+    def pieces(self, trial: Trial, effects: Sequence[Effect]) -> list[Piece]:
+        """What each tree needs of a simulation of a trial under effects."""
+        on = [self._tree(effect) for effect in effects]
+        cuts = [k for k, tree in enumerate(on) if tree < 0]
+        spans = list(zip([-1, *cuts], [*cuts, len(on)], strict=True))
+        state = trial.conditions.get(start.STATE)
+        state = state if isinstance(state, dict) else {}
+        joints = {joint: self.parts.get(("joint", joint), 0) for joint in state}
+        return [
+            Piece(
+                tree,
+                tuple(
+                    tuple(effects[k] for k in range(first + 1, last) if on[k] == tree)
+                    for first, last in spans
+                ),
+                {joint: state[joint] for joint, at in joints.items() if at == tree},
+            )
+            for tree in range(len(self.columns))
+        ]
+
+    def common(self, effects: Iterable[Effect]) -> tuple[Effect, ...]:
+        """The effects that are on all trees."""
+        return tuple(effect for effect in effects if self._tree(effect) < 0)
+
+    def _tree(self, effect: Effect) -> int:
+        """Number of the tree that an effect is on, -1 = all."""
+        kind = own_effects.OWNERS.get(effect.name, "channel")
+        tree = self.parts.get((kind, str(effect.values.get("part", ""))), -1)
+        return 0 if len(self.columns) == 1 else tree
+
+
+def _parts(model: mujoco.MjModel) -> dict[tuple[str, str], int]:
+    """Number of the tree of each joint, body, site, geom and actuator; -1 = none."""
+    made: dict[tuple[str, str], int] = {}
+    for kind, bodies in (
+        ("body", range(model.nbody)),
+        ("joint", model.jnt_bodyid),
+        ("site", model.site_bodyid),
+        ("geom", model.geom_bodyid),
+    ):
+        for number, body in enumerate(bodies):
+            made[kind, getattr(model, kind)(number).name] = int(model.body_treeid[body])
+    for number in range(model.nu):
+        on_joint = model.actuator_trntype[number] == mujoco.mjtTrn.mjTRN_JOINT
+        joint = model.actuator_trnid[number, 0]
+        body = model.jnt_bodyid[joint] if on_joint else 0
+        made["actuator", model.actuator(number).name] = int(model.body_treeid[body])
+    return made
+
+
+def together(
+    trial: Trial, common: Sequence[Effect], pieces: Sequence[Sequence[Piece]]
+) -> list[Run]:
+    """Simulations of a trial that hold pieces of each tree.
+
+    Args:
+        trial: that all are of.
+        common: effects on all trees.
+        pieces: by tree; the n-th of each are in the n-th simulation.
+    """
+    made = []
+    for row in zip_longest(*pieces):
+        there = [piece for piece in row if piece is not None]
+        effects: list[Effect] = []
+        for span in range(len(common) + 1):
+            for piece in there:
+                effects += piece.local[span]
+            effects += common[span : span + 1]
+        state = trial.conditions.get(start.STATE)
+        if isinstance(state, dict):
+            state = dict(state)
+            for piece in there:
+                state.update(piece.state)
+            run = trial.replace(conditions={**trial.conditions, start.STATE: state})
+        else:
+            run = trial
+        made.append((run, tuple(effects)))
+    return made
