@@ -6,6 +6,7 @@ is unsure about; `bns gap describe` prints the same.
 
 import json
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -66,9 +67,9 @@ def describe(
     log: str | Path,
     *,
     out: str | Path = "",
-    kp: float = 0.0,
-    kd: float = 0.0,
-    torque: float = np.inf,
+    kp: float | Sequence[float] = 0.0,
+    kd: float | Sequence[float] = 0.0,
+    torque: float | Sequence[float] = np.inf,
 ) -> Description:
     """Describe a robot.
 
@@ -77,14 +78,19 @@ def describe(
         log: of a kind that `bns.gap.importers.tables` knows.
         out: where the description will lie; the model is named from there. Empty: in
             the working directory, under the model's name.
-        kp, kd: gains of a position loop that the robot has and its MJCF has not.
-        torque: largest torque or force of that loop.
+        kp, kd: gains of a position loop that the robot has and its MJCF has not
+            [N m/rad, N m s/rad]; one for all commands, or one for each in the order of
+            the log.
+        torque: largest torque or force of that loop [N m or N]; the same.
 
     Raises:
         FormatError: a file that cannot be read, or without times or commands.
-        BnsError: no column can be told, or a loop is needed.
+        BnsError: no column can be told, a loop is needed, or it has another number of
+            gains than there are commands.
     """
-    loop = {"kp": kp, "kd": kd, "torque": torque} if kp else {}
+    given = {"kp": kp, "kd": kd, "torque": torque}
+    loop = {key: tuple(map(float, np.atleast_1d(v))) for key, v in given.items()}
+    loop = loop if any(loop["kp"]) else {}
     work = Work(
         Path(model), str(log), tables.read(log), loop, compiled(Path(model), ())
     )
@@ -330,7 +336,11 @@ def toml(work: Work, out: Path) -> str:
                 "unit": item.channel.unit,
                 "low": item.low,
                 "high": item.high,
-                **{k: v for k, v in work.loop.items() if np.isfinite(v)},
+                **{
+                    key: getattr(item, key)
+                    for key in work.loop
+                    if np.isfinite(getattr(item, key))
+                },
             },
         )
     for column, part, unit in work.seen:

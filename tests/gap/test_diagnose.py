@@ -17,7 +17,7 @@ from bns.gap.models.wheeled.model import WheeledModel
 from bns.gap.planning import excitation
 from bns.gap.recordings import check
 from bns.gap.records import Diagnosis
-from bns.gap.stages import BY_FITS, BY_TANGENT, WITH_LIGHT
+from bns.gap.stages import BY_FITS, BY_TANGENT, OF_MANY, WITH_LIGHT
 from bns.storage.files import TEMPORARY
 from bns.worlds.effects.base import CommandEffect, Parameter
 from bns.worlds.physics.wheeled_world import MujocoWorld
@@ -78,7 +78,7 @@ def test_a_simulated_recording_without_noise_is_named(model, told):
     assert found.verdict.named == (("wheel_gain[left]",),)
 
 
-@pytest.mark.parametrize("shares", [BY_TANGENT, BY_FITS, WITH_LIGHT])
+@pytest.mark.parametrize("shares", [BY_TANGENT, BY_FITS, OF_MANY, WITH_LIGHT])
 def test_stages_share_the_time_of_a_diagnosis(shares):
     assert sum(shares.values()) == pytest.approx(1.0)
     assert min(shares.values()) > 0

@@ -21,12 +21,13 @@ class Describe:
     """CSV, PACE (.pt) or MCAP file, or directory of a SAGE motion or LeRobotDataset"""
     out: str = ""
     """file for the description; default: MODEL.toml in the working directory"""
-    kp: float = 0.0
-    """gain of the position loop that the robot has and its MJCF has not [N m/rad]"""
-    kd: float = 0.0
-    """its damping [N m s/rad]"""
-    torque: float = math.inf
-    """its largest torque [N m]; default: that of the MJCF's motors"""
+    kp: tuple[float, ...] = ()
+    """gain of the position loop that the robot has and its MJCF has not [N m/rad]: one
+    for all commands, or one for each in the order of the log"""
+    kd: tuple[float, ...] = ()
+    """its damping [N m s/rad], the same"""
+    torque: tuple[float, ...] = ()
+    """its largest torque [N m], the same; default: that of the MJCF's motors"""
 
 
 def main(verb: str, argv: list[str]) -> int:
@@ -38,9 +39,9 @@ def main(verb: str, argv: list[str]) -> int:
         given.model,
         given.log,
         out=given.out,
-        kp=given.kp,
-        kd=given.kd,
-        torque=given.torque,
+        kp=given.kp or 0.0,
+        kd=given.kd or 0.0,
+        torque=given.torque or math.inf,
     )
     for title, lines in (("guessed", found.guessed), ("unsure", found.unsure)):
         for line in lines:

@@ -28,7 +28,7 @@ class Work:
     path: Path
     log: str
     table: Table
-    loop: dict[str, float]
+    loop: dict[str, tuple[float, ...]]
     model: mujoco.MjModel
     sources: dict[str, tuple[str, str]] = field(default_factory=dict)
     times: np.ndarray = field(default_factory=lambda: np.zeros(0))
@@ -116,6 +116,7 @@ def commands(work: Work, told: list[Column], seen: list[Column]) -> None:
             f"No command ({', '.join(c.name for c in told)}) is of an actuator of "
             f"{work.path} ({', '.join(names) or 'it has none: give --kp and --kd'})."
         )
+    _each(work)
     told_to = {actuator for _, actuator, _ in work.told}
     if not work.loop:
         work.unsure.extend(
@@ -237,7 +238,7 @@ def _no_loop(work: Work, column: Column, seen: Sequence[Column]) -> None:
 def tolds(work: Work) -> list[Told]:
     """Command channels as a description has them, in SI units."""
     made = []
-    for column, actuator, unit in work.told:
+    for row, (column, actuator, unit) in enumerate(work.told):
         values = column.values[np.isfinite(column.values)] * factor(unit)
         allowed = (-np.inf, np.inf)
         names = [work.model.actuator(a).name for a in range(work.model.nu)]
@@ -248,5 +249,21 @@ def tolds(work: Work) -> list[Told]:
                 allowed = float(edges[0]), float(edges[1])
         low, high = guesses.limits(values, allowed)
         channel = Channel(work.channel(column, unit), si_unit(unit))
-        made.append(Told(channel, actuator, low, high, **work.loop))
+        loop = {key: given[row % len(given)] for key, given in work.loop.items()}
+        made.append(Told(channel, actuator, low, high, **loop))
     return made
+
+
+def _each(work: Work) -> None:
+    """Stop where gains are neither one for all commands nor one for each.
+
+    Raises:
+        BnsError: so it is.
+    """
+    for key, given in work.loop.items():
+        if len(given) not in (1, len(work.told)):
+            raise BnsError(
+                f"--{key} has {len(given)} values for {len(work.told)} commands: give "
+                "one for all, or one for each of "
+                f"{', '.join(column.name for column, _, _ in work.told)}."
+            )

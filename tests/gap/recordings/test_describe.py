@@ -129,6 +129,15 @@ def test_goals_told_to_motors_need_a_loop(arm, tmp_path):
         describe(tmp_path / "arm.xml", tmp_path / "log.csv")
 
 
+def test_each_command_may_have_gains_of_its_own(arm, tmp_path):
+    files = tmp_path / "arm.xml", tmp_path / "log.csv"
+    found = describe(*files, kp=(20, 30), kd=1.5)
+    gains = [line for line in found.toml.splitlines() if line[:2] in ("kp", "kd")]
+    assert gains == ["kp = 20.0", "kd = 1.5", "kp = 30.0", "kd = 1.5"]
+    with pytest.raises(BnsError, match="--kp has 3 values for 2 commands"):
+        describe(*files, kp=(20, 30, 40))
+
+
 def test_names_that_say_nothing_go_by_order(tmp_path):
     (tmp_path / "arm.xml").write_text(ARM.replace("ACTUATORS", SERVOS))
     recorded(tmp_path / "log.csv", seconds=4, names="u0,u1,a,b")
