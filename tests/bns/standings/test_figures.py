@@ -7,7 +7,7 @@ import pytest
 
 from bns.errors import BnsError, UnknownNameError
 from bns.experiment.batch import check_world
-from bns.prior import mismatch
+from bns.prior import mismatch, repertoire
 from bns.standings import design, figures, page
 from bns.standings.design import Wanted
 from bns.standings.figures import Cell
@@ -150,10 +150,15 @@ def test_the_page_keeps_what_it_says_of_other_tasks():
     assert page.page([], walked) == walked
 
 
-def test_the_page_says_what_a_repertoire_could_do():
-    low = page.page([cells("ite", np.full((3, 50), 0.2), prior="P1")])
-    assert "Repertoire `phantomx-1`" in low and "0.75 m in the undamaged model" in low
-    assert "less than the" in low  # the ceiling that the map is, before what is found
+def test_the_page_says_what_a_repertoire_could_do(monkeypatch):
+    walked = [cells("ite", np.full((3, 50), 0.2), prior="P1")]
+    text = page.page(walked)
+    assert "Repertoire `phantomx-1`" in text and "0.98 m in the undamaged model" in text
+    assert "less than the" not in text
+    ships = repertoire.read("phantomx-1")
+    small = replace(ships, worth=ships.worth / 2)
+    monkeypatch.setattr(page.repertoire, "read", lambda name: small)
+    assert "0.49 m in the undamaged model, less than the" in page.page(walked)
 
 
 class TestGap:
