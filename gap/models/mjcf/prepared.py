@@ -21,7 +21,8 @@ def spec(config: OwnConfig) -> mujoco.MjSpec:
 
     Actuators without a name are called as their joint (or tendon, site, body) is.
     Where the description gives the gains of a position loop, the actuator becomes one
-    (what it did before is dropped), or is added to the joint of that name. Bodies that
+    (what it did before is dropped), or is added to the joint of that name; loops that
+    the model's step is too long for are integrated implicitly. Bodies that
     it says are held are fixed where they are, and touch no ground.
 
     Raises:
@@ -33,6 +34,8 @@ def spec(config: OwnConfig) -> mujoco.MjSpec:
     for told in config.told:
         if told.kp:
             _close(made, told)
+    if any(told.kd for told in config.told):
+        _steady(made, config.told)
     if config.held:
         _hold(made, config.held)
     return made
@@ -149,6 +152,19 @@ def _close(made: mujoco.MjSpec, told: Told) -> None:
         actuator.forcerange = [-limit, limit]
 
 
+def _steady(made: mujoco.MjSpec, tolds: Sequence[Told]) -> None:
+    """Integrate implicitly, if Euler's method would make a loop's damping unstable: it
+    is taken for the whole step, in which the loop turns a light joint round."""
+    if made.option.integrator != mujoco.mjtIntegrator.mjINT_EULER:
+        return
+    model = made.compile()
+    for told in tolds:
+        joint = model.actuator_trnid[model.actuator(told.actuator).id, 0]
+        inertia = model.dof_M0[model.jnt_dofadr[joint]]
+        if told.kd * model.opt.timestep > STIFF * inertia:
+            made.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+
+
 def largest(actuator: mujoco.MjsActuator, gear: float) -> float:
     """Largest torque of a motor by its limits of control and force; infinity = any."""
     found = [np.inf]
@@ -178,6 +194,7 @@ def _padded(values: Sequence[float], count: int) -> list[float]:
     return [*values, *[0.0] * (count - len(values))]
 
 
+STIFF = 0.5  # of its speed that a loop may take from a joint in one step of Euler's
 GROUND = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
 CLOSE = 1e-9  # by which inertias may differ, of their size
 KINDS = (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_SDF)

@@ -154,11 +154,11 @@ def test_the_page_says_what_a_repertoire_could_do(monkeypatch):
     walked = [cells("ite", np.full((3, 50), 0.2), prior="P1")]
     text = page.page(walked)
     assert "Repertoire `phantomx-1`" in text and "0.98 m in the undamaged model" in text
-    assert "less than the" not in text
+    assert "less than the 1.00 m of the task" in text
     ships = repertoire.read("phantomx-1")
-    small = replace(ships, worth=ships.worth / 2)
-    monkeypatch.setattr(page.repertoire, "read", lambda name: small)
-    assert "0.49 m in the undamaged model, less than the" in page.page(walked)
+    able = replace(ships, worth=ships.worth * 2)
+    monkeypatch.setattr(page.repertoire, "read", lambda name: able)
+    assert "less than" not in page.page(walked)
 
 
 class TestGap:

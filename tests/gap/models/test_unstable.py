@@ -169,3 +169,27 @@ def test_a_model_that_weighs_by_its_geoms_alone_can_be_loaded(tmp_path):
     plain = model.physics.model.body("cart").mass[0]
     heavy = model.parse("body_mass:part=cart,added=0.3,dx=0,dy=0,dz=0")
     assert model.physics.compiled((heavy,)).model.body("cart").mass[0] == plain + 0.3
+
+
+WRIST = """<mujoco><option timestep="0.002"/><worldbody><body name="wrist">
+  <joint name="turn" axis="0 1 0"/><geom size="0.05" pos="0.1 0 0" mass="MASS"/>
+  </body></worldbody><actuator><motor name="turn" joint="turn"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize(("mass", "implicit"), [(0.1, True), (10.0, False)])
+def test_a_loop_stiffer_than_the_step_is_integrated_implicitly(
+    tmp_path, mass, implicit
+):
+    (tmp_path / "wrist.xml").write_text(WRIST.replace("MASS", str(mass)))
+    times = np.arange(0, 12, 0.01)
+    rows = np.stack([times, 0.2 * np.sin(3 * times), 0.2 * np.sin(3 * times)], axis=1)
+    head = "time,turn_goal,turn_pos"
+    np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header=head, comments="")
+    own = tmp_path / "own.toml"
+    describe(tmp_path / "wrist.xml", tmp_path / "log.csv", kp=50, kd=5).write(own)
+    text = own.read_text().replace(own.read_text().split('"')[3], "wrist.xml")
+    own.write_text(text)
+    model = OwnModel.read(own, threads=1)
+    fast = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    assert (model.physics.model.opt.integrator == fast) is implicit
+    assert len(model.read_log(str(tmp_path / "log.csv"))) == 4  # not unstable
