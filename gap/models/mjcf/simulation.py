@@ -371,5 +371,6 @@ def _key(trial: Trial, effects: Sequence[Effect]) -> tuple:
         told.durations.tobytes(),
         trial.times.tobytes(),
         trial.observed[:1].tobytes(),
+        isinstance(trial.conditions.get(start.STATE), dict),
         tuple(str(effect) for effect in effects),
     )

@@ -129,6 +129,17 @@ def test_legs_simulated_apart_move_as_together(hung):
         np.testing.assert_allclose(row, other, atol=1e-9)
 
 
+def test_a_start_that_is_off_is_told_from_the_one_that_was_seen(hung):
+    own = hung[1]
+    plain = [trial.replace(conditions={}) for trial in own.read_log(str(hung[2]))[:1]]
+    names, (base, *moved) = own.started(plain, [{}])
+    assert len(names) == len(moved) == len(LEGS)
+    for column, path in enumerate(moved):  # where each hip is seen first is not exact
+        off = path[0][0] - base[0][0]
+        assert off[column] == pytest.approx(own.config.seen[column].noise)
+        assert np.delete(off, column) == pytest.approx(0)
+
+
 def test_one_simulation_tells_of_all_legs(hung, monkeypatch):
     own = OwnModel(hung[1].config, threads=1)
     (trial, *_) = own.read_log(str(hung[2]))
