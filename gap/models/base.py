@@ -101,6 +101,11 @@ class GapModel(ABC):
     odds: float = 3.0
 
     @property
+    def grid(self) -> float:
+        """Time on whose multiples commands of recordings are put [s]; 0 = none."""
+        return self.dt
+
+    @property
     @abstractmethod
     def least(self) -> np.ndarray:
         """Smallest believed standard deviation of each feature, ``(C,)``."""

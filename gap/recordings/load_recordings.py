@@ -117,8 +117,7 @@ def trials(
             "No trial is left: nothing was recorded, or --only and --trials drop all."
         )
     _of_robot(found, model)
-    step = model.dt
-    return [on_grid(thinned(_fitting(trial, model)), step) for trial in found]
+    return [on_grid(thinned(_fitting(trial, model)), model.grid) for trial in found]
 
 
 def _read(

@@ -100,6 +100,12 @@ class OwnModel(GapModel):
         return self, cuts.restarted(trials, self.config, self, known)
 
     @property
+    def grid(self) -> float:
+        """See `GapModel.grid`: the finest step, for commands at 200 Hz lie between
+        steps of 2 ms."""
+        return self.dt / self.physics.finest
+
+    @property
     def least(self) -> np.ndarray:
         """Smallest believed standard deviation of each feature."""
         return LEAST * self.resolution

@@ -163,3 +163,15 @@ def test_the_description_in_the_documentation_is_one(tmp_path):
     assert bounds["joint_damping[elbow]"].high == 0.5
     assert bounds["body_mass[forearm]"].slack == 0.01
     assert made.config.log["shoulder"] == ("q1", "deg")
+
+
+def test_commands_between_steps_of_the_model_begin_when_they_were_told(arm, tmp_path):
+    step = 2.5 * arm.dt  # as of 200 Hz and 2 ms
+    count = 201
+    lines = ["time,shoulder_goal,elbow_goal,shoulder,elbow"]
+    lines += [
+        f"{n * step},{0.2 * np.sin(n / 20)},0.1,0,{n / 1e3}" for n in range(count)
+    ]
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    (trial,) = load_recordings.trials([str(tmp_path / "log.csv")], arm)
+    np.testing.assert_allclose(trial.commands.durations, step)
