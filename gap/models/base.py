@@ -100,9 +100,10 @@ class GapModel(ABC):
     spread: tuple[float, ...] = ()
     odds: float = 3.0
 
-    @property
-    def grid(self) -> float:
-        """Time on whose multiples commands of recordings are put [s]; 0 = none."""
+    def grid(self, trial: Trial) -> float:
+        """Time on whose multiples the commands of a recorded trial are put [s]; 0 =
+        none."""
+        del trial
         return self.dt
 
     @property

@@ -117,7 +117,8 @@ def trials(
             "No trial is left: nothing was recorded, or --only and --trials drop all."
         )
     _of_robot(found, model)
-    return [on_grid(thinned(_fitting(trial, model)), model.grid) for trial in found]
+    fitting = [thinned(_fitting(trial, model)) for trial in found]
+    return [on_grid(t, model.grid(t) if len(t.commands) else 0.0) for t in fitting]
 
 
 def _read(

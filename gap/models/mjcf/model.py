@@ -20,6 +20,7 @@ from bns.worlds.trial import Trial
 
 LEAST = 0.3  # of the noise that is told: the smallest that is believed
 LEVEL, PLACES = (0, 1), ("site", "body")  # axes and quantities of places over the floor
+BETWEEN = 0.02  # steps that commands are held for beyond a whole number: stamps jitter
 STRIDE = 0.5  # [s] over which those of a free body are compared
 
 
@@ -99,11 +100,12 @@ class OwnModel(GapModel):
         """See `GapModel.beside`: starts that were fitted to the nominal motion."""
         return self, cuts.restarted(trials, self.config, self, known)
 
-    @property
-    def grid(self) -> float:
-        """See `GapModel.grid`: the finest step, for commands at 200 Hz lie between
-        steps of 2 ms."""
-        return self.dt / self.physics.finest
+    def grid(self, trial: Trial) -> float:
+        """See `GapModel.grid`: the model's step, where commands are held for so many
+        of them, else the finest: commands at 200 Hz lie between steps of 2 ms."""
+        held = float(np.median(trial.commands.durations)) / self.dt
+        between = abs(held - round(held)) > BETWEEN
+        return self.dt / self.physics.finest if between else self.dt
 
     @property
     def least(self) -> np.ndarray:
