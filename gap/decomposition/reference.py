@@ -78,6 +78,10 @@ class Corrected(GapModel):
         """See `GapModel.stepped`: by the model as it was."""
         return self.model.stepped(trials, rows)
 
+    def grid(self, trial: Trial) -> float:
+        """See `GapModel.grid`."""
+        return self.model.grid(trial)
+
     def simulate(
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
