@@ -202,12 +202,11 @@ def _missed(work: Work, rows: np.ndarray, data: mujoco.MjData) -> float:
 
 def _stood(work: Work, rows: np.ndarray) -> mujoco.MjData:
     """The model after it has settled where its joints were seen first."""
-    first = {
-        part.name: float(column.values[rows][np.isfinite(column.values[rows])][0])
-        * factor(unit)
-        for column, part, unit in work.seen
-        if part.quantity == "joint"
-    }
+    first = {}
+    for column, part, unit in work.seen:
+        seen = column.values[rows][np.isfinite(column.values[rows])]
+        if part.quantity == "joint" and len(seen):
+            first[part.name] = float(seen[0]) * factor(unit)
     data = guesses.posed(work.model, guesses.nearest(work.model, first), 0.0)
     for joint, at in first.items():
         data.joint(joint).qpos[0] = at
@@ -236,7 +235,7 @@ def _hold(work: Work) -> None:
         longest = max(work.rows, key=len)
         rows = longest[work.times[longest] <= work.times[longest[0]] + guesses.CUT]
         errors = [_missed(each, rows, _stood(each, rows)) for each in (held, work)]
-        if errors[0] > HELD * errors[1]:
+        if not errors[0] <= HELD * errors[1]:  # nor where one diverged
             return
     work.held, work.model = bodies, held.model
     work.unsure.append(

@@ -42,10 +42,11 @@ class Work:
 
     def channel(self, column: Column, unit: str) -> str:
         """What the description calls a column: by its name, without a unit there that
-        is none of SI, since channels are in these."""
+        is none of SI, since channels are in these; unless another is called so."""
         plain = matching.unitless(column.name)
-        taken = plain in self.table.names or factor(unit) == 1.0
-        return column.name if taken else plain
+        others = {n for n in self.table.names if n != column.name}
+        taken = {plain} & (others | set(map(matching.unitless, others)))
+        return column.name if taken or factor(unit) == 1.0 else plain
 
 
 def compiled(

@@ -367,6 +367,14 @@ def test_a_speed_told_in_turns_a_minute_is_converted_under_a_name_without_them(
     assert '[observed."calf_rad"]' in found.toml
 
 
+def test_two_columns_that_units_tell_apart_keep_them(tmp_path):
+    servos = '<velocity name="hip" joint="FL_hip_joint" kv="5"/>'
+    head = "time,hip_cmd,hip_deg,hip_rpm"
+    found = written(tmp_path, servos, head, [SWAY, 20 * SWAY, 10 * SWAY])
+    for name in ("hip_deg", "hip_rpm"):
+        assert f'[observed."{name}"]' in found.toml
+
+
 def test_an_angle_called_as_a_body_is_no_place(tmp_path):
     servos = '<velocity name="hip" joint="FL_hip_joint" kv="5"/>'
     found = written(tmp_path, servos, "time,hip_cmd,upper_deg", [SWAY, 20 * SWAY])
