@@ -49,20 +49,12 @@ class Loads(NamedTuple):
 
 class _Group(NamedTuple):
     """Simulations of a trial under the same effects on all trees, and what is missing:
-    by tree the pieces by key."""
+    by the columns of a tree its pieces by key."""
 
     trial: Trial
     common: tuple[Effect, ...]
     lead: float
-    missing: dict[int, dict[tuple, trees.Piece]]
-
-    def runs(self) -> Iterator[tuple[Trial, tuple[Effect, ...], dict[int, tuple]]]:
-        """Trials to simulate, their effects, and by tree the key of its piece."""
-        pieces = [list(found.values()) for found in self.missing.values()]
-        keys = [[(t, key) for key in found] for t, found in self.missing.items()]
-        runs = trees.together(self.trial, self.common, pieces)
-        for (trial, effects), row in zip(runs, zip_longest(*keys), strict=True):
-            yield trial, effects, dict(item for item in row if item)
+    missing: dict[tuple[int, ...], dict[tuple, trees.Piece]]
 
 
 class Simulation:
@@ -207,8 +199,8 @@ class Simulation:
         Args:
             loads: of the nominal motion.
         """
-        if not loads.touching:
-            self._trees = trees.Trees.of(self.config, self.model)
+        whole, model = trees.Trees.one(self.config), self.model
+        self._trees = whole if loads.touching else trees.Trees.of(self.config, model)
 
     def _moments(self, trials: Sequence[Trial]) -> Iterator[mujoco.MjData]:
         """Moments of some trials of the nominal motion, all quantities computed; each
@@ -242,31 +234,43 @@ class Simulation:
             ahead: seconds by which each motion is ahead of the trial's clock.
         """
         leads = [0.0] * len(pairs) if ahead is None else ahead
-        fresh: dict[tuple, np.ndarray] = {}
-        keys, groups = [], dict[tuple, _Group]()
+        found: dict[tuple, np.ndarray] = {}
+        asked, groups = [], dict[tuple, _Group]()
         for (trial, items), lead in zip(pairs, leads, strict=True):
-            common = self._trees.common(items)
+            common, pieces = self._trees.split(trial, items)
             which = (parts, lead, *_key(trial, common))
             group = groups.setdefault(which, _Group(trial, common, lead, {}))
-            pieces = self._trees.pieces(trial, items)
-            keys.append([(*which, *piece.key()) for piece in pieces])
-            for key, piece in zip(keys[-1], pieces, strict=True):
+            asked.append({(*which, *piece.key()): piece for piece in pieces})
+            for key, piece in asked[-1].items():
                 if key in self._kept:
-                    fresh[key] = self._kept[key]
+                    found[key] = self._kept[key]
                 else:
-                    group.missing.setdefault(piece.tree, {})[key] = piece
-        runs = [(group, *run) for group in groups.values() for run in group.runs()]
-        jobs = [self._job(trial, items, parts) for _, trial, items, _ in runs]
+                    group.missing.setdefault(piece.columns, {})[key] = piece
+        runs = []
+        for group in groups.values():
+            for row in zip_longest(*(each.items() for each in group.missing.values())):
+                held = dict(item for item in row if item)
+                run = trees.joined(group.trial, group.common, held.values())
+                runs.append((held, group.lead, *run))
+        jobs = [self._job(trial, items, parts) for _, _, trial, items in runs]
         motions = self._pool.map(jobs) if jobs else []
-        for (group, trial, items, made), motion in zip(runs, motions, strict=True):
+        for (held, lead, trial, items), motion in zip(runs, motions, strict=True):
             states = motion.states[self._lead(self.dt / parts) :]
-            seen = self._samples(trial, items, states, self.dt / parts, group.lead)
-            for tree, key in made.items():
-                self._kept[key] = fresh[key] = seen[:, self._trees.columns[tree]]
+            seen = self._samples(trial, items, states, self.dt / parts, lead)
+            for key, piece in held.items():
+                self._kept[key] = found[key] = seen[:, piece.columns]
         while len(self._kept) > KEPT:
             self._kept.popitem(last=False)
-        order = np.argsort(np.concatenate(self._trees.columns))
-        return [np.hstack([fresh[key] for key in row])[:, order] for row in keys]
+        return [self._put_together(pieces, found) for pieces in asked]
+
+    def _put_together(
+        self, pieces: Mapping[tuple, trees.Piece], found: Mapping[tuple, np.ndarray]
+    ) -> np.ndarray:
+        """Samples ``(T, C)`` from those of each tree, by key."""
+        made = np.empty((len(found[next(iter(pieces))]), len(self.config.seen)))
+        for key, piece in pieces.items():
+            made[:, piece.columns] = found[key]
+        return made
 
     def _lead(self, dt: float) -> int:
         return round(self.config.settle / dt)

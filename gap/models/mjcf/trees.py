@@ -4,9 +4,8 @@ What is off on one of them changes nothing of the others. So one simulation tell
 number on each, and what was simulated of one goes with whatever the others do.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import zip_longest
 from typing import NamedTuple
 
 import mujoco
@@ -17,27 +16,24 @@ from bns.gap.models.mjcf.config import OwnConfig
 from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Trial
 
-Run = tuple[Trial, tuple[Effect, ...]]
-"""a trial, and the effects under which it is simulated"""
-
 
 class Piece(NamedTuple):
     """What one tree needs of a simulation.
 
     Attributes:
-        tree: its number.
+        columns: observed channels that it moves.
         local: effects on it, before each of those on all trees and after the last.
         state: of the trial's start, by joint of it, see `start.STATE`.
     """
 
-    tree: int
+    columns: tuple[int, ...]
     local: tuple[tuple[Effect, ...], ...]
     state: Mapping[str, list[float]]
 
     def key(self) -> tuple:
         """What tells it from others of the same trial and effects on all."""
         told = tuple(tuple(map(str, items)) for items in self.local)
-        return self.tree, told, str(self.state)
+        return self.columns, told, str(self.state)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,29 +77,29 @@ class Trees:
         known = {part: on for part, on in parts.items() if on >= 0}
         return cls(tuple(map(tuple, columns)), known)
 
-    def pieces(self, trial: Trial, effects: Sequence[Effect]) -> list[Piece]:
-        """What each tree needs of a simulation of a trial under effects."""
+    def split(
+        self, trial: Trial, effects: Sequence[Effect]
+    ) -> tuple[tuple[Effect, ...], list[Piece]]:
+        """The effects on all trees, and what each tree needs of a simulation of a trial
+        under effects."""
         on = [self._tree(effect) for effect in effects]
         cuts = [k for k, tree in enumerate(on) if tree < 0]
         spans = list(zip([-1, *cuts], [*cuts, len(on)], strict=True))
         state = trial.conditions.get(start.STATE)
         state = state if isinstance(state, dict) else {}
         joints = {joint: self.parts.get(("joint", joint), 0) for joint in state}
-        return [
+        pieces = [
             Piece(
-                tree,
+                columns,
                 tuple(
                     tuple(effects[k] for k in range(first + 1, last) if on[k] == tree)
                     for first, last in spans
                 ),
                 {joint: state[joint] for joint, at in joints.items() if at == tree},
             )
-            for tree in range(len(self.columns))
+            for tree, columns in enumerate(self.columns)
         ]
-
-    def common(self, effects: Iterable[Effect]) -> tuple[Effect, ...]:
-        """The effects that are on all trees."""
-        return tuple(effect for effect in effects if self._tree(effect) < 0)
+        return tuple(effects[k] for k in cuts), pieces
 
     def _tree(self, effect: Effect) -> int:
         """Number of the tree that an effect is on, -1 = all."""
@@ -131,31 +127,25 @@ def _parts(model: mujoco.MjModel) -> dict[tuple[str, str], int]:
     return made
 
 
-def together(
-    trial: Trial, common: Sequence[Effect], pieces: Sequence[Sequence[Piece]]
-) -> list[Run]:
-    """Simulations of a trial that hold pieces of each tree.
+def joined(
+    trial: Trial, common: Sequence[Effect], pieces: Collection[Piece]
+) -> tuple[Trial, tuple[Effect, ...]]:
+    """One simulation that holds pieces of several trees: the trial, and its effects.
 
     Args:
-        trial: that all are of.
+        trial: that the pieces are of.
         common: effects on all trees.
-        pieces: by tree; the n-th of each are in the n-th simulation.
+        pieces: one of each tree at most.
     """
-    made = []
-    for row in zip_longest(*pieces):
-        there = [piece for piece in row if piece is not None]
-        effects: list[Effect] = []
-        for span in range(len(common) + 1):
-            for piece in there:
-                effects += piece.local[span]
-            effects += common[span : span + 1]
-        state = trial.conditions.get(start.STATE)
-        if isinstance(state, dict):
-            state = dict(state)
-            for piece in there:
-                state.update(piece.state)
-            run = trial.replace(conditions={**trial.conditions, start.STATE: state})
-        else:
-            run = trial
-        made.append((run, tuple(effects)))
-    return made
+    effects: list[Effect] = []
+    for span in range(len(common) + 1):
+        for piece in pieces:
+            effects += piece.local[span]
+        effects += common[span : span + 1]
+    state = trial.conditions.get(start.STATE)
+    if isinstance(state, dict):
+        state = dict(state)
+        for piece in pieces:
+            state.update(piece.state)
+        trial = trial.replace(conditions={**trial.conditions, start.STATE: state})
+    return trial, tuple(effects)

@@ -1,5 +1,7 @@
 """A robot on a stand: its base is held, and its legs are simulated apart."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -127,6 +129,18 @@ def test_legs_simulated_apart_move_as_together(hung):
     apart = own.paths(trials, sets)
     for row, other in zip(whole, apart, strict=True):
         np.testing.assert_allclose(row, other, atol=1e-9)
+
+
+def test_what_was_kept_of_the_whole_robot_is_not_that_of_a_leg(hung):
+    """Trials that begin in a pose have no state of their own, which would tell."""
+    config = hung[1].config
+    other = replace(config, recorded=False, seen=config.seen[::-1])
+    own = OwnModel(other, threads=1)
+    trials = [t.replace(conditions={}) for t in hung[1].read_log(str(hung[2]))[:1]]
+    (whole,) = own.paths(trials, [[{}]])
+    own.physics.apart(own.physics.loads(trials))
+    (again,) = own.paths(trials, [[{}]])
+    np.testing.assert_allclose(again[0], whole[0], atol=1e-9)
 
 
 def test_a_start_that_is_off_is_told_from_the_one_that_was_seen(hung):
