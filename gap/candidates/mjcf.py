@@ -13,7 +13,7 @@ import numpy as np
 
 from bns.errors import BnsError, UnknownNameError
 from bns.gap.decomposition.row import Row
-from bns.gap.models.mjcf import effects
+from bns.gap.models.mjcf import effects, prepared
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.worlds.effects.parts import ALL, ROUND_GEOMS
 
@@ -188,13 +188,11 @@ def _long(model: mujoco.MjModel, bodies: Iterable[int]) -> list[str]:
 
 def _moved(model: mujoco.MjModel, told: Iterable[int]) -> list[int]:
     """Joints on what the actuators that are told can move: no ball that lies there."""
-    joints = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+    joints = [prepared.driven(model, actuator) for actuator in told]
+    if min(joints, default=0) < 0:
+        return list(range(model.njnt))
     root = model.body_rootid[model.jnt_bodyid]
-    roots = set()
-    for actuator in told:
-        if int(model.actuator_trntype[actuator]) not in map(int, joints):
-            return list(range(model.njnt))
-        roots.add(int(root[model.actuator_trnid[actuator][0]]))
+    roots = {int(root[joint]) for joint in joints}
     return [joint for joint in range(model.njnt) if int(root[joint]) in roots]
 
 

@@ -139,10 +139,8 @@ def joints(model: mujoco.MjModel) -> list[str]:
 
 def joint_of(model: mujoco.MjModel, actuator: int) -> str:
     """The joint that an actuator drives; "" = none."""
-    kinds = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
-    if int(model.actuator_trntype[actuator]) in map(int, kinds):
-        return model.joint(int(model.actuator_trnid[actuator][0])).name
-    return ""
+    joint = prepared.driven(model, actuator)
+    return model.joint(joint).name if joint >= 0 else ""
 
 
 def _told_unit(

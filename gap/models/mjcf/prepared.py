@@ -34,19 +34,26 @@ def spec(config: OwnConfig) -> mujoco.MjSpec:
     for told in config.told:
         if told.kp:
             _close(made, told)
-    if any(told.kd for told in config.told):
-        _steady(made, config.told)
-    if config.held:
-        _hold(made, config.held)
+    damped = [told for told in config.told if told.kd]
+    if damped or config.held:
+        model = made.compile()
+        _steady(made, model, damped)
+        _hold(made, model, config.held)
     return made
+
+
+def driven(model: mujoco.MjModel, actuator: int) -> int:
+    """Number of the joint that an actuator drives, -1 = none."""
+    kinds = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+    on_joint = int(model.actuator_trntype[actuator]) in map(int, kinds)
+    return int(model.actuator_trnid[actuator, 0]) if on_joint else -1
 
 
 def loose(model: mujoco.MjModel) -> list[str]:
     """Names of the bodies on free joints that carry joints which are driven."""
-    kinds = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
-    by_joint = np.isin(model.actuator_trntype, [int(kind) for kind in kinds])
-    bodies = model.jnt_bodyid[model.actuator_trnid[by_joint, 0]]
-    roots = [int(root) for root in np.unique(model.body_rootid[bodies])]
+    joints = (driven(model, actuator) for actuator in range(model.nu))
+    bodies = (model.jnt_bodyid[joint] for joint in joints if joint >= 0)
+    roots = sorted({int(model.body_rootid[body]) for body in bodies})
     names = [model.body(root).name for root in roots if free_joint(model, root) >= 0]
     return [name for name in names if name]
 
@@ -65,9 +72,16 @@ def free_joint(model: mujoco.MjModel, body: int) -> int:
     return first if free else -1
 
 
-def _hold(made: mujoco.MjSpec, names: Sequence[str]) -> None:
-    """Fix bodies where they are; poses of the other joints stay as they are."""
-    model = made.compile()
+def _hold(made: mujoco.MjSpec, model: mujoco.MjModel, names: Sequence[str]) -> None:
+    """Fix bodies where they are; poses of the other joints stay as they are.
+
+    Args:
+        made: the spec; written to.
+        model: that it compiles to, with these bodies free.
+        names: of the bodies.
+    """
+    if not names:
+        return
     joints = {name: free_joint(model, number(model, "body", name)) for name in names}
     for name, joint in joints.items():
         if joint < 0:
@@ -152,17 +166,21 @@ def _close(made: mujoco.MjSpec, told: Told) -> None:
         actuator.forcerange = [-limit, limit]
 
 
-def _steady(made: mujoco.MjSpec, tolds: Sequence[Told]) -> None:
+def _steady(made: mujoco.MjSpec, model: mujoco.MjModel, damped: Sequence[Told]) -> None:
     """Integrate implicitly, if Euler's method would make a loop's damping unstable: it
-    is taken for the whole step, in which the loop turns a light joint round."""
-    if made.option.integrator != mujoco.mjtIntegrator.mjINT_EULER:
-        return
-    model = made.compile()
-    for told in tolds:
-        joint = model.actuator_trnid[model.actuator(told.actuator).id, 0]
-        inertia = model.dof_M0[model.jnt_dofadr[joint]]
-        if told.kd * model.opt.timestep > STIFF * inertia:
-            made.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    is taken for the whole step, in which the loop turns a light joint round.
+
+    Args:
+        made: the spec; written to.
+        model: that it compiles to.
+        damped: commands of loops with damping.
+    """
+    joints = [driven(model, model.actuator(told.actuator).id) for told in damped]
+    inertia = model.dof_M0[model.jnt_dofadr[joints]]
+    taken = np.array([told.kd for told in damped]) * model.opt.timestep
+    euler = made.option.integrator == mujoco.mjtIntegrator.mjINT_EULER
+    if euler and (taken > STIFF * inertia).any():
+        made.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 
 
 def largest(actuator: mujoco.MjsActuator, gear: float) -> float:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import mujoco
 
 from bns.gap.models.mjcf import effects as own_effects
-from bns.gap.models.mjcf import start
+from bns.gap.models.mjcf import prepared, start
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Trial
@@ -120,9 +120,8 @@ def _parts(model: mujoco.MjModel) -> dict[tuple[str, str], int]:
         for number, body in enumerate(bodies):
             made[kind, getattr(model, kind)(number).name] = int(model.body_treeid[body])
     for number in range(model.nu):
-        on_joint = model.actuator_trntype[number] == mujoco.mjtTrn.mjTRN_JOINT
-        joint = model.actuator_trnid[number, 0]
-        body = model.jnt_bodyid[joint] if on_joint else 0
+        joint = prepared.driven(model, number)
+        body = model.jnt_bodyid[joint] if joint >= 0 else 0
         made["actuator", model.actuator(number).name] = int(model.body_treeid[body])
     return made
 
