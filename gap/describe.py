@@ -7,16 +7,15 @@ is unsure about; `bns gap describe` prints the same.
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
-import mujoco
 import numpy as np
 
 from bns.errors import BnsError, FormatError
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column
-from bns.gap.models.mjcf import guesses, matching, prepared, start
+from bns.gap.models.mjcf import begin, guesses, matching
 from bns.gap.models.mjcf.channels import (
     Work,
     commands,
@@ -25,10 +24,8 @@ from bns.gap.models.mjcf.channels import (
 )
 from bns.gap.models.mjcf.config import WINDOW
 from bns.gap.models.mjcf.log import split
-from bns.gap.models.mjcf.measured import observed, replayed
+from bns.gap.models.mjcf.measured import observed
 from bns.worlds.data.units import FACTORS, factor, si_unit
-
-HELD = 0.5  # of the error on the ground, less of which says that a stand holds a robot
 
 
 @dataclass(frozen=True)
@@ -98,8 +95,8 @@ def describe(
     told, seen = _columns(work)
     commands(work, told, seen)
     observed(work, seen)
-    _hold(work)
-    _begin(work)
+    begin.hold(work)
+    begin.begin(work)
     return Description(
         toml(work, place(model, out)), tuple(work.guessed), tuple(work.unsure)
     )
@@ -185,124 +182,6 @@ def _columns(work: Work) -> tuple[list[Column], list[Column]]:
             "JOINT_goal."
         )
     return told, seen
-
-
-def _missed(work: Work, rows: np.ndarray, data: mujoco.MjData) -> float:
-    """Squared error of the model from a state on, of the columns' variances, summed."""
-    made = replayed(work, rows, data)
-    return sum(
-        float(
-            np.nanmean((column.values[rows] * factor(unit) - made[part]) ** 2)
-            / np.nanvar(column.values * factor(unit))
-        )
-        for column, part, unit in work.seen
-        if part in made
-    )
-
-
-def _stood(work: Work, rows: np.ndarray) -> mujoco.MjData:
-    """The model after it has settled where its joints were seen first."""
-    first = {}
-    for column, part, unit in work.seen:
-        seen = column.values[rows][np.isfinite(column.values[rows])]
-        if part.quantity == "joint" and len(seen):
-            first[part.name] = float(seen[0]) * factor(unit)
-    data = guesses.posed(work.model, guesses.nearest(work.model, first), 0.0)
-    for joint, at in first.items():
-        data.joint(joint).qpos[0] = at
-    for column, actuator, unit in work.told:
-        data.actuator(actuator).ctrl[0] = column.values[rows[0]] * factor(unit)
-    mujoco.mj_step(
-        work.model, data, nstep=round(guesses.SETTLE / work.model.opt.timestep)
-    )
-    data.time = 0.0
-    return data
-
-
-def _hold(work: Work) -> None:
-    """Whether a stand holds the robot: there is nothing to stand on, or its joints move
-    much more like that than like those of a robot on the ground."""
-    bodies = tuple(prepared.loose(work.model))
-    carried = start.free(work.model)
-    if not bodies or any(
-        part.axis and part.name in carried for _, part, _ in work.seen
-    ):
-        return
-    held = replace(work, model=compiled(work.path, tolds(work), bodies))
-    why = "the model has nothing to stand on"
-    if prepared.grounded(work.model):
-        why = "its joints move like that, not like those of a robot on the ground"
-        longest = max(work.rows, key=len)
-        rows = longest[work.times[longest] <= work.times[longest[0]] + guesses.CUT]
-        errors = [_missed(each, rows, _stood(each, rows)) for each in (held, work)]
-        if not errors[0] <= HELD * errors[1]:  # nor where one diverged
-            return
-    work.held, work.model = bodies, held.model
-    work.unsure.append(
-        f"held: a stand holds {' and '.join(map(repr, bodies))} off the ground, for "
-        f"{why}; delete `held` if none does"
-    )
-
-
-def _settled(work: Work, rows: np.ndarray, pose: str) -> bool:
-    """Whether a trial begins as a robot does that has come to rest, not as one that was
-    let go: by which of the two predicts its first samples better."""
-    rows = rows[work.times[rows] <= work.times[rows[0]] + guesses.SETTLE]
-    errors = [
-        _missed(work, rows, guesses.posed(work.model, pose, lasting))
-        for lasting in (guesses.SETTLE, 0.0)
-    ]
-    return errors[0] <= errors[1]
-
-
-def _begin(work: Work) -> None:
-    """How trials begin: at rest in a pose, or where they were; cut or not."""
-    told = np.stack([c.values for c, _, _ in work.told], axis=1)
-    longest = max(work.rows, key=len)
-    span = float(np.ptp(work.times[longest]))
-    first, tolerance = {}, {}
-    for column, part, unit in work.seen:
-        if part.quantity == "joint":
-            pieces = [column.values[rows] * factor(unit) for rows in work.rows]
-            heads = [p[np.isfinite(p)][:1] for p in pieces]
-            first[part.name] = float(np.median(np.concatenate(heads)))
-            wide = guesses.NEAR * float(
-                np.nanmax(column.values) - np.nanmin(column.values)
-            )
-            tolerance[part.name] = max(
-                guesses.SIGMAS * guesses.noise(pieces), wide * factor(unit)
-            )
-    pose, settle = guesses.rests(work.model, first, tolerance)
-    if settle and not _settled(work, longest, pose or ""):
-        settle = 0.0
-    loose = bool(start.free(work.model))
-    if span > guesses.LONG and guesses.curved(told[longest]) and not loose:
-        work.start = {"recorded": True, "cut": guesses.CUT}
-        work.start |= {"keyframe": pose} if pose else {}
-        work.guessed.append(
-            f"start: one long recording, cut into pieces of {guesses.CUT:g} s that "
-            "begin with the positions and speeds of the data"
-        )
-    elif pose is None and loose:
-        pose = guesses.nearest(work.model, first)
-        work.start = {"recorded": True, "settle": guesses.SETTLE}
-        work.start |= {"keyframe": pose} if pose else {}
-        work.unsure.append(
-            "start: the robot is free and trials begin in no pose of the model, so "
-            "each begins where its joints were recorded, settling on the floor for "
-            f"{guesses.SETTLE:g} s; give a keyframe for the rest"
-        )
-    elif pose is None:
-        work.start = {"recorded": True}
-        work.unsure.append(
-            "start: trials begin in no pose of the model at rest, so each begins where "
-            "its joints were recorded; give a keyframe for the rest"
-        )
-    else:
-        work.start = {"keyframe": pose} if pose else {}
-        work.start |= {"settle": settle} if settle else {}
-        what = f"keyframe {pose!r}" if pose else "the model's own pose"
-        work.guessed.append(f"start: at rest in {what}, settling for {settle:g} s")
 
 
 def toml(work: Work, out: Path) -> str:
