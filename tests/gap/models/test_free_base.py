@@ -4,10 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from bns.gap.describe import describe
 from bns.gap.diagnose import diagnose
 from bns.gap.models.mjcf import start
-from bns.gap.models.mjcf.model import STRIDE, OwnModel
+from bns.gap.models.mjcf.model import STRIDE
+from tests.gap.own_robots import described
 
 LEGS = {"lf": (0.2, 0.12), "rf": (0.2, -0.12), "lh": (-0.2, 0.12), "rh": (-0.2, -0.12)}
 LEG = """<body name="{name}_arm" pos="{x} {y} 0.04">
@@ -36,7 +36,6 @@ def model():
 def recorded(folder, *, armature=0.0, away=0.4, seconds=10.0):
     """A log of it waving, at a place of its own, whose commands come up to a sample
     before they are told."""
-    (folder / "stander.xml").write_text(model())
     robot = mujoco.MjModel.from_xml_string(model())
     robot.dof_armature[-1] += armature
     rng, data = np.random.default_rng(4), mujoco.MjData(robot)
@@ -66,17 +65,11 @@ def recorded(folder, *, armature=0.0, away=0.4, seconds=10.0):
     return log
 
 
-def described(folder, log):
-    found = describe(folder / "stander.xml", log, out=folder / "own.toml")
-    found.write(folder / "own.toml")
-    return found, OwnModel.read(folder / "own.toml", threads=1)
-
-
 @pytest.fixture(scope="module")
 def stander(tmp_path_factory):
     folder = tmp_path_factory.mktemp("stander")
     log = recorded(folder)
-    return *described(folder, log), log
+    return *described(folder, model(), log), log
 
 
 def test_its_log_is_not_cut_and_columns_are_found(stander):
@@ -121,7 +114,7 @@ def test_nothing_planted_is_no_gap(stander):
 
 def test_a_planted_inertia_is_named_with_its_value(tmp_path):
     log = recorded(tmp_path, armature=0.01)
-    _, own = described(tmp_path, log)
+    _, own = described(tmp_path, model(), log)
     found = diagnose(own.read_log(str(log)), own, rows=TRIED, full=False)
     assert found.verdict.named == (("joint_armature[rh_hip]",),)
     assert found.best.magnitudes[0] == pytest.approx(0.01, abs=0.002)

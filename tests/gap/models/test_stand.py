@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from bns.errors import BnsError, UnknownNameError
-from bns.gap.describe import describe
 from bns.gap.diagnose import diagnose
 from bns.gap.models.mjcf import trees
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.models.mjcf.model import OwnModel
+from tests.gap.own_robots import described
 
 LEGS = {"lf": (0.2, 0.12), "rf": (0.2, -0.12), "lh": (-0.2, 0.12), "rh": (-0.2, -0.12)}
 LEG = """<body name="{name}_leg" pos="{x} {y} 0">
@@ -61,25 +61,18 @@ def recorded(folder, *, stand, damping=0.0, seconds=9.0):
     return log
 
 
-def described(folder, log, text):
-    (folder / "robot.xml").write_text(text)
-    found = describe(folder / "robot.xml", log, out=folder / "own.toml")
-    found.write(folder / "own.toml")
-    return found, OwnModel.read(folder / "own.toml", threads=1)
-
-
 @pytest.fixture(scope="module")
 def hung(tmp_path_factory):
     folder = tmp_path_factory.mktemp("hung")
     log = recorded(folder, stand=True, damping=0.3)
-    return *described(folder, log, model()), log
+    return *described(folder, model(), log), log
 
 
 @pytest.mark.parametrize(
     ("floor", "why"), [(True, "its joints"), (False, "nothing to")]
 )
 def test_a_stand_is_found_and_its_log_is_cut(tmp_path, hung, floor, why):
-    found, own = described(tmp_path, hung[2], model(floor=floor))
+    found, own = described(tmp_path, model(floor=floor), hung[2])
     assert own.config.held == ("trunk",) and own.config.cut > 0
     assert any(
         line.startswith("held: a stand") and why in line for line in found.unsure
@@ -87,7 +80,7 @@ def test_a_stand_is_found_and_its_log_is_cut(tmp_path, hung, floor, why):
 
 
 def test_a_robot_on_the_floor_is_not_held(tmp_path):
-    found, own = described(tmp_path, recorded(tmp_path, stand=False), model())
+    found, own = described(tmp_path, model(), recorded(tmp_path, stand=False))
     assert not own.config.held and "held" not in found.toml
 
 

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from bns.gap.decomposition.reference import Corrected
-from bns.gap.describe import describe
 from bns.gap.diagnose import diagnose
 from bns.gap.models.base import GapModel
 from bns.gap.models.mjcf import cuts, log, prepared
-from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.models.mjcf.model import OwnModel
+from tests.gap.own_robots import described
 
 CART = """<mujoco model="cart"><option timestep="0.01" integrator="RK4"/>
   <visual><global offwidth="64"/></visual>
@@ -56,12 +55,8 @@ def recorded(path, friction=0.0, trials=5, seconds=3.0, gain=1.0):
 @pytest.fixture
 def said(tmp_path):
     def run(friction):
-        (tmp_path / "cart.xml").write_text(CART)
         recorded(tmp_path / "log.csv", friction)
-        own = tmp_path / "own.toml"
-        described = describe(tmp_path / "cart.xml", tmp_path / "log.csv", out=own)
-        described.write(own)
-        model = OwnModel.read(own, threads=1)
+        _, model = described(tmp_path, CART, tmp_path / "log.csv")
         trials = model.read_log(str(tmp_path / "log.csv"))
         return trials, diagnose(trials, model, full=False), model
 
@@ -84,11 +79,9 @@ def test_friction_of_an_unstable_robot_is_named(said):
 @pytest.fixture
 def weak(tmp_path):
     """One long recording of a cart whose motor pushes four fifths; its model."""
-    (tmp_path / "cart.xml").write_text(CART)
     recorded(tmp_path / "log.csv", trials=1, seconds=12.0, gain=0.8)
-    own = tmp_path / "own.toml"
-    describe(tmp_path / "cart.xml", tmp_path / "log.csv", out=own).write(own)
-    model = OwnModel(replace(OwnConfig.read(own), cut=3.0), threads=1)
+    _, model = described(tmp_path, CART, tmp_path / "log.csv")
+    model = OwnModel(replace(model.config, cut=3.0), threads=1)
     return model, model.read_log(str(tmp_path / "log.csv"))
 
 
@@ -161,11 +154,8 @@ def test_a_mesh_that_a_sensor_needs_stays():
 
 def test_a_model_that_weighs_by_its_geoms_alone_can_be_loaded(tmp_path):
     text = CART.replace("<option", '<compiler inertiafromgeom="true"/><option')
-    (tmp_path / "cart.xml").write_text(text)
     recorded(tmp_path / "log.csv", trials=1)
-    own = tmp_path / "own.toml"
-    describe(tmp_path / "cart.xml", tmp_path / "log.csv", out=own).write(own)
-    model = OwnModel.read(own, threads=1)
+    _, model = described(tmp_path, text, tmp_path / "log.csv")
     plain = model.physics.model.body("cart").mass[0]
     heavy = model.parse("body_mass:part=cart,added=0.3,dx=0,dy=0,dz=0")
     assert model.physics.compiled((heavy,)).model.body("cart").mass[0] == plain + 0.3
@@ -180,16 +170,12 @@ WRIST = """<mujoco><option timestep="0.002"/><worldbody><body name="wrist">
 def test_a_loop_stiffer_than_the_step_is_integrated_implicitly(
     tmp_path, mass, implicit
 ):
-    (tmp_path / "wrist.xml").write_text(WRIST.replace("MASS", str(mass)))
+    text = WRIST.replace("MASS", str(mass))
     times = np.arange(0, 12, 0.01)
     rows = np.stack([times, 0.2 * np.sin(3 * times), 0.2 * np.sin(3 * times)], axis=1)
     head = "time,turn_goal,turn_pos"
     np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header=head, comments="")
-    own = tmp_path / "own.toml"
-    describe(tmp_path / "wrist.xml", tmp_path / "log.csv", kp=50, kd=5).write(own)
-    text = own.read_text().replace(own.read_text().split('"')[3], "wrist.xml")
-    own.write_text(text)
-    model = OwnModel.read(own, threads=1)
+    _, model = described(tmp_path, text, tmp_path / "log.csv", kp=50, kd=5)
     fast = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     assert (model.physics.model.opt.integrator == fast) is implicit
     assert len(model.read_log(str(tmp_path / "log.csv"))) == 4  # not unstable

@@ -11,6 +11,7 @@ from bns.gap.importers import tables
 from bns.gap.models.mjcf import cuts, matching, start
 from bns.gap.models.mjcf.model import OwnModel
 from bns.gap.recordings import load_recordings
+from tests.gap.own_robots import described
 
 ARM = """
 <mujoco model="arm"><compiler angle="radian"/>
@@ -57,17 +58,9 @@ def recorded(path, *, seconds=12.0, unit=1.0, names="hip_goal,calf_goal,hip,calf
 
 @pytest.fixture
 def arm(tmp_path):
-    (tmp_path / "arm.xml").write_text(ARM.replace("ACTUATORS", MOTORS))
-    recorded(tmp_path / "log.csv", unit=np.pi / 180)
-    found = describe(
-        tmp_path / "arm.xml",
-        tmp_path / "log.csv",
-        out=tmp_path / "own.toml",
-        kp=20,
-        kd=1.5,
-    )
-    found.write(tmp_path / "own.toml")
-    return found, OwnModel.read(tmp_path / "own.toml", threads=1), tmp_path / "log.csv"
+    log, text = tmp_path / "log.csv", ARM.replace("ACTUATORS", MOTORS)
+    recorded(log, unit=np.pi / 180)
+    return *described(tmp_path, text, log, kp=20, kd=1.5), log
 
 
 def test_channels_are_told_by_name_and_units_by_motion(arm):
@@ -126,11 +119,11 @@ def test_a_command_that_is_late_is_late_in_every_piece(arm):
 
 def test_goals_told_to_motors_need_a_loop(arm, tmp_path):
     with pytest.raises(BnsError, match="--kp and --kd"):
-        describe(tmp_path / "arm.xml", tmp_path / "log.csv")
+        describe(tmp_path / "robot.xml", tmp_path / "log.csv")
 
 
 def test_each_command_may_have_gains_of_its_own(arm, tmp_path):
-    files = tmp_path / "arm.xml", tmp_path / "log.csv"
+    files = tmp_path / "robot.xml", tmp_path / "log.csv"
     found = describe(*files, kp=(20, 30), kd=1.5)
     gains = [line for line in found.toml.splitlines() if line[:2] in ("kp", "kd")]
     assert gains == ["kp = 20.0", "kd = 1.5", "kp = 30.0", "kd = 1.5"]
@@ -326,10 +319,8 @@ def test_a_place_that_one_trial_does_not_move_is_found_in_another(tmp_path):
     head = "time,trial,hip_goal,calf_goal,hip,calf,toe_x,toe_y"
     log = tmp_path / "log.csv"
     np.savetxt(log, rows, delimiter=",", header=head, comments="", fmt="%.6f")
-    robot = tmp_path / "arm.xml"
-    robot.write_text(ARM.replace("ACTUATORS", SERVOS))
-    describe(robot, log, out=tmp_path / "own.toml").write(tmp_path / "own.toml")
-    seen = OwnModel.read(tmp_path / "own.toml", threads=1).config.seen
+    _, model = described(tmp_path, ARM.replace("ACTUATORS", SERVOS), log)
+    seen = model.config.seen
     assert [(item.part, item.axis) for item in seen[2:]] == [("toe", 0), ("toe", 1)]
 
 
