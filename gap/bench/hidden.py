@@ -14,7 +14,7 @@ from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.refit import newton
 from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.singles import Singles
-from bns.gap.models.base import PLANE
+from bns.gap.models.library import PLANE
 from bns.worlds.effects.base import Effect
 
 LEAST = 0.4  # size below which an effect counts as not excited, and is drawn again

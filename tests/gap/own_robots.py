@@ -3,6 +3,26 @@
 from bns.gap.describe import Description, describe
 from bns.gap.models.mjcf.model import OwnModel
 
+ARM = """
+<mujoco model="arm"><compiler angle="radian"/>
+  <option timestep="0.005" integrator="implicitfast"/>
+  <default><joint damping="0.6" armature="0.01"/></default>
+  <worldbody><body name="upper">
+    <joint name="FL_hip_joint" axis="1 0 0" range="-1.5 1.5" limited="true"/>
+    <geom type="capsule" fromto="0 0 0 0 0 -0.2" size="0.02" mass="1"/>
+    <body name="lower" pos="0 0 -0.2">
+      <joint name="FL_calf_joint" axis="0 1 0" range="-2 2" limited="true"/>
+      <geom type="capsule" fromto="0 0 0 0 0 -0.2" size="0.02" mass="0.3"/>
+      <site name="toe" pos="0 0 -0.2"/>
+    </body></body></worldbody>
+  <actuator>ACTUATORS</actuator></mujoco>"""
+MOTORS = "".join(
+    f'<motor joint="FL_{name}_joint" ctrlrange="-20 20"/>' for name in ("hip", "calf")
+)
+SERVOS = "".join(
+    f'<position joint="FL_{name}_joint" kp="20" kv="1.5"/>' for name in ("hip", "calf")
+)
+
 
 def described(folder, mjcf, log, **loop) -> tuple[Description, OwnModel]:
     """A robot described from a log, and the model of that description.

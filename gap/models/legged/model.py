@@ -12,10 +12,11 @@ import numpy as np
 
 from bns.gap.candidates import legged
 from bns.gap.decomposition.row import Row
-from bns.gap.models.base import LibraryModel, Windows
+from bns.gap.models.base import Windows
 from bns.gap.models.legged import scatter
 from bns.gap.models.legged import signs as walk_signs
 from bns.gap.models.legged.signs import Signs
+from bns.gap.models.library import LibraryModel
 from bns.gap.recordings import segments
 from bns.gap.recordings.trial_conditions import as_number
 from bns.worlds.active import Stages, as_damage

@@ -11,7 +11,8 @@ import numpy as np
 
 from bns.gap.candidates import light
 from bns.gap.decomposition.row import Row
-from bns.gap.models.base import GapModel, LibraryModel, Windows
+from bns.gap.models.base import GapModel, Windows
+from bns.gap.models.library import LibraryModel
 from bns.gap.models.light.reader import Reader, Reads, extra
 from bns.gap.recordings import trial_conditions
 from bns.gap.recordings.trial_conditions import as_number

@@ -13,7 +13,8 @@ import numpy as np
 from bns import models
 from bns.errors import BnsError
 from bns.gap.decomposition.row import Row
-from bns.gap.models.base import LibraryModel, Windows
+from bns.gap.models.base import Windows
+from bns.gap.models.library import LibraryModel
 from bns.gap.models.servo import candidates as servo_candidates
 from bns.gap.models.servo.nominal import Nominal
 from bns.gap.models.servo.runs import SAMPLE, Runs, runs
