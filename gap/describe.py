@@ -87,7 +87,10 @@ def describe(
     """
     given = {"kp": kp, "kd": kd, "torque": torque}
     loop = {key: tuple(map(float, np.atleast_1d(v))) for key, v in given.items()}
-    loop = loop if any(loop["kp"]) else {}
+    if not any(loop["kp"]):
+        if any(loop["kd"]) or np.isfinite(loop["torque"]).any():
+            raise BnsError("--kd and --torque are of a position loop: give its --kp.")
+        loop = {}
     work = Work(
         Path(model), str(log), tables.read(log), loop, compiled(Path(model), ())
     )

@@ -254,12 +254,17 @@ def tolds(work: Work) -> list[Told]:
 
 
 def _each(work: Work) -> None:
-    """Stop where gains are neither one for all commands nor one for each.
+    """Stop where gains are neither one for all commands nor one for each, or are none.
 
     Raises:
         BnsError: so it is.
     """
     for key, given in work.loop.items():
+        if not min(given) >= 0 or (key == "kp" and not min(given) > 0):
+            raise BnsError(
+                f"--{key} {min(given):g} is no gain: give a positive --kp, and --kd "
+                "and --torque not below 0."
+            )
         if len(given) not in (1, len(work.told)):
             raise BnsError(
                 f"--{key} has {len(given)} values for {len(work.told)} commands: give "

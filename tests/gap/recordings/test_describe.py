@@ -109,6 +109,11 @@ def test_each_command_may_have_gains_of_its_own(arm, tmp_path):
     assert gains == ["kp = 20.0", "kd = 1.5", "kp = 30.0", "kd = 1.5"]
     with pytest.raises(BnsError, match="--kp has 3 values for 2 commands"):
         describe(*files, kp=(20, 30, 40))
+    for wrong in ({"kp": -5}, {"kp": (20, 0)}, {"kp": 20, "kd": -1}):
+        with pytest.raises(BnsError, match="is no gain: give a positive --kp"):
+            describe(*files, **wrong)
+    with pytest.raises(BnsError, match="give its --kp"):
+        describe(*files, kd=1.5)
 
 
 def test_names_that_say_nothing_go_by_order(tmp_path):
