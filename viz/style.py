@@ -253,7 +253,7 @@ def _narrowed(figure: "Figure", legend: "Legend", width: float) -> None:
 
 
 def _broken(text: "Text", room: float, *, upright: bool) -> None:
-    """A text in as many lines as it takes.
+    """A text in as many lines as it takes; a name is broken after an underscore.
 
     Args:
         text: one line.
@@ -275,4 +275,5 @@ def _broken(text: "Text", room: float, *, upright: bool) -> None:
     if fits:
         return
     letters = len(said) * (room - 2 * EDGE) / (high - low)
-    text.set_text("\n".join(wrap(said, max(int(np.floor(letters)), 8))))
+    lines = wrap(said.replace("_", "_ "), max(int(np.floor(letters)), 8))
+    text.set_text("\n".join(line.replace("_ ", "_") for line in lines))

@@ -8,7 +8,7 @@ import pytest
 
 from bns.errors import OutOfBoundsError
 from bns.learners.bns.learner import DIVERSITY, SNN_ERROR
-from bns.viz import facts, figures
+from bns.viz import facts, figures, style
 from bns.viz.choices import choose, typical
 from bns.viz.figures import trials
 from bns.viz.figures.motion import SHOWN, groups
@@ -180,3 +180,14 @@ def test_dashes_cover_half_the_length():
     pieces = dashes(np.array([[0.0, 0.0], [1.0, 0.0]]), dash=0.05)
     assert np.isclose(sum(np.ptp(piece[:, 0]) for piece in pieces), 0.5, atol=0.05)
     assert dashes(np.zeros((3, 2))) == []
+
+
+def test_a_long_name_is_broken_after_an_underscore():
+    name = "shoulder_lift_joint_position [rad]"
+    with style.plotting() as figure_class:
+        figure = figure_class(figsize=(4, 1.2), layout="constrained")
+        label = figure.subplots().set_ylabel(name)
+        style.fit(figure)
+    lines = label.get_text().split("\n")
+    assert len(lines) > 1 and "".join(lines).replace(" ", "") == name.replace(" ", "")
+    assert all(line.endswith("_") for line in lines[:-2])
