@@ -203,12 +203,7 @@ def decompose(
         beyond=rest.beyond(
             size.plain, problem.recorded, known, size.inside, Row.inexact
         ),
-        recurs=rest.recurrence(
-            problem,
-            point.linear.rest(point.linear.solve(point.support)),
-            point.noise.sd,
-            piece=rest.SHORT if point.noise.order else rest.PIECE,
-        ),
+        recurs=_recurs(problem, point, size.plain),
         scatter=size.scatter,
         moved=max(rest.excess(problem.recorded, known, size.inside), 1.0),
         inside=size.inside,
@@ -221,6 +216,14 @@ def decompose(
     )
     parts = shares.parts(problem, point, lasting=made.lasting)
     return replace(made, parts=tuple(parts))
+
+
+def _recurs(problem: Problem, point: Point, plain: np.ndarray) -> float:
+    """Standard errors by which what a point leaves, ``(N, C)``, recurs."""
+    left = point.linear.rest(point.linear.solve(point.support))
+    piece = rest.SHORT if point.noise.order else rest.PIECE
+    within = rest.recurrence(problem, left, point.noise.sd, piece=piece)
+    return max(within, rest.repeated(problem, plain))
 
 
 def _settled(

@@ -143,7 +143,7 @@ def decompose(tried: Singles) -> Point:
         best = chosen
     if problem.model.many:
         best = _renewed(problem, best)
-    best = simpler.simplest(problem, best)
+    best = _simplest(problem, best)
     return _beyond_chance(problem, start, best, len(start.linear.free))
 
 
@@ -168,10 +168,20 @@ def beside(problem: Problem, point: Point) -> tuple[Problem, Point]:
         values = np.where(other, problem.nominal, point.values)
         problem = replace(problem, model=model, trials=tuple(begun))
         point = descend(problem, values, support, point.noise)
-        point = simpler.simplest(problem, point)
+        point = _simplest(problem, point)
         if point.support == support:
             break
     return problem, point
+
+
+def _simplest(problem: Problem, point: Point) -> Point:
+    """A point made simpler. Where many may depart and another explanation took the
+    place of one, what stood beside the wrong one may go: the set is searched again."""
+    made = simpler.simplest(problem, point)
+    if not problem.model.many or made.support == point.support:
+        return made
+    again = descend(problem, made.values, made.support, made.noise, made)
+    return refit.better(problem, [made, again])
 
 
 def _renewed(problem: Problem, best: Point) -> Point:

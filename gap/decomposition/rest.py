@@ -1,9 +1,10 @@
 """How large a gap is beyond what measuring it scatters, and whether it recurs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from bns import seeding
 from bns.gap.decomposition.latent import Latent
@@ -22,6 +23,8 @@ ANYWHERE = 30.0  # deviations of the floor, and times the variance of other tria
 PAIRS = 3  # of repeats from which one may stray
 SEARCHED = 1.0  # standard errors that the best of some ten lags exceeds by chance
 SURE = 3.0  # standard errors from which an error is said to recur
+OVER = (0.0, 0.3, 1.0)  # [s] over which errors of repeats are compared; 0 = as they are
+OUTLYING = 4.0  # root mean squares beyond which one error counts no more
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,6 +236,78 @@ def recurrence(
     every = [*lags.values(), same]
     alone = max(abs(_errors(sums)) for sums in every) - SEARCHED
     return max(_errors(np.sum(every, axis=0)), _errors(same), alone)
+
+
+def repeated(problem: Problem, rest: np.ndarray) -> float:
+    """Standard errors by which repeats have errors in common.
+
+    What only scatters is independent in two trials that were told the same: the sum of
+    their errors is as large as the difference. Both are compared by Fisher's F for each
+    feature and each of `OVER`, with as many degrees of freedom as the difference shows
+    (Satterthwaite, 1946), and as many tests count. Changes over a time tell what recurs
+    from a robot that goes astray slowly.
+
+    Args:
+        problem: the recording.
+        rest: residuals, ``(N, C)``.
+
+    Returns:
+        of a normal distribution, for the least probability; 0 without repeats.
+    """
+    rest = np.nan_to_num(rest)
+    most = OUTLYING * np.sqrt((rest**2).mean(axis=0))
+    rest = np.clip(rest, -most, most)
+    pairs = [
+        [np.flatnonzero(problem.trial == number) for number in pair]
+        for pair in repeats(problem)
+    ]
+    chances: list[float] = []
+    for over in OVER:
+        chances += _chances([_changes(problem, rest, pair, over) for pair in pairs])
+    least = min(chances, default=1.0) * max(len(chances), 1)
+    return float(stats.norm.isf(np.clip(least, 1e-300, 0.5)))
+
+
+def _chances(pieces: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[float]:
+    """Probability, by feature, that errors of repeats are as much alike by chance.
+
+    Args:
+        pieces: by pair of repeats, squares of sums and of differences of their errors
+            in pieces that count as independent, ``(K, C)`` each.
+    """
+    if not any(len(common) for common, _ in pieces):
+        return []
+    common, apart = (np.concatenate(part) for part in zip(*pieces, strict=True))
+    found = []
+    for one, other in zip(common.T, apart.T, strict=True):
+        size = max(float(other.sum()), 1e-300)
+        free = size**2 / max(float((other**2).sum()), 1e-300)
+        found.append(float(stats.f.sf(one.sum() / size, free, free)))
+    return found
+
+
+def _changes(
+    problem: Problem, rest: np.ndarray, pair: Sequence[np.ndarray], over: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Squares of the sum and of the difference of two trials' errors, or of what these
+    change over a time [s], in pieces of both, ``(K, C)`` each."""
+    length = min(map(len, pair))
+    one, other = (rest[rows[:length]] for rows in pair)
+    times = problem.windows[problem.trial[pair[0][0]]].times[:length]
+    step = max(float(np.median(np.diff(times))), 1e-6) if length > 1 else np.inf
+    lag = max(round(over / step), 1) if over else 0
+    if length <= lag:
+        none = np.zeros((0, rest.shape[1]))
+        return none, none
+    if lag:
+        one, other = one[lag:] - one[:-lag], other[lag:] - other[:-lag]
+    piece = max(over, SHORT) if over else PIECE
+    part = ((times[: len(one)] - times[0]) / piece).astype(int)
+    starts = np.flatnonzero(np.diff(part, prepend=-1))
+    return (
+        np.add.reduceat((one + other) ** 2, starts, axis=0),
+        np.add.reduceat((one - other) ** 2, starts, axis=0),
+    )
 
 
 def scattered(

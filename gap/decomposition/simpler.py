@@ -25,7 +25,7 @@ def simplest(problem: Problem, point: Point) -> Point:
     """
     point = narrowed(problem, point)
     if problem.model.many:
-        return swapped(problem, point)
+        return swapped(problem, parted(problem, point))
     return pruned(problem, point)
 
 
@@ -135,7 +135,9 @@ def parted(problem: Problem, point: Point) -> Point:
         values[back] = problem.nominal[back]
         parts = {problem.rows[row].term for row in rows}
         support = (point.support - {name, other}) | parts
-        half = refit.fitted_at(problem, replace(point, values=values), support)
+        half = refit.fitted_at(
+            problem, replace(point, values=values), support, near=problem.model.many
+        )
         if _as_good(problem, half, point):
             return half
     return point
