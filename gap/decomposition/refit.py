@@ -135,6 +135,7 @@ def newton(
     part = problem if only is None else replace(problem, recorded=_kept(problem, only))
     names = [k for name in sorted(support) for k in problem.terms[name]]
     rest = _rest(part, values, only)
+    at = values  # where slopes were taken
     for _ in range(turns):
         which = [
             k
@@ -144,10 +145,13 @@ def newton(
         ]
         if not which:
             break
-        if slopes is None or any(k not in slopes for k in which):
-            slopes = part.slopes(values, which, only=only)
+        far = np.abs((values - at)[which] / part.sd[which]).max() > fit.FAR
+        if slopes is None or far or any(k not in slopes for k in which):
+            slopes, at = part.slopes(values, which, only=only), values
         moved = _step(part, values, rest, which, known, slopes, only)
-        slopes = None
+        if moved is None and at is not values:  # by slopes of elsewhere
+            slopes = None
+            continue
         if moved is None:
             break
         change = np.abs((moved[0] - values)[which] / part.sd[which]).max()
