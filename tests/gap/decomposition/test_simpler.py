@@ -1,0 +1,52 @@
+"""One explanation for several: what is the same motion with less."""
+
+import numpy as np
+
+from bns.gap.bench import mjcf_cases
+from bns.gap.decomposition import descent, refit, simpler
+from bns.gap.decomposition.problem import Problem
+from bns.gap.models.mjcf import effects
+from bns.gap.models.mjcf.model import OwnModel
+from tests.gap.own_robots import ARM, MOTORS
+
+DESCRIBED = """
+name = "arm"
+model = "robot.xml"
+commands.hip = { actuator = "hip", unit = "N m", low = -2.0, high = 2.0 }
+commands.calf = { actuator = "calf", unit = "N m", low = -0.5, high = 0.5 }
+observed.q0 = { joint = "FL_hip_joint", unit = "rad", noise = 0.002 }
+observed.q1 = { joint = "FL_calf_joint", unit = "rad", noise = 0.002 }
+[effects]
+actuator_gain = ["hip", "calf"]
+joint_damping = ["FL_calf_joint"]
+joint_friction = ["FL_calf_joint"]
+"""
+GAINS, HIP = "actuator_gain[all]", "actuator_gain[hip]"
+DAMPING, FRICTION = "joint_damping[FL_calf_joint]", "joint_friction[FL_calf_joint]"
+
+
+def motors():
+    """The arm's, by the name of their joint."""
+    made = MOTORS
+    for name in ("hip", "calf"):
+        made = made.replace(f'joint="FL_{name}', f'name="{name}" joint="FL_{name}')
+    return made
+
+
+def test_a_gain_of_both_motors_is_one_of_one_with_nothing_to_undo_it(tmp_path):
+    (tmp_path / "robot.xml").write_text(ARM.replace("ACTUATORS", motors()))
+    (tmp_path / "own.toml").write_text(DESCRIBED)
+    model = OwnModel.read(tmp_path / "own.toml", threads=1)
+    told = mjcf_cases.commands(model, np.random.default_rng(0), 3)
+    planted = [
+        effects.make("actuator_gain", {"part": "hip", "factor": 1.2}),
+        effects.make("joint_friction", {"part": "FL_calf_joint", "added": 0.1}),
+    ]
+    problem = Problem.of(mjcf_cases.record(model, told, planted), model)
+    start = descent.nothing(problem)
+    both = refit.fitted_at(problem, start, {GAINS, DAMPING, FRICTION})
+    assert both.support == {GAINS, DAMPING, FRICTION}
+    one = simpler.parted(problem, both)
+    assert HIP in one.support and GAINS not in one.support
+    (hip,) = problem.terms[HIP]
+    assert abs(one.values[hip] - 1.2) < 0.02
