@@ -10,11 +10,11 @@ from bns.gap.decomposition import rest
 PAIRS, LENGTH, STEP = 3, 60, 0.1  # of repeats; windows of a trial, and seconds apart
 
 
-def recorded(pairs=PAIRS):
-    """Trials of which each was told the same as the one `pairs` before it."""
+def recorded(commands=PAIRS):
+    """Trials that are told so many commands in turn."""
     told = [
-        SimpleNamespace(values=np.full((1, 1), n % pairs), durations=np.array([6.0]))
-        for n in range(2 * pairs)
+        SimpleNamespace(values=np.full((1, 1), n % commands), durations=np.array([6.0]))
+        for n in range(2 * PAIRS)
     ]
     times = 0.5 + STEP * np.arange(LENGTH)
     return SimpleNamespace(
@@ -32,10 +32,12 @@ def scatter(rng, kind):
     return made.reshape(-1, 2)
 
 
+@pytest.mark.parametrize("commands", [1, PAIRS])
 @pytest.mark.parametrize("kind", ["noise", "walk"])
-def test_scatter_does_not_recur(kind):
+def test_scatter_does_not_recur(kind, commands):
     rng = np.random.default_rng(3)
-    found = [rest.repeated(recorded(), scatter(rng, kind)) for _ in range(200)]
+    problem = recorded(commands)
+    found = [rest.repeated(problem, scatter(rng, kind)) for _ in range(200)]
     assert np.mean(np.array(found) > rest.SURE) <= 0.01
 
 
