@@ -127,7 +127,8 @@ def newton(
         known: noise.
         turns: steps at most.
         only: trials that count, None = all; the others' residuals are left out.
-        slopes: derivatives at these values, for the first step; None = taken.
+        slopes: derivatives at these values, which do until the fit has moved by
+            `fit.FAR`; None = taken.
 
     Returns:
         values, and residuals there ``(N, C)``.
@@ -149,11 +150,11 @@ def newton(
         if slopes is None or far or any(k not in slopes for k in which):
             slopes, at = part.slopes(values, which, only=only), values
         moved = _step(part, values, rest, which, known, slopes, only)
-        if moved is None and at is not values:  # by slopes of elsewhere
-            slopes = None
-            continue
         if moved is None:
-            break
+            if at is values:
+                break
+            slopes = None  # were of elsewhere
+            continue
         change = np.abs((moved[0] - values)[which] / part.sd[which]).max()
         values, rest = moved
         if change < STILL:
