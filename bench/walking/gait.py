@@ -5,7 +5,7 @@ They are regained after legs were raised, with a sliding window of 300 patterns.
 
 from collections.abc import Sequence
 from itertools import product
-from typing import get_args
+from typing import Any
 
 import numpy as np
 
@@ -95,17 +95,8 @@ def hexapod_gait(quick: bool) -> Result:
             "within the stretch": int((timed <= STRETCH).sum()),
             "trials to its distance in as many commands": experiments.waits(told),
             "at the end": at_the_end(record),
-            runs.OWN: _of(runs.walking("nominal", quick=quick), hand),
         },
     )
-
-
-def _of(record: RunRecord, hand: runs.Hand) -> dict[str, object]:
-    timed = experiments.first(runs.adequate(record, hand))
-    return {
-        "trials to its distance in its time": experiments.waits(timed),
-        "at the end": at_the_end(record),
-    }
 
 
 def at_the_end(record: RunRecord) -> dict[str, object]:
@@ -207,23 +198,22 @@ def recover_hexapod(quick: bool) -> Result:
 
     The runs of all types are those of `hexapod-gait` up to the damage. The figure is
     that of the window, ten runs a type; beside it, from the same undamaged runs on,
-    what forgetting by evidence comes to (`watch.forget`), and the presets
-    `hexapod-recover`, thirty runs a type, and `hexapod-nominal`, from runs of its own.
+    what forgetting by evidence comes to (`watch.forget`), and the preset
+    `hexapod-recover`, thirty runs a type.
     """
-    records, others, *ours = (
-        runs.recovering(kind, quick=quick) for kind in get_args(runs.Kind)
+    records, others, ours = (
+        runs.recovering(kind, quick=quick) for kind in ("window", "forget", "own")
     )
     hand = runs.by_hand()
     found: dict[str, object] = {}
     medians, holds = [], True
     for legs, record in records.items():
-        row = found[legs] = _recovery(legs, record, hand)
+        row = found[legs] = recovery(legs, record, hand)
         row["with watch.forget"] = {
-            **_recovery(legs, others[legs], hand),
+            **recovery(legs, others[legs], hand),
             "trials until it forgot": experiments.waits(_forgot(others[legs])),
         }
-        for preset, found_by in zip(("hexapod-recover", runs.OWN), ours, strict=True):
-            row[preset] = _recovery(legs, found_by[legs], hand)
+        row["hexapod-recover"] = recovery(legs, ours[legs], hand)
         median = row["median"]
         limit = LIMIT_MILD if legs in MILD else LIMIT_SEVERE
         holds = holds and median is not None and median <= limit
@@ -244,7 +234,8 @@ def _forgot(record: RunRecord) -> np.ndarray:
     return np.where(dropped.any(1), dropped.argmax(1) + 1.0, np.inf)
 
 
-def _recovery(legs: str, record: RunRecord, hand: runs.Hand) -> dict[str, object]:
+def recovery(legs: str, record: RunRecord, hand: runs.Hand) -> dict[str, Any]:
+    """Trials until robots walk again after a damage, by each yardstick."""
     onset, ways = int(record.damage_onset[0]), record["distance"]
     late = np.median(ways[:, -runs.BEFORE :], axis=1)
     enough = runs.SHARE * runs.before(record)

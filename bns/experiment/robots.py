@@ -42,8 +42,10 @@ def told(name: str) -> Told:
     return Told(robot.kind, channels, robot.ranges)
 
 
-def feet(name: str) -> Callable[[np.ndarray], np.ndarray]:
-    """Where the feet of a robot are: goals ``(..., 18)`` to ``(..., 6, 3)``.
+def contacts(name: str) -> Callable[[np.ndarray], np.ndarray]:
+    """Where the feet of a robot and its belly's corners are.
+
+    Goals ``(..., 18)`` to places ``(..., 10, 3)``, the six feet first.
 
     Raises:
         BnsError: that is known of the PhantomX alone.
@@ -55,7 +57,7 @@ def feet(name: str) -> Callable[[np.ndarray], np.ndarray]:
         )
     from bns.models.phantomx import kinematics
 
-    return kinematics.feet
+    return kinematics.contacts
 
 
 def digest(name: str) -> str:

@@ -166,6 +166,9 @@ class WalkConfig:
     nominal: bool = False
     """the networks learn what is missing from a model of feet that stay where they
     stand (own; bns/learners/bns/nominal.py)"""
+    lost_legs: bool = False
+    """which legs bear nothing is told from the motion, and the model goes on without
+    them (own; bns/learners/bns/bearing.py); needs nominal and watch.forget"""
     mutation_magnitude: float = 20.0
     """standard deviation of a goal's mutation [ticks of 300/1023 deg] (table 7.2,
     unit silent)"""
@@ -184,6 +187,10 @@ class WalkConfig:
     batch: int = 128
     """patterns of a training step, drawn at random (Adam); 0 = all of them (Rprop).
     snn.epochs counts these steps"""
+    passes: float = 0.0
+    """times that a pattern is drawn in a training, on average, so that few patterns are
+    learned in few steps (own; batch > 0); 0 = snn.epochs steps, however many there
+    are"""
     learning_rate: float = 0.002
     """of Adam (batch > 0)"""
     adequate: float = 0.70

@@ -86,6 +86,7 @@ BOUNDS = {
     "walk.doubt": Bound(0, 1000),
     "walk.batch": Bound(0, 100_000, "patterns"),
     "walk.learning_rate": Bound(1e-6, 1),
+    "walk.passes": Bound(0, 100_000, "times"),
     "walk.adequate": Bound(0.001, 100, "m"),
     "watch.threshold": Bound(0, 1000),
     "watch.warmup": Bound(2, 1000, "trials"),

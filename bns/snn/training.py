@@ -259,7 +259,8 @@ def fit_adam(
 ) -> tuple[Tensor, Tensor]:
     """Train all runs' networks; the rate falls to zero along half a cosine.
 
-    The loss is that of `fit` divided by the number of patterns.
+    Runs that take fewer steps than others (`walk.passes`) rest while these go on. The
+    loss is that of `fit` divided by the number of patterns.
 
     Args:
         shape: of the networks.
@@ -274,10 +275,10 @@ def fit_adam(
     inputs, targets, weight = patterns
     counts = weight.sum((1, 2, 3)).long()
     batch, off = config.walk.batch, config.snn.dropout
-    steps, state = config.snn.epochs, AdamState.fresh(theta)
+    steps, state = _steps(config, counts), AdamState.fresh(theta)
     decay = config.snn.weight_decay / counts.clamp(min=1)[:, None]
     some = (counts > 0).float()[:, None, None, None].expand(-1, 1, 1, batch)
-    for number in range(steps):
+    for number in range(int(steps.max())):
         coins = draws.uniform(len(theta), batch)
         index = whole_below(coins, counts.clamp(min=1)[:, None])[:, None]
         shown = inputs.gather(2, index.expand(-1, inputs.shape[1], -1))
@@ -287,11 +288,19 @@ def fit_adam(
             _gradient_by_run(shape, theta, shown, wanted.unsqueeze(1), some, keep)
             / batch
         )
-        here = torch.tensor(number / steps)
+        here = (number / steps).clamp(max=1.0)
         rate = config.walk.learning_rate * (1 + torch.cos(torch.pi * here)) / 2
         grad = grad + decay * theta
         theta, state = adam(theta, grad, state, rate, torch.tensor(number + 1.0))
     return theta, mean_error(shape, theta, patterns)
+
+
+def _steps(config: RunConfig, counts: Tensor) -> Tensor:
+    """Steps of a training, ``(R, 1)``, or one number where all runs take as many."""
+    if not config.walk.passes:
+        return torch.tensor(config.snn.epochs)
+    steps = (config.walk.passes * counts / config.walk.batch).ceil()
+    return steps.clamp(min=1)[:, None]
 
 
 def _gradient_by_run(shape: Shape, theta: Tensor, *patterns: Any) -> Tensor:

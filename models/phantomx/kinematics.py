@@ -25,6 +25,7 @@ class Shape(NamedTuple):
         coxa, femur, tibia: lengths [m].
         femur_zero: of the femur half-way, above the horizontal [rad].
         knee_zero: of the tibia half-way, above the femur's line [rad].
+        belly: corners of the body's underside, shape ``(4, 3)`` [m].
     """
 
     hips: np.ndarray
@@ -35,6 +36,7 @@ class Shape(NamedTuple):
     tibia: float
     femur_zero: float
     knee_zero: float
+    belly: np.ndarray
 
 
 @cache
@@ -46,6 +48,8 @@ def shape() -> Shape:
     ends = {"front": 1, "rear": -1, "middle": 0}
     ahead = np.array([ends[leg.rpartition("_")[2]] for leg in LEGS])
     out = np.where(ahead == 0, value["hip_middle_side"], value["hip_side"])
+    size = [value[f"belly_{name}"] / 2 for name in ("length", "width", "height")]
+    corners = [(1, 1, -1), (1, -1, -1), (-1, 1, -1), (-1, -1, -1)]
     return Shape(
         hips=np.column_stack([ahead * value["hip_forward"], side * out]),
         side=side,
@@ -55,6 +59,7 @@ def shape() -> Shape:
         tibia=value["tibia_length"],
         femur_zero=value["femur_zero"],
         knee_zero=value["knee_zero"],
+        belly=np.array(corners) * size,
     )
 
 
@@ -80,6 +85,21 @@ def feet(goals: np.ndarray) -> np.ndarray:
         ],
         axis=-1,
     )
+
+
+def contacts(goals: np.ndarray) -> np.ndarray:
+    """What may touch the floor: the six feet, then the belly's corners.
+
+    Args:
+        goals: joint angles, shape ``(..., 18)`` [rad].
+
+    Returns:
+        Shape ``(..., 10, 3)`` [m].
+    """
+    found = feet(goals)
+    belly = shape().belly
+    corners = np.broadcast_to(belly, (*found.shape[:-2], *belly.shape))
+    return np.concatenate([found, corners], axis=-2)
 
 
 def goals(feet: np.ndarray) -> np.ndarray:

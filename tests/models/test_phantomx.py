@@ -34,6 +34,13 @@ def test_feet_are_where_the_model_has_them(model):
         np.testing.assert_allclose(kinematics.feet(goals), seen, atol=1e-6)
 
 
+def test_the_belly_touches_with_the_corners_of_its_box(model):
+    size = model.geom("belly").size
+    belly = kinematics.contacts(np.zeros(18))[6:]
+    np.testing.assert_allclose(np.abs(belly), np.tile(size, (4, 1)))
+    assert (belly[:, 2] < 0).all() and len({tuple(row) for row in belly}) == 4
+
+
 def test_inverse_kinematics_undoes_the_forward_one():
     rng = np.random.default_rng(2)
     low, high = models.robot("phantomx").ranges.T

@@ -263,11 +263,13 @@ def foretold(like: np.ndarray, told: np.ndarray, scale: np.ndarray) -> np.ndarra
 
     Args:
         like: covariance of the patterns ``(N, N)``.
-        told: outputs ``(N, O)``.
+        told: outputs ``(N, O)``, or several accounts of them ``(N, A, O)``: then the
+            result is ``(N, A)``.
         scale: mean square of each output ``(O,)``.
     """
     root = np.linalg.cholesky(like)
-    fresh = np.linalg.solve(root, told)
-    spread = np.log(np.diag(root)) * told.shape[1] + np.log(scale).sum() / 2
-    found: np.ndarray = -(fresh**2 / scale).sum(1) / 2 - spread
+    fresh = np.linalg.solve(root, told.reshape(len(told), -1)).reshape(told.shape)
+    spread = np.log(np.diag(root)) * told.shape[-1] + np.log(scale).sum() / 2
+    squares = (fresh**2 / scale).sum(-1) / 2
+    found: np.ndarray = -squares - spread.reshape(-1, *[1] * (told.ndim - 2))
     return found

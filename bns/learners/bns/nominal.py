@@ -2,15 +2,18 @@
 with, without physics.
 
 Between two poses of the legs the body moves so that the feet that bear it stay where
-they are. Which bear it is statics: of all triples of feet whose triangle holds the
-middle of the body, the one that is lowest there, and each foot bears its share of the
-weight. Where feet that bear move against each other, all slip, and the body moves as
-friction asks: so that the ways that feet slip, each times its load, are least.
+they are. Which bear it is statics: of all triples of feet and corners of the belly
+whose triangle holds the middle of the body, the one that is lowest there, and each
+bears its share of the weight. Where what bears moves against each other, all slip, and
+the body moves as friction asks: so that the ways that they slip, each times its load,
+are least. A lost leg bears nothing, and a body that its feet do not hold lies on its
+belly.
 
-A network is trained on this model once, since generations ask for it often.
+A network is trained on this model once for each set of lost legs, since generations ask
+for it often.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from itertools import combinations
 
@@ -27,73 +30,94 @@ from bns.snn.training import AdamState, Patterns, adam, gradient
 GIVEN = 55.0  # patterns: five trials
 PIECES = 8  # of a command
 SOFT = 0.004  # [m] triples that are so much higher bear a third as much
+LYING = 0.01  # [m] that a belly counts as higher, or where two feet hold the middle its
+# corners would make further ways to stand
 SLIPS = 3  # turns of reweighting: the sum of slips for that of their squares
 LEAST = 0.001  # [m] of slip, so that weights stay finite
 SAMPLES, STEPS, BATCH, RATE, HIDDEN = 20_000, 3_000, 256, 0.002, 300
-Feet = Callable[[np.ndarray], np.ndarray]
-TRIPLES = np.array(list(combinations(range(6), 3)))
+FEET = 6
+Contacts = Callable[[np.ndarray], np.ndarray]
+Lost = frozenset[int]  # legs, by their place in `bns.models.legs.LEGS`
+NONE: Lost = frozenset()
 
 
-def moved(before: np.ndarray, after: np.ndarray, feet: Feet) -> np.ndarray:
-    """Motion of the body by commands, ``(N, 3)`` [m, m, rad] in its frame.
+def moved(
+    before: np.ndarray,
+    after: np.ndarray,
+    contacts: Contacts,
+    accounts: Sequence[Lost] = (NONE,),
+) -> np.ndarray:
+    """Motion of the body by commands, in its frame.
 
     Args:
         before: goals in force, ``(N, 18)`` [rad].
         after: the next ones.
-        feet: where feet are for goals ``(N, 18)``: ``(N, 6, 3)`` [m].
+        contacts: where feet and the belly's corners are for goals ``(N, 18)``:
+            ``(N, C, 3)`` [m], see `robots.contacts`.
+        accounts: A sets of legs that bear nothing.
+
+    Returns:
+        ``(A, N, 3)`` [m, m, rad].
     """
     change = after - before
     longest = np.abs(change).max(-1, keepdims=True)
-    x, y, yaw = np.zeros((3, len(before)))
-    here = feet(before)
+    x, y, yaw = np.zeros((3, len(accounts), len(before)))
+    here = contacts(before)
     for piece in range(1, PIECES + 1):
         way = np.minimum(np.abs(change), longest * piece / PIECES)
-        there = feet(before + np.sign(change) * way)
-        middle = (here + there) / 2
-        change_of_feet = (there - here)[..., :2]
-        ahead, left, turn = _rigid(middle[..., :2], change_of_feet, loads(middle))
+        there = contacts(before + np.sign(change) * way)
+        middle, moves = (here + there) / 2, (there - here)[..., :2]
+        ahead, left, turn = _rigid(middle[..., :2], moves, loads(middle, accounts))
         cos, sin = np.cos(yaw), np.sin(yaw)
         x, y = x + cos * ahead - sin * left, y + sin * ahead + cos * left
         yaw, here = yaw + turn, there
     return np.stack([x, y, yaw], axis=-1)
 
 
-def loads(feet: np.ndarray) -> np.ndarray:
-    """Share of the weight on each foot, ``(N, 6)``, from their places ``(N, 6, 3)``."""
-    places = feet[:, TRIPLES]
+def loads(contacts: np.ndarray, accounts: Sequence[Lost] = (NONE,)) -> np.ndarray:
+    """Share of the weight on each contact, ``(A, N, C)``.
+
+    Args:
+        contacts: their places, feet first, ``(N, C, 3)`` [m]; three of those that bear
+            hold the middle, as the corners of the belly do.
+        accounts: A sets of legs that bear nothing.
+    """
+    triples = np.array(list(combinations(range(contacts.shape[1]), 3)))
+    places = contacts[:, triples]
     a, b, c = np.moveaxis(places[..., :2], 2, 0)
     share = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)], axis=-1)
     total = share.sum(-1, keepdims=True)
     share = share / np.where(np.abs(total) < 1e-6, 1e-6, total)
-    height = (share * places[..., 2]).sum(-1)
-    # where none holds the middle, the one that does so best
-    height = np.where(share.min(-1) > -0.02, height, 10.0 - share.min(-1))
-    likely = np.exp(-(height - height.min(1, keepdims=True)) / SOFT)
-    borne = (likely / likely.sum(1, keepdims=True))[..., None] * share.clip(0, 1)
-    found = np.zeros(feet.shape[:2])
-    for column, triple in enumerate(TRIPLES):
-        found[:, triple] += borne[:, column]
+    height = (share * places[..., 2]).sum(-1) + LYING * (triples >= FEET).any(1)
+    gone = np.array([np.isin(triples, list(lost)) for lost in accounts])
+    bears = ~gone.reshape(len(accounts), 1, -1, 3).max(-1)
+    height = np.where(bears & (share.min(-1) > -0.02), height, np.inf)
+    likely = np.exp(-(height - height.min(-1, keepdims=True)) / SOFT)
+    likely = likely / likely.sum(-1, keepdims=True)
+    found = np.zeros((len(accounts), *contacts.shape[:2]))
+    for column, triple in enumerate(triples):
+        found[..., triple] += likely[..., [column]] * share[:, column].clip(0, 1)
     return found
 
 
 def _rigid(
-    feet: np.ndarray, change: np.ndarray, load: np.ndarray
+    places: np.ndarray, moves: np.ndarray, load: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Forward, left and turn of a body whose feet slip least, each ``(N,)``."""
+    """Forward, left and turn of a body whose contacts slip least, each ``(A, N)``."""
     weight = load
     for _ in range(SLIPS + 1):
-        total = weight.sum(-1)[:, None] + 1e-9
+        total = weight.sum(-1)[..., None] + 1e-9
         centre, mean = (
-            (weight[..., None] * part).sum(1) / total for part in (feet, change)
+            (weight[..., None] * part).sum(-2) / total for part in (places, moves)
         )
-        around, own = feet - centre[:, None], change - mean[:, None]
-        inertia = (weight * (around**2).sum(-1)).sum(1) + 1e-6
-        turn = -(weight * _cross(around, own)).sum(1) / inertia
-        ahead = -mean[:, 0] + turn * centre[:, 1]
-        left = -mean[:, 1] - turn * centre[:, 0]
+        around, own = places - centre[..., None, :], moves - mean[..., None, :]
+        inertia = (weight * (around**2).sum(-1)).sum(-1) + 1e-6
+        turn = -(weight * _cross(around, own)).sum(-1) / inertia
+        ahead = -mean[..., 0] + turn * centre[..., 1]
+        left = -mean[..., 1] - turn * centre[..., 0]
         slip = np.hypot(
-            change[..., 0] + ahead[:, None] - turn[:, None] * feet[..., 1],
-            change[..., 1] + left[:, None] + turn[:, None] * feet[..., 0],
+            moves[..., 0] + ahead[..., None] - turn[..., None] * places[..., 1],
+            moves[..., 1] + left[..., None] + turn[..., None] * places[..., 0],
         )
         weight = load / (slip + LEAST)
     return ahead, left, turn
@@ -140,7 +164,10 @@ class Nominal:
         runs: R.
 
     Attributes:
-        theta: weights of `network`.
+        lost: legs that bear nothing, of each run.
+        theta: weights of `network`, ``(R, D)``.
+        moving: 1 for inputs, goals in force and next ones, of legs that are not lost, 0
+            for the others, ``(R, 36, 1)``: what those are told moves nothing.
         trust: what the model's forward, left and turn are multiplied by, ``(R, 3, 1)``.
 
     Raises:
@@ -148,9 +175,25 @@ class Nominal:
     """
 
     def __init__(self, config: RunConfig, runs: int):
-        made = network(config.world.robot, config.walk.reach)
-        self.theta = made.to(config.device)
-        self.trust = torch.ones(runs, 3, 1, device=config.device)
+        self.robot, self.reach = config.world.robot, config.walk.reach
+        self.device = torch.device(config.device)
+        self.lost = [NONE] * runs
+        self.theta = self._network(NONE).repeat(runs, 1)
+        self.trust = torch.ones(runs, 3, 1, device=self.device)
+        self.moving = torch.ones(runs, SHAPE.inputs, 1, device=self.device)
+
+    def _network(self, lost: Lost) -> Tensor:
+        return network(self.robot, self.reach, lost).to(self.device)
+
+    def without(self, run: int, lost: Lost) -> None:
+        """Legs of a run bear nothing from now on."""
+        if lost == self.lost[run]:
+            return
+        self.lost[run] = lost
+        self.theta[run] = self._network(lost)[0]
+        moving = torch.ones_like(self.moving[run]).view(2, FEET, -1)
+        moving[:, list(lost)] = 0.0
+        self.moving[run] = moving.view(-1, 1)
 
     def weigh(self, patterns: Patterns) -> Tensor:
         """Trust the model by its least squares share in patterns, from 0 to 1.
@@ -170,9 +213,23 @@ class Nominal:
         self.trust = torch.where(square > 0, share, 1.0)
         return self.trust * told
 
+    def state(self) -> dict[str, np.ndarray]:
+        """How far each run trusts the model, and which legs it takes for lost."""
+        lost = np.zeros((len(self.lost), FEET), bool)
+        for run, legs in enumerate(self.lost):
+            lost[run, list(legs)] = True
+        return {"nominal.trust": self.trust.cpu().numpy(), "nominal.lost": lost}
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Go on from `state`."""
+        trust = torch.from_numpy(arrays["nominal.trust"].copy())
+        self.trust = trust.to(self.device)
+        for run, legs in enumerate(arrays["nominal.lost"]):
+            self.without(run, frozenset(np.flatnonzero(legs).tolist()))
+
 
 @cache
-def network(robot: str, reach: float) -> Tensor:
+def network(robot: str, reach: float, lost: Lost = NONE) -> Tensor:
     """Weights of a network of `SHAPE` that says what `moved` says, ``(1, D)``.
 
     The same each time, so no run has to keep them.
@@ -180,6 +237,7 @@ def network(robot: str, reach: float) -> Tensor:
     Args:
         robot: its name.
         reach: farthest that goals are from half-way [rad].
+        lost: legs that bear nothing; their goals are 0 in its inputs.
 
     Raises:
         BnsError: a robot whose legs are not known.
@@ -188,8 +246,11 @@ def network(robot: str, reach: float) -> Tensor:
 
     rng, draws = np.random.default_rng(0), Draws(0)
     before, after = drawn(rng, SAMPLES, reach)
+    for goals in (before, after):
+        goals.reshape(SAMPLES, FEET, -1)[:, list(lost)] = 0.0
     inputs = _tensor(np.concatenate([before, after], axis=1) / GOAL)
-    targets = _tensor(moved(before, after, robots.feet(robot)) / np.array(MOVED))
+    told = moved(before, after, robots.contacts(robot), (lost,))[0]
+    targets = _tensor(told / np.array(MOVED))
     theta = SHAPE.random(1, draws)
     state, every = AdamState.fresh(theta), torch.ones(1, 1, 1, BATCH)
     for number in range(STEPS):
@@ -207,5 +268,6 @@ def _tensor(rows: np.ndarray) -> Tensor:
 
 
 def said(theta: Tensor, seen: Tensor) -> Tensor:
-    """What such a network says of inputs ``(R, 36, N)``: ``(R, 3, N)``."""
-    return torch.cat([forward(SHAPE, theta, part[None])[:, 0] for part in seen])
+    """What such networks ``(R, D)`` say of inputs ``(R, 36, N)``: ``(R, 3, N)``."""
+    pairs = zip(theta.split(1), seen.split(1), strict=True)
+    return torch.cat([forward(SHAPE, own, part)[:, 0] for own, part in pairs])

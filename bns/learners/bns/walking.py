@@ -26,7 +26,7 @@ from bns.evolution.generation import Rates
 from bns.evolution.goals import TICK, GoalBreeder, Goals
 from bns.experiment.config import RunConfig
 from bns.experiment.task_settings import WalkConfig
-from bns.learners.bns import change_detection
+from bns.learners.bns import bearing, change_detection
 from bns.learners.bns.memory import Memory
 from bns.learners.bns.navigation import OpenLoopProblem
 from bns.learners.bns.nominal import Nominal, said
@@ -59,7 +59,8 @@ class WalkEvaluator:
     def inputs(self, population: Population) -> Tensor:
         """Network inputs, ``(R, 2 C, K * P)``, the individual varying fastest."""
         scaled = goal_inputs(population.genes)
-        return scaled.permute(0, 3, 2, 1).flatten(2).contiguous()
+        found = scaled.permute(0, 3, 2, 1).flatten(2).contiguous()
+        return found if self.nominal is None else found * self.nominal.moving
 
     def members(self, theta: Tensor, seen: Tensor) -> Tensor:
         """Scaled outputs of every member, ``(R, G, 3, N)``, piece by piece."""
@@ -208,6 +209,7 @@ class WalkProblem(OpenLoopProblem):
         "distance_predicted": "from start to end as the SNN foresaw it [m]",
         "disagreement": "of the ensemble on the controller tried (equation 7.2)",
         "worth_predicted": "what it was worth inside the SNN",
+        "legs_lost": "numbers of the legs taken for lost before it: 15 = legs 1 and 5",
     }
 
     def set_up(self) -> None:
@@ -230,6 +232,14 @@ class WalkProblem(OpenLoopProblem):
         names = [channel.name for channel in self.encoding.channels]
         self._femurs = [i for i, name in enumerate(names) if name.endswith("_femur")]
         self.nominal = Nominal(config, self.runs) if config.walk.nominal else None
+        self.bearing = None
+        if config.walk.lost_legs:
+            if self.nominal is None or not config.watch.forget:
+                raise BnsError(
+                    "walk.lost_legs asks the model of the legs when the robot has "
+                    "changed; set walk.nominal = true and watch.forget = true as well."
+                )
+            self.bearing = bearing.Bearing(config.world.robot, self.runs)
         self.evaluator = WalkEvaluator(self.shape, config.walk, self.nominal)
         self.breeder = GoalBreeder(config.evolution, self.encoding, True)
         self._compile()
@@ -271,13 +281,21 @@ class WalkProblem(OpenLoopProblem):
         far = walking.distance(poses)
         spread = self.evaluator.disagreement(theta, chosen)[:, 0]
         worth = self.evaluator.cost(theta, chosen)[:, 0]
+        told = {} if self.bearing is None else {"legs_lost": self._legs_lost()}
         return {
+            **told,
             "predicted": poses,
             "distance_predicted": far,
             "disagreement": spread.double().cpu().numpy(),
             "worth_predicted": worth.double().cpu().numpy(),
             "fitness_predicted": walking.cost(far),
         }
+
+    def _legs_lost(self) -> np.ndarray:
+        """Numbers of the legs that each run takes for lost, as digits, ``(R,)``."""
+        lost = [] if self.nominal is None else self.nominal.lost
+        numbers = ["".join(str(leg + 1) for leg in sorted(legs)) for legs in lost]
+        return np.array([float(text or 0) for text in numbers])
 
     def behaviours(self, memories: Sequence[Memory], population: Population) -> Tensor:
         """See `Problem.behaviours`: what `WalkTask.behaviour` says of commands."""
@@ -290,19 +308,26 @@ class WalkProblem(OpenLoopProblem):
 
     def foreseen(self, memory: Memory, run: int, inputs: np.ndarray) -> np.ndarray:
         """See `OpenLoopProblem.foreseen`; with what the ensemble adds to."""
-        found, model = super().foreseen(memory, run, inputs), self.nominal
+        model = self.nominal
         if model is None:
-            return found
+            return super().foreseen(memory, run, inputs)
+        inputs = inputs * model.moving[run, :, 0].cpu().numpy()
+        found = super().foreseen(memory, run, inputs)
         seen = torch.from_numpy(inputs.T.astype(np.float32))[None].to(self.device)
-        told = model.trust[run] * said(model.theta, seen)[0]
+        told = model.trust[run] * said(model.theta[run : run + 1], seen)[0]
         total: np.ndarray = found + told.cpu().numpy().T
         return total
 
     def forget(self, run: int, memories: Sequence[Memory]) -> int:
-        """See `Problem.forget`; by `change_detection`."""
+        """See `Problem.forget`; by `bearing` and `change_detection`."""
         memory, size = memories[0], self.config.walk.commands
         inputs, targets = memory.patterns(run)
-        newest = change_detection.changed(inputs, targets, size)
+        newest = 0
+        if self.nominal is not None and self.bearing is not None:
+            told, lost = self.bearing.told(run, inputs), self.nominal.lost[run]
+            lost, newest = bearing.judged(inputs, targets, told, size, lost)
+            self.nominal.without(run, lost)
+        newest = newest or change_detection.changed(inputs, targets, size)
         if not newest:
             return 0
         memory.keep(run, newest)
@@ -313,6 +338,8 @@ class WalkProblem(OpenLoopProblem):
     ) -> tuple[Tensor, Tensor]:
         """See `Problem.train`; by Adam on parts of the patterns (walk.batch > 0)."""
         if self.nominal is not None:
+            seen = patterns.inputs * self.nominal.moving
+            patterns = patterns._replace(inputs=seen)
             rest = patterns.targets - self.nominal.weigh(patterns)
             patterns = patterns._replace(targets=rest)
         if self.config.walk.batch == 0:
@@ -320,12 +347,10 @@ class WalkProblem(OpenLoopProblem):
         return training.fit_adam(shape, self.config, theta, patterns, self.draws)
 
     def state(self) -> dict[str, np.ndarray]:
-        """See `Problem.state`: how far each run trusts the model."""
-        model = self.nominal
-        return {} if model is None else {"nominal.trust": model.trust.cpu().numpy()}
+        """See `Problem.state`; that of the model of the legs."""
+        return {} if self.nominal is None else self.nominal.state()
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """See `Problem.restore`."""
         if self.nominal is not None:
-            trust = torch.from_numpy(arrays["nominal.trust"].copy())
-            self.nominal.trust = trust.to(self.device)
+            self.nominal.restore(arrays)

@@ -16,10 +16,14 @@ from tests.bns.robots import Slider, small
 STANDING = np.zeros((1, 18))
 CROUCHED = gait.tripod(gait.Tripod(stride=0.02, height=0.12))[3:4]  # all feet down
 FEET = kinematics.feet(CROUCHED)
+TOUCHING = kinematics.contacts(CROUCHED)
+LEFT = frozenset({0, 2, 4})
 
 
-def moving(feet):
-    return nominal.moved(CROUCHED, kinematics.goals(feet), kinematics.feet)[0]
+def moving(feet, *lost):
+    accounts = lost or (nominal.NONE,)
+    goals = kinematics.goals(feet)
+    return nominal.moved(CROUCHED, goals, kinematics.contacts, accounts)[-1, 0]
 
 
 def test_a_body_goes_against_the_feet_that_it_stands_on():
@@ -35,18 +39,38 @@ def test_a_body_turns_against_the_feet_that_it_stands_on():
 
 
 def test_feet_in_the_air_bear_nothing_and_the_rest_the_weight():
-    feet = FEET.copy()
-    feet[:, ~gait.ONE_SET, 2] += 0.03
-    load = nominal.loads(feet)[0]
+    touching = TOUCHING.copy()
+    touching[:, np.flatnonzero(~gait.ONE_SET), 2] += 0.03
+    load = nominal.loads(touching)[0, 0]
     assert load.sum() == pytest.approx(1.0)
-    assert load[gait.ONE_SET].min() > 0.2
-    assert load[~gait.ONE_SET].max() < 0.05
+    assert load[:6][gait.ONE_SET].min() > 0.2
+    assert load[:6][~gait.ONE_SET].max() < 0.05
+    assert load[6:].max() < 1e-6, "the belly is off the floor"
+
+
+def test_lost_legs_bear_nothing_and_a_body_that_none_hold_lies_on_its_belly():
+    one, side = nominal.loads(TOUCHING, (frozenset({4}), LEFT))[:, 0]
+    assert one[4] == 0 and one[6:].max() < 1e-6
+    assert [one.sum(), side.sum()] == pytest.approx([1.0, 1.0])
+    assert side[list(LEFT)].max() == 0
+    assert side[[6, 8]].sum() > 0.3, "the left corners"
+
+
+def test_only_legs_that_bear_move_the_body():
+    step = np.zeros((1, 6, 3))
+    step[:, 4] = -0.02, 0.0, 0.0
+    alone = moving(FEET + step, frozenset({4}))
+    assert alone == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+    step[:, :] = -0.02, 0.01, 0.0
+    assert moving(FEET + step, nominal.NONE, frozenset({4})) == pytest.approx(
+        (0.02, -0.01, 0.0), abs=1e-3
+    )
 
 
 def test_a_tripod_gait_goes_a_stride_every_other_command():
     goals = gait.tripod()
     before = np.concatenate([STANDING, goals[:-1]])
-    ahead = nominal.moved(before, goals, kinematics.feet)[2:, 0]
+    ahead = nominal.moved(before, goals, kinematics.contacts)[0, 2:, 0]
     assert ahead[0::2] == pytest.approx(gait.BEST.stride, rel=0.25)
     assert np.abs(ahead[1::2]).max() < 0.2 * gait.BEST.stride
 
@@ -57,7 +81,7 @@ def test_the_network_says_what_the_model_says_and_is_the_same_each_time():
     before, after = nominal.drawn(np.random.default_rng(1), 500, reach)
     seen = np.concatenate([before, after], axis=1) / GOAL
     said = nominal.said(theta, nominal._tensor(seen))[0].numpy().T * np.array(MOVED)
-    told = nominal.moved(before, after, kinematics.feet)
+    told = nominal.moved(before, after, kinematics.contacts)[0]
     rest = ((said - told) ** 2).sum(0) / ((told - told.mean(0)) ** 2).sum(0)
     assert (rest < 0.4).all()
     again = nominal.network.__wrapped__("phantomx", reach)
@@ -116,7 +140,49 @@ def test_the_model_is_trusted_as_far_as_patterns_bear_it_out(share, trust):
 
 def test_robots_whose_legs_are_not_known_are_refused():
     with pytest.raises(BnsError, match="not those of 'other'"):
-        robots.feet("other")
+        robots.contacts("other")
+
+
+def test_a_robot_with_lost_legs_is_told_by_its_motion_and_resumes_so():
+    def advance(one, number):
+        seen = Slider().run(one.propose(number).tried)
+        return one.observe(number, seen, None)
+
+    settings = {"walk.nominal": True, "walk.lost_legs": True, "watch.forget": True}
+    config = small().with_(settings)
+    first, second = (Bns([config], replicates=[0], onsets=[-1]) for _ in range(2))
+    gone = frozenset({1, 4})
+    first.problem.nominal.without(0, gone)
+    model = first.problem.nominal
+    assert model.moving[0].flatten().reshape(2, 6, 3).sum((0, 2)).tolist() == [
+        6, 0, 6, 6, 0, 6
+    ]  # fmt: skip
+    for number in range(3):
+        advance(first, number)
+    second.restore(first.state())
+    assert second.problem.nominal.lost == first.problem.nominal.lost
+    wanted, found = advance(first, 3), advance(second, 3)
+    for name in wanted:
+        np.testing.assert_array_equal(found[name], wanted[name])
+
+
+def test_goals_of_lost_legs_change_nothing_that_is_foreseen():
+    settings = {"walk.nominal": True, "walk.lost_legs": True, "watch.forget": True}
+    one = Bns([small().with_(settings)], replicates=[0], onsets=[-1])
+    one.problem.nominal.without(0, frozenset({4}))
+    memory, population = one.memories[0], one.population
+    before = one.problem.evaluator.cost(memory.theta, population)
+    population.genes[..., 12:15] += 0.1
+    after = one.problem.evaluator.cost(memory.theta, population)
+    torch.testing.assert_close(after, before, rtol=0, atol=0)
+
+
+@pytest.mark.parametrize("missing", ["walk.nominal", "watch.forget"])
+def test_lost_legs_need_a_model_and_forgetting(missing):
+    settings = {"walk.nominal": True, "walk.lost_legs": True, "watch.forget": True}
+    config = small().with_(settings | {missing: False})
+    with pytest.raises(BnsError, match=missing):
+        Bns([config], replicates=[0], onsets=[-1])
 
 
 def test_resumed_with_the_model_it_gives_the_same_bytes():

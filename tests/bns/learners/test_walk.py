@@ -134,6 +134,24 @@ class TestTraining:
         _, loss = training.fit_adam(SHAPE, config, theta, patterns, draws)
         assert (loss < 0.1 * targets[0].square().mean()).all()
 
+    def test_few_patterns_are_learned_in_few_steps(self):
+        config, draws = small(), Draws(0)
+        inputs, targets = draws.uniform(2, 36, 64) - 0.5, draws.uniform(2, 3, 64)
+        weight = torch.ones(2, 1, 1, 64)
+        weight[0, ..., 8:] = 0.0
+        theta = SHAPE.random(2, draws)
+        patterns = Patterns(inputs, targets, weight)
+
+        def fit(**settings):
+            changed = config.with_(settings | {"walk.batch": 16, "snn.dropout": 0.0})
+            found, _ = training.fit_adam(SHAPE, changed, theta, patterns, Draws(1))
+            return found
+
+        once = fit(**{"snn.epochs": 1})
+        twice = fit(**{"walk.passes": 2.0})  # 8 patterns are a step, 64 are eight
+        torch.testing.assert_close(twice[0], once[0], rtol=0, atol=0)
+        assert not torch.isclose(twice[1], once[1]).any()
+
     def test_slope_of_relu_is_that_of_autograd(self):
         from bns.snn.training import gradient
 
