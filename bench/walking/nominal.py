@@ -8,12 +8,16 @@ from bench.learning import experiments
 from bench.result import Result, bench
 from bench.walking import gait, runs
 from bns.experiment.record import RunRecord
+from bns.learners.bns import bearing
+from bns.learners.bns.nominal import NONE
+from bns.learners.bns.walking import MOVED, of_trial
 from bns.worlds.effects.leg_sets import TYPES
 
 AGAIN = {"type0": 5, "type1": 5, "type3": 5, "type2": 12, "type5": 8}
 """trials until adequate again, at most"""
 ADEQUATE = 20  # trials until adequate for the first time, at most
 LATE = 10  # trials at the end by which legs are counted as told
+RANDOM = (0, 1, 2, 3, 4, 5, 7, 12, 14)  # damages of random trials
 
 
 @bench(
@@ -45,6 +49,7 @@ def hexapod_nominal(quick: bool) -> Result:
             "trials to the tripod's distance in its time": first,
             "undamaged": gait.at_the_end(sound),
             "taken for lost though sound": told(sound, []),
+            "likeliest set right, of random trials": random_trials(quick),
             **found,
         },
     )
@@ -69,6 +74,32 @@ def told(record: RunRecord, legs: Sequence[int]) -> dict[str, object]:
         ),
         "trials until all right": experiments.waits(experiments.first(right)),
     }
+
+
+def random_trials(quick: bool) -> dict[str, dict[str, int]]:
+    """How often the likeliest set of lost legs is the right one, of random trials."""
+    counts = (2,) if quick else (2, 4, 8, 12)
+    names = ["", "type0"] if quick else ["", *(f"type{number}" for number in RANDOM)]
+    found = {f"{count} trials": {"right": 0, "of": 0} for count in counts}
+    for seed in range(1 if quick else 2):
+        rng = np.random.default_rng(seed)
+        goals = rng.uniform(-0.6, 0.6, (max(counts), 11, 18))
+        for name in names:
+            lost = frozenset(leg - 1 for leg in TYPES[int(name[4:])]) if name else NONE
+            damage = f"leg_raised:legs={name},blend=1" if name else ""
+            seen = [of_trial(trial) for trial in runs.walked(goals, damage=damage)]
+            for count in counts:
+                row = found[f"{count} trials"]
+                row["right"] += _likeliest(seen[:count]) == lost
+                row["of"] += 1
+    return found
+
+
+def _likeliest(seen: Sequence[tuple[np.ndarray, np.ndarray]]) -> frozenset[int]:
+    inputs, moved = (np.concatenate(parts) for parts in zip(*seen, strict=True))
+    told = bearing.Bearing("phantomx", 1).told(0, inputs.astype(np.float32))
+    odds = bearing.odds(inputs, moved / np.array(MOVED), told)
+    return bearing.ACCOUNTS[int(odds.argmax())]
 
 
 def _places(digits: float) -> list[bool]:

@@ -113,8 +113,8 @@ def judged(
     whole = len(inputs) // size * size
     if whole < NEW[0] * size:
         return Account(lost)
-    rest = targets[-whole:, None].clip(-LARGEST, LARGEST) - SHARES * told[-whole:]
-    like, known = _like(inputs[-whole:].astype(float)), ACCOUNTS.index(lost)
+    rest = _rest(targets[-whole:], told[-whole:])
+    like, known = _like(inputs[-whole:]), ACCOUNTS.index(lost)
     newest = _changed(like, rest, size, known)
     if newest:
         best = int(_said(like[-newest:, -newest:], rest[-newest:]).argmax())
@@ -124,6 +124,12 @@ def judged(
     best = int(said.argmax())
     sure = said[best] - said[known] > SURE * whole / size
     return Account(ACCOUNTS[best] if sure else lost)
+
+
+def odds(inputs: np.ndarray, targets: np.ndarray, told: np.ndarray) -> np.ndarray:
+    """Log probability of patterns under each of `ACCOUNTS` less what lost legs cost,
+    ``(A,)``; see `judged`."""
+    return _said(_like(inputs), _rest(targets, told))
 
 
 def _changed(like: np.ndarray, rest: np.ndarray, size: int, known: int) -> int:
@@ -138,8 +144,8 @@ def _changed(like: np.ndarray, rest: np.ndarray, size: int, known: int) -> int:
     for some in wanted:
         alone = foretold(like[-some:, -some:], rest[-some:], scale)
         gain = (alone - together[-some:, None]).reshape(-1, size, len(ACCOUNTS)).sum(1)
-        odds = gain.sum(0) - gain.max(0).clip(min=0.0) - legs
-        found.append((float(odds.max()), some))
+        brings = gain.sum(0) - gain.max(0).clip(min=0.0) - legs
+        found.append((float(brings.max()), some))
     most, newest = max(found)
     return newest if most > ODDS else 0
 
@@ -154,8 +160,14 @@ def _said(like: np.ndarray, rest: np.ndarray) -> np.ndarray:
     return found
 
 
-def _like(seen: np.ndarray) -> np.ndarray:
+def _rest(targets: np.ndarray, told: np.ndarray) -> np.ndarray:
+    """What the model leaves under each account, ``(N, A, 3)``."""
+    found: np.ndarray = targets[:, None].clip(-LARGEST, LARGEST) - SHARES * told
+    return found
+
+
+def _like(inputs: np.ndarray) -> np.ndarray:
     """Covariance of what the model leaves, its mean square being 1, ``(N, N)``."""
-    noise = np.eye(len(seen))
-    smooth: np.ndarray = covariance(seen) - 1.0 - NOISE * noise
+    noise = np.eye(len(inputs))
+    smooth: np.ndarray = covariance(inputs.astype(float)) - 1.0 - NOISE * noise
     return SMOOTH * smooth + (1.0 - SMOOTH) * noise
