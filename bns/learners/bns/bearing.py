@@ -127,8 +127,16 @@ def judged(
 
 
 def odds(inputs: np.ndarray, targets: np.ndarray, told: np.ndarray) -> np.ndarray:
-    """Log probability of patterns under each of `ACCOUNTS` less what lost legs cost,
-    ``(A,)``; see `judged`."""
+    """Log probability of patterns under each of `ACCOUNTS`, less what lost legs cost.
+
+    Args:
+        inputs: scaled, ``(N, I)``.
+        targets: scaled, ``(N, 3)``.
+        told: what the model says under each account, scaled, ``(N, A, 3)``.
+
+    Returns:
+        ``(A,)``.
+    """
     return _said(_like(inputs), _rest(targets, told))
 
 
