@@ -275,10 +275,11 @@ def fit_adam(
     inputs, targets, weight = patterns
     counts = weight.sum((1, 2, 3)).long()
     batch, off = config.walk.batch, config.snn.dropout
-    steps, state = _steps(config, counts), AdamState.fresh(theta)
+    steps, own = config.snn.epochs, _steps(config, counts)
+    most, state = steps if own is None else int(own.max()), AdamState.fresh(theta)
     decay = config.snn.weight_decay / counts.clamp(min=1)[:, None]
     some = (counts > 0).float()[:, None, None, None].expand(-1, 1, 1, batch)
-    for number in range(int(steps.max())):
+    for number in range(most):
         coins = draws.uniform(len(theta), batch)
         index = whole_below(coins, counts.clamp(min=1)[:, None])[:, None]
         shown = inputs.gather(2, index.expand(-1, inputs.shape[1], -1))
@@ -288,17 +289,18 @@ def fit_adam(
             _gradient_by_run(shape, theta, shown, wanted.unsqueeze(1), some, keep)
             / batch
         )
-        here = (number / steps).clamp(max=1.0)
-        rate = config.walk.learning_rate * (1 + torch.cos(torch.pi * here)) / 2
+        here = torch.tensor(number / steps) if own is None else number / own
+        rate = torch.cos(torch.pi * here.clamp(max=1.0))
+        rate = config.walk.learning_rate * (1 + rate) / 2
         grad = grad + decay * theta
         theta, state = adam(theta, grad, state, rate, torch.tensor(number + 1.0))
     return theta, mean_error(shape, theta, patterns)
 
 
-def _steps(config: RunConfig, counts: Tensor) -> Tensor:
-    """Steps of a training, ``(R, 1)``, or one number where all runs take as many."""
+def _steps(config: RunConfig, counts: Tensor) -> Tensor | None:
+    """Steps of each run's training, ``(R, 1)``; None where all take as many."""
     if not config.walk.passes:
-        return torch.tensor(config.snn.epochs)
+        return None
     steps = (config.walk.passes * counts / config.walk.batch).ceil()
     return steps.clamp(min=1)[:, None]
 
