@@ -22,7 +22,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.learning import experiments, light
+from bench.learning import experiments, light, trunks
 from bench.result import Result, bench
 from bns import stats
 from bns.experiment.config import RunConfig
@@ -43,7 +43,7 @@ def detect_damage(quick: bool) -> Result:
     """`RUNS` of each of nine damages, from trial 20 on, nobody told (table 6.7)."""
     configs = {damage: watched(damage) for damage in light.ALL}
     twin = watched("unharmed")
-    records = experiments.forked([twin, *configs.values()], quick=quick)
+    records = trunks.forked([twin, *configs.values()], quick=quick)
     whole, quiet = (records[twin.preset][name] for name in ("fitness", "detected"))
     found = {
         damage: _row(records[config.preset], light.AFFECTED[damage], whole)
@@ -124,7 +124,7 @@ def detection_triggered(quick: bool) -> Result:
         for damage in light.DAMAGES
     }
     wanted = [config for pair in sides.values() for config in pair.values()]
-    records = experiments.forked(wanted, quick=quick)
+    records = trunks.forked(wanted, quick=quick)
     found: dict[str, dict[str, object]] = {}
     worst = 0.0
     for damage, pair in sides.items():
@@ -165,7 +165,7 @@ def forget_by_evidence(quick: bool) -> Result:
     """`RUNS` a side of each damage, light following; nobody is told."""
     sides = {damage: _sides(damage) for damage in light.ALL}
     wanted = [config for side in sides.values() for config in side.values()]
-    records = experiments.forked(wanted, quick=quick)
+    records = trunks.forked(wanted, quick=quick)
     found: dict[str, dict[str, object]] = {}
     worst, chance = 0.0, np.zeros(DRAWS)
     for damage, configs in sides.items():

@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.learning import experiments
+from bench.learning import experiments, trunks
 from bench.result import Result, bench
 from bns import presets, stats
 from bns.experiment.config import RunConfig, WorldConfig
@@ -112,7 +112,7 @@ def damaged(
     words += ["ensemble"] if ensemble else []
     config = experiments.named(config, "-".join(["light", damage or "whole", *words]))
     config = replace(config, replicates=runs)
-    return replace(config, seed=experiments.seed(config)) if damage else config
+    return replace(config, seed=trunks.seed(config)) if damage else config
 
 
 def recovering(damage: str, *, runs: int = experiments.REPLICATES) -> RunConfig:
@@ -127,7 +127,7 @@ def recovering(damage: str, *, runs: int = experiments.REPLICATES) -> RunConfig:
     config = replace(config, trials=ONSET + AFTER, world=world)
     config = experiments.named(config, f"light-recover-{damage}")
     config = replace(config, replicates=runs)
-    return replace(config, seed=experiments.seed(config))
+    return replace(config, seed=trunks.seed(config))
 
 
 MEDIAN, FEWEST, LIMIT = 6, 27, 15
@@ -189,7 +189,7 @@ def recover_light(quick: bool) -> Result:
     silent = {damage: damaged(damage, light=SILENT, runs=RUNS) for damage in DAMAGES}
     ours = {damage: recovering(damage, runs=RUNS) for damage in DAMAGES}
     wanted = [*configs.values(), *silent.values(), *ours.values()]
-    records = experiments.forked(wanted, quick=quick)
+    records = trunks.forked(wanted, quick=quick)
     found: dict[str, dict[str, object]] = {}
     holds, worst = True, 0.0
     for damage, config in configs.items():

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.learning import ceiling, experiments, light
+from bench.learning import ceiling, experiments, light, trunks
 from bench.result import Result, bench
 from bns import stats
 from bns.experiment.config import RunConfig
@@ -190,7 +190,7 @@ def intermittent_wheel(quick: bool) -> Result:
         )
         for name, noise in (("noise-aware", 1.0), ("plain", 0.0))
     }
-    records = experiments.forked(sides.values(), quick=quick)
+    records = trunks.forked(sides.values(), quick=quick)
     aware, plain = (records[config.preset] for config in sides.values())
     declines = {"noise-aware": _decline(aware), "plain": _decline(plain)}
     middle = float(np.median(declines["noise-aware"]))

@@ -16,7 +16,7 @@ import numpy as np
 
 from bench.learning import experiments
 from bench.result import Result, bench
-from bench.runner import RESULTS, write
+from bench.runner import stored, write
 from bench.walking import runs
 from bns import presets, seeding
 from bns.experiment.record import RunRecord
@@ -54,8 +54,7 @@ def hexapod_ceiling(quick: bool) -> Result:
         holds=None,
         n=sum(map(len, ways.values())),
         details={
-            "farthest [m]": ways["in full"],
-            f"farthest within {REACH:g} rad [m]": ways["within the preset's reach"],
+            **{_title(reach): ways[name] for name, reach in BOTH.items()},
             "trials of a search": BUDGET,
         },
     )
@@ -73,16 +72,17 @@ def known(legs: str, reach: float | None = None) -> float | None:
     row = json.loads(place.read_text()) if place.exists() else {"trials": 0}
     if row["trials"] >= BUDGET:
         return float(row["farthest [m]"])
-    name = "farthest [m]" if reach is None else f"farthest within {reach:g} rad [m]"
-    told: float | None = _published().get(name, {}).get(legs)
-    return told
+    return _published().get(_title(reach), {}).get(legs)
+
+
+def _title(reach: float | None) -> str:
+    return "farthest [m]" if reach is None else f"farthest within {reach:g} rad [m]"
 
 
 @cache
 def _published() -> dict[str, dict[str, float]]:
-    file = RESULTS / "walking" / "hexapod-ceiling.json"
-    found: dict[str, dict[str, float]] = json.loads(file.read_text())["details"]
-    return found
+    row = stored().get("hexapod-ceiling")
+    return row["details"] if row else {}
 
 
 def shares(ways: np.ndarray, legs: str) -> dict[str, dict[str, float]]:

@@ -9,15 +9,16 @@ from bench.result import Result, bench
 from bench.walking import gait, runs
 from bns.experiment.record import RunRecord
 from bns.learners.bns import bearing
-from bns.learners.bns.nominal import NONE
+from bns.learners.bns.nominal import NONE, Lost
 from bns.learners.bns.walking import MOVED, of_trial
-from bns.worlds.effects.leg_sets import TYPES
+from bns.models.phantomx import kinematics
+from bns.worlds.effects import leg_sets
 
 AGAIN = {"type0": 5, "type1": 5, "type3": 5, "type2": 12, "type5": 8}
 """trials until adequate again, at most"""
 ADEQUATE = 20  # trials until adequate for the first time, at most
-LATE = 10  # trials at the end by which legs are counted as told
-RANDOM = (0, 1, 2, 3, 4, 5, 7, 12, 14)  # damages of random trials
+RANDOM = ("", *(f"type{number}" for number in (0, 1, 2, 3, 4, 5, 7, 12, 14)))
+"""damages of random trials, "" = none"""
 
 
 @bench(
@@ -35,7 +36,7 @@ def hexapod_nominal(quick: bool) -> Result:
     found, held = {}, 0
     for legs, record in runs.recovering("nominal", quick=quick).items():
         row = gait.recovery(legs, record, hand)
-        row["legs told"] = told(record, [leg - 1 for leg in TYPES[int(legs[4:])]])
+        row["legs told"] = told(record, lost(legs))
         median = row["until adequate again"]["median"]
         held += median is not None and median <= AGAIN[legs]
         found[legs] = row
@@ -48,14 +49,19 @@ def hexapod_nominal(quick: bool) -> Result:
         details={
             "trials to the tripod's distance in its time": first,
             "undamaged": gait.at_the_end(sound),
-            "taken for lost though sound": told(sound, []),
+            "taken for lost though sound": told(sound, NONE),
             "likeliest set right, of random trials": random_trials(quick),
             **found,
         },
     )
 
 
-def told(record: RunRecord, legs: Sequence[int]) -> dict[str, object]:
+def lost(damage: str) -> Lost:
+    """The legs that a damage raises, by their place; "" = none."""
+    return frozenset(leg - 1 for leg in leg_sets.read(damage)) if damage else NONE
+
+
+def told(record: RunRecord, legs: Lost) -> dict[str, object]:
     """How a record's robots told which legs are lost, over its last trials.
 
     Args:
@@ -63,8 +69,8 @@ def told(record: RunRecord, legs: Sequence[int]) -> dict[str, object]:
         legs: that are lost in truth, by their place, at the end.
     """
     said = np.array([[_places(x) for x in row] for row in record["legs_lost"]])
-    truth = np.isin(np.arange(6), legs)
-    late = said[:, -LATE:]
+    truth = np.isin(np.arange(6), list(legs))
+    late = said[:, -gait.LATE :]
     onset = max(int(record.damage_onset[0]), 0)
     right = (said[:, onset:] == truth).all(2)
     return {
@@ -79,25 +85,23 @@ def told(record: RunRecord, legs: Sequence[int]) -> dict[str, object]:
 def random_trials(quick: bool) -> dict[str, dict[str, int]]:
     """How often the likeliest set of lost legs is the right one, of random trials."""
     counts = (2,) if quick else (2, 4, 8, 12)
-    names = ["", "type0"] if quick else ["", *(f"type{number}" for number in RANDOM)]
     found = {f"{count} trials": {"right": 0, "of": 0} for count in counts}
     for seed in range(1 if quick else 2):
         rng = np.random.default_rng(seed)
         goals = rng.uniform(-0.6, 0.6, (max(counts), 11, 18))
-        for name in names:
-            lost = frozenset(leg - 1 for leg in TYPES[int(name[4:])]) if name else NONE
+        for name in RANDOM[: 2 if quick else None]:
             damage = f"leg_raised:legs={name},blend=1" if name else ""
             seen = [of_trial(trial) for trial in runs.walked(goals, damage=damage)]
             for count in counts:
                 row = found[f"{count} trials"]
-                row["right"] += _likeliest(seen[:count]) == lost
+                row["right"] += _likeliest(seen[:count]) == lost(name)
                 row["of"] += 1
     return found
 
 
-def _likeliest(seen: Sequence[tuple[np.ndarray, np.ndarray]]) -> frozenset[int]:
+def _likeliest(seen: Sequence[tuple[np.ndarray, np.ndarray]]) -> Lost:
     inputs, moved = (np.concatenate(parts) for parts in zip(*seen, strict=True))
-    told = bearing.Bearing("phantomx", 1).told(0, inputs.astype(np.float32))
+    told = bearing.told(inputs, kinematics.contacts)
     odds = bearing.odds(inputs, moved / np.array(MOVED), told)
     return bearing.ACCOUNTS[int(odds.argmax())]
 

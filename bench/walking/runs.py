@@ -1,7 +1,7 @@
 """The walking experiments that several benches share (investigation D).
 
 Undamaged runs come in groups of ten; the runs of each damage begin as copies of such a
-group after its last trial, since up to there nothing differs (`experiments.forked`).
+group after its last trial, since up to there nothing differs (`trunks.forked`).
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -153,7 +153,7 @@ def recovering(kind: Kind, *, quick: bool = False) -> Mapping[str, RunRecord]:
         if told and any(forgets(trunk).any() for trunk in trunks.values()):
             raise BnsError("Run the undamaged runs with watch.forget, too.")
         for (_, group), config in configs.items():
-            experiments.begin(_trunk(kind, group), config, idle=("watch", "walk"))
+            trunks.begin(_trunk(kind, group), config, idle=("watch", "walk"))
     found = records(configs.values(), quick=quick)
     return {
         legs: joined([found[configs[legs, group].preset] for group in groups])

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.learning import experiments
+from bench.learning import experiments, trunks
 from bench.walking import ceiling, gait
 from bench.walking import runs as hexapod_runs
 from bns import presets
@@ -41,7 +41,7 @@ def trunk(tmp_path, monkeypatch):
 def test_a_branch_has_the_bytes_of_a_run_from_the_start(trunk, tmp_path):
     branch = damaged(trunk)
     train(trunk, experiments.directory(trunk))
-    experiments.begin(trunk, branch)
+    trunks.begin(trunk, branch)
     place = experiments.directory(branch)
     assert len(list((place / "steps").iterdir())) == ONSET, "it goes on, not anew"
     train(branch, place, resume=True)
@@ -59,15 +59,15 @@ def test_a_branch_has_the_bytes_of_a_run_from_the_start(trunk, tmp_path):
 )
 def test_a_branch_that_differs_earlier_is_refused(trunk, changes):
     with pytest.raises(BnsError, match="branch is no continuation of trunk"):
-        experiments.begin(trunk, damaged(trunk, **changes))
+        trunks.begin(trunk, damaged(trunk, **changes))
 
 
 def test_a_section_that_did_nothing_in_the_trunk_may_differ(trunk):
     branch = damaged(trunk, watch=replace(trunk.watch, forget=True))
     train(trunk, experiments.directory(trunk))
     with pytest.raises(BnsError, match="no continuation"):
-        experiments.begin(trunk, branch)
-    experiments.begin(trunk, branch, idle=("watch",))
+        trunks.begin(trunk, branch)
+    trunks.begin(trunk, branch, idle=("watch",))
     place = experiments.directory(branch)
     assert len(list((place / "steps").iterdir())) == ONSET
     assert RunStore.open(place).config.watch.forget
@@ -80,15 +80,15 @@ def side(damage="wheel_gain:wheel=left,factor=0.5@2", **settings):
     world = WorldConfig(name="light", damage=(damage,))
     settings = {"adaptation": AdaptationConfig(population_reset=True)} | settings
     config = replace(config, preset="side", trials=4, world=world, **settings)
-    return replace(config, record_replicates=0, seed=experiments.seed(config))
+    return replace(config, record_replicates=0, seed=trunks.seed(config))
 
 
 @pytest.mark.parametrize("watch", [WatchConfig(), WatchConfig(detect=True, warmup=2)])
 def test_it_has_the_same_bytes(tmp_path, monkeypatch, watch):
     monkeypatch.setattr(experiments, "RUNS", tmp_path)
     config = side(watch=watch)
-    experiments.grow(config)
-    experiments.branch(config)
+    trunks.grow(config)
+    trunks.branch(config)
     train(config, tmp_path / "straight")
     forked = contents(experiments.directory(config))
     straight = contents(tmp_path / "straight")
@@ -97,10 +97,10 @@ def test_it_has_the_same_bytes(tmp_path, monkeypatch, watch):
 
 def test_sides_of_a_trunk_differ_from_the_damage_on_only():
     one, other = side(), side("sensor_noise:factor=2@2", adaptation=AdaptationConfig())
-    assert experiments.trunk(one) == experiments.trunk(other)
+    assert trunks.trunk(one) == trunks.trunk(other)
     windowed = side(adaptation=AdaptationConfig(window=30))
-    assert experiments.trunk(windowed) != experiments.trunk(one)
-    assert experiments.seed(windowed) != experiments.seed(one)
+    assert trunks.trunk(windowed) != trunks.trunk(one)
+    assert trunks.seed(windowed) != trunks.seed(one)
 
 
 def test_what_a_false_alarm_sets_off_belongs_to_the_trunk():
@@ -109,7 +109,7 @@ def test_what_a_false_alarm_sets_off_belongs_to_the_trunk():
         side(watch=watched),
         side(watch=watched, adaptation=AdaptationConfig()),
     )
-    assert experiments.trunk(reset) != experiments.trunk(none)
+    assert trunks.trunk(reset) != trunks.trunk(none)
 
 
 def test_waiting_times_say_how_many_came():

@@ -89,8 +89,10 @@ def loads(contacts: np.ndarray, accounts: Sequence[Lost] = (NONE,)) -> np.ndarra
     total = share.sum(-1, keepdims=True)
     share = share / np.where(np.abs(total) < 1e-6, 1e-6, total)
     height = (share * places[..., 2]).sum(-1) + LYING * (triples >= FEET).any(1)
-    gone = np.array([np.isin(triples, list(lost)) for lost in accounts])
-    bears = ~gone.reshape(len(accounts), 1, -1, 3).max(-1)
+    gone = np.zeros((len(accounts), contacts.shape[1]), bool)
+    for account, lost in zip(gone, accounts, strict=True):
+        account[list(lost)] = True
+    bears = ~gone[:, None, triples].max(-1)
     height = np.where(bears & (share.min(-1) > -0.02), height, np.inf)
     likely = np.exp(-(height - height.min(-1, keepdims=True)) / SOFT)
     likely = likely / likely.sum(-1, keepdims=True)

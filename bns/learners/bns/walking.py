@@ -26,7 +26,8 @@ from bns.evolution.generation import Rates
 from bns.evolution.goals import TICK, GoalBreeder, Goals
 from bns.experiment.config import RunConfig
 from bns.experiment.task_settings import WalkConfig
-from bns.learners.bns import bearing, change_detection
+from bns.learners.bns import change_detection
+from bns.learners.bns.bearing import Bearing
 from bns.learners.bns.memory import Memory
 from bns.learners.bns.navigation import OpenLoopProblem
 from bns.learners.bns.nominal import Nominal, said
@@ -239,7 +240,7 @@ class WalkProblem(OpenLoopProblem):
                     "walk.lost_legs asks the model of the legs when the robot has "
                     "changed; set walk.nominal = true and watch.forget = true as well."
                 )
-            self.bearing = bearing.Bearing(config.world.robot, self.runs)
+            self.bearing = Bearing(self.nominal)
         self.evaluator = WalkEvaluator(self.shape, config.walk, self.nominal)
         self.breeder = GoalBreeder(config.evolution, self.encoding, True)
         self._compile()
@@ -281,21 +282,15 @@ class WalkProblem(OpenLoopProblem):
         far = walking.distance(poses)
         spread = self.evaluator.disagreement(theta, chosen)[:, 0]
         worth = self.evaluator.cost(theta, chosen)[:, 0]
-        told = {} if self.bearing is None else {"legs_lost": self._legs_lost()}
+        legs = {} if self.bearing is None else {"legs_lost": self.bearing.numbers()}
         return {
-            **told,
+            **legs,
             "predicted": poses,
             "distance_predicted": far,
             "disagreement": spread.double().cpu().numpy(),
             "worth_predicted": worth.double().cpu().numpy(),
             "fitness_predicted": walking.cost(far),
         }
-
-    def _legs_lost(self) -> np.ndarray:
-        """Numbers of the legs that each run takes for lost, as digits, ``(R,)``."""
-        lost = [] if self.nominal is None else self.nominal.lost
-        numbers = ["".join(str(leg + 1) for leg in sorted(legs)) for legs in lost]
-        return np.array([float(text or 0) for text in numbers])
 
     def behaviours(self, memories: Sequence[Memory], population: Population) -> Tensor:
         """See `Problem.behaviours`: what `WalkTask.behaviour` says of commands."""
@@ -322,11 +317,7 @@ class WalkProblem(OpenLoopProblem):
         """See `Problem.forget`; by `bearing` and `change_detection`."""
         memory, size = memories[0], self.config.walk.commands
         inputs, targets = memory.patterns(run)
-        newest = 0
-        if self.nominal is not None and self.bearing is not None:
-            told, lost = self.bearing.told(run, inputs), self.nominal.lost[run]
-            lost, newest = bearing.judged(inputs, targets, told, size, lost)
-            self.nominal.without(run, lost)
+        newest = self.bearing.ask(run, inputs, targets, size) if self.bearing else 0
         newest = newest or change_detection.changed(inputs, targets, size)
         if not newest:
             return 0

@@ -1,11 +1,14 @@
 """Legs that no longer bear, against robots whose lost legs are known."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+import torch
 
 from bns.learners.bns import bearing, nominal
 from bns.learners.bns.bearing import ACCOUNTS, judged
-from bns.learners.bns.walking import GOAL, MOVED
+from bns.learners.bns.walking import GOAL, MOVED, goal_inputs
 from bns.models.phantomx import kinematics
 
 SIZE, BEFORE = 11, 8  # commands of a trial; trials of a sound robot
@@ -17,10 +20,9 @@ def walks():
     """Goals of 14 random trials, scaled, and what each account says of them."""
     rng = np.random.default_rng(3)
     goals = rng.uniform(-0.6, 0.6, (14, SIZE, 18))
-    before = np.concatenate([np.zeros((14, 1, 18)), goals[:, :-1]], axis=1)
-    inputs = (np.concatenate([before, goals], axis=2) / GOAL).reshape(-1, 36)
+    inputs = goal_inputs(torch.from_numpy(goals)).numpy().reshape(-1, 36)
     inputs = inputs.astype(np.float32)
-    return inputs, bearing.Bearing("phantomx", 1).told(0, inputs)
+    return inputs, bearing.told(inputs, kinematics.contacts)
 
 
 def moved(walks, lost, change=BEFORE, seed=0):
@@ -72,7 +74,8 @@ def test_legs_that_bear_again_are_named(walks):
 
 def test_what_is_kept_of_a_pattern_is_what_the_model_says():
     rng = np.random.default_rng(1)
-    kept = bearing.Bearing("phantomx", 2)
+    model = SimpleNamespace(robot="phantomx", lost=[nominal.NONE] * 2)
+    kept = bearing.Bearing(model)
     inputs = rng.uniform(-1, 1, (6, 36)).astype(np.float32)
     first = kept.told(1, inputs[:4])
     both = kept.told(1, inputs[2:])

@@ -143,13 +143,16 @@ def test_robots_whose_legs_are_not_known_are_refused():
         robots.contacts("other")
 
 
-def test_a_robot_with_lost_legs_is_told_by_its_motion_and_resumes_so():
-    def advance(one, number):
-        seen = Slider().run(one.propose(number).tried)
-        return one.observe(number, seen, None)
+LOST = {"walk.nominal": True, "walk.lost_legs": True, "watch.forget": True}
 
-    settings = {"walk.nominal": True, "walk.lost_legs": True, "watch.forget": True}
-    config = small().with_(settings)
+
+def advance(one, number):
+    seen = Slider().run(one.propose(number).tried)
+    return one.observe(number, seen, None)
+
+
+def test_a_robot_with_lost_legs_is_told_by_its_motion_and_resumes_so():
+    config = small().with_(LOST)
     first, second = (Bns([config], replicates=[0], onsets=[-1]) for _ in range(2))
     gone = frozenset({1, 4})
     first.problem.nominal.without(0, gone)
@@ -167,8 +170,7 @@ def test_a_robot_with_lost_legs_is_told_by_its_motion_and_resumes_so():
 
 
 def test_goals_of_lost_legs_change_nothing_that_is_foreseen():
-    settings = {"walk.nominal": True, "walk.lost_legs": True, "watch.forget": True}
-    one = Bns([small().with_(settings)], replicates=[0], onsets=[-1])
+    one = Bns([small().with_(LOST)], replicates=[0], onsets=[-1])
     one.problem.nominal.without(0, frozenset({4}))
     memory, population = one.memories[0], one.population
     before = one.problem.evaluator.cost(memory.theta, population)
@@ -179,17 +181,12 @@ def test_goals_of_lost_legs_change_nothing_that_is_foreseen():
 
 @pytest.mark.parametrize("missing", ["walk.nominal", "watch.forget"])
 def test_lost_legs_need_a_model_and_forgetting(missing):
-    settings = {"walk.nominal": True, "walk.lost_legs": True, "watch.forget": True}
-    config = small().with_(settings | {missing: False})
+    config = small().with_(LOST | {missing: False})
     with pytest.raises(BnsError, match=missing):
         Bns([config], replicates=[0], onsets=[-1])
 
 
 def test_resumed_with_the_model_it_gives_the_same_bytes():
-    def advance(one, number):
-        seen = Slider().run(one.propose(number).tried)
-        return one.observe(number, seen, None)
-
     first, second = learner(nominal=True, repeat=0.1), learner(nominal=True, repeat=0.1)
     for number in range(6):
         advance(first, number)
