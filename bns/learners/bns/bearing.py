@@ -91,7 +91,15 @@ class Bearing:
         return found.newest
 
     def told(self, run: int, inputs: np.ndarray) -> np.ndarray:
-        """As the function `told`, of patterns that are kept for a run."""
+        """As the function `told`, what was said of a run's patterns being kept.
+
+        Args:
+            run: whose patterns they are.
+            inputs: scaled goals in force and next ones, ``(N, 36)``.
+
+        Returns:
+            scaled motion, ``(N, A, 3)``.
+        """
         keys, known = [row.tobytes() for row in inputs], self._known[run]
         fresh = [number for number, key in enumerate(keys) if key not in known]
         if fresh:
