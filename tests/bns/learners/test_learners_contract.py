@@ -43,6 +43,7 @@ CUT = {
         "settings.generations": 2,
         "settings.add_node": 0.3,
     },
+    "practising": {"settings.diagnose": False, "settings.each": 2, "settings.first": 3},
     "pets": {"settings.population": 12, "settings.iterations": 2, "settings.elites": 3},
     "rma": {f"settings.{name}": n for name, n in {**FEW, "steps": 9}.items()},
     "static_snn": {"settings.commands": 1, "settings.generations": 2},
@@ -88,12 +89,12 @@ def small(learner: str, task: str):
     if "evolution" in registry.sections(learner):
         sizes = {"population": 12, "generations": 2, "tournament": 3}
         config = config.with_({f"evolution.{name}": n for name, n in sizes.items()})
-    config = config.with_(CUT.get(learner, {}))
     if registry.get(learner).needs_model:
         prior = {"prior.world": MODELS[task][0], "prior.evaluations": 200}
         if "each" in registry.get(learner).Settings.bounds:
             prior |= {"settings.first": 20, "settings.each": 40}
         config = config.with_(prior)
+    config = config.with_(CUT.get(learner, {}))
     return replace(config, trials=4, replicates=2, record_replicates=1, threads=1)
 
 
