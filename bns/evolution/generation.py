@@ -59,12 +59,15 @@ class Rates(NamedTuple):
             configuration.
         repeat: probability that a walker's child repeats its commands, ``(R,)``, see
             `bns.evolution.goals`; None = none does.
+        reach: farthest that a walker's goals are from half-way, ``(C,)`` [rad]; None =
+            as the encoding has it.
     """
 
     rate: Tensor
     magnitude: Tensor
     chicken: Tensor | None = None
     repeat: Tensor | None = None
+    reach: Tensor | None = None
 
 
 class Coins(NamedTuple):

@@ -1,6 +1,7 @@
 """Chromosomes of walking robots: K commands of servo goals, always all of them."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from bns.evolution.generation import Breeder, Coins, Rates
 from bns.evolution.selection import tournament_by_rank
 from bns.experiment import robots
 from bns.experiment.config import RunConfig
+from bns.experiment.task_settings import WalkConfig
 from bns.worlds.trial import Channel, Commands
 
 TICK = math.radians(300 / 1023)  # [rad] AX-12A manual: 300 degrees are 1023 ticks
@@ -55,9 +57,10 @@ class Goals:
                 "world.robot = 'phantomx', or learner = 'navigation'."
             )
         bounds = torch.tensor(robot.ranges, dtype=torch.float32, device=config.device)
+        farthest = torch.from_numpy(reaches(walk, robot.channels)).to(bounds)
         return cls(
-            low=bounds[:, 0].clamp(min=-walk.reach),
-            high=bounds[:, 1].clamp(max=walk.reach),
+            low=bounds[:, 0].maximum(-farthest),
+            high=bounds[:, 1].minimum(farthest),
             initial=walk.initial,
             max_commands=walk.commands,
             limit=walk.limit,
@@ -99,6 +102,22 @@ class Goals:
         return [Commands(row.clip(low, high), longest, self.channels) for row in goals]
 
 
+def reaches(
+    walk: WalkConfig, channels: Sequence[Channel], grown: float = 1.0
+) -> np.ndarray:
+    """How far goals of servos may be from half-way, ``(C,)`` [rad].
+
+    Args:
+        walk: settings.
+        channels: the servos.
+        grown: how much of the way from `reach` to `coxa_reach` coxae have come.
+    """
+    wider = max(walk.coxa_reach - walk.reach, 0.0) * grown
+    coxae = [channel.name.endswith("_coxa") for channel in channels]
+    found: np.ndarray = walk.reach + wider * np.array(coxae)
+    return found
+
+
 class GoalBreeder(Breeder):
     """Makes the next population; children of crossover stay within the bounds, too.
 
@@ -127,6 +146,8 @@ class GoalBreeder(Breeder):
         """See `Breeder.breed`; goals are kept within their bounds."""
         bred = super().breed(population, cost, rates, coins)
         low, high = self.encoding.low, self.encoding.high
+        if rates.reach is not None:
+            low, high = low.maximum(-rates.reach), high.minimum(rates.reach)
         return bred._replace(genes=torch.minimum(torch.maximum(bred.genes, low), high))
 
     def _mutate(self, children: Population, rates: Rates, coins: Coins) -> Population:

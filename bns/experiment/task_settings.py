@@ -163,6 +163,13 @@ class WalkConfig:
     reach: float = 3.0
     """no goal is farther than this from half-way [rad]; the servos' own limits hold
     besides"""
+    coxa_reach: float = 0.0
+    """the same of the servos that swing a leg, once it has grown (own); smaller ones
+    than reach = as reach"""
+    grow_from: int = 0
+    """trial from which their reach grows, evenly, from reach to coxa_reach"""
+    grow_until: int = 0
+    """trial by which it has"""
     nominal: bool = False
     """the networks learn what is missing from a model of feet that stay where they
     stand (own; bns/learners/bns/nominal.py)"""
@@ -191,6 +198,13 @@ class WalkConfig:
     """times that a pattern is drawn in a training, on average, so that few patterns are
     learned in few steps (own; batch > 0); 0 = snn.epochs steps, however many there
     are"""
+    pull: float = 0.0
+    """farthest from what the networks say that a pattern counts in a training, in their
+    scaled outputs of 0.05 m and 0.25 rad, so that a tumble does not undo what they know
+    (own; batch > 0); 0 = however far it is"""
+    anchors: float = 0.0
+    """random motions in which the model is right, for each pattern of a training, so
+    that networks stay near the model where nothing was seen (own; needs nominal)"""
     learning_rate: float = 0.002
     """of Adam (batch > 0)"""
     adequate: float = 0.70

@@ -134,7 +134,7 @@ class Practising(Bns):
         "practised": "trials in the model before it",
         "mended": "1 where a diagnosis mended the model after it",
     }
-    figures = (
+    figures: ClassVar[tuple[Curves | str, ...]] = (
         *Bns.figures,
         Curves(
             name="model_miss",

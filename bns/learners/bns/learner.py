@@ -89,7 +89,11 @@ class Bns(Learner):
         "diversity_51": "thesis equation 5.1",
         "diversity_73": "thesis equation 7.3",
     }
-    figures = (SNN_ERROR, "displacement", DIVERSITY)
+    figures: ClassVar[tuple[Curves | str, ...]] = (
+        SNN_ERROR,
+        "displacement",
+        DIVERSITY,
+    )
 
     def begin(self) -> None:
         """See `Learner.begin`.
@@ -145,7 +149,8 @@ class Bns(Learner):
     @classmethod
     def figures_of(cls, task: Task) -> list[Curves | str]:
         """See `Learner.figures_of`; beside, those of the task's networks."""
-        return [SNN_ERROR, *cls.kind(task).figures, "displacement", DIVERSITY]
+        first, *others = cls.figures
+        return [first, *cls.kind(task).figures, *others]
 
     @classmethod
     def compiles(cls, config: RunConfig) -> bool:

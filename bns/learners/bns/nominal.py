@@ -20,8 +20,10 @@ from itertools import combinations
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn.functional import pad
 
 from bns.draws import Draws, whole_below
+from bns.evolution.goals import reaches
 from bns.experiment import robots
 from bns.experiment.config import RunConfig
 from bns.snn.network import Shape, forward
@@ -130,14 +132,14 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def drawn(
-    rng: np.random.Generator, count: int, reach: float
+    rng: np.random.Generator, count: int, reach: float | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of goals as walks have them: near, far and at the bounds; some stay.
 
     Args:
         rng: the only source of randomness.
         count: N.
-        reach: farthest that goals are from half-way [rad].
+        reach: farthest that goals are from half-way, of all or of each ``(18,)`` [rad].
 
     Returns:
         goals in force and the next ones, each ``(N, 18)`` [rad].
@@ -177,7 +179,9 @@ class Nominal:
     """
 
     def __init__(self, config: RunConfig, runs: int):
-        self.robot, self.reach = config.world.robot, config.walk.reach
+        self.robot = config.world.robot
+        channels = robots.told(self.robot).channels
+        self.reach = tuple(reaches(config.walk, channels).tolist())
         self.device = torch.device(config.device)
         self.lost = [NONE] * runs
         self.theta = self._network(NONE).repeat(runs, 1)
@@ -215,6 +219,31 @@ class Nominal:
         self.trust = torch.where(square > 0, share, 1.0)
         return self.trust * told
 
+    def anchored(
+        self, patterns: Patterns, share: float, rng: np.random.Generator
+    ) -> Patterns:
+        """Patterns of what the model leaves, with some in which it leaves nothing.
+
+        Args:
+            patterns: of all runs, padded behind.
+            share: of each run's own number that are added.
+            rng: of their goals.
+        """
+        from bns.learners.bns.walking import GOAL
+
+        counts = patterns.weight.sum((1, 2, 3)).long().tolist()
+        more = [int(share * count) for count in counts]
+        longest = max(both[0] + both[1] for both in zip(counts, more, strict=True))
+        room = max(longest - patterns.inputs.shape[2], 0)
+        inputs, targets, weight = (pad(part, (0, room)) for part in patterns)
+        for run, (count, added) in enumerate(zip(counts, more, strict=True)):
+            goals = np.concatenate(drawn(rng, added, np.array(self.reach)), axis=1)
+            new = slice(count, count + added)
+            seen = _tensor(goals / GOAL)[0].to(inputs.device)
+            inputs[run, :, new] = seen * self.moving[run]
+            weight[run, ..., new] = 1.0  # their targets are 0 already
+        return Patterns(inputs, targets, weight)
+
     def state(self) -> dict[str, np.ndarray]:
         """How far each run trusts the model, and which legs it takes for lost."""
         lost = np.zeros((len(self.lost), FEET), bool)
@@ -231,14 +260,14 @@ class Nominal:
 
 
 @cache
-def network(robot: str, reach: float, lost: Lost = NONE) -> Tensor:
+def network(robot: str, reach: float | tuple[float, ...], lost: Lost = NONE) -> Tensor:
     """Weights of a network of `SHAPE` that says what `moved` says, ``(1, D)``.
 
     The same each time, so no run has to keep them.
 
     Args:
         robot: its name.
-        reach: farthest that goals are from half-way [rad].
+        reach: farthest that goals are from half-way, of all or of each of 18 [rad].
         lost: legs that bear nothing; their goals are 0 in its inputs.
 
     Raises:
@@ -247,7 +276,7 @@ def network(robot: str, reach: float, lost: Lost = NONE) -> Tensor:
     from bns.learners.bns.walking import GOAL, MOVED
 
     rng, draws = np.random.default_rng(0), Draws(0)
-    before, after = drawn(rng, SAMPLES, reach)
+    before, after = drawn(rng, SAMPLES, np.array(reach))
     for goals in (before, after):
         goals.reshape(SAMPLES, FEET, -1)[:, list(lost)] = 0.0
     inputs = _tensor(np.concatenate([before, after], axis=1) / GOAL)

@@ -20,10 +20,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from bns.draws import whole_below
 from bns.errors import BnsError
 from bns.evolution.chromosome import Population
 from bns.evolution.generation import Rates
-from bns.evolution.goals import TICK, GoalBreeder, Goals
+from bns.evolution.goals import TICK, GoalBreeder, Goals, reaches
 from bns.experiment.config import RunConfig
 from bns.experiment.task_settings import WalkConfig
 from bns.learners.bns import change_detection
@@ -32,7 +33,7 @@ from bns.learners.bns.memory import Memory
 from bns.learners.bns.navigation import OpenLoopProblem
 from bns.learners.bns.nominal import Nominal, said
 from bns.snn import training
-from bns.snn.network import OUTPUTS, Shape, forward, integrate
+from bns.snn.network import OUTPUTS, Shape, forward, integrate, predict
 from bns.tasks import walk as walking
 from bns.worlds.trial import Trial, body_displacements
 
@@ -40,6 +41,7 @@ GOAL = 0.5  # [rad] that is scaled to 1; assumed
 MOVED = (0.05, 0.05, 0.25)  # [m, m, rad] of a command that are scaled to 1; assumed
 SHORTEST = 1e-6  # [m] so that the printed form stays finite
 START = (0.0, 0.0, 0.0)
+SEEDS = 2**24  # of motions drawn by NumPy: as many as a float32 tells apart
 CHUNK = 1100  # patterns predicted at once on a CPU: activations stay in its cache
 
 
@@ -241,6 +243,11 @@ class WalkProblem(OpenLoopProblem):
                     "changed; set walk.nominal = true and watch.forget = true as well."
                 )
             self.bearing = Bearing(self.nominal)
+        if config.walk.anchors and self.nominal is None:
+            raise BnsError(
+                "walk.anchors are motions in which the model of the legs is right; set "
+                "walk.nominal = true as well."
+            )
         self.evaluator = WalkEvaluator(self.shape, config.walk, self.nominal)
         self.breeder = GoalBreeder(config.evolution, self.encoding, True)
         self._compile()
@@ -263,7 +270,17 @@ class WalkProblem(OpenLoopProblem):
             torch.from_numpy(rate).to(self.device),
             each.expand(-1, servos).to(self.device),
             repeat=self._repeat(trial),
+            reach=self._reach(trial),
         )
+
+    def _reach(self, trial: int) -> Tensor | None:
+        """How far goals may be from half-way now, ``(C,)`` [rad]; None = as ever."""
+        walk = self.config.walk
+        if trial >= walk.grow_until:
+            return None
+        share = (trial - walk.grow_from) / max(walk.grow_until - walk.grow_from, 1)
+        found = reaches(walk, self.encoding.channels, max(share, 0.0))
+        return torch.from_numpy(found).to(self.encoding.low)
 
     def _repeat(self, trial: int) -> Tensor | None:
         """Chance that a child repeats its commands, of each run; None = of no run."""
@@ -328,13 +345,21 @@ class WalkProblem(OpenLoopProblem):
         self, shape: Shape, theta: Tensor, patterns: training.Patterns
     ) -> tuple[Tensor, Tensor]:
         """See `Problem.train`; by Adam on parts of the patterns (walk.batch > 0)."""
-        if self.nominal is not None:
-            seen = patterns.inputs * self.nominal.moving
-            patterns = patterns._replace(inputs=seen)
-            rest = patterns.targets - self.nominal.weigh(patterns)
+        walk, model = self.config.walk, self.nominal
+        if model is not None:
+            patterns = patterns._replace(inputs=patterns.inputs * model.moving)
+            rest = patterns.targets - model.weigh(patterns)
             patterns = patterns._replace(targets=rest)
-        if self.config.walk.batch == 0:
+        if walk.batch == 0:
             return super().train(shape, theta, patterns)
+        if walk.pull:
+            foreseen = predict(shape, theta, patterns.inputs)
+            away = (patterns.targets - foreseen).clamp(-walk.pull, walk.pull)
+            patterns = patterns._replace(targets=foreseen + away)
+        if walk.anchors and model is not None:
+            seed = int(whole_below(self.draws.uniform(1), SEEDS))
+            rng = np.random.default_rng(seed)
+            patterns = model.anchored(patterns, walk.anchors, rng)
         return training.fit_adam(shape, self.config, theta, patterns, self.draws)
 
     def state(self) -> dict[str, np.ndarray]:
