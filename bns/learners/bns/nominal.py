@@ -235,13 +235,13 @@ class Nominal:
         more = [int(share * count) for count in counts]
         longest = max(both[0] + both[1] for both in zip(counts, more, strict=True))
         room = max(longest - patterns.inputs.shape[2], 0)
-        inputs, targets, weight = (pad(part, (0, room)) for part in patterns)
+        inputs, targets, weight = (pad(part, (0, room)).clone() for part in patterns)
         for run, (count, added) in enumerate(zip(counts, more, strict=True)):
             goals = np.concatenate(drawn(rng, added, np.array(self.reach)), axis=1)
             new = slice(count, count + added)
             seen = _tensor(goals / GOAL)[0].to(inputs.device)
             inputs[run, :, new] = seen * self.moving[run]
-            weight[run, ..., new] = 1.0  # their targets are 0 already
+            targets[run, :, new], weight[run, ..., new] = 0.0, 1.0
         return Patterns(inputs, targets, weight)
 
     def state(self) -> dict[str, np.ndarray]:

@@ -13,7 +13,7 @@ from bns.errors import UnknownNameError
 from bns.evolution import generation, selection, variation
 from bns.evolution.chromosome import Encoding, Population
 from bns.evolution.generation import Breeder, Rates
-from bns.evolution.goals import COINS, TICK, GoalBreeder, Goals, repeated
+from bns.evolution.goals import COINS, TICK, GoalBreeder, Goals, reaches, repeated
 from bns.experiment.task_settings import ControllerConfig
 from bns.learners.bns.config import EvolutionConfig
 from bns.learners.bns.learner import Bns
@@ -276,6 +276,30 @@ class TestGoals:
         bred = breeder.breed(population, draws.uniform(1, 40), rates, coins)
         assert bred.genes.abs().max() <= 0.5
         assert (bred.genes.abs() < 0.49).any()
+
+    def test_coxae_may_reach_farther_than_other_joints(self):
+        walk = replace(small().walk, reach=0.6, coxa_reach=0.9)
+        goals = Goals.of(small(walk=walk))
+        coxae = [channel.name.endswith("_coxa") for channel in goals.channels]
+        for grown, farthest in ((0.0, 0.6), (0.5, 0.75), (1.0, 0.9)):
+            found = reaches(walk, goals.channels, grown)
+            np.testing.assert_allclose(found, np.where(coxae, farthest, 0.6))
+        assert goals.high.max() == pytest.approx(0.9)
+        assert (goals.high[~torch.tensor(coxae)] <= 0.6).all()
+        smaller = reaches(replace(walk, coxa_reach=0.3), goals.channels)
+        assert (smaller == 0.6).all()
+
+    def test_a_reach_that_grows_holds_children_back(self):
+        walk = replace(small().walk, reach=0.5, coxa_reach=0.9)
+        goals, draws = Goals.of(small(walk=walk)), Draws(0)
+        breeder = GoalBreeder(small().evolution, goals, True)
+        population = goals.random(1, 40, draws)
+        edge = torch.where(population.genes > 0, goals.high, goals.low)
+        reach = torch.full((18,), 0.55)
+        rates = Rates(torch.tensor([0.5]), torch.full((1, 18), 0.3), reach=reach)
+        coins = breeder.draw(draws, rates)
+        told = population._replace(genes=edge), draws.uniform(1, 40), rates, coins
+        assert breeder.breed(*told).genes.abs().max() <= 0.55
 
 
 class TestRepetition:

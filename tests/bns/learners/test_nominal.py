@@ -10,6 +10,7 @@ from bns.learners.bns import nominal
 from bns.learners.bns.learner import Bns
 from bns.learners.bns.walking import GOAL, MOVED
 from bns.models.phantomx import gait, kinematics
+from bns.snn.network import predict
 from bns.snn.training import Patterns
 from tests.bns.robots import Slider, small
 
@@ -138,6 +139,44 @@ def test_the_model_is_trusted_as_far_as_patterns_bear_it_out(share, trust):
     assert model.trust.flatten().tolist() == [1.0] * 3, "nothing speaks against it"
 
 
+def test_anchors_are_motions_in_which_the_model_leaves_nothing():
+    config = small().with_({"walk.nominal": True, "walk.coxa_reach": 0.9})
+    model = nominal.Nominal(config, 2)
+    model.without(1, frozenset({4}))
+    inputs, targets = torch.ones(2, 36, 12), torch.full((2, 3, 12), 9.0)
+    weight = torch.zeros(2, 1, 1, 12)
+    weight[0, ..., :10], weight[1, ..., :4] = 1.0, 1.0
+    given = Patterns(inputs, targets, weight)
+    found = model.anchored(given, 0.5, np.random.default_rng(0))
+    assert found.inputs.shape == (2, 36, 15)
+    assert found.weight.sum((1, 2, 3)).tolist() == [15, 6]
+    assert weight.sum() == 14 and (inputs == 1).all() and (targets == 9).all()
+    for run, count, more in ((0, 10, 5), (1, 4, 2)):
+        assert (found.targets[run, :, :count] == 9).all()
+        added = slice(count, count + more)
+        assert (found.targets[run, :, added] == 0).all()
+        assert found.inputs[run, :, added].std(1).gt(0).sum() >= 30
+    angles = found.inputs[0, :, 10:].view(2, 6, 3, 5) * GOAL
+    assert angles[:, :, 0].abs().max() > 0.6 >= angles[:, :, 1:].abs().max()
+    assert (found.inputs[1, :, 4:6].view(2, 6, 3, 2)[:, 4] == 0).all()
+    with pytest.raises(BnsError, match=r"walk\.nominal"):
+        learner(anchors=0.5)
+
+
+def test_a_pattern_pulls_no_farther_than_it_is_told():
+    shown = {}
+    for pull in (0.0, 0.1):
+        one = learner(pull=pull)
+        problem, memory = one.problem, one.memories[0]
+        drawn = torch.randn(1, 36, 8, generator=torch.Generator().manual_seed(0))
+        far = Patterns(drawn, torch.full((1, 3, 8), 50.0), torch.ones(1, 1, 1, 8))
+        before = predict(memory.shape, memory.theta, drawn)
+        theta, _ = problem.train(memory.shape, memory.theta, far)
+        moved = predict(memory.shape, theta, drawn) - before
+        shown[pull] = float(moved.abs().max())
+    assert shown[0.1] < 0.5 < shown[0.0]
+
+
 def test_robots_whose_legs_are_not_known_are_refused():
     with pytest.raises(BnsError, match="not those of 'other'"):
         robots.contacts("other")
@@ -194,3 +233,13 @@ def test_resumed_with_the_model_it_gives_the_same_bytes():
     wanted, found = advance(first, 6), advance(second, 6)
     for name in wanted:
         np.testing.assert_array_equal(found[name], wanted[name])
+
+
+def test_the_reach_of_coxae_grows_from_trial_to_trial():
+    problem = learner(coxa_reach=0.9, grow_from=10, grow_until=40).problem
+    for trial, farthest in ((0, 0.6), (10, 0.6), (25, 0.75), (39, 0.89)):
+        reach = problem.rates(trial).reach
+        assert reach is not None
+        assert reach.view(6, 3).amax(0).tolist() == pytest.approx([farthest, 0.6, 0.6])
+    assert problem.rates(40).reach is None
+    assert learner().problem.rates(0).reach is None
