@@ -73,6 +73,11 @@ def warnings(
             "Every fitted effect ends at a bound: the ranges are too narrow, or the "
             "model is of another robot."
         )
+    elif found.best.at_bound:
+        made.append(
+            f"{', '.join(found.best.at_bound)}: ends where its range does, and may be "
+            "farther off than it says."
+        )
     items = {row.term: row for row in rows}
     least = found.signatures.get("detectability", {})
     quiet = [name for name, size in least.items() if size is None and name in items]

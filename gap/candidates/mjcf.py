@@ -342,7 +342,9 @@ def _of_model(
     if kind == "body":
         mass = float(model.body_mass[at])
         if name == "body_mass":
-            return -0.9 * mass, 2.0 * mass, "kg"
+            # a light hand may carry what is heavy to it, not what is to the robot
+            lifted = 0.5 * float(model.body_mass.sum())
+            return -0.9 * mass, max(2.0 * mass, lifted), "kg"
         size = float(np.sqrt(model.body_inertia[at].max() / max(mass, 1e-9)))
         return -size, size, "m"
     return _of_joint(name, at, model)

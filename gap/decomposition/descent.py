@@ -21,6 +21,7 @@ TURNS = 4  # of fitting and searching
 FEW = 2  # explanations that need no other start if they leave little
 ENOUGH = 1.2  # times what all explanations leave: little more
 NEARLY = 1.5  # the same where these, all together, only describe the recording
+STRETCHED = 4.0  # deviations of slack that are no slack any more
 ROUNDS = 2  # of levels, and of what walkers scatter
 MARGIN = 1.02  # of the held-out error that an autoregression may cost
 WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
@@ -306,9 +307,24 @@ def _alone(tried: Singles) -> Point:
 
 def _beyond_chance(problem: Problem, start: Point, found: Point, count: int) -> Point:
     """A point; the nominal model, if it is no better than the best of `count`
-    explanations is by chance."""
+    explanations is by chance, and if that is not because slack stands for them."""
     nominal, here = refit.costs(problem, [start, found])
-    return found if here + np.log(max(count, 1)) < nominal else start
+    if here + np.log(max(count, 1)) < nominal:
+        return found
+    inside = found.support <= _stretched(problem, start)
+    return found if found.support and inside else start
+
+
+def _stretched(problem: Problem, start: Point) -> Support:
+    """Explanations that the nominal model takes farther than it may be off: their slack
+    is a deviation, and so many are none."""
+    linear, found = start.linear, set()
+    for value, column in zip(linear.solve(frozenset()), linear.columns, strict=True):
+        row = problem.rows[column]
+        slack = row.slack or np.inf
+        if not row.nuisance and abs(value) * row.sd > STRETCHED * slack:
+            found.add(row.term)
+    return frozenset(found)
 
 
 def _with_level(problem: Problem, best: Single, start: Point) -> list[Point]:

@@ -172,7 +172,9 @@ def commands_before(trial: Trial, row: int) -> list[list[float]]:
 def state(trial: Trial, row: int, config: OwnConfig) -> dict[str, list[float]]:
     """Position and speed of each observed joint at a sample, and how sure these are.
 
-    A speed that is observed itself is taken as the mean around the sample.
+    A speed that is observed itself is taken as the mean around the sample. Where it is
+    all that is seen of a joint, as of a flywheel, that has come as far since the first
+    sample as its speeds say, and that counts as known.
 
     Args:
         trial: the recording.
@@ -194,7 +196,16 @@ def state(trial: Trial, row: int, config: OwnConfig) -> dict[str, list[float]]:
             mean, _, sd, _ = parabola(at, trial.observed[near, column], item.noise)
             if item.part in found:
                 found[item.part][1::2] = mean, sd
+            else:
+                come = _come(trial.times[:row], trial.observed[:row, column])
+                found[item.part] = [come, mean, 0.0, sd]
     return found
+
+
+def _come(times: np.ndarray, speeds: np.ndarray) -> float:
+    """How far samples of a speed say that something has come."""
+    seen = np.isfinite(speeds)
+    return float(np.trapezoid(speeds[seen], times[seen]))
 
 
 def around(times: np.ndarray, seen: np.ndarray, row: int) -> np.ndarray:

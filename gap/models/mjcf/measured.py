@@ -44,9 +44,12 @@ def observed(work: Work, seen: list[Column]) -> None:
     speeds = [c for c in seen if matching.quantity(c) == tables.SPEED]
     others = [c for c in seen if c not in speeds]
     named = matching.by_place(others, places)
-    for kind, group in (("joint", others), ("speed", speeds)):
+    for kind, group in (("speed", speeds), ("joint", others)):
         rest = [c for c in group if c.name not in named or c.name in joints(model)]
-        for parts in (joints(model), driven):
+        # a flywheel is seen by its speed alone: what turns otherwise is another joint
+        fast = [p.name for p in found.values() if p.quantity == "speed"]
+        still = [joint for joint in joints(model) if joint not in fast]
+        for parts in (joints(model), still if fast else driven, driven):
             left = [c for c in rest if c.name not in found]
             free = [p for p in parts if Part(kind, p) not in found.values()]
             hits, reasons = matching.match(left, free)

@@ -138,6 +138,7 @@ def unsure(trial: Trial, config: OwnConfig) -> dict[str, float]:
             f"{number}[{joint}]": float(sd)
             for joint, sds in found.items()
             for number, sd in zip(NUMBERS, sds, strict=True)
+            if sd > 0
         }
     if not config.recorded:
         return {}

@@ -1,0 +1,89 @@
+"""Robots of others: a wheel seen by its speed alone, and a table that leans."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from bns.gap.diagnose import diagnose
+from bns.gap.models.mjcf import start
+from tests.gap.own_robots import described
+
+FLYWHEEL = """<mujoco model="flywheel"><option timestep="0.004" integrator="RK4"/>
+  <worldbody><body name="rod" pos="0 0 1">
+    <joint name="swing" axis="0 1 0" damping="0.015"/>
+    <geom type="cylinder" fromto="0 0 0 0 0 -0.28" size="0.02" mass="0.34"
+      contype="0" conaffinity="0"/>
+    <body name="wheel" pos="0 0.03 -0.28">
+      <joint name="spin" axis="0 1 0" damping="0.0006"/>
+      <geom type="cylinder" size="0.07 0.006" euler="1.5708 0 0" mass="0.3"
+        contype="0" conaffinity="0"/></body></body></worldbody>
+  <actuator><motor name="turn" joint="spin"/></actuator></mujoco>"""
+
+
+@pytest.fixture
+def spun(tmp_path):
+    """The model and trials of a log of 15 s of a flywheel on a pendulum."""
+    model = mujoco.MjModel.from_xml_string(FLYWHEEL)
+    model.opt.timestep = 0.001
+    data, rng = mujoco.MjData(model), np.random.default_rng(0)
+    lines = ["time,torque_cmd_Nm,phi_deg,wheel_rpm"]
+    for sample in range(1500):
+        at = sample / 100
+        data.ctrl[0] = 0.15 * np.sin(5 * at) + 0.1 * np.sign(np.sin(1.7 * at))
+        seen = (
+            np.degrees(data.qpos[0]) + rng.normal(0, 0.05),
+            data.qvel[1] * 30 / np.pi + rng.normal(0, 1.0),
+        )
+        cells = (at, data.ctrl[0], *seen)
+        lines.append(",".join(f"{cell:.6g}" for cell in cells))
+        mujoco.mj_step(model, data, 10)
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    _, own = described(tmp_path, FLYWHEEL, tmp_path / "log.csv")
+    return own, own.read_log(str(tmp_path / "log.csv"))
+
+
+def test_a_joint_seen_by_its_speed_alone_begins_with_it(spun):
+    own, trials = spun
+    parts = {item.channel.name: (item.quantity, item.part) for item in own.config.seen}
+    assert sorted(parts.values()) == [("joint", "swing"), ("speed", "spin")]
+    assert len(trials) > 3
+    fast = [abs(trial.conditions[start.STATE]["spin"][1]) for trial in trials]
+    assert max(fast) > 20  # rad/s
+    assert all(
+        "start_position[spin]" not in start.unsure(t, own.config) for t in trials
+    )
+    (made,) = own.simulate(trials, [()])
+    noise = np.array([item.noise for item in own.config.seen])
+    for trial, path in zip(trials, made, strict=True):
+        off = (trial.observed - path) / noise
+        assert np.sqrt(np.nanmean(off**2, axis=0)).max() < 4
+
+
+PUCK = """<mujoco model="puck"><option timestep="0.002"/>
+  <worldbody><body name="table"><geom type="box" size="1 1 0.01" pos="0 0 -0.1"
+      contype="0" conaffinity="0"/>
+    <body name="puck"><joint name="slide" type="slide" axis="1 0 0" damping="0.05"/>
+      <geom type="cylinder" size="0.05 0.01" mass="0.5" contype="0" conaffinity="0"/>
+    </body></body></worldbody>
+  <actuator><motor name="push" joint="slide"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize(("lean", "named"), [(0.0, False), (0.006, True)])
+def test_a_table_that_leans_six_times_as_far_as_tables_do_is_a_gap(
+    tmp_path, lean, named
+):
+    model = mujoco.MjModel.from_xml_string(PUCK)
+    model.opt.timestep = 0.0005
+    model.opt.gravity[0] = 9.81 * lean
+    rng, lines = np.random.default_rng(1), ["time,push,slide,trial"]
+    for trial in range(6):
+        data, told = mujoco.MjData(model), rng.uniform(-0.4, 0.4, 6).round(2)
+        for sample in range(150):
+            data.ctrl[0] = told[sample // 25]
+            seen = data.qpos[0] + rng.normal(0, 0.0015)
+            lines.append(f"{sample / 50:.3f},{data.ctrl[0]},{seen:.5f},{trial}")
+            mujoco.mj_step(model, data, 40)
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    _, own = described(tmp_path, PUCK, tmp_path / "log.csv")
+    found = diagnose(own.read_log(str(tmp_path / "log.csv")), own, full=False)
+    assert list(found.best.names) == (["body_tilt.pitch[table]"] if named else [])
