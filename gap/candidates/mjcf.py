@@ -78,6 +78,7 @@ USUAL = (
     "command_limit",
     "command_delay",
     "command_lag",
+    "reading_delay",
     "reading_gain",
     "reading_offset",
     "geom_radius",
@@ -87,7 +88,8 @@ USUAL = (
 """considered where the user does not say which, on what the commands move:
 `actuator_kp` and `actuator_kd` of position servos, a limit of force of these and of
 servos of speed, `actuator_gain` and `command_limit` of all but position servos, the
-tilt of what is bolted to the world; the radius of wheels and feet, and grip and
+tilt of what is bolted to the world; `reading_delay` of places, by a camera, beside
+joints, by encoders; the radius of wheels and feet, and grip and
 softness of all that touch, where they touch something"""
 FEW = 6  # joints up to which `RARER` are considered, too
 RARER = ("joint_backlash", "body_length")
@@ -154,6 +156,7 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
             for item, number in zip(config.told, told, strict=True)
             if number not in servos
         ],
+        "reading_delay": _by_camera(config),
         "reading_gain": seen,
         "reading_offset": seen,
         "body_tilt": _bolted(model, owned),
@@ -172,6 +175,18 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
         else:
             made[name] = tuple(of.get(name, (ALL,)))
     return {name: parts for name, parts in made.items() if parts}
+
+
+def _by_camera(config: OwnConfig) -> tuple[str, ...]:
+    """Channels of places, where joints are seen as well: two clocks, one of them late."""
+    places = [item.quantity in ("site", "body") for item in config.seen]
+    if all(places):
+        return ()
+    return tuple(
+        item.channel.name
+        for item, place in zip(config.seen, places, strict=True)
+        if place
+    )
 
 
 def _long(model: mujoco.MjModel, bodies: Iterable[int]) -> list[str]:

@@ -1,9 +1,12 @@
 """Robots of others: a wheel seen by its speed alone, and a table that leans."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
 
+from bns.gap.candidates import mjcf
 from bns.gap.diagnose import diagnose
 from bns.gap.models.mjcf import start
 from tests.gap.own_robots import described
@@ -87,3 +90,16 @@ def test_a_table_that_leans_six_times_as_far_as_tables_do_is_a_gap(
     _, own = described(tmp_path, PUCK, tmp_path / "log.csv")
     found = diagnose(own.read_log(str(tmp_path / "log.csv")), own, full=False)
     assert list(found.best.names) == (["body_tilt.pitch[table]"] if named else [])
+
+
+def test_a_camera_beside_encoders_may_be_late(spun):
+    own, _ = spun
+    assert "reading_delay" not in {row.effect for row in own.listed}
+    place = replace(own.config.seen[0], quantity="body", part="wheel", axis=0)
+    beside = replace(own.config, seen=(*own.config.seen, place))
+    made = mjcf.candidates(beside, own.physics.model)
+    late = [row for row in made if row.effect == "reading_delay"]
+    assert [row.fixed["part"] for row in late] == [place.channel.name]
+    alone = replace(own.config, seen=(place,))
+    names = [r.effect for r in mjcf.candidates(alone, own.physics.model)]
+    assert "reading_delay" not in names and "command_delay" in names
