@@ -178,7 +178,7 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
 
 
 def _by_camera(config: OwnConfig) -> tuple[str, ...]:
-    """Channels of places, where joints are seen as well: two clocks, one of them late."""
+    """Channels of places, where joints are seen as well: of two clocks one is late."""
     places = [item.quantity in ("site", "body") for item in config.seen]
     if all(places):
         return ()
