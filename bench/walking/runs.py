@@ -32,7 +32,7 @@ RECOVERING: Mapping[Kind, Sequence[str]] = {
     "window": GROUPS[:1],
     "forget": GROUPS[:1],
     "own": GROUPS,
-    "nominal": GROUPS[:2],
+    "nominal": GROUPS[:1],
 }
 """groups that are damaged"""
 OWN = "hexapod-nominal"  # the preset of the kind `nominal`, with trunks of its own
