@@ -9,6 +9,8 @@ import pytest
 from bns.gap.candidates import mjcf
 from bns.gap.diagnose import diagnose
 from bns.gap.models.mjcf import start
+from bns.gap.records import Diagnosis, Fit, Verdict
+from bns.gap.warnings import warnings
 from tests.gap.own_robots import described
 
 FLYWHEEL = """<mujoco model="flywheel"><option timestep="0.004" integrator="RK4"/>
@@ -103,3 +105,21 @@ def test_a_camera_beside_encoders_may_be_late(spun):
     alone = replace(own.config, seen=(place,))
     names = [r.effect for r in mjcf.candidates(alone, own.physics.model)]
     assert "reading_delay" not in names and "command_delay" in names
+
+
+def test_a_magnitude_at_the_end_of_its_range_is_pointed_out(spun):
+    own, _ = spun
+    plain = dict(magnitudes=(0.7,), intervals=((0.6, 0.7),), units=("kg",))
+    nothing = Fit((), (), (), (), (), 9.0, 9.0, 0.0, 9.0)
+    for at_bound in ((), ("body_mass[rod]",)):
+        fit = Fit(
+            ("body_mass[rod]",), ("body_mass:part=rod,added=0.7",), **plain,
+            loss=1.0, held_out=1.0, held_out_se=0.1, evidence=1.0, at_bound=at_bound,
+        )  # fmt: skip
+        other = replace(fit, names=("joint_damping[swing]",), at_bound=())
+        named = (fit.names,)
+        verdict = Verdict("effect", named, named, 0.0, 0.0, 1.0, (), 1.0, "it is heavy")
+        fits = (fit, other, nothing)
+        found = Diagnosis("flywheel", 4, (), verdict, fits, {}, {}, {}, {})
+        said = " ".join(warnings(found, own.listed))
+        assert ("body_mass[rod]: ends where its range does" in said) == bool(at_bound)
