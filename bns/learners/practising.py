@@ -17,8 +17,9 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from bns import models, seeding
+from bns import seeding
 from bns.errors import BnsError
+from bns.experiment import diagnosing
 from bns.experiment.config import LearnerSettings
 from bns.learners.base import Curves, Panel, Proposal
 from bns.learners.bns.learner import Bns
@@ -303,20 +304,7 @@ class Practising(Bns):
 
     def _named(self, trials: Sequence[Trial]) -> list[tuple[str, ...]]:
         """Sets of effects that the diagnosis of trials names, the best first."""
-        from bns.gap.diagnose import diagnose
-        from bns.gap.models.base import GapModel
-        from bns.gap.models.legged.model import WalkModel
-        from bns.gap.models.wheeled.model import WheeledModel
-
-        robot = models.robot(self.config.world.robot)
-        kinds: dict[str, Any] = {"legged": WalkModel, "wheeled": WheeledModel}
-        model: GapModel = kinds[robot.kind](self.config.world.robot)
-        try:
-            found = diagnose(trials, model, seed=self.config.seed, full=False)
-        except BnsError:  # too little to be seen in these trials
-            return []
-        sets = [found.best.effects, *(fit.effects for fit in found.fits)]
-        return [effects for effects in dict.fromkeys(sets) if effects]
+        return diagnosing.named(trials, self.config.world.robot, seed=self.config.seed)
 
     def state(self) -> dict[str, np.ndarray]:
         """See `Learner.state`; with what is known of the models, and their cost."""

@@ -31,7 +31,7 @@ MAY_IMPORT = {
     "gap": LOW | {"gap"},
     "hardware": LOW | {"hardware"},
     "learner": {"base", "learner", "experiment", "worlds"},
-    "experiment": LOW | {"learner", "experiment"},
+    "experiment": LOW | {"gap", "learner", "experiment"},
     "viz": HIGH | {"viz"},
     "cli": HIGH | {"viz", "cli"},
 }
@@ -48,13 +48,15 @@ EXPERIMENT = {
     f"bns.experiment.{name}"
     for name in (
         "batch",
+        "diagnosing",
         "robots",
         "run",
         "static_snn",
         "world_factory",
     )
 } | {"bns.doctor", "bns.prior.maker"}
-"""modules around the learner that set experiments up: they make worlds by name"""
+"""modules around the learner that set experiments up: they make worlds by name, and ask
+the diagnosis for those that mend their model"""
 
 
 def layer(name: str) -> str:

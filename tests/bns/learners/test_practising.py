@@ -1,12 +1,14 @@
 """BNS that practises in a model, which a diagnosis mends where the robot is another."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from bns import presets
 from bns.errors import BnsError
+from bns.experiment import diagnosing
 from bns.experiment.batch import Batch
 from bns.experiment.loading import with_learner
 from bns.learners.practising import Practising
@@ -120,3 +122,20 @@ def test_settings_that_it_has_in_its_own_way(given, match):
     model = CountedWorld(wheels(), 10)
     with pytest.raises(BnsError, match=match):
         Practising([config], replicates=[0], onsets=[-1], models=[model])
+
+
+@pytest.mark.parametrize("robot", ["khepera3", "phantomx"])
+def test_sets_that_the_diagnosis_fits_come_once_the_named_one_first(robot, monkeypatch):
+    asked = []
+
+    def diagnose(trials, model, **given):
+        asked.append((model.name, given["seed"]))
+        if not trials:
+            raise BnsError("too few")
+        fits = [SimpleNamespace(effects=e) for e in ((), (FAST,), (SLOW,))]
+        return SimpleNamespace(best=fits[2], fits=fits)
+
+    monkeypatch.setattr("bns.gap.diagnose.diagnose", diagnose)
+    assert diagnosing.named(["a trial"], robot, seed=3) == [(SLOW,), (FAST,)]
+    assert diagnosing.named([], robot) == []
+    assert asked == [(robot, 3), (robot, 0)]

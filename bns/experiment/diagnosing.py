@@ -1,0 +1,39 @@
+"""What the diagnosis names in a robot's trials, for learners that mend their model."""
+
+from collections.abc import Sequence
+
+from bns.errors import BnsError
+from bns.experiment import robots
+from bns.worlds.trial import Trial
+
+
+def named(
+    trials: Sequence[Trial], robot: str, *, seed: int = 0
+) -> list[tuple[str, ...]]:
+    """Sets of effects that explain trials, beside the robot as it was made.
+
+    Args:
+        trials: lists of commands and what was observed, two at least.
+        robot: its name; of kind "wheeled" or "legged".
+        seed: of what is drawn.
+
+    Returns:
+        the set that the diagnosis names, and the others that it fitted, the best
+        first, each effect as text; none where too little is to be seen.
+
+    Raises:
+        UnknownNameError: no such robot.
+    """
+    from bns.gap.diagnose import diagnose
+    from bns.gap.models.base import GapModel
+    from bns.gap.models.legged.model import WalkModel
+    from bns.gap.models.wheeled.model import WheeledModel
+
+    legged = robots.told(robot).kind == "legged"
+    model: GapModel = WalkModel(robot) if legged else WheeledModel(robot)
+    try:
+        found = diagnose(trials, model, seed=seed, full=False)
+    except BnsError:
+        return []
+    sets = [found.best.effects, *(fit.effects for fit in found.fits)]
+    return [effects for effects in dict.fromkeys(sets) if effects]
