@@ -76,7 +76,7 @@ class Known:
         self.trials: list[Trial] = []
 
     def state(self) -> dict[str, np.ndarray]:
-        """All of it as plain arrays."""
+        """All of it as plain arrays, each as `restore` takes it."""
         arrays = {
             "effects": np.array(self.effects, dtype=np.str_),
             "numbers": np.array([self.right, self.usual, self.asked, self.mended]),
