@@ -148,9 +148,9 @@ def recovering(kind: Kind, *, quick: bool = False) -> Mapping[str, RunRecord]:
         for legs, group in product(TYPES, groups)
     }
     if not quick:
-        trunks = records(_trunk(kind, group) for group in groups)
+        sound = records(_trunk(kind, group) for group in groups)
         told = kind in ("forget", "own")  # the trunks were run without
-        if told and any(forgets(trunk).any() for trunk in trunks.values()):
+        if told and any(forgets(record).any() for record in sound.values()):
             raise BnsError("Run the undamaged runs with watch.forget, too.")
         for (_, group), config in configs.items():
             trunks.begin(_trunk(kind, group), config, idle=("watch", "walk"))
