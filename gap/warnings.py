@@ -73,7 +73,7 @@ def warnings(
             "Every fitted effect ends at a bound: the ranges are too narrow, or the "
             "model is of another robot."
         )
-    elif found.best.at_bound:
+    elif found.fits and found.best.at_bound:
         made.append(
             f"{', '.join(found.best.at_bound)}: ends where its range does, and may be "
             "farther off than it says."
