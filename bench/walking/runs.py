@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 import torch
 
-from bench.learning import experiments
+from bench.learning import experiments, trunks
 from bns import presets
 from bns.errors import BnsError
 from bns.experiment.config import RunConfig
