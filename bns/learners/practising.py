@@ -287,16 +287,19 @@ class Practising(Bns):
         if not self.rule.diagnose or count < known.asked:
             return False
         known.asked = min(2 * count, MOST)
-        usual = self.rule.wrong
-        for effects in self._named(known.trials):
-            if self.models[run].left < 2 * count:
-                return False
+        sets = self._named(known.trials)
+        if not sets or self.models[run].left < count:
+            return False
+        before = self._missed(run, known.effects, known.trials, trial)
+        enough = min(2 * self.rule.wrong, float(np.median(before)) / 2)
+        for effects in sets:
+            if self.models[run].left < count:
+                break
             try:
                 missed = self._missed(run, effects, known.trials, trial)
             except BnsError:  # an effect that the model cannot have
                 continue
-            before = self._missed(run, known.effects, known.trials, trial)
-            if np.median(missed) < min(2 * usual, float(np.median(before)) / 2):
+            if np.median(missed) < enough:
                 known.effects, known.usual = effects, float(np.median(missed))
                 known.right, known.mended, known.trials = True, True, []
                 return True
