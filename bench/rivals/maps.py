@@ -13,6 +13,7 @@ import numpy as np
 
 from bench.learning import experiments, light
 from bench.result import Result, bench
+from bench.rivals import batches
 from bns import presets
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord
@@ -260,22 +261,13 @@ def trials_to_solve(damage: str, learning: bool, runs: int, after: int) -> list[
         runs: replicates.
         after: trials from the damage on.
     """
-    from bns.experiment.batch import Batch
-    from bns.experiment.loading import with_learner
-    from bns.experiment.world_factory import make_models, make_world
-
-    base = replace(presets.load("khepera-simple"), replicates=runs, threads=1)
-    config = with_learner(base, "rte").with_(
-        {
-            "prior.world": "mujoco",
-            "settings.learning": learning,
-            "world.damage": [f"{damage}@{ONSET}"],
-        }
-    )
-    batch = Batch([config], [make_world(config)], models=make_models(config))
-    solved = np.array(
-        [batch.advance(trial)[0].columns["solved"] for trial in range(ONSET + after)]
-    )[ONSET:]
-    ever = solved.any(axis=0)
-    first: list[int] = np.where(ever, solved.argmax(axis=0) + 1, after + 1).tolist()
+    told = {
+        "prior.world": "mujoco",
+        "settings.learning": learning,
+        "world.damage": [f"{damage}@{ONSET}"],
+    }
+    seen = batches.columns("rte", runs=runs, trials=ONSET + after, **told)
+    solved = seen["solved"][:, ONSET:]
+    ever = solved.any(axis=1)
+    first: list[int] = np.where(ever, solved.argmax(axis=1) + 1, after + 1).tolist()
     return first

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from bench.result import Result, bench
+from bench.rivals import batches
 from bns import presets
 from bns.experiment.batch import Batch
 from bns.experiment.config import RunConfig
 from bns.experiment.loading import with_learner
-from bns.experiment.world_factory import make_models, make_world
 from bns.prior import mismatch
 
 SLOW, WIDE = "wheel_gain:wheel=left,factor=0.8", "axle_length:factor=1.2"
@@ -35,10 +35,6 @@ def _config(preset: str, learner: str, runs: int, **told: Any) -> RunConfig:
     model = {"prior.world": "hexapod", "prior.step": 0.008}
     model = model if legged else {"prior.world": "mujoco"}
     return with_learner(base, learner).with_({**model, **told})
-
-
-def _batch(config: RunConfig) -> Batch:
-    return Batch([config], [make_world(config)], models=make_models(config))
 
 
 def _numbers(batch: Batch, trials: int) -> tuple[np.ndarray, np.ndarray]:
@@ -74,7 +70,7 @@ def _found(learner: str, *, quick: bool) -> Result:
     runs, details = 1 if quick else RUNS, {}
     for damage in (SLOW, WIDE):
         told = {**EACH, "world.damage": [damage]}
-        batch = _batch(_config("khepera-simple", learner, runs, **told))
+        batch = batches.batch(_config("khepera-simple", learner, runs, **told))
         numbers, misses = _numbers(batch, TESTS + 1)
         details[damage] = {
             "numbers": numbers[:, -1].round(4).tolist(),
@@ -112,7 +108,7 @@ def faithful_self_modelling(quick: bool) -> Result:
                 "settings.first": 30,
                 "settings.rounds": ROUNDS + 1,
             }
-            batch = _batch(_config("hexapod-walk", "self_modelling", 1, **told))
+            batch = batches.batch(_config("hexapod-walk", "self_modelling", 1, **told))
             numbers, _ = _numbers(batch, ROUNDS + 1)
             truth = np.arange(1, 7) == leg
             named.append(bool(numbers[0, -1].argmax() == leg - 1))
@@ -139,7 +135,7 @@ def faithful_transferability(quick: bool) -> Result:
     runs = 1 if quick else 3
     told = {"settings.first": 400, "world.reality": mismatch.reality("phantomx")}
     config = _config("hexapod-walk", "transferability", runs, **told)
-    batch = _batch(config)
+    batch = batches.batch(config)
     for trial in range(12):
         batch.advance(trial)
     learner, rows = batch.learner, []
@@ -179,7 +175,7 @@ def faithful_t_resilience(quick: bool) -> Result:
     rows = {}
     for damage in damages[: 1 if quick else None]:
         told = {"world.damage": [f"{damage}@{ONSET}"]}
-        batch = _batch(_config("hexapod-walk", "t_resilience", 1, **told))
+        batch = batches.batch(_config("hexapod-walk", "t_resilience", 1, **told))
         steps = [
             batch.advance(trial)[0].columns
             for trial in range(ONSET + (8 if quick else 30))

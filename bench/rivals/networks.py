@@ -19,10 +19,10 @@ import numpy as np
 import torch
 
 from bench.result import Result, bench
+from bench.rivals import batches
 from bns import presets
 from bns.evolution.neat import Lineage, NeatSettings, bred
 from bns.evolution.topology import SLOPE, Ends, Marks, networks, sizes
-from bns.experiment.batch import Batch
 from bns.experiment.config import RunConfig
 from bns.experiment.loading import with_learner
 from bns.experiment.run import train
@@ -36,21 +36,6 @@ RUNS, AFTER = 10, 5
 TRANSFERS, RECOVERS = 0.5, 0.1
 PRETORIUS = {"settings.commands": 5000, "settings.trainings": 20}
 """commands of Pretorius et al. (2009)"""
-
-
-def _columns(config: RunConfig) -> dict[str, np.ndarray]:
-    """Figures of all trials of a batch, each ``(R, T)``."""
-    batch = Batch([config], [make_world(config)])
-    rows = [batch.advance(trial)[0].columns for trial in range(config.trials)]
-    names = set.intersection(*(set(row) for row in rows))
-    return {name: np.array([row[name] for row in rows]).T for name in names}
-
-
-def _config(learner: str, *, runs: int, trials: int, **told: Any) -> RunConfig:
-    base = presets.load("khepera-simple")
-    base = replace(base, trials=trials, replicates=runs, threads=1)
-    base = base if learner == "bns" else with_learner(base, learner)
-    return base.with_({"world.damage": [], **told})
 
 
 @bench(
@@ -71,7 +56,7 @@ def faithful_static_snn(quick: bool) -> Result:
     onset = transfer + AFTER
     told = {**told, "world.damage": [f"{SLOW}@{onset}"]}
     trials = onset + AFTER
-    seen = _columns(_config("static_snn", runs=runs, trials=trials, **told))
+    seen = batches.columns("static_snn", runs=runs, trials=trials, **told)
     solved = seen["solved"]
     share, after = solved[:, transfer:onset].mean(), solved[:, onset:].mean()
     return Result(
@@ -103,7 +88,7 @@ def faithful_pets(quick: bool) -> Result:
     runs, trials = (3, 10) if quick else (RUNS, MOST)
     found = {}
     for learner in ("pets", "bns"):
-        solved = _columns(_config(learner, runs=runs, trials=trials))["solved"]
+        solved = batches.columns(learner, runs=runs, trials=trials)["solved"]
         first = np.where(solved.any(1), solved.argmax(1) + 1, trials + 1)
         found[learner] = {
             "trials until solved": first.tolist(),

@@ -1,16 +1,12 @@
 """Whether a learner that practises and is told by the diagnosis recovers sooner."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from bench.learning import experiments
 from bench.result import Result, bench
-from bns import presets
-from bns.experiment.batch import Batch
-from bns.experiment.loading import with_learner
-from bns.experiment.world_factory import make_models, make_world
+from bench.rivals import batches
 
 ONSET, AFTER = 12, 20
 RUNS = 6
@@ -61,13 +57,10 @@ def practising_recovers(quick: bool) -> Result:
 
 
 def _columns(side: str, told: dict[str, Any], runs: int) -> dict[str, np.ndarray]:
-    base = replace(presets.load("khepera-simple"), replicates=runs, threads=1)
-    settings = {key: value for key, value in told.items() if key != "learner"}
-    damage = f"wheel_gain:wheel={side},factor=0.8@{ONSET}"
-    if told["learner"] != "bns":
-        base = with_learner(base, told["learner"])
-        settings |= {"prior.world": "mujoco"}
-    config = base.with_({**settings, "world.damage": [damage], "compiled": "no"})
-    batch = Batch([config], [make_world(config)], models=make_models(config))
-    seen = [batch.advance(trial)[0].columns for trial in range(ONSET + AFTER)]
-    return {name: np.stack([row[name] for row in seen], axis=1) for name in seen[0]}
+    damage = [f"wheel_gain:wheel={side},factor=0.8@{ONSET}"]
+    model = {} if told["learner"] == "bns" else {"prior.world": "mujoco"}
+    return batches.columns(
+        runs=runs,
+        trials=ONSET + AFTER,
+        **{"world.damage": damage, "compiled": "no", **model, **told},
+    )

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 from bns.errors import BnsError
-from bns.experiment import robots
 from bns.worlds.trial import Trial
 
 
@@ -14,7 +13,7 @@ def named(
 
     Args:
         trials: lists of commands and what was observed, two at least.
-        robot: its name; of kind "wheeled" or "legged".
+        robot: its name.
         seed: of what is drawn.
 
     Returns:
@@ -23,14 +22,12 @@ def named(
 
     Raises:
         UnknownNameError: no such robot.
+        BnsError: one that the diagnosis has no model of.
     """
     from bns.gap.diagnose import diagnose
-    from bns.gap.models.base import GapModel
-    from bns.gap.models.legged.model import WalkModel
-    from bns.gap.models.wheeled.model import WheeledModel
+    from bns.gap.recordings import load_recordings
 
-    legged = robots.told(robot).kind == "legged"
-    model: GapModel = WalkModel(robot) if legged else WheeledModel(robot)
+    model = load_recordings.model(robot)
     try:
         found = diagnose(trials, model, seed=seed, full=False)
     except BnsError:

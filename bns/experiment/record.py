@@ -164,7 +164,7 @@ class Step:
             ]
         except reading.UNREADABLE as error:
             raise FormatError(f"{name} is not complete: {error}.") from error
-        return cls(_under("column.", stored), _under("array.", stored), trials)
+        return cls(under("column.", stored), under("array.", stored), trials)
 
 
 def assemble(
@@ -208,7 +208,8 @@ def assemble(
     )
 
 
-def _under(prefix: str, stored: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def under(prefix: str, stored: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The arrays whose names begin with a prefix, each as it was, without it."""
     return {
         name.removeprefix(prefix): value
         for name, value in stored.items()

@@ -207,6 +207,15 @@ class Learner(ABC):
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Go on from `state`."""
 
+    def spent(self) -> dict[str, np.ndarray]:
+        """What models have spent, a part of `state`: "spent" ``(R,)``; none without."""
+        return {"spent": np.array([model.spent for model in self.models], np.int64)}
+
+    def restore_spent(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Go on from `spent`."""
+        for model, spent in zip(self.models, arrays["spent"], strict=True):
+            model.spent = int(spent)
+
     def run_in_background(self) -> None:  # noqa: B027 (nothing to do is the default)
         """From now on think in `think`, while trials run, and not in `propose`."""
 
@@ -226,7 +235,7 @@ class RememberingLearner(Learner):
 
     def state(self) -> dict[str, np.ndarray]:
         """See `Learner.state`: all that each run knows, and what models have spent."""
-        found = {"spent": np.array([model.spent for model in self.models], np.int64)}
+        found = self.spent()
         for run, memory in enumerate(self.memories):
             found |= {f"{run}.{name}": array for name, array in vars(memory).items()}
         return found
@@ -236,5 +245,4 @@ class RememberingLearner(Learner):
         for run, memory in enumerate(self.memories):
             for name in vars(memory):
                 setattr(memory, name, arrays[f"{run}.{name}"].copy())
-        for model, spent in zip(self.models, arrays["spent"], strict=True):
-            model.spent = int(spent)
+        self.restore_spent(arrays)

@@ -166,7 +166,7 @@ class CmaEs(Learner):
         """See `Learner.state`: the costs that were told, and what models have spent."""
         return {
             "costs": np.array([search.costs for search in self.searches]),
-            "spent": np.array([model.spent for model in self.models], np.int64),
+            **self.spent(),
         }
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
@@ -175,8 +175,7 @@ class CmaEs(Learner):
         for search, costs in zip(self.searches, arrays["costs"], strict=True):
             for cost in costs:
                 search.tell(float(cost))
-        for model, spent in zip(self.models, arrays["spent"], strict=True):
-            model.spent = int(spent)
+        self.restore_spent(arrays)
 
 
 LEARNER = CmaEs

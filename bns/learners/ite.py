@@ -325,7 +325,7 @@ class Ite(Learner):
             "map_genes": made[0],
             "map_behaviours": made[1],
             "map_worth": made[2],
-            "spent": np.array([model.spent for model in self.models], np.int64),
+            **self.spent(),
         }
 
     @property
@@ -350,8 +350,7 @@ class Ite(Learner):
         for run, (zero, unit) in enumerate(arrays["scale"]):
             if unit:
                 self.maps[run] = self.maps[run]._replace(zero=zero, unit=unit)
-        for model, spent in zip(self.models, arrays["spent"], strict=True):
-            model.spent = int(spent)
+        self.restore_spent(arrays)
 
 
 def harmed(trials: Sequence[Trial]) -> np.ndarray:

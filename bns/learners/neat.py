@@ -359,14 +359,12 @@ class Neat(Bns):
 
     def state(self) -> dict[str, np.ndarray]:
         """See `Learner.state`; beside, what models have spent."""
-        spent = np.array([model.spent for model in self.models], np.int64)
-        return super().state() | {"spent": spent}
+        return super().state() | self.spent()
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """See `Learner.restore`."""
         super().restore(arrays)
-        for model, spent in zip(self.models, arrays["spent"], strict=True):
-            model.spent = int(spent)
+        self.restore_spent(arrays)
 
 
 def _inside(config: RunConfig) -> RunConfig:

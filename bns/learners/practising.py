@@ -21,10 +21,11 @@ from bns import seeding
 from bns.errors import BnsError
 from bns.experiment import diagnosing
 from bns.experiment.config import LearnerSettings
+from bns.experiment.record import Step, under
 from bns.learners.base import Curves, Panel, Proposal
 from bns.learners.bns.learner import Bns
 from bns.worlds.damage import Damage
-from bns.worlds.trial import Channel, Commands, Trial
+from bns.worlds.trial import Trial
 
 MOST = 12
 """trials that a diagnosis is given at most: it costs time with each"""
@@ -77,45 +78,18 @@ class Known:
 
     def state(self) -> dict[str, np.ndarray]:
         """All of it as plain arrays, each as `restore` takes it."""
-        arrays = {
+        return {
             "effects": np.array(self.effects, dtype=np.str_),
             "numbers": np.array([self.right, self.usual, self.asked, self.mended]),
+            **Step({}, {}, self.trials).to_arrays(),
         }
-        for number, trial in enumerate(self.trials):
-            parts = {
-                "values": trial.commands.values,
-                "durations": trial.commands.durations,
-                "told": _written(trial.commands.channels),
-                "seen": _written(trial.channels),
-                **{name: getattr(trial, name) for name in _ARRAYS},
-            }
-            arrays |= {f"{number}.{name}": part for name, part in parts.items()}
-        return arrays
 
-    def restore(self, arrays: Mapping[str, np.ndarray], robot: str) -> None:
-        """Go on from `state`, of a robot of that name."""
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Go on from `state`."""
         self.effects = tuple(str(text) for text in arrays["effects"])
         right, self.usual, asked, mended = arrays["numbers"].tolist()
         self.right, self.asked, self.mended = bool(right), int(asked), bool(mended)
-        self.trials = []
-        while f"{len(self.trials)}.values" in arrays:
-            own = f"{len(self.trials)}."
-            told = _read(arrays[own + "told"])
-            listed = Commands(arrays[own + "values"], arrays[own + "durations"], told)
-            parts: Any = {name: arrays[own + name] for name in _ARRAYS}
-            seen = _read(arrays[own + "seen"])
-            self.trials.append(Trial(listed, channels=seen, robot=robot, **parts))
-
-
-_ARRAYS = ("times", "observed", "boundaries", "handled")
-
-
-def _written(channels: Sequence[Channel]) -> np.ndarray:
-    return np.array([[c.name, c.unit] for c in channels], dtype=np.str_)
-
-
-def _read(rows: np.ndarray) -> tuple[Channel, ...]:
-    return tuple(Channel(str(name), str(unit)) for name, unit in rows)
+        self.trials = list(Step.from_arrays(arrays, "A learner's state").trials)
 
 
 class Practising(Bns):
@@ -198,9 +172,7 @@ class Practising(Bns):
         problem = self.problem
         self.cost = problem.cost(self.memories, self.population)
         if trial + number >= self.config.evolve_from:
-            self.population, self.cost = problem.settle(
-                trial, self.memories, self.population, self.cost
-            )
+            self._settle(trial)
             self._evolve(trial, self.config.evolution.generations)
         best = self.cost.reshape(self.runs, -1).argmin(1)
         tried = problem.controllers(self._by_run(self.population).pick(best))
@@ -209,9 +181,7 @@ class Practising(Bns):
             names = ("practising", self.replicates[run], trial, number)
             seed = seeding.integer(self.config.seed, *names)
             seen = self._modelled(run, self.known[run].effects, [tried[run]], seed)[0]
-            for parts in problem.patterns(run, seen):
-                for memory, part in zip(self.memories, parts, strict=True):
-                    memory.append(run, trial, part)
+            self._remember(run, trial, problem.patterns(run, seen))
             which[run] = True
         for memory in self.memories:
             memory.train(problem, which)
@@ -311,8 +281,7 @@ class Practising(Bns):
 
     def state(self) -> dict[str, np.ndarray]:
         """See `Learner.state`; with what is known of the models, and their cost."""
-        arrays = super().state()
-        arrays["spent"] = np.array([model.spent for model in self.models], np.int64)
+        arrays = super().state() | self.spent()
         for run, known in enumerate(self.known):
             own = known.state().items()
             arrays |= {f"model.{run}.{name}": array for name, array in own}
@@ -321,16 +290,9 @@ class Practising(Bns):
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """See `Learner.restore`."""
         super().restore(arrays)
-        for model, spent in zip(self.models, arrays["spent"], strict=True):
-            model.spent = int(spent)
+        self.restore_spent(arrays)
         for run, known in enumerate(self.known):
-            own = f"model.{run}."
-            mine = {
-                name.removeprefix(own): array
-                for name, array in arrays.items()
-                if name.startswith(own)
-            }
-            known.restore(mine, self.config.world.robot)
+            known.restore(under(f"model.{run}.", arrays))
 
 
 LEARNER = Practising

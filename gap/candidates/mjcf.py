@@ -14,7 +14,7 @@ import numpy as np
 from bns.errors import BnsError, UnknownNameError
 from bns.gap.decomposition.row import Row
 from bns.gap.models.mjcf import effects, prepared
-from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.models.mjcf.config import PLACES, OwnConfig
 from bns.worlds.effects.parts import ALL, ROUND_GEOMS
 
 RATIOS = (0.4, 0.6, 0.8, 0.9, 1.1, 1.25, 1.6, 2.5)
@@ -179,7 +179,7 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
 
 def _by_camera(config: OwnConfig) -> tuple[str, ...]:
     """Channels of places, where joints are seen as well: of two clocks one is late."""
-    places = [item.quantity in ("site", "body") for item in config.seen]
+    places = [item.quantity in PLACES for item in config.seen]
     if all(places):
         return ()
     return tuple(

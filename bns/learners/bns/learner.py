@@ -5,7 +5,7 @@ controllers and trials: `propose` gives what to try, the caller runs it, `observ
 learns from what came back. What differs between tasks is in their `Problem`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -22,6 +22,7 @@ from bns.learners.bns.adaptations import Adaptations
 from bns.learners.bns.change_detection import Detector
 from bns.learners.bns.choice import Deployed, Seen, choose, packed, unpack
 from bns.learners.bns.config import BNS_SECTIONS
+from bns.learners.bns.memory import Patterns
 from bns.learners.bns.problem import Problem, should_compile
 from bns.tasks import registry as tasks
 from bns.tasks.base import Task
@@ -182,9 +183,7 @@ class Bns(Learner):
         if self.deploys:
             self._keep_deployed()
         if trial >= self.config.evolve_from:
-            self.population, self.cost = self.problem.settle(
-                trial, self.memories, self.population, self.cost
-            )
+            self._settle(trial)
             if not self._background:
                 self._evolve(trial, self.config.evolution.generations)
         self._trial, self._generations = trial, 0
@@ -249,6 +248,11 @@ class Bns(Learner):
                 kept.forget(int(min(marks)), trial)
         return np.array([float(kept.again == trial) for kept in self.deployed])
 
+    def _settle(self, trial: int) -> None:
+        self.population, self.cost = self.problem.settle(
+            trial, self.memories, self.population, self.cost
+        )
+
     def _evolve(self, trial: int, generations: int) -> None:
         self.population, self.cost = self.problem.evolve(
             self.memories,
@@ -301,15 +305,22 @@ class Bns(Learner):
             errors[run] = problem.error(run, trial, self.memories, new)
             if watch.detect:
                 innovations[run] = problem.innovation(run, self.memories, new)
-            for parts in (new, *others) if self.learns_from(number) else ():
-                for memory, part in zip(self.memories, parts, strict=True):
-                    memory.append(run, number, part)
+            if self.learns_from(number):
+                self._remember(run, number, (new, *others))
         row = dict(zip(problem.errors, errors.T.copy(), strict=True))
         if watch.detect:
             onsets = self.adaptations.onsets
             row.update(self.detector.figures(number, innovations, onsets))
         self._train(row)
         return row
+
+    def _remember(
+        self, run: int, number: int, patterns: Iterable[Sequence[Patterns]]
+    ) -> None:
+        """Keep what a trial teaches a run, see `Problem.patterns`."""
+        for parts in patterns:
+            for memory, part in zip(self.memories, parts, strict=True):
+                memory.append(run, number, part)
 
     def learns_from(self, trial: int) -> bool:
         """Whether the SNN is to know a trial; here every one."""

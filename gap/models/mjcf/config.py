@@ -31,7 +31,8 @@ START = ("keyframe", "recorded", "settle", "cut")
 LOOP = ("kp", "kd", "torque")
 """of a position loop that the MJCF file lacks"""
 
-QUANTITIES = ("joint", "speed", "site", "body")
+PLACES = ("site", "body")
+QUANTITIES = ("joint", "speed", *PLACES)
 """what an observed channel can be: position or speed of a joint, place of a site or
 body"""
 AXES = ("x", "y", "z")

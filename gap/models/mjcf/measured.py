@@ -49,7 +49,7 @@ def observed(work: Work, seen: list[Column]) -> None:
         # a flywheel is seen by its speed alone: what turns otherwise is another joint
         fast = [p.name for p in found.values() if p.quantity == "speed"]
         still = [joint for joint in joints(model) if joint not in fast]
-        for parts in (joints(model), still if fast else driven, driven):
+        for parts in (joints(model), *([still] if fast else []), driven):
             left = [c for c in rest if c.name not in found]
             free = [p for p in parts if Part(kind, p) not in found.values()]
             hits, reasons = matching.match(left, free)

@@ -11,7 +11,7 @@ from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, Windows
 from bns.gap.models.mjcf import cuts, log, masses, roughness, start
 from bns.gap.models.mjcf import effects as own_effects
-from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.models.mjcf.config import PLACES, OwnConfig
 from bns.gap.models.mjcf.simulation import Simulation
 from bns.gap.recordings import segments
 from bns.storage import files
@@ -19,7 +19,7 @@ from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Trial
 
 LEAST = 0.3  # of the noise that is told: the smallest that is believed
-LEVEL, PLACES = (0, 1), ("site", "body")  # axes and quantities of places over the floor
+LEVEL = (0, 1)  # axes of places over the floor
 BETWEEN = 0.02  # steps that commands are held for beyond a whole number: stamps jitter
 STRIDE = 0.5  # [s] over which those of a free body are compared
 
