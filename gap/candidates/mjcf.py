@@ -202,12 +202,13 @@ def _long(model: mujoco.MjModel, bodies: Iterable[int]) -> list[str]:
 
 
 def _moved(model: mujoco.MjModel, told: Iterable[int]) -> list[int]:
-    """Joints on what the actuators that are told can move: no ball that lies there."""
+    """Joints on what the actuators that are told can move, by way of equalities and
+    tendons, too: no ball that lies there."""
     joints = [prepared.driven(model, actuator) for actuator in told]
     if min(joints, default=0) < 0:
         return list(range(model.njnt))
     root = model.body_rootid[model.jnt_bodyid]
-    roots = {int(root[joint]) for joint in joints}
+    roots = prepared.tied(model, {int(root[joint]) for joint in joints})
     return [joint for joint in range(model.njnt) if int(root[joint]) in roots]
 
 

@@ -1,4 +1,4 @@
-"""Robots of others: a wheel seen by its speed alone, and a table that leans."""
+"""Robots of others: a wheel seen by its speed alone, a table that leans, linkages."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ import pytest
 
 from bns.gap.candidates import mjcf
 from bns.gap.diagnose import diagnose
-from bns.gap.models.mjcf import start
+from bns.gap.models.mjcf import prepared, start
 from bns.gap.records import Diagnosis, Fit, Verdict
 from bns.gap.warnings import warnings
 from tests.gap.own_robots import described
@@ -123,3 +123,29 @@ def test_a_magnitude_at_the_end_of_its_range_is_pointed_out(spun):
         found = Diagnosis("flywheel", 4, (), verdict, fits, {}, {}, {}, {})
         said = " ".join(warnings(found, own.listed))
         assert ("body_mass[rod]: ends where its range does" in said) == bool(at_bound)
+
+
+FOURBAR = """<mujoco><worldbody>
+    <body name="crank"><joint name="crank" axis="0 -1 0"/>
+      <geom type="capsule" size="0.01" fromto="0 0 0 0.08 0 0"/></body>
+    <body name="rocker" pos="0.25 0 0"><joint name="rocker" axis="0 -1 0"/>
+      <geom type="capsule" size="0.01" fromto="0 0 0 0.08 0 0"/></body>
+    <body name="ball" pos="0 1 0"><freejoint/><geom size="0.05"/></body></worldbody>
+  {tie}
+  <actuator><velocity name="motor" joint="crank"/></actuator></mujoco>"""
+TIES = {
+    "none": "",
+    "bodies": '<equality><connect body1="crank" body2="rocker" anchor="0.1 0 0"/>'
+    "</equality>",
+    "joints": '<equality><joint joint1="crank" joint2="rocker"/></equality>',
+    "tendon": '<tendon><fixed><joint joint="crank" coef="1"/><joint joint="rocker" '
+    'coef="-1"/></fixed></tendon>',
+}
+
+
+@pytest.mark.parametrize("tie", TIES)
+def test_what_is_tied_to_a_driven_part_moves_with_it(tie):
+    model = mujoco.MjModel.from_xml_string(FOURBAR.format(tie=TIES[tie]))
+    crank, rocker = model.body("crank").id, model.body("rocker").id
+    wanted = {crank} if tie == "none" else {crank, rocker}
+    assert prepared.tied(model, {crank}) == wanted
