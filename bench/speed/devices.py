@@ -1,15 +1,18 @@
-"""The learner on a GPU beside the same learner on the processor."""
+"""The learner on a GPU beside the same on the processor: seconds, and trials."""
 
 import time
 from dataclasses import replace
 from statistics import median
 from typing import Any
 
+import numpy as np
 import torch
 
+from bench.learning import experiments
 from bench.result import Result, bench
 from bench.speed.learners import by_trial, drawn, in_network
-from bns import presets
+from bench.walking import runs
+from bns import presets, stats
 from bns.errors import BnsError
 from bns.evolution.chromosome import Population
 from bns.experiment.config import RunConfig
@@ -19,6 +22,10 @@ TASKS = ("khepera-simple", "khepera-light", "hexapod-walk")
 RUNS, MANY = 30, 300  # in a batch
 WARM, COUNTED = 2, 5  # trials
 CLOSE = 1e-3  # of costs, relative; float32
+DAMAGE = "left-20"  # of `experiments.DAMAGES`
+WALKED, SMALL = 50, 4  # trials of walkers; in a quick look
+THREADS = 6  # of each of the three that run side by side
+UNLIKE = 0.01  # p below which the two devices learn differently
 
 
 @bench(
@@ -56,6 +63,56 @@ def learner_device(quick: bool) -> Result:
         unit="x",
         holds=None,
         n=COUNTED * len(sizes),
+        details=details,
+    )
+
+
+@bench(
+    "least p of trials to solve and to recover, learned on a GPU or a processor",
+    bar="none: printed (>= 0.01: as two seeds)",
+)
+def learned_on_gpu(quick: bool) -> Result:
+    """30 robots of `khepera-simple` lose 20 % of a wheel's speed, on each device; and
+    ten of `hexapod-nominal` walk, learning on the GPU. quick: six and one, few trials.
+    """
+    if not torch.cuda.is_available():
+        raise BnsError(f"learned-on-gpu needs a GPU: torch here has no {CARD!r}")
+    wheeled = experiments.damaged(DAMAGE)
+    wheeled = experiments.shortened(wheeled) if quick else wheeled
+    walking = runs.undamaged("gpu", trials=WALKED, preset=runs.OWN)
+    walking = replace(runs.small(walking), trials=SMALL) if quick else walking
+    configs = [
+        replace(wheeled, preset=f"{DAMAGE}-{device}", device=device, threads=THREADS)
+        for device in (CARD, "cpu")
+    ]
+    configs.append(replace(walking, device=CARD, threads=THREADS))
+    found = experiments.records(configs)
+    card, processor, walked = (found[config.preset] for config in configs)
+    details: dict[str, Any] = {"GPU": torch.cuda.get_device_name()}
+    least = 1.0
+    for name, trials in (
+        ("solve", stats.trials_to_solve),
+        ("recover", stats.trials_to_recover),
+    ):
+        pair = trials(card), trials(processor)
+        p = float(stats.mann_whitney(*pair))
+        each = dict(zip((CARD, "cpu"), map(experiments.waits, pair), strict=True))
+        details[f"trials to {name}"] = {**each, "p": round(p, 4)}
+        least = min(least, p)
+    hit = runs.adequate(walked, runs.by_hand())
+    details["walkers on the GPU"] = {
+        "trials to the tripod's distance in its time": experiments.waits(
+            experiments.first(hit)
+        ),
+        "last ten trials, median [m]": round(
+            float(np.median(walked["distance"][:, -10:])), 3
+        ),
+    }
+    return Result(
+        figure=round(least, 4),
+        unit="p",
+        holds=None if quick else least >= UNLIKE,
+        n=card.replicates + processor.replicates + walked.replicates,
         details=details,
     )
 
