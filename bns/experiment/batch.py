@@ -13,6 +13,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
 from bns import seeding
 from bns.errors import BnsError
@@ -25,6 +26,13 @@ from bns.tasks.base import Task
 from bns.worlds.damage import Damage
 from bns.worlds.trial import Trial
 from bns.worlds.world import CountedWorld, World, ring
+
+
+ALGEBRA = "libscipy_openblas"
+"""prefix of the linear algebra that comes with NumPy and SciPy. Left alone it takes a
+thread a core for matrices that one has done sooner, and batches that run side by side
+on many cores then mostly wait for each other; what it gives would depend on the cores.
+"""
 
 
 class Batch:
@@ -55,6 +63,7 @@ class Batch:
         self.damages = [Damage.parse(config.world.damage) for config in configs]
         self.task: Task = tasks.of(configs[0])
         self.learner: Learner = learner or self._make_learner(models)
+        self._algebra = ThreadpoolController().select(prefix=ALGEBRA)
 
     def _make_learner(self, models: Sequence[CountedWorld]) -> Learner:
         return learners.get(self.configs[0].learner)(
@@ -71,7 +80,7 @@ class Batch:
         return slice(index * self.replicates, (index + 1) * self.replicates)
 
     def advance(self, trial: int, *, recorded: int = 0) -> tuple[Step, list[Trial]]:
-        """One trial of every run: propose, execute, learn.
+        """One trial of every run: propose, execute, learn; see `ALGEBRA`.
 
         Args:
             trial: its number, counted from 0.
@@ -80,6 +89,10 @@ class Batch:
         Returns:
             What happened, and the trial of every run.
         """
+        with self._algebra.limit(limits=1):
+            return self._advance(trial, recorded)
+
+    def _advance(self, trial: int, recorded: int) -> tuple[Step, list[Trial]]:
         proposal = self.learner.propose(trial)
         tried = self._execute(proposal.tried, trial, "world")
         best = None

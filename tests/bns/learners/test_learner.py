@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from threadpoolctl import ThreadpoolController
 
 from bns.draws import Draws
 from bns.errors import BnsError
-from bns.experiment.batch import Batch
+from bns.experiment.batch import ALGEBRA, Batch
 from bns.experiment.config import RunConfig, WorldConfig
 from bns.experiment.run import train
 from bns.experiment.task_settings import TaskConfig, metres_per_second
@@ -52,6 +53,26 @@ def test_same_seed_same_bytes_and_another_seed_others():
         play(made, 3)
     assert one.learner.theta.numpy().tobytes() == two.learner.theta.numpy().tobytes()
     assert not torch.equal(one.learner.theta, other.learner.theta)
+
+
+def test_numpy_computes_on_one_thread_in_a_trial_and_on_as_many_as_before_after(
+    monkeypatch,
+):
+    made = batch(SMALL)
+    algebra = ThreadpoolController().select(prefix=ALGEBRA)
+    seen = []
+    observe = made.learner.observe
+
+    def watched(*given):
+        seen.extend(library["num_threads"] for library in algebra.info())
+        return observe(*given)
+
+    monkeypatch.setattr(made.learner, "observe", watched)
+    with algebra.limit(limits=2):
+        before = [library["num_threads"] for library in algebra.info()]
+        play(made, 1)
+        assert [library["num_threads"] for library in algebra.info()] == before
+    assert set(seen) <= {1}
 
 
 def test_restored_goes_on_to_the_same_bytes():
