@@ -27,7 +27,6 @@ from bns.worlds.damage import Damage
 from bns.worlds.trial import Trial
 from bns.worlds.world import CountedWorld, World, ring
 
-
 ALGEBRA = "libscipy_openblas"
 """prefix of the linear algebra that comes with NumPy and SciPy. Left alone it takes a
 thread a core for matrices that one has done sooner, and batches that run side by side
