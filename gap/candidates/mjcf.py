@@ -14,7 +14,7 @@ import numpy as np
 from bns.errors import BnsError, UnknownNameError
 from bns.gap.decomposition.row import Row
 from bns.gap.models.mjcf import effects, prepared
-from bns.gap.models.mjcf.config import PLACES, OwnConfig
+from bns.gap.models.mjcf.config import PLACES, OwnConfig, Seen
 from bns.worlds.effects.parts import ALL, ROUND_GEOMS
 
 RATIOS = (0.4, 0.6, 0.8, 0.9, 1.1, 1.25, 1.6, 2.5)
@@ -91,6 +91,8 @@ servos of speed, `actuator_gain` and `command_limit` of all but position servos,
 tilt of what is bolted to the world; `reading_delay` of places, by a camera, beside
 joints, by encoders; the radius of wheels and feet, and grip and
 softness of all that touch, where they touch something"""
+PUSHED = ("joint_damping", "joint_friction", "body_mass")
+"""... also on what is seen and has no motor: a block that is gripped, a door"""
 FEW = 6  # joints up to which `RARER` are considered, too
 RARER = ("joint_backlash", "body_length")
 """the same of a model of few joints: many would cost more than they tell"""
@@ -137,9 +139,9 @@ def _called(item: Row, given: str) -> Row:
 def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]]:
     told = [model.actuator(item.actuator).id for item in config.told]
     moved = _moved(model, told)
-    joints = tuple(model.joint(j).name for j in moved if _hinged(model, j))
+    seen_on = _on(model, (_owner(model, item) for item in config.seen))
+    pushed = [joint for joint in seen_on if joint not in moved]
     owned = {int(model.jnt_bodyid[j]) for j in moved}
-    bodies = [model.body(number).name for number in sorted(owned)]
     seen = tuple(item.channel.name for item in config.seen)
     affine = model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE
     servos = {n for n in told if affine[n] and model.actuator_biasprm[n][1]}
@@ -161,7 +163,7 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
         "reading_offset": seen,
         "body_tilt": _bolted(model, owned),
         "body_length": _long(model, sorted(owned)),
-        **_surfaces(model, joints=moved),
+        **_surfaces(model, joints=(*moved, *pushed)),
     }
     made: dict[str, tuple[str, ...]] = {}
     for name in (*USUAL, *(RARER if len(moved) <= FEW else ())):
@@ -169,12 +171,21 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
         if kind == "actuator":
             made[name] = tuple(model.actuator(n).name for n in told if n in of[name])
         elif kind and name not in of:
-            made[name] = tuple(
-                part for part in (joints if kind == "joint" else bodies) if part
-            )
+            parts = _parts(model, kind, moved)
+            made[name] = parts + (_parts(model, kind, pushed) if name in PUSHED else ())
         else:
             made[name] = tuple(of.get(name, (ALL,)))
     return {name: parts for name, parts in made.items() if parts}
+
+
+def _parts(model: mujoco.MjModel, kind: str, joints: Iterable[int]) -> tuple[str, ...]:
+    """Names of the hinges and slides among joints, or of the bodies on them."""
+    if kind == "joint":
+        found = [model.joint(j).name for j in joints if _hinged(model, j)]
+    else:
+        owned = {int(model.jnt_bodyid[j]) for j in joints}
+        found = [model.body(number).name for number in sorted(owned)]
+    return tuple(name for name in found if name)
 
 
 def _by_camera(config: OwnConfig) -> tuple[str, ...]:
@@ -207,9 +218,27 @@ def _moved(model: mujoco.MjModel, told: Iterable[int]) -> list[int]:
     joints = [prepared.driven(model, actuator) for actuator in told]
     if min(joints, default=0) < 0:
         return list(range(model.njnt))
-    root = model.body_rootid[model.jnt_bodyid]
-    roots = prepared.tied(model, {int(root[joint]) for joint in joints})
-    return [joint for joint in range(model.njnt) if int(root[joint]) in roots]
+    return _on(model, (int(model.jnt_bodyid[joint]) for joint in joints))
+
+
+def _on(model: mujoco.MjModel, bodies: Iterable[int]) -> list[int]:
+    """Joints of the trees of some bodies, and of what is tied to them."""
+    roots = {int(model.body_rootid[body]) for body in bodies} - {0}
+    roots = prepared.tied(model, roots)
+    return [
+        joint
+        for joint, body in enumerate(model.jnt_bodyid)
+        if int(model.body_rootid[body]) in roots
+    ]
+
+
+def _owner(model: mujoco.MjModel, item: Seen) -> int:
+    """Number of the body that a channel tells of."""
+    if item.quantity == "body":
+        return int(model.body(item.part).id)
+    if item.quantity == "site":
+        return int(model.site(item.part).bodyid[0])
+    return int(model.joint(item.part).bodyid[0])
 
 
 def _surfaces(

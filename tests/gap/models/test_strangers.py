@@ -9,6 +9,7 @@ import pytest
 from bns.gap.candidates import mjcf
 from bns.gap.diagnose import diagnose
 from bns.gap.models.mjcf import prepared, start
+from bns.gap.models.mjcf.model import OwnModel
 from bns.gap.records import Diagnosis, Fit, Verdict
 from bns.gap.warnings import warnings
 from tests.gap.own_robots import described
@@ -149,3 +150,34 @@ def test_what_is_tied_to_a_driven_part_moves_with_it(tie):
     crank, rocker = model.body("crank").id, model.body("rocker").id
     wanted = {crank} if tie == "none" else {crank, rocker}
     assert prepared.tied(model, {crank}) == wanted
+
+
+PUSHER = """name = "pusher"
+model = "pusher.xml"
+[commands.speed]
+actuator = "motor"
+unit = "rad/s"
+low = -1.0
+high = 1.0
+[observed.crank]
+joint = "crank"
+unit = "rad"
+noise = 0.001
+{ball}[log]
+time = "t"
+speed = "speed"
+crank = "crank"
+"""
+BALL = '[observed.ball]\nbody = "ball"\naxis = "x"\nunit = "m"\nnoise = 0.001\n'
+
+
+@pytest.mark.parametrize("ball", ["", BALL])
+def test_what_is_pushed_about_is_considered_where_it_is_seen(ball, tmp_path):
+    (tmp_path / "pusher.xml").write_text(FOURBAR.format(tie=""))
+    text = PUSHER.format(ball=ball) + ('ball = "ball"\n' if ball else "")
+    (tmp_path / "pusher.toml").write_text(text)
+    own = OwnModel.read(tmp_path / "pusher.toml", threads=1)
+    names = [item.name for item in mjcf.candidates(own.config, own.physics.model)]
+    assert ("body_mass[ball]" in names) == bool(ball)
+    assert "body_mass[crank]" in names
+    assert "body_mass[rocker]" not in names
