@@ -88,7 +88,8 @@ USUAL = (
 """considered where the user does not say which, on what the commands move:
 `actuator_kp` and `actuator_kd` of position servos, a limit of force of these and of
 servos of speed, `actuator_gain` and `command_limit` of all but position servos, the
-tilt of what is bolted to the world; `reading_delay` of places, by a camera, beside
+tilt of what is bolted to the world; `command_lag` of each command of a model of few
+joints, and of all; `reading_delay` of places, by a camera, beside
 joints, by encoders; the radius of wheels and feet, and grip and
 softness of all that touch, where they touch something"""
 PUSHED = ("joint_damping", "joint_friction", "body_mass")
@@ -143,6 +144,7 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
     pushed = [joint for joint in seen_on if joint not in moved]
     owned = {int(model.jnt_bodyid[j]) for j in moved}
     seen = tuple(item.channel.name for item in config.seen)
+    channels = tuple(item.channel.name for item in config.told)
     affine = model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE
     servos = {n for n in told if affine[n] and model.actuator_biasprm[n][1]}
     looped = servos | {n for n in told if affine[n] and model.actuator_biasprm[n][2]}
@@ -158,6 +160,7 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
             for item, number in zip(config.told, told, strict=True)
             if number not in servos
         ],
+        "command_lag": channels if 1 < len(channels) <= FEW >= len(moved) else (ALL,),
         "reading_delay": _by_camera(config),
         "reading_gain": seen,
         "reading_offset": seen,

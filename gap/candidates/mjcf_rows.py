@@ -27,6 +27,7 @@ GROUPED = (
     "geom_radius",
     "actuator_gain",
     "actuator_kp",
+    "command_lag",
 )
 """effects that may be on all parts alike: one kind of bearing, wheel, motor or supply;
 a loop's damping, `actuator_kd`, is left to that of all joints"""
@@ -193,7 +194,7 @@ def _plausible(item: Row) -> tuple[float, float]:
     elif item.effect.endswith("_offset") and not sd:
         sd = OFFSET * (item.high - item.low)
         slack = SHARE * sd
-    if item.fixed["part"] == ALL and item.effect in GROUPED:
+    if item.joins:
         slack = 0.0
     return sd or EIGHTH * (item.high - item.low), slack
 
