@@ -15,7 +15,7 @@ from bns.errors import BnsError, UnknownNameError
 from bns.gap.decomposition.row import Row
 from bns.gap.models.mjcf import effects, prepared
 from bns.gap.models.mjcf.config import PLACES, OwnConfig, Seen
-from bns.worlds.effects.parts import ALL, ROUND_GEOMS
+from bns.worlds.effects.parts import ALL, ROUND_GEOMS, WIDE
 
 RATIOS = (0.4, 0.6, 0.8, 0.9, 1.1, 1.25, 1.6, 2.5)
 SHARES = (0.02, 0.05, 0.12, 0.3, 1.0)  # of the largest value, beyond the nominal
@@ -28,6 +28,7 @@ WIDER = 10.0
 LEAST = 0.002  # of a limit in the model, which may be far beyond the robot's
 SHORT = 1e-6  # [m] no length
 TILT = 0.5  # [rad] largest tilt of a body
+FREE = ((-np.pi, np.pi), (-1.0, 1.0))  # [rad], [m] of a joint without stops
 PLAY = 0.3  # [rad or m] largest play, or offset of an encoder
 EXCITE = {
     "joint_damping": "fast motion of that joint",
@@ -48,6 +49,7 @@ EXCITE = {
     "reading_offset": "any command",
     "reading_delay": "fast motion",
     "joint_stribeck": "slow motion and reversals of that joint",
+    "joint_stop": "motion to where a stop may be",
     "joint_backlash": "reversals of that joint under changing load",
     "encoder_offset": "motion against gravity, or between stops",
     "body_centre": "motion against gravity, or sudden changes of speed",
@@ -69,6 +71,7 @@ USUAL = (
     "joint_friction",
     "joint_armature",
     "joint_stiffness",
+    "joint_stop",
     "body_mass",
     "body_tilt",
     "actuator_gain",
@@ -88,15 +91,17 @@ USUAL = (
 """considered where the user does not say which, on what the commands move:
 `actuator_kp` and `actuator_kd` of position servos, a limit of force of these and of
 servos of speed, `actuator_gain` and `command_limit` of all but position servos, the
-tilt of what is bolted to the world; `command_lag` of each command of a model of few
-joints, and of all; `reading_delay` of places, by a camera, beside
-joints, by encoders; the radius of wheels and feet, and grip and
-softness of all that touch, where they touch something"""
+tilt of what is bolted to the world; `joint_stop` of joints that are seen;
+`command_lag` of each command of a model of few joints, and of all; `reading_delay` of
+places, by a camera, beside joints, by encoders; the radius of wheels and feet, and grip
+and softness of all that touch, where they touch something"""
 PUSHED = ("joint_damping", "joint_friction", "body_mass")
 """... also on what is seen and has no motor: a block that is gripped, a door"""
 FEW = 6  # joints up to which `RARER` are considered, too
 RARER = ("joint_backlash", "body_length")
 """the same of a model of few joints: many would cost more than they tell"""
+UNSIGNED = ("joint_backlash", "joint_stop")
+"""effects on joints that are no number added to the model's"""
 TOUCHING = ("geom_radius", "geom_friction", "geom_compliance")
 """effects that nothing shows where nothing touches"""
 
@@ -160,6 +165,7 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
             for item, number in zip(config.told, told, strict=True)
             if number not in servos
         ],
+        "joint_stop": [item.part for item in config.seen if item.quantity == "joint"],
         "command_lag": channels if 1 < len(channels) <= FEW >= len(moved) else (ALL,),
         "reading_delay": _by_camera(config),
         "reading_gain": seen,
@@ -184,7 +190,7 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
 def _parts(model: mujoco.MjModel, kind: str, joints: Iterable[int]) -> tuple[str, ...]:
     """Names of the hinges and slides among joints, or of the bodies on them."""
     if kind == "joint":
-        found = [model.joint(j).name for j in joints if _hinged(model, j)]
+        found = [model.joint(j).name for j in joints if prepared.hinged(model, j)]
     else:
         owned = {int(model.jnt_bodyid[j]) for j in joints}
         found = [model.body(number).name for number in sorted(owned)]
@@ -269,15 +275,12 @@ def _surfaces(
 def _bolted(model: mujoco.MjModel, bodies: Iterable[int]) -> list[str]:
     """Names of the bodies on the world that carry some bodies and are not afloat."""
     afloat = {
-        int(model.jnt_bodyid[j]) for j in range(model.njnt) if not _hinged(model, j)
+        int(model.jnt_bodyid[j])
+        for j in range(model.njnt)
+        if not prepared.hinged(model, j)
     }
     roots = {int(model.body_rootid[body]) for body in bodies} - afloat
     return [model.body(root).name for root in sorted(roots) if model.body(root).name]
-
-
-def _hinged(model: mujoco.MjModel, joint: int) -> bool:
-    kinds = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
-    return int(model.jnt_type[joint]) in map(int, kinds)
 
 
 def _candidates(
@@ -290,10 +293,14 @@ def _candidates(
         low, high, unit = _range(name, part, config, model)
         given = config.bounds.get(f"{stem}[{part}]", {})
         low, high = given.get("low", low), given.get("high", high)
-        signed = name.startswith("joint_") and name != "joint_backlash"
+        signed = name.startswith("joint_") and name not in UNSIGNED
         widest = WIDER * high if signed and "high" not in given else high
         sd = EIGHTH * (high if signed else high - low)
-        nominal = high if name == "command_limit" else about.nominal
+        nominal = about.nominal
+        if name == "command_limit" or nominal == WIDE:
+            nominal = high
+        elif nominal == -WIDE:
+            nominal = low
         yield Row(
             name=f"{stem}[{part}]",
             effect=name,
@@ -406,6 +413,9 @@ def _of_joint(name: str, joint: int, model: mujoco.MjModel) -> tuple[float, floa
     mujoco.mj_fullM(model, data, full)
     inertia = float(full[dof, dof])
     slide = int(model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
+    if name == "joint_stop":
+        low, high = model.jnt_range[joint] if model.jnt_limited[joint] else FREE[slide]
+        return float(low), float(high), "m" if slide else "rad"
     if name in ("encoder_offset", "joint_backlash"):
         low = -PLAY if name == "encoder_offset" else 0.0
         return low, PLAY, "m" if slide else "rad"

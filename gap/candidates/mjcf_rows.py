@@ -35,6 +35,9 @@ LATE = ("command_delay", "command_lag", "reading_delay")
 LATER = 0.01  # [s] for derivatives: a lag has next to none where there is none
 CUT = (0.15, 0.3, 0.5, 0.7, 0.9)  # of what was told at most: levels of a limit of it
 TAKEN = (0.4, 0.6, 0.75, 0.88, 0.95, 0.99)  # quantiles of forces, for their limits
+STOPPED = 0.995  # quantile of a joint's positions at which a stop may be
+BESIDE = (0.0, 0.02, -0.02)  # of its travel, beside which one is tried
+SOONER = 0.2  # of its travel, by which a stop may be sooner; later by a quarter of it
 MORE, FULL = (1.25, 1.6), 0.98  # limits that are tried where the model's own is reached
 TOLD = (0.05, 0.12, 0.2, 0.3, 0.4, 0.55)  # quantiles of what was told, for dead zones
 EIGHTH = 0.125  # of the largest value: the plausible one
@@ -69,6 +72,7 @@ def rows(
     *,
     stepped: bool = False,
     forces: Mapping[str, np.ndarray] | None = None,
+    ends: Mapping[str, np.ndarray] | None = None,
 ) -> tuple[Row, ...]:
     """All numbers that may be off, with those of all joints alike.
 
@@ -81,6 +85,8 @@ def rows(
             was simulated by the model's own is a recording, too; neither is a gap.
         forces: by actuator with a limit, those of the nominal motion over it, each
             ``(n,)``.
+        ends: of joints that are stopped sooner than the nominal motion, by name:
+            lowest and highest position recorded, and in the nominal motion, ``(2, 2)``.
     """
     lead = max(0.002, 0.5 * dt)
     late = max(lead, trial_conditions.moments_unknown(trials) / 2)
@@ -89,6 +95,8 @@ def rows(
         if item.effect == "body_mass":
             body = bodies[item.fixed["part"]]
             made += masses.rows(item, body, EXCITE[item.effect])
+        elif item.effect == "joint_stop":
+            made += _stop(item, (ends or {}).get(item.fixed["part"]))
         else:
             made += _of(item, trials, forces or {})
     edge = max(0.02, late)
@@ -183,6 +191,32 @@ def _of(
         slack=item.slack or slack,
         levels=(0.15, 0.3) if late else (),
         step=step,  # of a small one contacts show their chatter
+    )
+
+
+def _stop(item: Row, ends: np.ndarray | None) -> Iterable[Row]:
+    """A stop where the recorded motion ends before the nominal one does.
+
+    Args:
+        item: the candidate.
+        ends: of its joint, see `rows`; None = it ends nowhere sooner.
+    """
+    way, place = (1.0, 1) if item.parameter == "high" else (-1.0, 0)
+    if ends is None or way * (ends[1, place] - ends[0, place]) <= 0:
+        return
+    travel = float(np.ptp(ends[1]))
+    at, free = float(ends[0, place]), float(ends[1, place]) + way * SOONER * travel / 4
+    sooner = at - way * SOONER * travel
+    yield Row(
+        item.name,
+        free,
+        travel / 3,
+        min(free, sooner),
+        max(free, sooner),
+        unit=item.unit,
+        smooth=False,
+        levels=tuple(at + share * travel for share in BESIDE),
+        excite=EXCITE[item.effect],
     )
 
 

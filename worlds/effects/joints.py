@@ -15,6 +15,9 @@ def _added(unit: str, number: str, example: float) -> Parameter:
     return strength("added", unit, (-WIDE, WIDE), doc, example=example)
 
 
+NARROW = 1e-6  # [rad or m] or degrees; MuJoCo refuses a joint without any way to go
+
+
 class _JointNumber(BodyEffect):
     """Something is added to a number of a joint."""
 
@@ -103,6 +106,32 @@ class JointBacklash(BodyEffect):
     def _write(self, spec: Any) -> None:
         for joint in parts.joints(spec, self["part"]):
             parts.loosen(spec, joint, self["play"])
+
+
+class JointStop(BodyEffect):
+    """A joint meets a stop that the model does not know: a shelf, a cable, a bent part.
+
+    Stops that the model has stay. How soft the stop is follows from the model
+    (`solreflimit` of the joint).
+    """
+
+    name = "joint_stop"
+    source = "MuJoCo's joint limits"
+    robots = ("own",)
+    choices = parts.part("joint")
+    parameters = (
+        Parameter("low", "rad or m", -WIDE, -WIDE, WIDE, "lowest position", -0.05),
+        Parameter("high", "rad or m", WIDE, -WIDE, WIDE, "highest position", 0.05),
+    )
+
+    def _write(self, spec: Any) -> None:
+        for joint in parts.joints(spec, self["part"]):
+            low, high = (
+                parts.in_file(spec, joint, self[end]) for end in ("low", "high")
+            )
+            if joint.range[0] != joint.range[1]:
+                low, high = max(low, joint.range[0]), min(high, joint.range[1])
+            joint.range, joint.limited = (low, max(high, low + NARROW)), True
 
 
 class EncoderOffset(BodyEffect):

@@ -133,7 +133,7 @@ def joints(model: mujoco.MjModel) -> list[str]:
     return [
         model.joint(j).name
         for j in range(model.njnt)
-        if rehearsal.hinged(model, j) and model.joint(j).name
+        if prepared.hinged(model, j) and model.joint(j).name
     ]
 
 

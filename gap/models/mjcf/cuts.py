@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 
 from bns.gap.models.base import GapModel
-from bns.gap.models.mjcf import start
+from bns.gap.models.mjcf import prepared, start
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.recordings.segments import piece
 from bns.worlds.trial import Trial
@@ -281,10 +281,8 @@ def foreseen(
 def _observed(config: OwnConfig, model: mujoco.MjModel) -> bool:
     """Whether each joint turns or slides and is seen: then a state can be told."""
     seen = {item.part for item in config.seen if item.quantity == "joint"}
-    kinds = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
     return all(
-        int(model.jnt_type[number]) in map(int, kinds)
-        and model.joint(number).name in seen
+        prepared.hinged(model, number) and model.joint(number).name in seen
         for number in range(model.njnt)
     )
 

@@ -20,6 +20,7 @@ from bns.worlds.trial import Trial
 
 LEAST = 0.3  # of the noise that is told: the smallest that is believed
 LEVEL = (0, 1)  # axes of places over the floor
+SHORT, SHARE = 5.0, 0.01  # of the noise, of a joint's travel: sooner by more is stopped
 BETWEEN = 0.02  # steps that commands are held for beyond a whole number: stamps jitter
 STRIDE = 0.5  # [s] over which those of a free body are compared
 
@@ -133,7 +134,31 @@ class OwnModel(GapModel):
             self._bodies,
             stepped=self._parts > 1,
             forces=loads.forces,
+            ends=self._ends(trials, loads.travel),
         )
+
+    def _ends(
+        self, trials: Sequence[Trial], travel: Mapping[str, np.ndarray]
+    ) -> dict[str, np.ndarray]:
+        """See `mjcf_rows.rows`, of joints that went less far than the nominal motion.
+
+        Args:
+            trials: a recording.
+            travel: of the nominal motion of some trials, see `Loads`.
+        """
+        found = {}
+        for column, item in enumerate(self.config.seen):
+            if item.quantity == "joint":
+                went = np.concatenate([trial.observed[:, column] for trial in trials])
+                share = 1.0 - mjcf_rows.STOPPED
+                ends = np.nanquantile(went, (share, 1.0 - share))
+                free = travel.get(item.part, ends)
+                out = np.array([ends[0] - free[0], free[1] - ends[1]])
+                least = max(SHORT * item.noise, SHARE * float(np.ptp(free)))
+                free = np.where(out > least, free, ends)
+                if (free != ends).any():
+                    found[item.part] = np.stack([ends, free])
+        return found
 
     def stepped(self, trials: Sequence[Trial], rows: Sequence[Row]) -> tuple[Row, ...]:
         """See `GapModel.stepped`: a simulation is rough where something touches."""

@@ -99,6 +99,12 @@ def _by_tendon(model: mujoco.MjModel) -> Iterable[list[int]]:
         yield bodies
 
 
+def hinged(model: mujoco.MjModel, joint: int) -> bool:
+    """Whether a joint is a hinge or a slide."""
+    kinds = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+    return int(model.jnt_type[joint]) in map(int, kinds)
+
+
 def loose(model: mujoco.MjModel) -> list[str]:
     """Names of the bodies on free joints that carry joints which are driven."""
     joints = (driven(model, actuator) for actuator in range(model.nu))

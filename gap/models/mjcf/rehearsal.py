@@ -6,6 +6,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from bns.gap.models.mjcf import prepared
 from bns.worlds.data.units import per_si
 
 JOINT, SITE, BODY, SPEED = "joint", "site", "body", "speed"
@@ -33,12 +34,6 @@ class Fit(NamedTuple):
     score: float
     unit: str
     correlation: float
-
-
-def hinged(model: mujoco.MjModel, joint: int) -> bool:
-    """Whether a joint has one coordinate."""
-    kinds = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
-    return int(model.jnt_type[joint]) in map(int, kinds)
 
 
 def motions(
@@ -79,7 +74,7 @@ def _by_part(model: mujoco.MjModel, table: np.ndarray) -> dict[Part, np.ndarray]
     found = {}
     for number in range(model.njnt):
         joint = model.joint(number)
-        if hinged(model, number) and joint.name:
+        if prepared.hinged(model, number) and joint.name:
             found[Part(JOINT, joint.name)] = table[:, joint.qposadr[0]]
             found[Part(SPEED, joint.name)] = table[:, model.nq + joint.dofadr[0]]
     base = model.nq + model.nv

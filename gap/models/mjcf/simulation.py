@@ -41,10 +41,12 @@ class Loads(NamedTuple):
     Attributes:
         forces: of each actuator that has a limit, over that, by name, ``(n,)``.
         touching: names of the geoms that touch something.
+        travel: lowest and highest position of each hinge and slide, by name, ``(2,)``.
     """
 
     forces: Mapping[str, np.ndarray] = {}
     touching: frozenset[str] = frozenset()
+    travel: Mapping[str, np.ndarray] = {}
 
 
 class _Group(NamedTuple):
@@ -171,15 +173,17 @@ class Simulation:
         return parts
 
     def loads(self, trials: Sequence[Trial]) -> Loads:
-        """Forces and contacts at moments of some of the trials, as the nominal model
-        moves.
+        """Forces, contacts and positions at moments of some of the trials, as the
+        nominal model moves.
 
         Args:
             trials: recorded.
         """
         model, seen, touching = self.model, [], set[int]()
+        places = []
         for data in self._moments(trials):
             seen.append(np.abs(data.actuator_force))
+            places.append(data.qpos.copy())
             touching |= set(data.contact.geom.ravel().tolist())
         most = np.abs(model.actuator_forcerange).max(axis=1)
         limited = np.flatnonzero(model.actuator_forcelimited).tolist()
@@ -190,6 +194,13 @@ class Simulation:
                 if seen  # else it diverged at once
             },
             frozenset(model.geom(number).name for number in touching),
+            {
+                model.joint(number).name: np.array([min(went), max(went)])
+                for number, went in enumerate(np.array(places).T[model.jnt_qposadr])
+                if prepared.hinged(model, number)
+            }
+            if places
+            else {},
         )
 
     def apart(self, loads: Loads) -> None:

@@ -181,3 +181,36 @@ def test_what_is_pushed_about_is_considered_where_it_is_seen(ball, tmp_path):
     assert ("body_mass[ball]" in names) == bool(ball)
     assert "body_mass[crank]" in names
     assert "body_mass[rocker]" not in names
+
+
+LIFT = """<mujoco model="lift"><option timestep="0.002"/>
+  <worldbody><body name="plate"><joint name="rail" type="slide" axis="1 0 0"
+      damping="2"/><geom size="0.05" mass="0.8" contype="0" conaffinity="0"/>
+    </body></worldbody>
+  <actuator><position name="drive" joint="rail" kp="120" kv="12"/></actuator>
+  </mujoco>"""
+
+
+def test_a_stop_that_the_model_does_not_know_is_found_where_it_is(tmp_path):
+    model = mujoco.MjModel.from_xml_string(
+        LIFT.replace('axis="1 0 0"', 'axis="1 0 0" limited="true" range="-1 0.12"')
+    )
+    model.opt.timestep = 0.0005
+    rng, lines = np.random.default_rng(1), ["time,drive,rail,trial"]
+    for trial in range(6):
+        data, told = mujoco.MjData(model), rng.uniform(-0.3, 0.3, 4).round(2)
+        for sample in range(160):
+            data.ctrl[0] = told[sample // 40]
+            seen = data.qpos[0] + rng.normal(0, 0.001)
+            lines.append(f"{sample / 50:.3f},{data.ctrl[0]},{seen:.5f},{trial}")
+            mujoco.mj_step(model, data, 40)
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    _, own = described(tmp_path, LIFT, tmp_path / "log.csv")
+    trials = own.read_log(str(tmp_path / "log.csv"))
+    found = diagnose(trials, own, full=False)
+    assert list(found.best.names) == ["joint_stop.high[rail]"]
+    assert found.best.magnitudes[0] == pytest.approx(0.12, abs=0.003)
+    (stopped,) = own.simulate(trials, [tuple(map(own.parse, found.best.effects))])
+    assert max(path.max() for path in stopped) == pytest.approx(
+        max(np.nanmax(trial.observed) for trial in trials), abs=0.005
+    )
