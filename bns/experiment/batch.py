@@ -62,7 +62,7 @@ class Batch:
         self.damages = [Damage.parse(config.world.damage) for config in configs]
         self.task: Task = tasks.of(configs[0])
         self.learner: Learner = learner or self._make_learner(models)
-        self._algebra = ThreadpoolController().select(prefix=ALGEBRA)
+        self._algebra = _algebra()
 
     def _make_learner(self, models: Sequence[CountedWorld]) -> Learner:
         return learners.get(self.configs[0].learner)(
@@ -131,6 +131,11 @@ class Batch:
             part = tried[self.part(index)]
             trials += self.task.execute(world, part, trial=trial, seeds=seeds)
         return trials
+
+
+def _algebra() -> ThreadpoolController:
+    """What limits the threads of NumPy's linear algebra, see `ALGEBRA`."""
+    return ThreadpoolController().select(prefix=ALGEBRA)
 
 
 def told(trials: Sequence[Trial]) -> list[Trial]:
@@ -293,6 +298,7 @@ def _serve(
     from bns.learners import registry as learners
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # it ends with the robot's process
+    _algebra().limit(limits=1)  # until the process ends; the robot's loop needs a core
     learner = learners.get(configs[0].learner)(
         configs,
         replicates=replicates,
