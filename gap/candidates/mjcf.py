@@ -25,6 +25,7 @@ EIGHTH = 0.125  # of a range: a plausible departure where nothing else is known
 # Times the largest value that is looked for first: geared servos have much friction and
 # inertia for the links that they move; assumed.
 WIDER = 10.0
+SLOWEST = 0.03  # [s] period of a loop
 LEAST = 0.002  # of a limit in the model, which may be far beyond the robot's
 SHORT = 1e-6  # [m] no length
 TILT = 0.5  # [rad] largest tilt of a body
@@ -55,6 +56,7 @@ EXCITE = {
     "body_centre": "motion against gravity, or sudden changes of speed",
     "body_length": "large excursions",
     "body_tilt": "motion against gravity",
+    "actuator_period": "steps",
     "actuator_kp": "steps, and loads that are held",
     "actuator_kd": "steps",
     "actuator_torque_limit": "large and sudden commands",
@@ -77,6 +79,7 @@ USUAL = (
     "actuator_gain",
     "actuator_kp",
     "actuator_kd",
+    "actuator_period",
     "actuator_torque_limit",
     "command_limit",
     "command_delay",
@@ -89,7 +92,8 @@ USUAL = (
     "geom_compliance",
 )
 """considered where the user does not say which, on what the commands move:
-`actuator_kp` and `actuator_kd` of position servos, a limit of force of these and of
+`actuator_kp` and `actuator_kd` of position servos, `actuator_period` of all whose gains
+the description gives, a limit of force of these and of
 servos of speed, `actuator_gain` and `command_limit` of all but position servos, the
 tilt of what is bolted to the world; `joint_stop` of joints that are seen;
 `command_lag` of each command of a model of few joints, and of all; `reading_delay` of
@@ -177,7 +181,9 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
     made: dict[str, tuple[str, ...]] = {}
     for name in (*USUAL, *(RARER if len(moved) <= FEW else ())):
         kind = effects.OWNERS.get(name)
-        if kind == "actuator":
+        if name == "actuator_period":
+            made[name] = (ALL,) if any(item.kd for item in config.told) else ()
+        elif kind == "actuator":
             made[name] = tuple(model.actuator(n).name for n in told if n in of[name])
         elif kind and name not in of:
             parts = _parts(model, kind, moved)
@@ -377,13 +383,15 @@ def _of_model(
     name: str, kind: str, part: str, model: mujoco.MjModel
 ) -> tuple[float, float, str]:
     known = _names(model, kind)
-    if kind == "geom" and part == ALL:
+    if part == ALL and (kind == "geom" or name == "actuator_period"):
         known.append(ALL)
     if part not in known:
         raise UnknownNameError(f"{kind} in [effects] {name}", part, known)
     at = known.index(part)
     if name == "actuator_torque_limit":
         return LEAST, 3.0, "1"
+    if name == "actuator_period":
+        return 0.0, SLOWEST, "s"
     if name == "geom_radius":
         return 0.7, 1.4, "1"
     if name == "geom_compliance":

@@ -44,11 +44,13 @@ EIGHTH = 0.125  # of the largest value: the plausible one
 OFFSET = 0.0625  # of the span of an offset
 
 # plausible departure and slack of what has no scale of its own (assumed): a gain of a
-# motor is known to 10 %, of a sensor and a tyre to 3 %, a delay to 40 ms
+# motor is known to 10 %, of a sensor and a tyre to 3 %, a delay to 40 ms; loops run at
+# 1 kHz, or at some 200 Hz
 PLAUSIBLE = {
     "actuator_gain": (0.1, 0.003),
     "actuator_kp": (0.05, 0.003),
     "actuator_kd": (0.15, 0.01),
+    "actuator_period": (0.004, 4e-4),
     "command_gain": (0.1, 0.003),
     "reading_gain": (0.03, 0.001),
     "geom_friction": (0.3, 0.0),

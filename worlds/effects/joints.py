@@ -240,6 +240,35 @@ class ActuatorKd(BodyEffect):
             item.biasprm[2] *= self["factor"]
 
 
+class ActuatorPeriod(BodyEffect):
+    """A servo's loop runs in a computer, once in a period.
+
+    It holds its force for that long, and takes speeds from two of its readings: it goes
+    by where the joint was half a period ago, and by how fast it was a whole one ago. To
+    first order that is a loop with less damping, by kp period / 2, on a joint with
+    less armature, by kd period, of which it has none at least.
+    """
+
+    name = "actuator_period"
+    source = "zero-order hold and backward difference; bounds assumed"
+    robots = ("own",)
+    choices = parts.part("actuator")
+    parameter = strength("period", "s", (0.0, 0.5), "of the loop", example=0.02)
+
+    def _write(self, spec: Any) -> None:
+        """See `BodyEffect.edit`.
+
+        Raises:
+            BnsError: an actuator has no damping gain.
+        """
+        period = self["period"]
+        for item in _servos(spec, self["part"], 2, "damping gain"):
+            kp, kd = -item.biasprm[1], -item.biasprm[2]
+            (joint,) = parts.joints(spec, item.target)
+            joint.armature = max(joint.armature - kd * period * item.gear[0] ** 2, 0.0)
+            item.biasprm[2] += kp * period / 2
+
+
 class ActuatorTorqueLimit(BodyEffect):
     """An actuator's largest force or torque differs from the model's.
 

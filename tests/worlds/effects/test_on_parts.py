@@ -270,3 +270,41 @@ class TestCommands:
         made = effect.change(step, 0.01)
         assert made[9] == 0 and made[10] == pytest.approx(0.02)
         assert made[58] == pytest.approx(0.98) and made[59] == 1.0
+
+
+LOOP = """
+<mujoco><option timestep="0.001" integrator="implicitfast"/><worldbody><body>
+  <joint name="knee" axis="0 1 0" armature="0.01" damping="0.05"/>
+  <geom type="capsule" fromto="0 0 0 0 0 -0.2" size="0.02" mass="0.6"/>
+</body></worldbody><actuator>{}</actuator></mujoco>
+"""
+KP, KD = 25.0, 0.8
+
+
+@pytest.mark.parametrize("period", [0.005, 0.01])
+def test_a_loop_in_a_computer_is_one_with_its_period(period):
+    goals = [
+        0.4 * np.sin(3 * t) + 0.3 * (np.sin(7 * t) > 0)
+        for t in np.arange(round(3 / period)) * period
+    ]
+
+    def moved(model, loop) -> np.ndarray:
+        data, path, last = mujoco.MjData(model), [], 0.0
+        for goal in goals:
+            at = data.qpos[0]
+            data.ctrl[0] = (
+                KP * (goal - at) - KD * (at - last) / period if loop else goal
+            )
+            last = at
+            for _ in range(round(period / model.opt.timestep)):
+                mujoco.mj_step(model, data)
+                path.append(data.qpos[0])
+        return np.array(path)
+
+    real = moved(compiled(xml=LOOP.format('<motor joint="knee"/>')), loop=True)
+    servo = LOOP.format(f'<position name="a" joint="knee" kp="{KP}" kv="{KD}"/>')
+    apart = [
+        np.std(real - moved(compiled(*texts, xml=servo), loop=False))
+        for texts in ((), (f"actuator_period:part=a,period={period}",))
+    ]
+    assert apart[1] < 0.3 * apart[0]
