@@ -93,15 +93,15 @@ USUAL = (
 )
 """considered where the user does not say which, on what the commands move:
 `actuator_kp` and `actuator_kd` of position servos, `actuator_period` of all whose gains
-the description gives, a limit of force of these and of
-servos of speed, `actuator_gain` and `command_limit` of all but position servos, the
-tilt of what is bolted to the world; `joint_stop` of joints that are seen;
-`command_lag` of each command of a model of few joints, and of all; `reading_delay` of
-places, by a camera, beside joints, by encoders; the radius of wheels and feet, and grip
-and softness of all that touch, where they touch something"""
+the description gives, a limit of force of these and of servos of speed, `actuator_gain`
+and `command_limit` of all but position servos, the tilt of what is bolted to the world;
+`joint_stop` of joints that are seen; `command_lag` of each command where there are few,
+and of all; `reading_delay` of each reading where there are few, else of places, by a
+camera, beside joints, by encoders; the radius of wheels and feet, and grip and softness
+of all that touch, where they touch something"""
 PUSHED = ("joint_damping", "joint_friction", "body_mass")
 """... also on what is seen and has no motor: a block that is gripped, a door"""
-FEW = 6  # joints up to which `RARER` are considered, too
+FEW = 6  # joints up to which `RARER` are considered, too; commands, readings
 RARER = ("joint_backlash", "body_length")
 """the same of a model of few joints: many would cost more than they tell"""
 UNSIGNED = ("joint_backlash", "joint_stop")
@@ -170,8 +170,8 @@ def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...
             if number not in servos
         ],
         "joint_stop": [item.part for item in config.seen if item.quantity == "joint"],
-        "command_lag": channels if 1 < len(channels) <= FEW >= len(moved) else (ALL,),
-        "reading_delay": _by_camera(config),
+        "command_lag": channels if 1 < len(channels) <= FEW else (ALL,),
+        "reading_delay": seen if 1 < len(seen) <= FEW else _by_camera(config),
         "reading_gain": seen,
         "reading_offset": seen,
         "body_tilt": _bolted(model, owned),

@@ -95,17 +95,20 @@ def test_a_table_that_leans_six_times_as_far_as_tables_do_is_a_gap(
     assert list(found.best.names) == (["body_tilt.pitch[table]"] if named else [])
 
 
-def test_a_camera_beside_encoders_may_be_late(spun):
+def test_of_few_readings_each_may_be_late_of_many_a_camera_beside_encoders(spun):
     own, _ = spun
-    assert "reading_delay" not in {row.effect for row in own.listed}
-    place = replace(own.config.seen[0], quantity="body", part="wheel", axis=0)
-    beside = replace(own.config, seen=(*own.config.seen, place))
-    made = mjcf.candidates(beside, own.physics.model)
-    late = [row for row in made if row.effect == "reading_delay"]
-    assert [row.fixed["part"] for row in late] == [place.channel.name]
-    alone = replace(own.config, seen=(place,))
-    names = [r.effect for r in mjcf.candidates(alone, own.physics.model)]
-    assert "reading_delay" not in names and "command_delay" in names
+
+    def late(seen) -> list[str]:
+        config = replace(own.config, seen=seen)
+        made = mjcf.candidates(config, own.physics.model)
+        assert "command_delay" in {row.effect for row in made}
+        return [r.fixed["part"] for r in made if r.effect == "reading_delay"]
+
+    joints = own.config.seen
+    assert late(joints) == [item.channel.name for item in joints]
+    assert late(joints[:1]) == []
+    place = replace(joints[0], quantity="body", part="wheel", axis=0)
+    assert late((*joints * 3, place)) == [place.channel.name]
 
 
 def test_a_magnitude_at_the_end_of_its_range_is_pointed_out(spun):
