@@ -48,7 +48,7 @@ def _refitted(
         return []
     clear = problem.model.many and descent.enough(problem, point, 1)
     fitted = tried.by_tangent if clear else tried.fitted
-    most = fitted[0].height + 2 * (TIED + MARGIN)
+    most = min((one.height for one in fitted), default=0.0) + 2 * (TIED + MARGIN)
     near = [one for one in fitted if one.height < most]
     rivals = [one for one in near if one.name not in point.support][:KEPT]
     if not rivals:

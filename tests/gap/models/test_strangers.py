@@ -213,6 +213,8 @@ def test_a_stop_that_the_model_does_not_know_is_found_where_it_is(tmp_path):
     found = diagnose(trials, own, full=False)
     assert list(found.best.names) == ["joint_stop.high[rail]"]
     assert found.best.magnitudes[0] == pytest.approx(0.12, abs=0.003)
+    alone = OwnModel(replace(own.config, effects={"joint_stop": ("rail",)}), threads=1)
+    assert diagnose(trials, alone, full=False).best.names == found.best.names
     (stopped,) = own.simulate(trials, [tuple(map(own.parse, found.best.effects))])
     assert max(path.max() for path in stopped) == pytest.approx(
         max(np.nanmax(trial.observed) for trial in trials), abs=0.005
