@@ -74,6 +74,29 @@ PUCK = """<mujoco model="puck"><option timestep="0.002"/>
   <actuator><motor name="push" joint="slide"/></actuator></mujoco>"""
 
 
+def logged(folder, model, *, span, commands, samples, noise):
+    """Write a log of six trials at 50 Hz of a model with one joint and one actuator.
+
+    Args:
+        folder: where `log.csv` is written.
+        model: the robot, at steps of 0.5 ms.
+        span: commands are drawn up to so much either way.
+        commands: of a trial.
+        samples: that each lasts.
+        noise: of the measurement.
+    """
+    rng = np.random.default_rng(1)
+    lines = [f"time,{model.actuator(0).name},{model.joint(0).name},trial"]
+    for trial in range(6):
+        data, told = mujoco.MjData(model), rng.uniform(-span, span, commands).round(2)
+        for sample in range(commands * samples):
+            data.ctrl[0] = told[sample // samples]
+            seen = data.qpos[0] + rng.normal(0, noise)
+            lines.append(f"{sample / 50:.3f},{data.ctrl[0]},{seen:.5f},{trial}")
+            mujoco.mj_step(model, data, 40)
+    (folder / "log.csv").write_text("\n".join(lines) + "\n")
+
+
 @pytest.mark.parametrize(("lean", "named"), [(0.0, False), (0.006, True)])
 def test_a_table_that_leans_six_times_as_far_as_tables_do_is_a_gap(
     tmp_path, lean, named
@@ -81,15 +104,7 @@ def test_a_table_that_leans_six_times_as_far_as_tables_do_is_a_gap(
     model = mujoco.MjModel.from_xml_string(PUCK)
     model.opt.timestep = 0.0005
     model.opt.gravity[0] = 9.81 * lean
-    rng, lines = np.random.default_rng(1), ["time,push,slide,trial"]
-    for trial in range(6):
-        data, told = mujoco.MjData(model), rng.uniform(-0.4, 0.4, 6).round(2)
-        for sample in range(150):
-            data.ctrl[0] = told[sample // 25]
-            seen = data.qpos[0] + rng.normal(0, 0.0015)
-            lines.append(f"{sample / 50:.3f},{data.ctrl[0]},{seen:.5f},{trial}")
-            mujoco.mj_step(model, data, 40)
-    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    logged(tmp_path, model, span=0.4, commands=6, samples=25, noise=0.0015)
     _, own = described(tmp_path, PUCK, tmp_path / "log.csv")
     found = diagnose(own.read_log(str(tmp_path / "log.csv")), own, full=False)
     assert list(found.best.names) == (["body_tilt.pitch[table]"] if named else [])
@@ -199,15 +214,7 @@ def test_a_stop_that_the_model_does_not_know_is_found_where_it_is(tmp_path):
         LIFT.replace('axis="1 0 0"', 'axis="1 0 0" limited="true" range="-1 0.12"')
     )
     model.opt.timestep = 0.0005
-    rng, lines = np.random.default_rng(1), ["time,drive,rail,trial"]
-    for trial in range(6):
-        data, told = mujoco.MjData(model), rng.uniform(-0.3, 0.3, 4).round(2)
-        for sample in range(160):
-            data.ctrl[0] = told[sample // 40]
-            seen = data.qpos[0] + rng.normal(0, 0.001)
-            lines.append(f"{sample / 50:.3f},{data.ctrl[0]},{seen:.5f},{trial}")
-            mujoco.mj_step(model, data, 40)
-    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    logged(tmp_path, model, span=0.3, commands=4, samples=40, noise=0.001)
     _, own = described(tmp_path, LIFT, tmp_path / "log.csv")
     trials = own.read_log(str(tmp_path / "log.csv"))
     found = diagnose(trials, own, full=False)
