@@ -12,10 +12,11 @@ import mujoco
 import numpy as np
 
 from bns.errors import BnsError, UnknownNameError
+from bns.gap.candidates.mjcf_usual import usual
 from bns.gap.decomposition.row import Row
-from bns.gap.models.mjcf import effects, prepared
-from bns.gap.models.mjcf.config import PLACES, OwnConfig, Seen
-from bns.worlds.effects.parts import ALL, ROUND_GEOMS, WIDE
+from bns.gap.models.mjcf import effects
+from bns.gap.models.mjcf.config import OwnConfig
+from bns.worlds.effects.parts import ALL, WIDE
 
 RATIOS = (0.4, 0.6, 0.8, 0.9, 1.1, 1.25, 1.6, 2.5)
 SHARES = (0.02, 0.05, 0.12, 0.3, 1.0)  # of the largest value, beyond the nominal
@@ -27,7 +28,6 @@ EIGHTH = 0.125  # of a range: a plausible departure where nothing else is known
 WIDER = 10.0
 SLOWEST = 0.03  # [s] period of a loop
 LEAST = 0.002  # of a limit in the model, which may be far beyond the robot's
-SHORT = 1e-6  # [m] no length
 TILT = 0.5  # [rad] largest tilt of a body
 FREE = ((-np.pi, np.pi), (-1.0, 1.0))  # [rad], [m] of a joint without stops
 PLAY = 0.3  # [rad or m] largest play, or offset of an encoder
@@ -68,46 +68,8 @@ _DELAYS = {
     "reading_delay[all]": ("command_delay[all]",),
 }
 """alike where every command and every reading is late"""
-USUAL = (
-    "joint_damping",
-    "joint_friction",
-    "joint_armature",
-    "joint_stiffness",
-    "joint_stop",
-    "body_mass",
-    "body_tilt",
-    "actuator_gain",
-    "actuator_kp",
-    "actuator_kd",
-    "actuator_period",
-    "actuator_torque_limit",
-    "command_limit",
-    "command_delay",
-    "command_lag",
-    "reading_delay",
-    "reading_gain",
-    "reading_offset",
-    "geom_radius",
-    "geom_friction",
-    "geom_compliance",
-)
-"""considered where the user does not say which, on what the commands move:
-`actuator_kp` and `actuator_kd` of position servos, `actuator_period` of all whose gains
-the description gives, a limit of force of these and of servos of speed, `actuator_gain`
-and `command_limit` of all but position servos, the tilt of what is bolted to the world;
-`joint_stop` of joints that are seen; `command_lag` of each command where there are few,
-and of all; `reading_delay` of each reading where there are few, else of places, by a
-camera, beside joints, by encoders; the radius of wheels and feet, and grip and softness
-of all that touch, where they touch something"""
-PUSHED = ("joint_damping", "joint_friction", "body_mass")
-"""... also on what is seen and has no motor: a block that is gripped, a door"""
-FEW = 6  # joints up to which `RARER` are considered, too; commands, readings
-RARER = ("joint_backlash", "body_length")
-"""the same of a model of few joints: many would cost more than they tell"""
 UNSIGNED = ("joint_backlash", "joint_stop")
 """effects on joints that are no number added to the model's"""
-TOUCHING = ("geom_radius", "geom_friction", "geom_compliance")
-"""effects that nothing shows where nothing touches"""
 
 
 def candidates(config: OwnConfig, model: mujoco.MjModel) -> tuple[Row, ...]:
@@ -120,7 +82,7 @@ def candidates(config: OwnConfig, model: mujoco.MjModel) -> tuple[Row, ...]:
     Raises:
         BnsError: an effect on a part that the model lacks, or bounds for none.
     """
-    wanted = config.effects if config.effects is not None else _usual(config, model)
+    wanted = config.effects if config.effects is not None else usual(config, model)
     config = replace(
         config, bounds={effects.current(k): row for k, row in config.bounds.items()}
     )
@@ -146,149 +108,6 @@ def _called(item: Row, given: str) -> Row:
     return replace(item, name=given + item.name.removeprefix(item.effect))
 
 
-def _usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]]:
-    told = [model.actuator(item.actuator).id for item in config.told]
-    moved = _moved(model, told)
-    seen_on = _on(model, (_owner(model, item) for item in config.seen))
-    pushed = [joint for joint in seen_on if joint not in moved]
-    owned = {int(model.jnt_bodyid[j]) for j in moved}
-    seen = tuple(item.channel.name for item in config.seen)
-    channels = tuple(item.channel.name for item in config.told)
-    affine = model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE
-    servos = {n for n in told if affine[n] and model.actuator_biasprm[n][1]}
-    looped = servos | {n for n in told if affine[n] and model.actuator_biasprm[n][2]}
-    damped = {number for number in servos if model.actuator_biasprm[number][2]}
-    limited = {number for number in told if model.actuator_forcelimited[number]}
-    of = {
-        "actuator_gain": set(told) - servos,
-        "actuator_kp": servos,
-        "actuator_kd": damped,
-        "actuator_torque_limit": limited & looped,
-        "command_limit": [
-            item.channel.name
-            for item, number in zip(config.told, told, strict=True)
-            if number not in servos
-        ],
-        "joint_stop": [item.part for item in config.seen if item.quantity == "joint"],
-        "command_lag": channels if 1 < len(channels) <= FEW else (ALL,),
-        "reading_delay": seen if 1 < len(seen) <= FEW else _by_camera(config),
-        "reading_gain": seen,
-        "reading_offset": seen,
-        "body_tilt": _bolted(model, owned),
-        "body_length": _long(model, sorted(owned)),
-        **_surfaces(model, joints=(*moved, *pushed)),
-    }
-    made: dict[str, tuple[str, ...]] = {}
-    for name in (*USUAL, *(RARER if len(moved) <= FEW else ())):
-        kind = effects.OWNERS.get(name)
-        if name == "actuator_period":
-            made[name] = (ALL,) if any(item.kd for item in config.told) else ()
-        elif kind == "actuator":
-            made[name] = tuple(model.actuator(n).name for n in told if n in of[name])
-        elif kind and name not in of:
-            parts = _parts(model, kind, moved)
-            made[name] = parts + (_parts(model, kind, pushed) if name in PUSHED else ())
-        else:
-            made[name] = tuple(of.get(name, (ALL,)))
-    return {name: parts for name, parts in made.items() if parts}
-
-
-def _parts(model: mujoco.MjModel, kind: str, joints: Iterable[int]) -> tuple[str, ...]:
-    """Names of the hinges and slides among joints, or of the bodies on them."""
-    if kind == "joint":
-        found = [model.joint(j).name for j in joints if prepared.hinged(model, j)]
-    else:
-        owned = {int(model.jnt_bodyid[j]) for j in joints}
-        found = [model.body(number).name for number in sorted(owned)]
-    return tuple(name for name in found if name)
-
-
-def _by_camera(config: OwnConfig) -> tuple[str, ...]:
-    """Channels of places, where joints are seen as well: of two clocks one is late."""
-    places = [item.quantity in PLACES for item in config.seen]
-    if all(places):
-        return ()
-    return tuple(
-        item.channel.name
-        for item, place in zip(config.seen, places, strict=True)
-        if place
-    )
-
-
-def _long(model: mujoco.MjModel, bodies: Iterable[int]) -> list[str]:
-    """Names of the bodies that turn and have a length: from their joint to the one body
-    that they carry, or to their centre of mass."""
-    found = []
-    for body in bodies:
-        carried = np.flatnonzero(model.body_parentid == body)
-        end = model.body_pos[carried[0]] if len(carried) == 1 else model.body_ipos[body]
-        if np.linalg.norm(end) > SHORT and model.body(body).name:
-            found.append(model.body(body).name)
-    return found
-
-
-def _moved(model: mujoco.MjModel, told: Iterable[int]) -> list[int]:
-    """Joints on what the actuators that are told can move, by way of equalities and
-    tendons, too: no ball that lies there."""
-    joints = [prepared.driven(model, actuator) for actuator in told]
-    if min(joints, default=0) < 0:
-        return list(range(model.njnt))
-    return _on(model, (int(model.jnt_bodyid[joint]) for joint in joints))
-
-
-def _on(model: mujoco.MjModel, bodies: Iterable[int]) -> list[int]:
-    """Joints of the trees of some bodies, and of what is tied to them."""
-    roots = {int(model.body_rootid[body]) for body in bodies} - {0}
-    roots = prepared.tied(model, roots)
-    return [
-        joint
-        for joint, body in enumerate(model.jnt_bodyid)
-        if int(model.body_rootid[body]) in roots
-    ]
-
-
-def _owner(model: mujoco.MjModel, item: Seen) -> int:
-    """Number of the body that a channel tells of."""
-    if item.quantity == "body":
-        return int(model.body(item.part).id)
-    if item.quantity == "site":
-        return int(model.site(item.part).bodyid[0])
-    return int(model.joint(item.part).bodyid[0])
-
-
-def _surfaces(
-    model: mujoco.MjModel, joints: Iterable[int]
-) -> dict[str, tuple[str, ...]]:
-    """Geoms of the effects on what touches: round ones on what joints carry, and all
-    where any of these can touch."""
-    roots = {int(model.body_rootid[model.jnt_bodyid[joint]]) for joint in joints}
-    able = [
-        number
-        for number in np.flatnonzero(model.geom_contype | model.geom_conaffinity)
-        if int(model.body_rootid[model.geom_bodyid[number]]) in roots
-    ]
-    round_ = [
-        model.geom(n).name for n in able if int(model.geom_type[n]) in ROUND_GEOMS
-    ]
-    every = (ALL,) if able else ()
-    return {
-        "geom_radius": tuple(name for name in round_ if name),
-        "geom_friction": every,
-        "geom_compliance": every,
-    }
-
-
-def _bolted(model: mujoco.MjModel, bodies: Iterable[int]) -> list[str]:
-    """Names of the bodies on the world that carry some bodies and are not afloat."""
-    afloat = {
-        int(model.jnt_bodyid[j])
-        for j in range(model.njnt)
-        if not prepared.hinged(model, j)
-    }
-    roots = {int(model.body_rootid[body]) for body in bodies} - afloat
-    return [model.body(root).name for root in sorted(roots) if model.body(root).name]
-
-
 def _candidates(
     name: str, part: str, config: OwnConfig, model: mujoco.MjModel
 ) -> Iterable[Row]:
@@ -303,10 +122,8 @@ def _candidates(
         widest = WIDER * high if signed and "high" not in given else high
         sd = EIGHTH * (high if signed else high - low)
         nominal = about.nominal
-        if name == "command_limit" or nominal == WIDE:
-            nominal = high
-        elif nominal == -WIDE:
-            nominal = low
+        if abs(nominal) >= WIDE:  # a limit that is nowhere: at the end of the range
+            nominal = high if nominal > 0 else low
         yield Row(
             name=f"{stem}[{part}]",
             effect=name,

@@ -6,7 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from bns.gap.candidates.mjcf import EXCITE, TOUCHING
+from bns.gap.candidates.mjcf import EXCITE
+from bns.gap.candidates.mjcf_usual import TOUCHING
 from bns.gap.decomposition.row import Row
 from bns.gap.models.mjcf import masses
 from bns.gap.models.mjcf.masses import Body

@@ -15,9 +15,6 @@ def _added(unit: str, number: str, example: float) -> Parameter:
     return strength("added", unit, (-WIDE, WIDE), doc, example=example)
 
 
-NARROW = 1e-6  # [rad or m] or degrees; MuJoCo refuses a joint without any way to go
-
-
 class _JointNumber(BodyEffect):
     """Something is added to a number of a joint."""
 
@@ -108,6 +105,9 @@ class JointBacklash(BodyEffect):
             parts.loosen(spec, joint, self["play"])
 
 
+NARROW = 1e-6  # [rad or m] or degrees; MuJoCo refuses a joint without any way to go
+
+
 class JointStop(BodyEffect):
     """A joint meets a stop that the model does not know: a shelf, a cable, a bent part.
 
@@ -129,7 +129,7 @@ class JointStop(BodyEffect):
             low, high = (
                 parts.in_file(spec, joint, self[end]) for end in ("low", "high")
             )
-            if joint.range[0] != joint.range[1]:
+            if int(joint.limited) and joint.range[0] != joint.range[1]:
                 low, high = max(low, joint.range[0]), min(high, joint.range[1])
             joint.range, joint.limited = (low, max(high, low + NARROW)), True
 
@@ -259,10 +259,15 @@ class ActuatorPeriod(BodyEffect):
         """See `BodyEffect.edit`.
 
         Raises:
-            BnsError: an actuator has no damping gain.
+            BnsError: an actuator has no damping gain, or a damping ratio for it.
         """
         period = self["period"]
         for item in _servos(spec, self["part"], 2, "damping gain"):
+            if item.biasprm[2] > 0:
+                raise BnsError(
+                    f"Actuator {item.name!r} has a damping ratio, from which the gain "
+                    "of a loop does not follow: give its damping as `kv`."
+                )
             kp, kd = -item.biasprm[1], -item.biasprm[2]
             (joint,) = parts.joints(spec, item.target)
             joint.armature = max(joint.armature - kd * period * item.gear[0] ** 2, 0.0)

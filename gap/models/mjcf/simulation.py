@@ -185,6 +185,7 @@ class Simulation:
             seen.append(np.abs(data.actuator_force))
             places.append(data.qpos.copy())
             touching |= set(data.contact.geom.ravel().tolist())
+        went = np.array(places)
         most = np.abs(model.actuator_forcerange).max(axis=1)
         limited = np.flatnonzero(model.actuator_forcelimited).tolist()
         return Loads(
@@ -195,12 +196,12 @@ class Simulation:
             },
             frozenset(model.geom(number).name for number in touching),
             {
-                model.joint(number).name: np.array([min(went), max(went)])
-                for number, went in enumerate(np.array(places).T[model.jnt_qposadr])
-                if prepared.hinged(model, number)
-            }
-            if places
-            else {},
+                model.joint(number).name: np.array(
+                    [went[:, at].min(), went[:, at].max()]
+                )
+                for number, at in enumerate(model.jnt_qposadr)
+                if places and prepared.hinged(model, number)
+            },
         )
 
     def apart(self, loads: Loads) -> None:

@@ -11,7 +11,7 @@ import pytest
 from bns.errors import BnsError
 from bns.gap import warnings
 from bns.gap.bench import mjcf_cases
-from bns.gap.candidates import mjcf
+from bns.gap.candidates import mjcf, mjcf_usual
 from bns.gap.decomposition import descent, diagnosis, record, refit, simpler
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.reference import Corrected
@@ -200,7 +200,10 @@ def test_geared_joints_may_have_ten_times_what_is_looked_for_first(arm, name):
     assert made.high == max(made.levels) == 0.1
 
 
-UNFELT = {*mjcf.TOUCHING, "actuator_torque_limit"}  # no contact, no limit to scale
+UNFELT = {
+    *mjcf_usual.TOUCHING,
+    "actuator_torque_limit",
+}  # no contact, no limit to scale
 
 
 @pytest.mark.parametrize("name", sorted(set(CLASSES) - UNFELT))

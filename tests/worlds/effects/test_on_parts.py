@@ -308,3 +308,26 @@ def test_a_loop_in_a_computer_is_one_with_its_period(period):
         for texts in ((), (f"actuator_period:part=a,period={period}",))
     ]
     assert apart[1] < 0.3 * apart[0]
+
+
+def test_the_period_of_a_loop_with_a_damping_ratio_is_refused():
+    servo = LOOP.format('<position name="a" joint="knee" kp="25" dampratio="1"/>')
+    with pytest.raises(BnsError, match="'a' has a damping ratio"):
+        compiled("actuator_period:part=a,period=0.005", xml=servo)
+
+
+@pytest.mark.parametrize(
+    ("limits", "ends"),
+    [
+        ("", (-1e9, 0.3)),
+        ('range="-0.5 0.2"', (-0.5, 0.2)),
+        ('range="-0.5 0.2" limited="false"', (-1e9, 0.3)),
+    ],
+)
+def test_a_stop_is_met_beside_those_that_the_model_has(limits, ends):
+    joint = 'name="knee" axis="0 1 0"'
+    xml = LOOP.format('<motor joint="knee"/>').replace(joint, f"{joint} {limits}")
+    xml = xml.replace("<mujoco>", '<mujoco><compiler angle="radian"/>')
+    model = compiled("joint_stop:part=knee,high=0.3", xml=xml)
+    assert model.jnt_limited[0]
+    assert tuple(model.jnt_range[0]) == pytest.approx(ends)
