@@ -27,6 +27,7 @@ EIGHTH = 0.125  # of a range: a plausible departure where nothing else is known
 # inertia for the links that they move; assumed.
 WIDER = 10.0
 SLOWEST = 0.03  # [s] period of a loop
+FASTEST = 0.1  # of a clock, which may be as slow
 LEAST = 0.002  # of a limit in the model, which may be far beyond the robot's
 TILT = 0.5  # [rad] largest tilt of a body
 FREE = ((-np.pi, np.pi), (-1.0, 1.0))  # [rad], [m] of a joint without stops
@@ -62,6 +63,7 @@ EXCITE = {
     "actuator_torque_limit": "large and sudden commands",
     "command_limit": "large commands",
     "command_rate": "large steps",
+    "log_clock": "fast motion",
 }
 _DELAYS = {
     "command_delay[all]": ("reading_delay[all]",),
@@ -200,7 +202,7 @@ def _of_model(
     name: str, kind: str, part: str, model: mujoco.MjModel
 ) -> tuple[float, float, str]:
     known = _names(model, kind)
-    if part == ALL and (kind == "geom" or name == "actuator_period"):
+    if part == ALL and (kind in ("geom", "model") or name == "actuator_period"):
         known.append(ALL)
     if part not in known:
         raise UnknownNameError(f"{kind} in [effects] {name}", part, known)
@@ -209,6 +211,8 @@ def _of_model(
         return LEAST, 3.0, "1"
     if name == "actuator_period":
         return 0.0, SLOWEST, "s"
+    if name == "log_clock":
+        return -FASTEST, FASTEST, "1"
     if name == "geom_radius":
         return 0.7, 1.4, "1"
     if name == "geom_compliance":
@@ -263,5 +267,6 @@ def _names(model: mujoco.MjModel, kind: str) -> list[str]:
         "body": model.nbody,
         "actuator": model.nu,
         "geom": model.ngeom,
+        "model": 0,
     }[kind]
     return [getattr(model, kind)(number).name for number in range(count)]

@@ -36,6 +36,7 @@ LATE = ("command_delay", "command_lag", "reading_delay")
 LATER = 0.01  # [s] for derivatives: a lag has next to none where there is none
 CUT = (0.15, 0.3, 0.5, 0.7, 0.9)  # of what was told at most: levels of a limit of it
 TAKEN = (0.4, 0.6, 0.75, 0.88, 0.95, 0.99)  # quantiles of forces, for their limits
+PEAKS = (0.8, 0.88, 0.95)  # of the largest force: what cuts short peaks alone
 STOPPED = 0.995  # quantile of a joint's positions at which a stop may be
 BESIDE = (0.0, 0.02, -0.02)  # of its travel, beside which one is tried
 SOONER = 0.2  # of its travel, by which a stop may be sooner; later by a quarter of it
@@ -46,7 +47,7 @@ OFFSET = 0.0625  # of the span of an offset
 
 # plausible departure and slack of what has no scale of its own (assumed): a gain of a
 # motor is known to 10 %, of a sensor and a tyre to 3 %, a delay to 40 ms; loops run at
-# 1 kHz, or at some 200 Hz
+# 1 kHz, or at some 200 Hz, and clocks to 1 %
 PLAUSIBLE = {
     "actuator_gain": (0.1, 0.003),
     "actuator_kp": (0.05, 0.003),
@@ -63,6 +64,7 @@ PLAUSIBLE = {
     "body_length": (0.03, 0.001),
     "body_tilt": (0.03, 0.001),
     "encoder_offset": (0.01, 0.0),
+    "log_clock": (0.01, 2e-4),
 }
 SHARE = 0.02  # slack of a number over its plausible departure
 
@@ -178,9 +180,11 @@ def _of(
         yield row(item.name, item.nominal, third, smooth=False, levels=levels)
         return
     if item.effect == "actuator_torque_limit":
-        taken = np.quantile(forces.get(item.fixed["part"], np.ones(1)), TAKEN).tolist()
-        levels = tuple(value for value in taken if value < 1.0)
-        levels += MORE if taken[-1] > FULL else ()
+        taken = forces.get(item.fixed["part"], np.ones(1))
+        usual = np.quantile(taken, TAKEN)
+        peaks = [share * taken.max() for share in PEAKS]
+        levels = tuple(sorted(float(x) for x in (*usual, *peaks) if x < 1.0))
+        levels += MORE if usual[-1] > FULL else ()
         if levels:
             yield row(item.name, 1.0, third, smooth=False, levels=levels)
         return

@@ -32,6 +32,7 @@ USUAL = (
     "geom_radius",
     "geom_friction",
     "geom_compliance",
+    "log_clock",
 )
 """considered where the user does not say which, on what the commands move:
 `actuator_kp` and `actuator_kd` of position servos, `actuator_period` of all whose gains
@@ -91,7 +92,9 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
     made: dict[str, tuple[str, ...]] = {}
     for name in (*USUAL, *(RARER if len(moved) <= FEW else ())):
         kind = effects.OWNERS.get(name)
-        if name == "actuator_period":
+        if kind == "model":
+            made[name] = (ALL,)
+        elif name == "actuator_period":
             made[name] = (ALL,) if any(item.kd for item in config.told) else ()
         elif kind == "actuator":
             made[name] = tuple(model.actuator(n).name for n in told if n in of[name])

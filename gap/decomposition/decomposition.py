@@ -189,6 +189,7 @@ def decompose(
     problem, point, size, unconfirmed = _settled(problem, start, point, known)
     if late and late.name not in point.support:
         late = None
+    moved = problem.model.moved(problem.recorded)
     tell("rivals")
     made = Decomposition(
         problem=problem,
@@ -200,12 +201,10 @@ def decompose(
         floor=known,
         before=size.before,
         after=size.after,
-        beyond=rest.beyond(
-            size.plain, problem.recorded, known, size.inside, Row.inexact
-        ),
+        beyond=rest.beyond(size.plain, moved, known, size.inside, Row.inexact),
         recurs=_recurs(problem, point, size.plain),
         scatter=size.scatter,
-        moved=max(rest.excess(problem.recorded, known, size.inside), 1.0),
+        moved=max(rest.excess(moved, known, size.inside), 1.0),
         inside=size.inside,
         unstable=_numbers(problem, unstable),
         strayed=_numbers(problem, size.strayed),

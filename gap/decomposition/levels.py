@@ -20,6 +20,7 @@ SEARCHED = 6  # levels whose sets are searched
 EACH = 2  # levels of one row among these
 AT_ONCE = 60  # levels in one batch, which bounds the memory
 PARTS = 6  # between two levels in a search for the best value
+LOOKS = 4  # of it, each nearer, the last ones where the one before gained
 TRIALS = 2  # in which an explanation is felt most, for a first look
 GAIN = 0.5  # of the loss that a new value has to bring
 
@@ -71,7 +72,32 @@ def best(problem: Problem, point: Point) -> Level | None:
         count[number] = count.get(number, 0) + 1
         if count[number] <= EACH and len(made) < SEARCHED:
             made.append(_level(problem, point, number, value, linear))
-    return min(made, key=lambda level: level.cost) if made else None
+    if not made:
+        return None
+    return _nearest(problem, point, min(made, key=lambda level: level.cost))
+
+
+def _nearest(problem: Problem, point: Point, level: Level) -> Level:
+    """A level, at the one of its row that leaves least beside its set: what was found
+    before it, and is no longer, may have made another one look better."""
+    (number, *_) = (n for n in problem.terms[level.name] if problem.rows[n].levels)
+    row = problem.rows[number]
+    if row.smooth:
+        return level
+    others = [value for value in row.levels if value != level.values[number]]
+    sets = [level.values]
+    for value in others:
+        moved = level.values.copy()
+        moved[number] = value
+        sets.append(moved)
+    paths = problem.predict(sets, fine=False)
+    left = [
+        point.noise.loss(np.where(problem.seen, problem.recorded - path, 0.0))
+        if np.isfinite(path[problem.seen]).all()
+        else np.inf
+        for path in paths
+    ]
+    return replace(level, values=sets[int(np.argmin(left))])
 
 
 def screened(
@@ -314,8 +340,8 @@ def _zoom(
     marks = np.unique([*row.levels, row.low, row.high])
     low = marks[marks < values[number]].max(initial=row.low)
     high = marks[marks > values[number]].min(initial=row.high)
-    for _ in range(2):
-        sets = []
+    for look in range(LOOKS):
+        before, sets = values[number], []
         for value in np.linspace(low, high, PARTS)[1:-1]:
             moved = values.copy()
             moved[number] = value
@@ -330,4 +356,6 @@ def _zoom(
         width = (high - low) / (PARTS - 1)
         low, high = max(values[number] - width, row.low), values[number] + width
         high = min(high, row.high)
+        if look and values[number] == before:
+            break
     return values, rest

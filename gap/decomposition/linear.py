@@ -24,6 +24,7 @@ explanations of a usual model, so that about one in all is expected"""
 EDGE = 0.1  # of a level's departure, by which a fit may leave its bounds: whole losses
 # are at theirs
 
+STRONG = 4.0  # plausible departures from which a row has a prior of its own size
 AT = 9.0  # squared deviations by which rows may want beyond a bound and still be at it
 
 Support = frozenset[str]
@@ -264,20 +265,42 @@ class Linear:
             if name in key and parts <= key:  # the parts alone can be all that it is
                 return self.cost(key - {name}) + KAPPA
         rows = self._rows(key)
-        plain = self.spread(frozenset())
-        value, found = plain.changed(rows, 1.0 - self.slack[rows] ** 2)
+        value, found = self._evidence(rows)
         far = self._beyond(rows, found)
         if edges := self._edges(key, far):
             rows = [row for row in rows if row not in edges]
-            value, found = plain.changed(rows, 1.0 - self.slack[rows] ** 2)
+            value, found = self._evidence(rows)
             far = self._beyond(rows, found)
-        value += self.paid(key) + tail(found) + self._nuisances_beyond(key, rows)
+        value += self.paid(key) + self._nuisances_beyond(key, rows)
         if far and (off := self._at_bounds(key, rows, found, far)) < AT:
             value, far = value + 0.5 * off, set()
         if far:
             out = {name for name in key if far & set(self.terms[name])}
             value = max(value, self.cost(key - out) + KAPPA * len(out))
         return float(value)
+
+    def _evidence(self, rows: list[int]) -> tuple[float, np.ndarray]:
+        """Minus the log evidence with some rows in, and their most probable values,
+        ``(n,)``; with priors as `tail` has them.
+
+        A normal prior holds back what is far off and not told well by the data, though
+        it may be of any size: a load many times as heavy as its link plausibly departs
+        by, of which one motion tells. Such rows have a prior of their own departure.
+
+        Args:
+            rows: numbers of the rows.
+        """
+        plain, known = self.spread(frozenset()), self.slack[rows] ** 2
+        value, found = plain.changed(rows, 1.0 - known)
+        value += tail(found)
+        far = np.abs(found) > STRONG
+        if far.any():
+            scale = np.where(far, found**2, 1.0)
+            other, wider = plain.changed(rows, scale - known)
+            other += tail(wider[~far])
+            if other < value:
+                return other, wider
+        return value, found
 
     def _nuisances_beyond(self, key: Support, rows: list[int]) -> float:
         """What it costs that nuisances are held to their bounds, in nats: half their

@@ -13,7 +13,8 @@ from bns.gap.decomposition.problem import Problem
 
 STEPS = 5  # of a fit; a walker, whose contacts make steps dear, takes fewer
 DAMPING = (0.0, 2.0, 20.0, 200.0)  # added to the curvature, in units of the prior
-LONGEST = 4.0  # prior standard deviations of one step
+LONGEST = 4.0  # prior standard deviations of one step; of what is farther off, twice
+# as far: a load may be many times what its link plausibly departs by
 STILL = 0.02  # prior standard deviations below which a fit has converged
 REWEIGHED = 2  # times that residuals are weighed by what is left of them
 
@@ -202,6 +203,7 @@ def _step(
 
     wider = np.where(free, np.maximum(np.abs(departure(values)), 1.0), 1.0)
     held = (flat / wider) ** 2  # by their priors, see `tail`
+    longest = np.maximum(LONGEST, wider)
     heavy = design * weight[:, None]
     curvature = heavy.T @ design / known.lam + np.diag(held)
     pull = heavy.T @ known.innovations(np.nan_to_num(rest)).ravel() / known.lam
@@ -210,7 +212,7 @@ def _step(
     low, high = problem.bounds
     for damping in DAMPING:
         step = np.linalg.solve(curvature + damping * np.eye(len(which)), pull)
-        step *= min(1.0, LONGEST / (np.abs(step).max() + 1e-30))
+        step *= min(1.0, 1 / ((np.abs(step) / longest).max() + 1e-30))
         there = values.copy()
         there[which] += step * problem.sd[which]
         there = np.clip(there, low, high)

@@ -25,8 +25,23 @@ def simplest(problem: Problem, point: Point) -> Point:
     """
     point = narrowed(problem, point)
     if problem.model.many:
-        return swapped(problem, parted(problem, point))
+        return swapped(problem, spared(problem, parted(problem, point)))
     return pruned(problem, point)
+
+
+def spared(problem: Problem, point: Point) -> Point:
+    """A point without what the others explain as well once they are fitted again, if
+    that is hardly any of it: a load on a hand is not half on the link before it.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+    """
+    for name in _weak(point)[:TRIED]:
+        smaller = refit.refitted(problem, point, point.support - {name}, near=True)
+        if smaller.support and _as_good(problem, smaller, point):
+            return refit.fitted_at(problem, smaller, smaller.support)
+    return point
 
 
 def swapped(problem: Problem, point: Point) -> Point:
@@ -80,13 +95,7 @@ def pruned(problem: Problem, point: Point) -> Point:
     """
     point = united(problem, parted(problem, joined(problem, point)))
     while len(point.support) > 1:
-        linear, support = point.linear, point.support
-        whole = max(linear.squares(()) - linear.squares(support), 1e-9)
-        last = {
-            name: (linear.squares(support - {name}) - linear.squares(support)) / whole
-            for name in support
-        }
-        weak = sorted((n for n in last if last[n] < WEAK), key=lambda n: (last[n], n))
+        support, weak = point.support, _weak(point)
         several = not problem.model.singly and 1 < len(weak) < len(support)
         together = [set(weak)] if several else []
         for names in (*together, *({name} for name in weak[:TRIED])):
@@ -97,6 +106,17 @@ def pruned(problem: Problem, point: Point) -> Point:
         else:
             return point
     return point
+
+
+def _weak(point: Point) -> list[str]:
+    """Explanations without which little less is explained, the weakest first."""
+    linear, support = point.linear, point.support
+    whole = max(linear.squares(()) - linear.squares(support), 1e-9)
+    last = {
+        name: (linear.squares(support - {name}) - linear.squares(support)) / whole
+        for name in support
+    }
+    return sorted((n for n in last if last[n] < WEAK), key=lambda n: (last[n], n))
 
 
 def joined(problem: Problem, point: Point) -> Point:

@@ -261,6 +261,10 @@ class GapModel(ABC):
         """How fast each feature moved, ``(N, C)``: noise may grow with it."""
         return np.abs(features)
 
+    def moved(self, features: np.ndarray) -> np.ndarray:
+        """What each feature moved, ``(N, C)``: wherever its zero is."""
+        return features
+
     def blocks(self, trials: Sequence[Trial], windows: Sequence[Windows]) -> np.ndarray:
         """Number of the stretch that each window belongs to, ``(N,)``.
 

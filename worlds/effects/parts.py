@@ -35,7 +35,8 @@ class Part(Choice):
     """A choice among the names of a model that is known later.
 
     Attributes:
-        kind: "joint", "body", "actuator", "geom" or "channel".
+        kind: "joint", "body", "actuator", "geom" or "channel"; "model" = of the whole
+            of it, which is `ALL`.
     """
 
     kind: str = "channel"
