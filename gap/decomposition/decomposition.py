@@ -189,7 +189,7 @@ def decompose(
     problem, point, size, unconfirmed = _settled(problem, start, point, known)
     if late and late.name not in point.support:
         late = None
-    moved = problem.model.moved(problem.recorded)
+    moved = problem.model.travelled(problem.recorded)
     tell("rivals")
     made = Decomposition(
         problem=problem,

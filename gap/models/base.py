@@ -261,7 +261,7 @@ class GapModel(ABC):
         """How fast each feature moved, ``(N, C)``: noise may grow with it."""
         return np.abs(features)
 
-    def moved(self, features: np.ndarray) -> np.ndarray:
+    def travelled(self, features: np.ndarray) -> np.ndarray:
         """What each feature moved, ``(N, C)``: wherever its zero is."""
         return features
 

@@ -260,8 +260,8 @@ class OwnModel(GapModel):
         """Change of each feature from window to window."""
         return np.abs(np.gradient(np.nan_to_num(features), axis=0))
 
-    def moved(self, features: np.ndarray) -> np.ndarray:
-        """See `GapModel.moved`: a joint that hangs at 2 rad and stays moves nothing."""
+    def travelled(self, features: np.ndarray) -> np.ndarray:
+        """See `GapModel.travelled`: a joint that hangs at 2 rad and stays moves nothing."""
         count = np.isfinite(features).sum(axis=0)
         mean = np.nan_to_num(features).sum(axis=0) / np.maximum(count, 1)
         moved: np.ndarray = features - mean
