@@ -138,6 +138,10 @@ class Corrected(GapModel):
         """See `GapModel.motion`."""
         return self.model.motion(features)
 
+    def travelled(self, features: np.ndarray) -> np.ndarray:
+        """See `GapModel.travelled`."""
+        return self.model.travelled(features)
+
     def patterns(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
         """See `GapModel.patterns`."""
         return self.model.patterns(trial, windows)
