@@ -1,13 +1,16 @@
 """Levels of what has no slope, and what ties with them, on recordings of a robot."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from bns.gap.bench.wheeled_cases import commands
-from bns.gap.decomposition import descent, diagnosis, refit, simpler
+from bns.gap.decomposition import descent, diagnosis, levels, refit, simpler
+from bns.gap.decomposition.levels import Level
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.row import Row
 from bns.gap.diagnose import diagnose
 from bns.gap.recordings import check
 from bns.worlds.physics.wheeled_world import MujocoWorld
@@ -53,6 +56,24 @@ def test_a_load_ties_with_the_centre_of_mass_that_it_shifts(model):
     names = ("centre_of_mass.dy", "payload", "wheel_gain[left]", "axle_length")
     found = diagnose(trials, model, rows=names, full=False)
     assert found.verdict.named == (("centre_of_mass.dy",), ("payload",))
+
+
+def test_a_level_is_the_one_that_leaves_least_beside_its_own_set():
+    """What was found before it may have made another one look better."""
+    row = Row("limit", 1.0, 0.3, 0.0, 1.0, smooth=False, levels=(0.2, 0.3, 0.4))
+    recorded = np.array([[0.3], [0.6]])
+    problem = SimpleNamespace(
+        terms={"limit": (0,)},
+        rows=(row,),
+        seen=np.isfinite(recorded),
+        recorded=recorded,
+        predict=lambda sets, fine: [v[0] * np.array([[1.0], [2.0]]) for v in sets],
+    )
+    point = SimpleNamespace(
+        noise=SimpleNamespace(loss=lambda rest: float((rest**2).sum()))
+    )
+    level = Level("limit", 5.0, np.array([0.4]), frozenset({"limit"}))
+    assert levels._nearest(problem, point, level).values == pytest.approx([0.3])
 
 
 @pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])

@@ -283,6 +283,16 @@ def test_a_large_departure_costs_the_log_of_its_size():
     assert linear.cost({"a"}) == pytest.approx(linear.cost({"b"}), abs=0.2)
 
 
+def test_what_is_far_off_and_told_by_little_is_not_held_back():
+    """Nor is a load many times what its link plausibly departs by."""
+    rng = np.random.default_rng(3)
+    problem = Rows(rng, low=-100.0, high=100.0)
+    problem.columns[0] = 0.05 * problem.columns[1]
+    linear = problem.linear(planted(rng, problem, a=40.0))
+    assert linear.cost({"a"}) < linear.cost({"b"}) + 1.5
+    assert search.best(linear)[1] in ({"a"}, {"b"})
+
+
 def test_residuals_that_scatter_explains_weigh_as_what_it_leaves_of_them():
     rng = np.random.default_rng(4)
     problem = Rows(rng)

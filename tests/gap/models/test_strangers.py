@@ -226,3 +226,36 @@ def test_a_stop_that_the_model_does_not_know_is_found_where_it_is(tmp_path):
     assert max(path.max() for path in stopped) == pytest.approx(
         max(np.nanmax(trial.observed) for trial in trials), abs=0.005
     )
+
+
+def test_a_limit_that_cuts_the_highest_peaks_alone_is_found(tmp_path):
+    servo = '<position name="drive" joint="rail" kp="120" kv="12"'
+    nominal = LIFT.replace(servo, f'{servo} forcerange="-200 200"')
+    model = mujoco.MjModel.from_xml_string(LIFT)
+    model.opt.timestep = 0.0005
+    model.actuator_forcelimited[0], model.actuator_forcerange[0] = 1, (-25, 25)
+    logged(tmp_path, model, span=0.3, commands=4, samples=40, noise=0.001)
+    _, own = described(tmp_path, nominal, tmp_path / "log.csv")
+    found = diagnose(own.read_log(str(tmp_path / "log.csv")), own, full=False)
+    assert list(found.best.names) == ["actuator_torque_limit[drive]"]
+    assert found.best.magnitudes[0] == pytest.approx(25 / 200, abs=0.01)
+
+
+def test_a_clock_that_is_fast_is_named(tmp_path):
+    model = mujoco.MjModel.from_xml_string(PUCK)
+    model.opt.timestep = 0.0005 / 1.05  # 20 ms of the log are 19.05 ms
+    logged(tmp_path, model, span=0.4, commands=6, samples=50, noise=0.0005)
+    _, own = described(tmp_path, PUCK, tmp_path / "log.csv")
+    trials = own.read_log(str(tmp_path / "log.csv"))
+    assert ("log_clock[all]",) in diagnose(trials, own, full=False).verdict.named
+    alone = OwnModel(replace(own.config, effects={"log_clock": ()}), threads=1)
+    found = diagnose(trials, alone, full=False)
+    assert found.best.magnitudes[0] == pytest.approx(0.05, abs=0.002)
+
+
+def test_a_joint_that_hangs_still_moves_nothing_wherever_its_zero_is(spun):
+    own, _ = spun
+    seen = np.array([[2.0, 1.0], [2.0, np.nan], [2.0, 3.0]])
+    moved = own.travelled(seen)
+    assert moved[:, 0] == pytest.approx(0.0)
+    assert moved[[0, 2], 1] == pytest.approx([-1.0, 1.0])
