@@ -16,7 +16,7 @@ from bns.gap.candidates.mjcf_usual import usual
 from bns.gap.decomposition.row import Row
 from bns.gap.models.mjcf import effects
 from bns.gap.models.mjcf.config import OwnConfig
-from bns.worlds.effects.parts import ALL, WIDE
+from bns.worlds.effects.parts import ALL, FILTERS, WIDE
 
 RATIOS = (0.4, 0.6, 0.8, 0.9, 1.1, 1.25, 1.6, 2.5)
 SHARES = (0.02, 0.05, 0.12, 0.3, 1.0)  # of the largest value, beyond the nominal
@@ -57,6 +57,7 @@ EXCITE = {
     "body_centre": "motion against gravity, or sudden changes of speed",
     "body_length": "large excursions",
     "body_tilt": "motion against gravity",
+    "actuator_lag": "steps",
     "actuator_period": "steps",
     "actuator_kp": "steps, and loads that are held",
     "actuator_kd": "steps",
@@ -211,6 +212,9 @@ def _of_model(
         return LEAST, 3.0, "1"
     if name == "actuator_period":
         return 0.0, SLOWEST, "s"
+    if name == "actuator_lag":
+        filtered = int(model.actuator_dyntype[at]) in FILTERS
+        return -0.9 * model.actuator_dynprm[at, 0] * filtered, LATE[-1], "s"
     if name == "log_clock":
         return -FASTEST, FASTEST, "1"
     if name == "geom_radius":

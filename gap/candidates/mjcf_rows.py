@@ -52,6 +52,7 @@ PLAUSIBLE = {
     "actuator_gain": (0.1, 0.003),
     "actuator_kp": (0.05, 0.003),
     "actuator_kd": (0.15, 0.01),
+    "actuator_lag": (0.04, 8e-4),
     "actuator_period": (0.004, 4e-4),
     "command_gain": (0.1, 0.003),
     "reading_gain": (0.03, 0.001),

@@ -7,7 +7,7 @@ import numpy as np
 
 from bns.gap.models.mjcf import effects, prepared
 from bns.gap.models.mjcf.config import PLACES, OwnConfig, Seen
-from bns.worlds.effects.parts import ALL, ROUND_GEOMS
+from bns.worlds.effects.parts import ALL, FILTERS, ROUND_GEOMS
 
 SHORT = 1e-6  # [m] no length
 USUAL = (
@@ -21,6 +21,7 @@ USUAL = (
     "actuator_gain",
     "actuator_kp",
     "actuator_kd",
+    "actuator_lag",
     "actuator_period",
     "actuator_torque_limit",
     "command_limit",
@@ -35,13 +36,14 @@ USUAL = (
     "log_clock",
 )
 """considered where the user does not say which, on what the commands move:
-`actuator_kp` and `actuator_kd` of position servos, `actuator_period` of all whose gains
-the description gives, a limit of force of these and of servos of speed, `actuator_gain`
-and `command_limit` of all but position servos, the tilt of what is bolted to the world;
-`joint_stop` of joints that are seen; `command_lag` of each command where there are few,
-and of all; `reading_delay` of each reading where there are few, else of places, by a
-camera, beside joints, by encoders; the radius of wheels and feet, and grip and softness
-of all that touch, where they touch something"""
+`actuator_kp` and `actuator_kd` of position servos, `actuator_lag` of those whose
+control the model filters, `actuator_period` of all whose gains the description
+gives, a limit of force of these and of servos of speed, `actuator_gain` and
+`command_limit` of all but position servos, the tilt of what is bolted to the world;
+`joint_stop` of joints that are seen; `command_lag` of each command where there are
+few, and of all; `reading_delay` of each reading where there are few, else of places,
+by a camera, beside joints, by encoders; the radius of wheels and feet, and grip and
+softness of all that touch, where they touch something"""
 PUSHED = ("joint_damping", "joint_friction", "body_mass")
 """... also on what is seen and has no motor: a block that is gripped, a door"""
 FEW = 6  # joints up to which `RARER` are considered, too; commands, readings
@@ -74,6 +76,7 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
         "actuator_gain": set(told) - servos,
         "actuator_kp": servos,
         "actuator_kd": damped,
+        "actuator_lag": {n for n in told if model.actuator_dyntype[n] in FILTERS},
         "actuator_torque_limit": limited & looped,
         "command_limit": [
             item.channel.name

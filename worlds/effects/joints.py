@@ -274,6 +274,44 @@ class ActuatorPeriod(BodyEffect):
             item.biasprm[2] += kp * period / 2
 
 
+UNFILTERED, FILTER = 0, 2  # mjtDyn: none, and the first order filter
+QUICKEST = 1e-4  # [s] that a filter keeps: MuJoCo divides by it
+
+
+class ActuatorLag(BodyEffect):
+    """An actuator follows its control more gradually than the model says: a valve, a
+    motor's winding, a muscle.
+
+    What is added is the time constant of MuJoCo's activation, by which forces follow,
+    not what is told; an actuator without one gets one, and begins without force.
+    """
+
+    name = "actuator_lag"
+    source = "MuJoCo's first-order filter: act' = (control - act) / time constant"
+    robots = ("own",)
+    choices = parts.part("actuator")
+    resizes = True
+    parameter = strength(
+        "added", "s", (-WIDE, WIDE), "to the time constant of its filter", example=0.05
+    )
+
+    def _write(self, spec: Any) -> None:
+        """See `BodyEffect.edit`.
+
+        Raises:
+            BnsError: an actuator has dynamics of another kind.
+        """
+        for item in parts.actuators(spec, self["part"]):
+            if item.dyntype == UNFILTERED:
+                item.dyntype, item.dynprm[0] = FILTER, 0.0
+            if item.dyntype not in parts.FILTERS:
+                raise BnsError(
+                    f"Actuator {item.name!r} has dynamics without a time constant: "
+                    "give one with `dyntype` none, filter or filterexact."
+                )
+            item.dynprm[0] = max(item.dynprm[0] + self["added"], QUICKEST)
+
+
 class ActuatorTorqueLimit(BodyEffect):
     """An actuator's largest force or torque differs from the model's.
 

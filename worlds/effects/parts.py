@@ -27,6 +27,7 @@ UNSERVOED = ("wheeled", "own")
 """... on numbers that the servo law sets in walking robots; there it has the effect"""
 
 SLIDE, HINGE = 2, 3  # mjtJoint
+FILTERS = (2, 3)  # mjtDyn: a first-order filter, and an exactly integrated one
 ROUND_GEOMS = (2, 3, 4, 5)  # mjtGeom: sphere, capsule, ellipsoid, cylinder
 
 

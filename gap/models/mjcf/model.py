@@ -261,7 +261,7 @@ class OwnModel(GapModel):
         return np.abs(np.gradient(np.nan_to_num(features), axis=0))
 
     def travelled(self, features: np.ndarray) -> np.ndarray:
-        """See `GapModel.travelled`: a joint that hangs at 2 rad and stays moves nothing."""
+        """See `GapModel.travelled`: a joint that hangs still moves nothing."""
         count = np.isfinite(features).sum(axis=0)
         mean = np.nan_to_num(features).sum(axis=0) / np.maximum(count, 1)
         moved: np.ndarray = features - mean

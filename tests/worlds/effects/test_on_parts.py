@@ -310,6 +310,25 @@ def test_a_loop_in_a_computer_is_one_with_its_period(period):
     assert apart[1] < 0.3 * apart[0]
 
 
+@pytest.mark.parametrize(
+    ("dynamics", "begins"), [("", 0.0), ('dyntype="filter" dynprm="0.06"', 0.06)]
+)
+def test_a_valve_that_is_slow_follows_by_its_time_constant(dynamics, begins):
+    xml = LOOP.format(f'<general name="a" joint="knee" gainprm="2" {dynamics}/>')
+    model = compiled("actuator_lag:part=a,added=0.1", xml=xml)
+    data = mujoco.MjData(model)
+    data.ctrl[0] = 1.0
+    constant = begins + 0.1
+    mujoco.mj_step(model, data, round(constant / model.opt.timestep))
+    assert data.act[0] == pytest.approx(1 - np.exp(-1), abs=0.01)
+
+
+def test_a_valve_that_integrates_has_no_time_constant():
+    xml = LOOP.format('<general name="a" joint="knee" dyntype="integrator"/>')
+    with pytest.raises(BnsError, match="'a' has dynamics without a time constant"):
+        compiled("actuator_lag:part=a,added=0.1", xml=xml)
+
+
 def test_the_period_of_a_loop_with_a_damping_ratio_is_refused():
     servo = LOOP.format('<position name="a" joint="knee" kp="25" dampratio="1"/>')
     with pytest.raises(BnsError, match="'a' has a damping ratio"):
