@@ -203,7 +203,8 @@ def _of_model(
     name: str, kind: str, part: str, model: mujoco.MjModel
 ) -> tuple[float, float, str]:
     known = _names(model, kind)
-    if part == ALL and (kind in ("geom", "model") or name == "actuator_period"):
+    every = kind == "geom" or name == "actuator_period"
+    if kind == "model" or (part == ALL and every):
         known.append(ALL)
     if part not in known:
         raise UnknownNameError(f"{kind} in [effects] {name}", part, known)

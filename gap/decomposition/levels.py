@@ -74,7 +74,9 @@ def best(problem: Problem, point: Point) -> Level | None:
             made.append(_level(problem, point, number, value, linear))
     if not made:
         return None
-    return _nearest(problem, point, min(made, key=lambda level: level.cost))
+    chosen = min(made, key=lambda level: level.cost)
+    beside = problem.model.many and point.support - chosen.support
+    return _nearest(problem, point, chosen) if beside else chosen
 
 
 def _nearest(problem: Problem, point: Point, level: Level) -> Level:

@@ -24,7 +24,6 @@ explanations of a usual model, so that about one in all is expected"""
 EDGE = 0.1  # of a level's departure, by which a fit may leave its bounds: whole losses
 # are at theirs
 
-STRONG = 4.0  # plausible departures from which a row has a prior of its own size
 AT = 9.0  # squared deviations by which rows may want beyond a bound and still be at it
 
 Support = frozenset[str]
@@ -264,12 +263,12 @@ class Linear:
         for name, parts in self.joins.items():
             if name in key and parts <= key:  # the parts alone can be all that it is
                 return self.cost(key - {name}) + KAPPA
-        rows = self._rows(key)
-        value, found = self._evidence(rows)
+        rows, plain = self._rows(key), self.spread(frozenset())
+        value, found = plain.weighed(rows, self.slack[rows] ** 2)
         far = self._beyond(rows, found)
         if edges := self._edges(key, far):
             rows = [row for row in rows if row not in edges]
-            value, found = self._evidence(rows)
+            value, found = plain.weighed(rows, self.slack[rows] ** 2)
             far = self._beyond(rows, found)
         value += self.paid(key) + self._nuisances_beyond(key, rows)
         if far and (off := self._at_bounds(key, rows, found, far)) < AT:
@@ -278,29 +277,6 @@ class Linear:
             out = {name for name in key if far & set(self.terms[name])}
             value = max(value, self.cost(key - out) + KAPPA * len(out))
         return float(value)
-
-    def _evidence(self, rows: list[int]) -> tuple[float, np.ndarray]:
-        """Minus the log evidence with some rows in, and their most probable values,
-        ``(n,)``; with priors as `tail` has them.
-
-        A normal prior holds back what is far off and not told well by the data, though
-        it may be of any size: a load many times as heavy as its link plausibly departs
-        by, of which one motion tells. Such rows have a prior of their own departure.
-
-        Args:
-            rows: numbers of the rows.
-        """
-        plain, known = self.spread(frozenset()), self.slack[rows] ** 2
-        value, found = plain.changed(rows, 1.0 - known)
-        value += tail(found)
-        far = np.abs(found) > STRONG
-        if far.any():
-            scale = np.where(far, found**2, 1.0)
-            other, wider = plain.changed(rows, scale - known)
-            other += tail(wider[~far])
-            if other < value:
-                return other, wider
-        return value, found
 
     def _nuisances_beyond(self, key: Support, rows: list[int]) -> float:
         """What it costs that nuisances are held to their bounds, in nats: half their
@@ -487,21 +463,6 @@ class Linear:
             normal=normal,
             slope=slope,
         )
-
-
-def tail(values: np.ndarray) -> float:
-    """What priors cost less than normal ones, in nats: beyond a plausible departure
-    they fall as its inverse, since damage may be of any size.
-
-    A prior whose scale is itself unknown, at the scale that explains a value best
-    (Tipping, JMLR 1, 2001): a value of `z` deviations costs ``1/2 + ln z``, not
-    ``z^2 / 2``.
-
-    Args:
-        values: of rows, in units of their priors.
-    """
-    far = np.maximum(np.abs(values), 1.0)
-    return float((0.5 + np.log(far) - far**2 / 2).sum())
 
 
 def stretches(count: int, kept: Iterable[int]) -> np.ndarray:

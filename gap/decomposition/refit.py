@@ -8,8 +8,9 @@ import numpy as np
 
 from bns.gap.decomposition import fit, levels, noise
 from bns.gap.decomposition.fit import Noise, Point, linearised, placed
-from bns.gap.decomposition.linear import Linear, Support, tail
+from bns.gap.decomposition.linear import Linear, Support
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.spread import tail
 
 STEPS = 5  # of a fit; a walker, whose contacts make steps dear, takes fewer
 DAMPING = (0.0, 2.0, 20.0, 200.0)  # added to the curvature, in units of the prior

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+STRONG = 4.0  # plausible departures from which a row has a prior of its own size
 LEAST = 1e-12  # of a prior's variance: what double precision leaves
 
 
@@ -79,6 +80,31 @@ class Spread:
         cost -= 0.5 * float((more * pull) @ left)
         return cost, (self.variance[rows] + more) * left
 
+    def weighed(
+        self, rows: Sequence[int], known: np.ndarray
+    ) -> tuple[float, np.ndarray]:
+        """Minus the log evidence with some rows in, and their most probable values,
+        ``(n,)``; with priors as `tail` has them.
+
+        A normal prior holds back what is far off and not told well by the data, though
+        it may be of any size: a load many times as heavy as its link plausibly departs
+        by, of which one motion tells. Such rows have a prior of their own departure.
+
+        Args:
+            rows: numbers of the rows.
+            known: variance that each has anyway, ``(n,)``.
+        """
+        value, found = self.changed(rows, 1.0 - known)
+        value += tail(found)
+        far = np.abs(found) > STRONG
+        if far.any():
+            scale = np.where(far, found**2, 1.0)
+            other, wider = self.changed(rows, scale - known)
+            other += tail(wider[~far])
+            if other < value:
+                return other, wider
+        return value, found
+
     def uncertain(self, rows: Sequence[int], more: np.ndarray) -> np.ndarray:
         """Posterior covariance of some rows where the variance of these is another,
         ``(n, n)``, in units of their priors.
@@ -91,3 +117,18 @@ class Spread:
         seen = np.linalg.solve(np.eye(len(rows)) + inner * more, inner)
         made: np.ndarray = np.diag(variance) - variance[:, None] * seen * variance
         return made
+
+
+def tail(values: np.ndarray) -> float:
+    """What priors cost less than normal ones, in nats: beyond a plausible departure
+    they fall as its inverse, since damage may be of any size.
+
+    A prior whose scale is itself unknown, at the scale that explains a value best
+    (Tipping, JMLR 1, 2001): a value of `z` deviations costs ``1/2 + ln z``, not
+    ``z^2 / 2``.
+
+    Args:
+        values: of rows, in units of their priors.
+    """
+    far = np.maximum(np.abs(values), 1.0)
+    return float((0.5 + np.log(far) - far**2 / 2).sum())

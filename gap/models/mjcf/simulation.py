@@ -332,7 +332,7 @@ class Simulation:
         sizes = [mujoco.mj_stateSize(some, STATE) for some in (model, self.model)]
         model = self.model if sizes[0] == sizes[1] else model
         state = str(trial.conditions.get(start.STATE))
-        key = (model.names, trial.observed[:1].tobytes(), state)
+        key = (model.names, sizes[0], trial.observed[:1].tobytes(), state)
         if key not in self._starts:
             self._starts[key] = self._begun_in(trial, model)
         return self._starts[key]

@@ -12,9 +12,9 @@ import pytest
 from bns.gap.decomposition import refit, search, shares
 from bns.gap.decomposition.fit import Noise, Point
 from bns.gap.decomposition.latent import Latent
-from bns.gap.decomposition.linear import KAPPA, Linear, tail
+from bns.gap.decomposition.linear import KAPPA, Linear
 from bns.gap.decomposition.noise import Memory, correlated, inflation, scale, weights
-from bns.gap.decomposition.spread import Spread
+from bns.gap.decomposition.spread import Spread, tail
 from tests.sources import ROOT
 
 NAMES = ("a", "b", "c", "d", "e", "f")

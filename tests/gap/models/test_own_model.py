@@ -168,6 +168,7 @@ PARTS = {
     "body": "forearm",
     "actuator": "elbow_servo",
     "geom": "forearm",
+    "model": "all",
 }
 
 
