@@ -203,8 +203,7 @@ def _of_model(
     name: str, kind: str, part: str, model: mujoco.MjModel
 ) -> tuple[float, float, str]:
     known = _names(model, kind)
-    every = kind == "geom" or name == "actuator_period"
-    if kind == "model" or (part == ALL and every):
+    if part == ALL and (kind == "geom" or name == "actuator_period"):
         known.append(ALL)
     if part not in known:
         raise UnknownNameError(f"{kind} in [effects] {name}", part, known)
@@ -267,11 +266,12 @@ def _of_joint(name: str, joint: int, model: mujoco.MjModel) -> tuple[float, floa
 
 
 def _names(model: mujoco.MjModel, kind: str) -> list[str]:
+    if kind == "model":
+        return [ALL]
     count = {
         "joint": model.njnt,
         "body": model.nbody,
         "actuator": model.nu,
         "geom": model.ngeom,
-        "model": 0,
     }[kind]
     return [getattr(model, kind)(number).name for number in range(count)]

@@ -1,7 +1,7 @@
 """Starts over the whole range of what has no slope at the nominal: dead bands, limits,
 lags that are long, wheels that stop."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -86,20 +86,19 @@ def _nearest(problem: Problem, point: Point, level: Level) -> Level:
     row = problem.rows[number]
     if row.smooth:
         return level
-    others = [value for value in row.levels if value != level.values[number]]
-    sets = [level.values]
-    for value in others:
-        moved = level.values.copy()
-        moved[number] = value
+    sets = _at(level.values, number, row.levels)
+    found = compared(problem, point, sets, None)
+    return replace(level, values=found[0][-1]) if found else level
+
+
+def _at(values: np.ndarray, number: int, levels: Iterable[float]) -> list[np.ndarray]:
+    """Values of all rows ``(R,)`` with one of them at each of some levels."""
+    sets = []
+    for level in levels:
+        moved = values.copy()
+        moved[number] = level
         sets.append(moved)
-    paths = problem.predict(sets, fine=False)
-    left = [
-        point.noise.loss(np.where(problem.seen, problem.recorded - path, 0.0))
-        if np.isfinite(path[problem.seen]).all()
-        else np.inf
-        for path in paths
-    ]
-    return replace(level, values=sets[int(np.argmin(left))])
+    return sets
 
 
 def screened(
@@ -259,10 +258,7 @@ def instead(
     for number, row in enumerate(problem.rows):
         if row.smooth or row.term in point.support:
             continue
-        for value in row.levels:
-            moved = bare.copy()
-            moved[number] = value
-            sets.append(moved)
+        sets += _at(bare, number, row.levels)
     return compared(problem, point, sets, _felt(problem, point, bare, most))
 
 
@@ -343,11 +339,8 @@ def _zoom(
     low = marks[marks < values[number]].max(initial=row.low)
     high = marks[marks > values[number]].min(initial=row.high)
     for look in range(LOOKS):
-        before, sets = values[number], []
-        for value in np.linspace(low, high, PARTS)[1:-1]:
-            moved = values.copy()
-            moved[number] = value
-            sets.append(moved)
+        before = values[number]
+        sets = _at(values, number, np.linspace(low, high, PARTS)[1:-1])
         base, *made = problem.predict([values, *sets], fine=False)
         losses = [known.loss(rest - (path - base)) for path in made]
         at = int(np.argmin(losses))

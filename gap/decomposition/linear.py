@@ -264,11 +264,11 @@ class Linear:
             if name in key and parts <= key:  # the parts alone can be all that it is
                 return self.cost(key - {name}) + KAPPA
         rows, plain = self._rows(key), self.spread(frozenset())
-        value, found = plain.weighed(rows, self.slack[rows] ** 2)
+        value, found = plain.evidence(rows, self.slack[rows] ** 2)
         far = self._beyond(rows, found)
         if edges := self._edges(key, far):
             rows = [row for row in rows if row not in edges]
-            value, found = plain.weighed(rows, self.slack[rows] ** 2)
+            value, found = plain.evidence(rows, self.slack[rows] ** 2)
             far = self._beyond(rows, found)
         value += self.paid(key) + self._nuisances_beyond(key, rows)
         if far and (off := self._at_bounds(key, rows, found, far)) < AT:

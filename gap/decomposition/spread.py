@@ -80,7 +80,7 @@ class Spread:
         cost -= 0.5 * float((more * pull) @ left)
         return cost, (self.variance[rows] + more) * left
 
-    def weighed(
+    def evidence(
         self, rows: Sequence[int], known: np.ndarray
     ) -> tuple[float, np.ndarray]:
         """Minus the log evidence with some rows in, and their most probable values,

@@ -274,7 +274,7 @@ class ActuatorPeriod(BodyEffect):
             item.biasprm[2] += kp * period / 2
 
 
-UNFILTERED, FILTER = 0, 2  # mjtDyn: none, and the first order filter
+UNFILTERED = 0  # mjtDyn: none
 QUICKEST = 1e-4  # [s] that a filter keeps: MuJoCo divides by it
 
 
@@ -303,7 +303,7 @@ class ActuatorLag(BodyEffect):
         """
         for item in parts.actuators(spec, self["part"]):
             if item.dyntype == UNFILTERED:
-                item.dyntype, item.dynprm[0] = FILTER, 0.0
+                item.dyntype, item.dynprm[0] = parts.FILTERS[0], 0.0
             if item.dyntype not in parts.FILTERS:
                 raise BnsError(
                     f"Actuator {item.name!r} has dynamics without a time constant: "

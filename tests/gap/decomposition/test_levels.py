@@ -66,11 +66,15 @@ def test_a_level_is_the_one_that_leaves_least_beside_its_own_set():
         terms={"limit": (0,)},
         rows=(row,),
         seen=np.isfinite(recorded),
-        recorded=recorded,
-        predict=lambda sets, fine: [v[0] * np.array([[1.0], [2.0]]) for v in sets],
+        nominal=np.array([1.0]),
+        predict=lambda sets, fine, only: [
+            v[0] * np.array([[1.0], [2.0]]) for v in sets
+        ],
     )
     point = SimpleNamespace(
-        noise=SimpleNamespace(loss=lambda rest: float((rest**2).sum()))
+        values=np.array([1.0]),
+        rest=recorded - np.array([[1.0], [2.0]]),
+        noise=SimpleNamespace(loss=lambda rest: float((rest**2).sum()), lam=1.0),
     )
     level = Level("limit", 5.0, np.array([0.4]), frozenset({"limit"}))
     assert levels._nearest(problem, point, level).values == pytest.approx([0.3])
