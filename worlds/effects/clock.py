@@ -7,11 +7,10 @@ from bns.worlds.effects.base import BodyEffect, strength
 
 
 class LogClock(BodyEffect):
-    """The clock of the log, by which commands and readings are stamped, is fast or
-    slow: the robot has moved for less or more time than it tells.
+    """The clock that stamps commands and readings of a log is fast or slow.
 
-    A loop that is taken to run at 250 Hz and runs at 240, or a simulation whose step is
-    not the one told.
+    The robot has moved for less or more time than the log tells: a loop is taken to run
+    at 250 Hz and runs at 240, or a simulation's step is not the one told.
     """
 
     name = "log_clock"

@@ -279,11 +279,11 @@ QUICKEST = 1e-4  # [s] that a filter keeps: MuJoCo divides by it
 
 
 class ActuatorLag(BodyEffect):
-    """An actuator follows its control more gradually than the model says: a valve, a
-    motor's winding, a muscle.
+    """An actuator follows its control more gradually than the model says.
 
-    What is added is the time constant of MuJoCo's activation, by which forces follow,
-    not what is told; an actuator without one gets one, and begins without force.
+    A valve, a motor's winding, a muscle. What is added is the time constant of MuJoCo's
+    activation, by which forces follow, not what is told; an actuator without one gets
+    one, and begins without force.
     """
 
     name = "actuator_lag"

@@ -45,6 +45,8 @@ class Part(Choice):
     @property
     def shown(self) -> str:
         """The alternatives for a listing."""
+        if self.kind == "model":
+            return ALL
         return f"{ALL}, a name, or a pattern such as *_knee"
 
     def check(self, effect: str, value: object) -> str:

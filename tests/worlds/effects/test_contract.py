@@ -144,6 +144,7 @@ class TestEveryEffect:
         assert effect.__module__.split(".")[3] in FILES[effect.stage]
         assert effect.stage in STAGES
         assert effect.doc and "\n" not in effect.doc
+        assert (effect.__doc__ or "").partition("\n")[0].endswith(".")
         assert effect.source and effect.robots and effect.parameters
         for item in effect.parameters:
             assert item.unit and item.doc
