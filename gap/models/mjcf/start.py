@@ -1,7 +1,7 @@
 """What is observed of a user's own model, from its physics states (`View`); and where a
 recorded trial begins: the state of the joints, and what was told before."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -9,6 +9,7 @@ import numpy as np
 
 from bns.gap.models.mjcf import prepared
 from bns.gap.models.mjcf.config import OwnConfig
+from bns.worlds.physics.rollout import STATE as PHYSICS
 from bns.worlds.trial import Trial
 
 STATE = "start"
@@ -22,6 +23,9 @@ NUMBERS = ("start_position", "start_speed")
 
 BEFORE, STEP = "told_before", "told_before_step"
 """conditions: commands before it, a row each, and the time between two [s]"""
+
+STOOD = 0.3  # [s] over which a robot that nothing holds has left its first samples
+CLEARLY = 0.25  # of the squared error, less of which says what held it
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,3 +196,52 @@ def before(
     past = (np.arange(count, 0, -1)) * dt  # [s] before the start
     at = len(rows) - np.ceil(past / step - 1e-9).astype(int)
     return np.array(rows, dtype=float)[np.clip(at, 0, None)]
+
+
+def at_rest(trial: Trial) -> bool:
+    """Whether nothing is known of what went before a trial."""
+    return STATE not in trial.conditions and BEFORE not in trial.conditions
+
+
+def told_before(trial: Trial, dt: float) -> Trial:
+    """A trial whose first command was told before it, too.
+
+    Args:
+        trial: recorded trial.
+        dt: physics step [s].
+    """
+    first = [[float(value) for value in trial.commands.values[0]]]
+    return trial.replace(conditions={**trial.conditions, BEFORE: first, STEP: dt})
+
+
+def held(
+    trials: Sequence[Trial],
+    begun: Sequence[np.ndarray],
+    model: mujoco.MjModel,
+    view: View,
+    ctrls: Sequence[Sequence[np.ndarray]],
+) -> bool:
+    """Whether the first command of trials held the robot before them, where it was: the
+    controls at rest would have taken it from its first samples. A drone hovers, and
+    muscles pull, when a log begins.
+
+    Args:
+        trials: recorded trials.
+        begun: physics state in which each begins to settle.
+        model: the nominal model.
+        view: of its channels.
+        ctrls: of each trial the control at rest, and that of the first command.
+    """
+    lasting = max(view.config.settle, STOOD)
+    noise = np.array([item.noise for item in view.config.seen])
+    data, errors = mujoco.MjData(model), np.zeros(2)
+    for trial, state, pair in zip(trials, begun, ctrls, strict=True):
+        seen = trial.observed[np.isfinite(trial.observed).all(axis=1)][0]
+        for number, ctrl in enumerate(pair):
+            mujoco.mj_setState(model, data, state, PHYSICS)
+            data.ctrl[:] = ctrl
+            mujoco.mj_step(model, data, nstep=round(lasting / model.opt.timestep))
+            mujoco.mj_getState(model, data, made := np.empty(len(state)), PHYSICS)
+            away = (view.read(model, made[None])[0] - seen) / noise
+            errors[number] += away @ away
+    return bool(errors[1] < CLEARLY * errors[0])

@@ -1,0 +1,83 @@
+"""What was told before a log begins: the first command, where nothing else would have
+kept the robot where it was seen first."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from bns.gap.diagnose import diagnose
+from bns.gap.models.mjcf import start
+from bns.gap.models.mjcf.model import OwnModel
+
+LIFT = """<mujoco model="lift"><option timestep="0.002"/>
+  <worldbody><body name="cage">
+    <joint name="rise" type="slide" axis="0 0 1" damping="0.8"/>
+    <geom type="box" size="0.1 0.1 0.1" mass="0.5"/></body></worldbody>
+  <actuator><motor name="winch" joint="rise"/></actuator></mujoco>"""
+DESCRIPTION = """name = "lift"
+model = "lift.xml"
+[commands.winch]
+actuator = "winch"
+unit = "N"
+low = 0
+high = 10
+[observed.rise]
+joint = "rise"
+unit = "m"
+noise = 0.001
+[effects]
+command_lag = ["winch"]
+actuator_gain = ["winch"]
+body_mass = ["cage"]
+[log]
+trial = "trial"
+"""
+WEIGHT = 0.5 * 9.81  # [N]
+
+
+def lifted(folder, *, hovers, lag=0.0):
+    """A lift and six trials of 2 s at 50 Hz, in which it is told a force every 0.4 s.
+
+    Args:
+        folder: where model, description and log are written.
+        hovers: whether it hung from its winch before a log begins; else gravity is off.
+        lag: time constant of the winch [s].
+    """
+    text = LIFT if hovers else LIFT.replace('"0.002"', '"0.002" gravity="0 0 0"')
+    (folder / "lift.xml").write_text(text)
+    (folder / "lift.toml").write_text(DESCRIPTION)
+    model = mujoco.MjModel.from_xml_string(text)
+    rng, lines = np.random.default_rng(3), ["time,winch,rise,trial"]
+    for trial in range(6):
+        data, told = mujoco.MjData(model), rng.uniform(-1.5, 1.5, 5).round(2)
+        told = np.abs(told)
+        if hovers:
+            told = np.append(WEIGHT, WEIGHT + told[1:] * [1, -1, 1, -1]).round(4)
+        force = told[0] if hovers else 0.0
+        for sample in range(100):
+            now = told[sample // 20]
+            seen = data.qpos[0] + rng.normal(0, 0.001)
+            lines.append(f"{sample / 50:.3f},{now},{seen:.5f},{trial}")
+            for _ in range(10):
+                force += (now - force) * (1 - np.exp(-0.002 / lag) if lag else 1.0)
+                data.ctrl[0] = force
+                mujoco.mj_step(model, data)
+    (folder / "log.csv").write_text("\n".join(lines) + "\n")
+    own = OwnModel.read(folder / "lift.toml", threads=1)
+    return own, own.read_log(str(folder / "log.csv"))
+
+
+@pytest.mark.parametrize("hovers", [True, False])
+def test_the_first_command_was_told_before_if_it_alone_kept_the_robot(tmp_path, hovers):
+    _, trials = lifted(tmp_path, hovers=hovers)
+    for trial in trials:
+        first = [list(trial.commands.values[0])]
+        assert trial.conditions.get(start.BEFORE) == (first if hovers else None)
+
+
+@pytest.mark.parametrize("hovers", [True, False])
+def test_a_lag_is_found_whether_the_robot_hung_or_lay_before(tmp_path, hovers):
+    own, trials = lifted(tmp_path, hovers=hovers, lag=0.08)
+    found = diagnose(trials, own, full=False)
+    assert list(found.best.names) == ["command_lag[winch]"]
+    assert found.best.magnitudes[0] == pytest.approx(0.08, abs=0.01)
