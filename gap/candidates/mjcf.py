@@ -83,7 +83,8 @@ def candidates(config: OwnConfig, model: mujoco.MjModel) -> tuple[Row, ...]:
         model: the nominal model.
 
     Raises:
-        BnsError: an effect on a part that the model lacks, or bounds for none.
+        BnsError: an effect on a part that the model lacks, bounds for none, or bounds
+            with nothing between them.
     """
     wanted = config.effects if config.effects is not None else usual(config, model)
     config = replace(
@@ -121,6 +122,11 @@ def _candidates(
         low, high, unit = _range(name, part, config, model)
         given = config.bounds.get(f"{stem}[{part}]", {})
         low, high = given.get("low", low), given.get("high", high)
+        if low >= high:
+            raise BnsError(
+                f"[bounds] {stem}[{part}]: low = {low:g} is not below high = {high:g}; "
+                "give both."
+            )
         signed = name.startswith("joint_") and name not in UNSIGNED
         widest = WIDER * high if signed and "high" not in given else high
         sd = EIGHTH * (high if signed else high - low)

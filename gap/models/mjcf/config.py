@@ -266,7 +266,11 @@ def _mapping(table: Any, where: str, path: Path) -> Mapping[str, Any]:
 def _bounds(name: str, row: Any, path: Path) -> Mapping[str, float]:
     row = _mapping(row, f"bounds of {name}", path)
     _known(row, ("low", "high", "slack"), f"bound of {name} in {path}")
-    return {key: _number(value, key, path) for key, value in row.items()}
+    least = {"slack": 0.0}
+    return {
+        key: _number(value, key, path, least.get(key, -BEYOND))
+        for key, value in row.items()
+    }
 
 
 def _number(

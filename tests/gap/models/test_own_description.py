@@ -150,6 +150,17 @@ def test_former_names_in_a_description_are_read(arm):
     assert str(made.make(1.2)) == "reading_gain:part=elbow,factor=1.2"
 
 
+@pytest.mark.parametrize("given", [{"low": 2.0, "high": 0.5}, {"low": 9.0}])
+def test_bounds_with_nothing_between_are_refused(arm, given):
+    config = replace(
+        OwnConfig.read(ARM),
+        effects={"reading_gain": ("elbow",)},
+        bounds={"reading_gain[elbow]": given},
+    )
+    with pytest.raises(BnsError, match=r"reading_gain\[elbow\]: low = .* give both"):
+        mjcf.candidates(config, arm.physics.model)
+
+
 def test_the_description_in_the_documentation_is_one(tmp_path):
     page = (ARM.parents[2] / "docs" / "gap_your_robot.md").read_text()
     (tmp_path / "arm.toml").write_text(page.split("```")[1])
