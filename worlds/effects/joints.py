@@ -160,6 +160,8 @@ class EncoderOffset(BodyEffect):
 
 
 NO_BIAS, AFFINE = 0, 1  # mjtBias
+MUSCLE = 2  # mjtGain
+FORCES = slice(2, 4)  # of a muscle's numbers: its peak force, and what that comes from
 LEAST = 1e-9  # of the force; MuJoCo takes a range of nothing for no limit at all
 
 
@@ -171,15 +173,16 @@ class ActuatorGain(BodyEffect):
     """An actuator is weaker, or stronger, than the model says."""
 
     name = "actuator_gain"
-    source = "MuJoCo's actuator model: gain and bias scaled together"
+    source = "MuJoCo's actuator model: gain and bias scaled together, a muscle's by force"
     robots = UNSERVOED
     choices = parts.part("actuator")
     parameter = _factor("force over the model's", 0.7)
 
     def _write(self, spec: Any) -> None:
         for item in parts.actuators(spec, self["part"]):
-            item.gainprm = np.asarray(item.gainprm) * self["factor"]
-            item.biasprm = np.asarray(item.biasprm) * self["factor"]
+            numbers = FORCES if item.gaintype == MUSCLE else slice(None)
+            for values in (item.gainprm, item.biasprm):
+                values[numbers] *= self["factor"]
 
 
 def _servos(spec: Any, which: str, gain: int, called: str) -> list[Any]:

@@ -214,6 +214,21 @@ class TestActuators:
             mujoco.mj_forward(model, data)
             assert data.actuator_force[0] == pytest.approx(-3 * kd)
 
+    @pytest.mark.parametrize("force", ['force="50"', 'scale="200"'])
+    def test_a_muscle_pulls_so_much_less_all_along(self, force):
+        xml = LOOP.format(f'<muscle joint="knee" lengthrange="-2 2" {force}/>')
+        pulls = []
+        for texts in ([], ["actuator_gain:factor=0.8"]):
+            model = compiled(*texts, xml=xml)
+            data = mujoco.MjData(model)
+            for angle, activation in ((-0.5, 0.3), (0.0, 1.0), (1.5, 0.0)):
+                data.qpos[0], data.act[0] = angle, activation
+                data.qvel[0] = angle
+                mujoco.mj_forward(model, data)
+                pulls.append(data.actuator_force[0])
+        assert np.array(pulls[3:]) == pytest.approx(0.8 * np.array(pulls[:3]))
+        assert min(np.abs(pulls)) > 0.001  # all three are felt
+
     def test_a_limited_servo_pushes_no_harder(self):
         model = compiled("actuator_torque_limit:part=shoulder_servo,factor=0.25")
         data = mujoco.MjData(model)
