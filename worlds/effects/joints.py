@@ -173,7 +173,7 @@ class ActuatorGain(BodyEffect):
     """An actuator is weaker, or stronger, than the model says."""
 
     name = "actuator_gain"
-    source = "MuJoCo's actuator model: gain and bias scaled together, a muscle's by force"
+    source = "MuJoCo's actuator model: gain and bias scaled; of a muscle, the force"
     robots = UNSERVOED
     choices = parts.part("actuator")
     parameter = _factor("force over the model's", 0.7)
