@@ -179,7 +179,8 @@ def linearised(
     slopes: Mapping[int, np.ndarray] | None = None,
     order: int | None = None,
 ) -> tuple[Linear, Noise, Mapping[int, np.ndarray]]:
-    """The linear model around values, with the noise that all rows together leave.
+    """The linear model around values, with the noise that all rows together leave. What
+    explanations and slack change is simulated to a share of it (`inexact`).
 
     Args:
         problem: the recording.
@@ -203,7 +204,7 @@ def linearised(
     whole = target(problem, values, rest, slopes)
     predicted = np.where(problem.seen, problem.recorded, 0.0) - np.nan_to_num(rest)
     motion = problem.model.motion(predicted)
-    moved = np.nan_to_num(problem.gap - rest)
+    inside = _departed(problem, values)
     exact = inexact(problem, values)
     left, told = rest, known.latent.of_each(slopes)
     for turn in range(MEASURED):
@@ -217,7 +218,8 @@ def linearised(
             memory = Memory.of(known.latent(left), problem.trial, order)
             known = replace(known, memory=memory)
         seen = np.where(problem.seen, known.innovations(left), np.nan)
-        change = np.abs(known.innovations(moved))
+        explained = _summed(problem, values, slopes, made, made.solve(inside))
+        change = np.abs(known.innovations(problem.gap - whole + explained))
         felt = None if problem.model.many else change
         sd = noise.scale(seen, motion, problem.model.least, felt)
         known = replace(known, sd=np.hypot(sd, exact * change), lam=1.0)
@@ -226,6 +228,15 @@ def linearised(
     whitened = np.sqrt(made.weight) * made.rest(found)
     lam = max(noise.correlated(whitened, problem.trial), noise.inflation(made, found))
     return made.correlated(lam), replace(known, lam=lam), slopes
+
+
+def _departed(problem: Problem, values: np.ndarray) -> set[str]:
+    """Names of explanations whose values ``(R,)`` are not nominal."""
+    return {
+        row.term
+        for row, value in zip(problem.rows, values, strict=True)
+        if value != row.nominal and not row.nuisance
+    }
 
 
 def inexact(problem: Problem, values: np.ndarray) -> float:

@@ -5,6 +5,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from bns.gap.decomposition import fit
+from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.row import Row
 from bns.gap.diagnose import diagnose
 from bns.gap.models.mjcf import start
 from bns.gap.models.mjcf.model import OwnModel
@@ -35,18 +38,20 @@ trial = "trial"
 WEIGHT = 0.5 * 9.81  # [N]
 
 
-def lifted(folder, *, hovers, lag=0.0):
+def lifted(folder, *, hovers=True, lag=0.0, more=0.0):
     """A lift and six trials of 2 s at 50 Hz, in which it is told a force every 0.4 s.
 
     Args:
         folder: where model, description and log are written.
         hovers: whether it hung from its winch before a log begins; else gravity is off.
         lag: time constant of the winch [s].
+        more: mass that the recorded one has more [kg].
     """
     text = LIFT if hovers else LIFT.replace('"0.002"', '"0.002" gravity="0 0 0"')
     (folder / "lift.xml").write_text(text)
     (folder / "lift.toml").write_text(DESCRIPTION)
-    model = mujoco.MjModel.from_xml_string(text)
+    heavier = text.replace('mass="0.5"', f'mass="{0.5 + more}"')
+    model = mujoco.MjModel.from_xml_string(heavier)
     rng, lines = np.random.default_rng(3), ["time,winch,rise,trial"]
     for trial in range(6):
         data, told = mujoco.MjData(model), rng.uniform(-1.5, 1.5, 5).round(2)
@@ -81,3 +86,20 @@ def test_a_lag_is_found_whether_the_robot_hung_or_lay_before(tmp_path, hovers):
     found = diagnose(trials, own, full=False)
     assert list(found.best.names) == ["command_lag[winch]"]
     assert found.best.magnitudes[0] == pytest.approx(0.08, abs=0.01)
+
+
+@pytest.mark.parametrize("more", [0.0, 0.011])
+def test_a_load_of_five_times_what_a_mass_may_be_off_is_named(tmp_path, more):
+    own, trials = lifted(tmp_path, more=more)
+    found = diagnose(trials, own, full=False)
+    assert list(found.best.names) == (["body_mass[cage]"] if more else [])
+
+
+def test_what_slack_explains_is_simulated_no_more_exactly_than_explanations(tmp_path):
+    own, trials = lifted(tmp_path, more=0.011)
+    problem = Problem.of(trials, own)
+    gap = problem.gap  # 0.2 m, most of which the mass explains within its slack
+    first = fit.first_noise(problem, gap, problem.recorded - gap)
+    _, noise, _ = fit.linearised(problem, problem.nominal, gap, first, order=0)
+    far = np.abs(gap) > 0.1
+    assert (noise.sd[far] > 0.9 * Row.inexact * np.abs(gap[far])).all()
