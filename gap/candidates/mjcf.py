@@ -57,6 +57,7 @@ EXCITE = {
     "body_centre": "motion against gravity, or sudden changes of speed",
     "body_length": "large excursions",
     "body_tilt": "motion against gravity",
+    "actuator_gear": "large commands",
     "actuator_lag": "steps",
     "actuator_period": "steps",
     "actuator_kp": "steps, and loads that are held",
@@ -223,7 +224,7 @@ def _of_model(
         return -0.9 * model.actuator_dynprm[at, 0] * filtered, LATE[-1], "s"
     if name == "log_clock":
         return -FASTEST, FASTEST, "1"
-    if name == "geom_radius":
+    if name in ("geom_radius", "actuator_gear"):
         return 0.7, 1.4, "1"
     if name == "geom_compliance":
         return 0.2, 10.0, "1"

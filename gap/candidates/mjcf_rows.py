@@ -27,6 +27,7 @@ GROUPED = (
     "joint_armature",
     "geom_radius",
     "actuator_gain",
+    "actuator_gear",
     "actuator_kp",
     "command_lag",
 )
@@ -46,13 +47,14 @@ EIGHTH = 0.125  # of the largest value: the plausible one
 OFFSET = 0.0625  # of the span of an offset
 
 # plausible departure and slack of what has no scale of its own (assumed): a gain of a
-# motor is known to 10 %, of a sensor and a tyre to 3 %, a delay to 40 ms; loops run at
-# 1 kHz, or at some 200 Hz. A clock is known to 1 %; its slack is that of gains, which
-# make a robot as much faster or slower
+# motor is known to 10 %, of a sensor, a gear and a tyre to 3 %, a delay to 40 ms; loops
+# run at 1 kHz, or at some 200 Hz. A clock is known to 1 %; its slack is that of gains,
+# which make a robot as much faster or slower
 PLAUSIBLE = {
     "actuator_gain": (0.1, 0.003),
     "actuator_kp": (0.05, 0.003),
     "actuator_kd": (0.15, 0.01),
+    "actuator_gear": (0.03, 0.001),
     "actuator_lag": (0.04, 8e-4),
     "actuator_period": (0.004, 4e-4),
     "command_gain": (0.1, 0.003),

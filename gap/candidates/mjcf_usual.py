@@ -19,6 +19,7 @@ USUAL = (
     "body_mass",
     "body_tilt",
     "actuator_gain",
+    "actuator_gear",
     "actuator_kp",
     "actuator_kd",
     "actuator_lag",
@@ -36,10 +37,11 @@ USUAL = (
     "log_clock",
 )
 """considered where the user does not say which, on what the commands move:
-`actuator_kp` and `actuator_kd` of position servos, `actuator_lag` of those whose
-control the model filters, `actuator_period` of all whose gains the description
-gives, a limit of force of these and of servos of speed, `actuator_gain` and
-`command_limit` of all but position servos, the tilt of what is bolted to the world;
+`actuator_kp` and `actuator_kd` of position servos, `actuator_gear` of servos of speed,
+`actuator_lag` of those whose control the model filters, `actuator_period` of all whose
+gains the description gives, a limit of force of these and of servos of speed,
+`actuator_gain` and `command_limit` of all but position servos, the tilt of what is
+bolted to the world;
 `joint_stop` of joints that are seen; `command_lag` of each command where there are
 few, and of all; `reading_delay` of each reading where there are few, else of places,
 by a camera, beside joints, by encoders; the radius of wheels and feet, and grip and
@@ -74,6 +76,7 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
     limited = {number for number in told if model.actuator_forcelimited[number]}
     of = {
         "actuator_gain": set(told) - servos,
+        "actuator_gear": looped - servos,
         "actuator_kp": servos,
         "actuator_kd": damped,
         "actuator_lag": {n for n in told if model.actuator_dyntype[n] in FILTERS},

@@ -185,6 +185,25 @@ class ActuatorGain(BodyEffect):
                 values[numbers] *= self["factor"]
 
 
+class ActuatorGear(BodyEffect):
+    """An actuator's gear differs from the model's: a gear ratio, a pulley, a lever.
+
+    A wheel or a drum that is larger by 6 % moves that much farther a turn: its gear is
+    1 / 1.06 of the model's. A motor is as much stronger as its gear is higher, like one
+    of more gain; a servo of position or speed goes as much less far, too.
+    """
+
+    name = "actuator_gear"
+    source = "MuJoCo's transmission: length = gear x position, force = gear x force"
+    robots = ("own",)
+    choices = parts.part("actuator")
+    parameter = factor((0.1, 10.0), "gear over the model's", example=0.9)
+
+    def _write(self, spec: Any) -> None:
+        for item in parts.actuators(spec, self["part"]):
+            item.gear = np.asarray(item.gear) * self["factor"]
+
+
 def _servos(spec: Any, which: str, gain: int, called: str) -> list[Any]:
     """Position actuators whose number `gain` of the bias is not zero."""
     some = parts.actuators(spec, which)

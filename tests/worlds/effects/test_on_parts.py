@@ -214,6 +214,18 @@ class TestActuators:
             mujoco.mj_forward(model, data)
             assert data.actuator_force[0] == pytest.approx(-3 * kd)
 
+    def test_a_larger_wheel_goes_farther_a_turn_and_pushes_less(self):
+        servo = '<velocity name="a" joint="knee" kv="9" gear="20"/>'
+        gear = ["actuator_gear:part=a,factor=0.8"]
+        for texts, ratio in (([], 20.0), (gear, 16.0)):
+            model = compiled(*texts, xml=LOOP.format(servo), gravity=False)
+            data = mujoco.MjData(model)
+            data.ctrl[0] = 4.0
+            mujoco.mj_forward(model, data)
+            assert data.qfrc_actuator[0] == pytest.approx(9 * 4 * ratio)
+            mujoco.mj_step(model, data, 2000)
+            assert data.qvel[0] == pytest.approx(4 / ratio, rel=1e-3)
+
     @pytest.mark.parametrize("force", ['force="50"', 'scale="200"'])
     def test_a_muscle_pulls_so_much_less_all_along(self, force):
         xml = LOOP.format(f'<muscle joint="knee" lengthrange="-2 2" {force}/>')
