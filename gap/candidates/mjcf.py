@@ -57,6 +57,7 @@ EXCITE = {
     "body_centre": "motion against gravity, or sudden changes of speed",
     "body_length": "large excursions",
     "body_tilt": "motion against gravity",
+    "gravity_compensation": "slow motion against gravity",
     "actuator_gear": "large commands",
     "actuator_lag": "steps",
     "actuator_period": "steps",
@@ -72,6 +73,8 @@ _DELAYS = {
     "reading_delay[all]": ("command_delay[all]",),
 }
 """alike where every command and every reading is late"""
+WHOLE = ("actuator_period", "gravity_compensation")
+"""effects on actuators and bodies that may be on all of them"""
 UNSIGNED = ("joint_backlash", "joint_stop")
 """effects on joints that are no number added to the model's"""
 
@@ -210,7 +213,7 @@ def _of_model(
     name: str, kind: str, part: str, model: mujoco.MjModel
 ) -> tuple[float, float, str]:
     known = _names(model, kind)
-    if part == ALL and (kind == "geom" or name == "actuator_period"):
+    if part == ALL and (kind == "geom" or name in WHOLE):
         known.append(ALL)
     if part not in known:
         raise UnknownNameError(f"{kind} in [effects] {name}", part, known)
@@ -230,6 +233,8 @@ def _of_model(
         return 0.2, 10.0, "1"
     if kind in ("actuator", "geom"):
         return 0.2, 3.0, "1"
+    if name == "gravity_compensation":
+        return -1.0, 1.0, "1"
     if name == "body_tilt":
         return -TILT, TILT, "rad"
     if name == "body_length":

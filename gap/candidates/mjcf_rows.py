@@ -48,8 +48,9 @@ OFFSET = 0.0625  # of the span of an offset
 
 # plausible departure and slack of what has no scale of its own (assumed): a gain of a
 # motor is known to 10 %, of a sensor, a gear and a tyre to 3 %, a delay to 40 ms; loops
-# run at 1 kHz, or at some 200 Hz. A clock is known to 1 %; its slack is that of gains,
-# which make a robot as much faster or slower
+# run at 1 kHz, or at some 200 Hz; what balances a weight is known as a motor is. A
+# clock is known to 1 %; its slack is that of gains, which make a robot as much faster
+# or slower
 PLAUSIBLE = {
     "actuator_gain": (0.1, 0.003),
     "actuator_kp": (0.05, 0.003),
@@ -68,6 +69,7 @@ PLAUSIBLE = {
     "body_length": (0.03, 0.001),
     "body_tilt": (0.03, 0.001),
     "encoder_offset": (0.01, 0.0),
+    "gravity_compensation": (0.1, 0.003),
     "log_clock": (0.01, 0.003),
 }
 SHARE = 0.02  # slack of a number over its plausible departure

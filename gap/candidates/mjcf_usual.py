@@ -18,6 +18,7 @@ USUAL = (
     "joint_stop",
     "body_mass",
     "body_tilt",
+    "gravity_compensation",
     "actuator_gain",
     "actuator_gear",
     "actuator_kp",
@@ -41,7 +42,7 @@ USUAL = (
 `actuator_lag` of those whose control the model filters, `actuator_period` of all whose
 gains the description gives, a limit of force of these and of servos of speed,
 `actuator_gain` and `command_limit` of all but position servos, the tilt of what is
-bolted to the world;
+bolted to the world, `gravity_compensation` where the model has some;
 `joint_stop` of joints that are seen; `command_lag` of each command where there are
 few, and of all; `reading_delay` of each reading where there are few, else of places,
 by a camera, beside joints, by encoders; the radius of wheels and feet, and grip and
@@ -92,6 +93,7 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
         "reading_gain": seen,
         "reading_offset": seen,
         "body_tilt": _bolted(model, owned),
+        "gravity_compensation": (ALL,) if model.body_gravcomp.any() else (),
         "body_length": _long(model, sorted(owned)),
         **_surfaces(model, joints=(*moved, *pushed)),
     }

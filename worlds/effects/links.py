@@ -94,6 +94,28 @@ class BodyTilt(BodyEffect):
             body.quat = made
 
 
+class GravityCompensation(BodyEffect):
+    """Springs, counterweights or motors carry more, or less, of a body's weight.
+
+    All are those of which the model says that something carries them (`gravcomp`), or
+    all if it says so of none.
+    """
+
+    name = "gravity_compensation"
+    source = "MuJoCo's gravcomp: an upward force of that share of the body's weight"
+    robots = ("own",)
+    choices = parts.part("body")
+    parameter = strength(
+        "added", "1", (-WIDE, WIDE), "share of the weight that is carried", example=0.3
+    )
+
+    def _write(self, spec: Any) -> None:
+        bodies = parts.bodies(spec, self["part"])
+        carried = [body for body in bodies if body.gravcomp]
+        for body in carried or bodies:
+            body.gravcomp += self["added"]
+
+
 def _turn(roll: float, pitch: float) -> tuple[np.ndarray, float]:
     """Axis and angle of a rotation vector."""
     angle = float(np.hypot(roll, pitch))

@@ -214,6 +214,15 @@ class TestActuators:
             mujoco.mj_forward(model, data)
             assert data.actuator_force[0] == pytest.approx(-3 * kd)
 
+    @pytest.mark.parametrize("part", ["rod", "all"])
+    def test_what_carries_half_of_a_weight_leaves_half_of_its_torque(self, part):
+        xml = ROD.replace('name="rod"', 'name="rod" gravcomp="0.8"')
+        model = compiled(f"gravity_compensation:part={part},added=-0.3", xml=xml)
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        held = data.qfrc_bias[0] - data.qfrc_gravcomp[0]
+        assert abs(held) == pytest.approx(0.5 * 0.6 * G * 0.2)
+
     def test_a_larger_wheel_goes_farther_a_turn_and_pushes_less(self):
         servo = '<velocity name="a" joint="knee" kv="9" gear="20"/>'
         gear = ["actuator_gear:part=a,factor=0.8"]
