@@ -38,6 +38,7 @@ GAINED = {
     "caster stuck, friction 0.4": ("caster_drag",),
     "eccentric left wheel 1.5 mm": ("wheel_eccentricity[left]",),
     "dead zone taken off both": ("dead_zone[both]",),
+    "swimmer thinner fluid": ("fluid_density[all]",),
 }
 BARS = (
     ("A", "singles named (aliases merged)", ">= 0.95"),

@@ -57,6 +57,8 @@ EXCITE = {
     "body_centre": "motion against gravity, or sudden changes of speed",
     "body_length": "large excursions",
     "body_tilt": "motion against gravity",
+    "fluid_density": "fast motion",
+    "fluid_viscosity": "slow motion",
     "gravity_compensation": "slow motion against gravity",
     "actuator_gear": "large commands",
     "actuator_lag": "steps",
@@ -231,7 +233,7 @@ def _of_model(
         return 0.7, 1.4, "1"
     if name == "geom_compliance":
         return 0.2, 10.0, "1"
-    if kind in ("actuator", "geom"):
+    if kind in ("actuator", "geom", "model"):
         return 0.2, 3.0, "1"
     if name == "gravity_compensation":
         return -1.0, 1.0, "1"

@@ -48,9 +48,9 @@ OFFSET = 0.0625  # of the span of an offset
 
 # plausible departure and slack of what has no scale of its own (assumed): a gain of a
 # motor is known to 10 %, of a sensor, a gear and a tyre to 3 %, a delay to 40 ms; loops
-# run at 1 kHz, or at some 200 Hz; what balances a weight is known as a motor is. A
-# clock is known to 1 %; its slack is that of gains, which make a robot as much faster
-# or slower
+# run at 1 kHz, or at some 200 Hz; what balances a weight is known as a motor is, and
+# drag no better. A clock is known to 1 %; its slack is that of gains, which make a
+# robot as much faster or slower
 PLAUSIBLE = {
     "actuator_gain": (0.1, 0.003),
     "actuator_kp": (0.05, 0.003),
@@ -69,9 +69,12 @@ PLAUSIBLE = {
     "body_length": (0.03, 0.001),
     "body_tilt": (0.03, 0.001),
     "encoder_offset": (0.01, 0.0),
+    "fluid_density": (0.1, 0.01),
+    "fluid_viscosity": (0.3, 0.03),
     "gravity_compensation": (0.1, 0.003),
     "log_clock": (0.01, 0.003),
 }
+INEXACT = {"joint_backlash": 0.05}  # gears bounce each in their own way
 SHARE = 0.02  # slack of a number over its plausible departure
 
 
@@ -204,6 +207,7 @@ def _of(
         slack=item.slack or slack,
         levels=(0.15, 0.3) if late else (),
         step=step,  # of a small one contacts show their chatter
+        inexact=INEXACT.get(item.effect, Row.inexact),
     )
 
 

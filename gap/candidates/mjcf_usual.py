@@ -35,6 +35,8 @@ USUAL = (
     "geom_radius",
     "geom_friction",
     "geom_compliance",
+    "fluid_density",
+    "fluid_viscosity",
     "log_clock",
 )
 """considered where the user does not say which, on what the commands move:
@@ -42,7 +44,8 @@ USUAL = (
 `actuator_lag` of those whose control the model filters, `actuator_period` of all whose
 gains the description gives, a limit of force of these and of servos of speed,
 `actuator_gain` and `command_limit` of all but position servos, the tilt of what is
-bolted to the world, `gravity_compensation` where the model has some;
+bolted to the world, `gravity_compensation` and a fluid's numbers where the model has
+some;
 `joint_stop` of joints that are seen; `command_lag` of each command where there are
 few, and of all; `reading_delay` of each reading where there are few, else of places,
 by a camera, beside joints, by encoders; the radius of wheels and feet, and grip and
@@ -93,6 +96,8 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
         "reading_gain": seen,
         "reading_offset": seen,
         "body_tilt": _bolted(model, owned),
+        "fluid_density": (ALL,) if model.opt.density else (),
+        "fluid_viscosity": (ALL,) if model.opt.viscosity else (),
         "gravity_compensation": (ALL,) if model.body_gravcomp.any() else (),
         "body_length": _long(model, sorted(owned)),
         **_surfaces(model, joints=(*moved, *pushed)),
@@ -101,7 +106,7 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
     for name in (*USUAL, *(RARER if len(moved) <= FEW else ())):
         kind = effects.OWNERS.get(name)
         if kind == "model":
-            made[name] = (ALL,)
+            made[name] = of.get(name, (ALL,))
         elif name == "actuator_period":
             made[name] = (ALL,) if any(item.kd for item in config.told) else ()
         elif kind == "actuator":

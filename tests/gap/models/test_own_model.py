@@ -201,8 +201,13 @@ def test_geared_joints_may_have_ten_times_what_is_looked_for_first(arm, name):
     assert made.high == max(made.levels) == 0.1
 
 
-# no contact, no limit to scale
-UNFELT = {*mjcf_usual.TOUCHING, "actuator_torque_limit"}
+# no contact, no limit, no medium to scale
+UNFELT = {
+    *mjcf_usual.TOUCHING,
+    "actuator_torque_limit",
+    "fluid_density",
+    "fluid_viscosity",
+}
 
 
 @pytest.mark.parametrize("name", sorted(set(CLASSES) - UNFELT))

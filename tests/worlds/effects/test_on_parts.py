@@ -359,6 +359,22 @@ def test_a_valve_that_is_slow_follows_by_its_time_constant(dynamics, begins):
     assert data.act[0] == pytest.approx(1 - np.exp(-1), abs=0.01)
 
 
+@pytest.mark.parametrize(
+    ("number", "speed", "degree"), [("density", 3.0, 2), ("viscosity", 0.1, 1)]
+)
+def test_drag_goes_with_the_number_of_the_medium(number, speed, degree):
+    xml = LOOP.format("").replace("<mujoco>", f'<mujoco><option {number}="900"/>')
+    drags = []
+    for texts, times in (([], 1), ([], 2), ([f"fluid_{number}:factor=1.5"], 1)):
+        model = compiled(*texts, xml=xml.replace('damping="0.05"', ""), gravity=False)
+        data = mujoco.MjData(model)
+        data.qvel[0] = times * speed
+        mujoco.mj_forward(model, data)
+        drags.append(data.qfrc_passive[0])
+    assert drags[0] < 0
+    assert np.array(drags) / drags[0] == pytest.approx([1, 2**degree, 1.5])
+
+
 def test_a_valve_that_integrates_has_no_time_constant():
     xml = LOOP.format('<general name="a" joint="knee" dyntype="integrator"/>')
     with pytest.raises(BnsError, match="'a' has dynamics without a time constant"):
