@@ -105,13 +105,11 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
     made: dict[str, tuple[str, ...]] = {}
     for name in (*USUAL, *(RARER if len(moved) <= FEW else ())):
         kind = effects.OWNERS.get(name)
-        if kind == "model":
-            made[name] = of.get(name, (ALL,))
-        elif name == "actuator_period":
+        if name == "actuator_period":
             made[name] = (ALL,) if any(item.kd for item in config.told) else ()
         elif kind == "actuator":
             made[name] = tuple(model.actuator(n).name for n in told if n in of[name])
-        elif kind and name not in of:
+        elif kind in ("joint", "body") and name not in of:
             parts = _parts(model, kind, moved)
             made[name] = parts + (_parts(model, kind, pushed) if name in PUSHED else ())
         else:
