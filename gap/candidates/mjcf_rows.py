@@ -74,7 +74,6 @@ PLAUSIBLE = {
     "gravity_compensation": (0.1, 0.003),
     "log_clock": (0.01, 0.003),
 }
-INEXACT = {"joint_backlash": 0.05}  # gears bounce each in their own way
 SHARE = 0.02  # slack of a number over its plausible departure
 
 
@@ -207,7 +206,6 @@ def _of(
         slack=item.slack or slack,
         levels=(0.15, 0.3) if late else (),
         step=step,  # of a small one contacts show their chatter
-        inexact=INEXACT.get(item.effect, Row.inexact),
     )
 
 
