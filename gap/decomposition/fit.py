@@ -273,7 +273,8 @@ def _summed(
     sizes = units(problem, values)
     total = np.zeros_like(problem.recorded)
     for number, value in zip(made.columns, found, strict=True):
-        total += slopes[number] * sizes[number] * value
+        if value:
+            total += slopes[number] * sizes[number] * value
     return total
 
 
