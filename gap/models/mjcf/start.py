@@ -236,12 +236,18 @@ def held(
     noise = np.array([item.noise for item in view.config.seen])
     data, errors = mujoco.MjData(model), np.zeros(2)
     for trial, state, pair in zip(trials, begun, ctrls, strict=True):
-        seen = trial.observed[np.isfinite(trial.observed).all(axis=1)][0]
+        seen = np.array([_first(column) for column in trial.observed.T])
         for number, ctrl in enumerate(pair):
             mujoco.mj_setState(model, data, state, PHYSICS)
             data.ctrl[:] = ctrl
             mujoco.mj_step(model, data, nstep=round(lasting / model.opt.timestep))
             mujoco.mj_getState(model, data, made := np.empty(len(state)), PHYSICS)
             away = (view.read(model, made[None])[0] - seen) / noise
-            errors[number] += away @ away
+            errors[number] += np.sum(away**2, where=np.isfinite(seen))
     return bool(errors[1] < CLEARLY * errors[0])
+
+
+def _first(column: np.ndarray) -> float:
+    """The first of samples ``(T,)`` that was seen; NaN = none was."""
+    seen = column[np.isfinite(column)]
+    return float(seen[0]) if len(seen) else np.nan

@@ -80,6 +80,14 @@ def test_the_first_command_was_told_before_if_it_alone_kept_the_robot(tmp_path, 
         assert trial.conditions.get(start.BEFORE) == (first if hovers else None)
 
 
+def test_what_was_not_seen_says_nothing_of_it(tmp_path):
+    own, trials = lifted(tmp_path)
+    blind = trials[0].replace(observed=np.full_like(trials[0].observed, np.nan))
+    plain = [trial.replace(conditions={}) for trial in (blind, *trials[1:])]
+    assert all(start.BEFORE in trial.conditions for trial in own.physics.held(plain))
+    assert own.physics.held(plain[:1]) == plain[:1]
+
+
 @pytest.mark.parametrize("hovers", [True, False])
 def test_a_lag_is_found_whether_the_robot_hung_or_lay_before(tmp_path, hovers):
     own, trials = lifted(tmp_path, hovers=hovers, lag=0.08)
