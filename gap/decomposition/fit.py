@@ -204,7 +204,7 @@ def linearised(
     whole = target(problem, values, rest, slopes)
     predicted = np.where(problem.seen, problem.recorded, 0.0) - np.nan_to_num(rest)
     motion = problem.model.motion(predicted)
-    inside = _departed(problem, values)
+    plain, inside = np.nan_to_num(problem.gap), _departed(problem, values)
     exact = inexact(problem, values)
     left, told = rest, known.latent.of_each(slopes)
     for turn in range(MEASURED):
@@ -219,7 +219,7 @@ def linearised(
             known = replace(known, memory=memory)
         seen = np.where(problem.seen, known.innovations(left), np.nan)
         explained = _summed(problem, values, slopes, made, made.solve(inside))
-        change = np.abs(known.innovations(problem.gap - whole + explained))
+        change = np.abs(known.innovations(plain - whole + explained))
         felt = None if problem.model.many else change
         sd = noise.scale(seen, motion, problem.model.least, felt)
         known = replace(known, sd=np.hypot(sd, exact * change), lam=1.0)

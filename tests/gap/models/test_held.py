@@ -111,3 +111,16 @@ def test_what_slack_explains_is_simulated_no_more_exactly_than_explanations(tmp_
     _, noise, _ = fit.linearised(problem, problem.nominal, gap, first, order=0)
     far = np.abs(gap) > 0.1
     assert (noise.sd[far] > 0.9 * Row.inexact * np.abs(gap[far])).all()
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_noise_is_a_number_where_nothing_was_seen(tmp_path, order):
+    own, trials = lifted(tmp_path, more=0.011)
+    problem = Problem.of(trials, own)
+    problem = problem.without(np.arange(len(problem.trial)) % 50 < 5)
+    gap = problem.gap
+    motion = np.nan_to_num(problem.recorded - gap)
+    first = fit.first_noise(problem, gap, motion)
+    _, noise, _ = fit.linearised(problem, problem.nominal, gap, first, order=order)
+    assert np.isfinite(noise.sd).all()
+    assert np.isfinite(noise.loss(gap))
