@@ -32,6 +32,18 @@ LEAST = 0.002  # of a limit in the model, which may be far beyond the robot's
 TILT = 0.5  # [rad] largest tilt of a body
 FREE = ((-np.pi, np.pi), (-1.0, 1.0))  # [rad], [m] of a joint without stops
 PLAY = 0.3  # [rad or m] largest play, or offset of an encoder
+RANGES = {
+    "actuator_gear": (0.7, 1.4, "1"),
+    "actuator_period": (0.0, SLOWEST, "s"),
+    "actuator_torque_limit": (LEAST, 3.0, "1"),
+    "body_length": (0.7, 1.4, "1"),
+    "body_tilt": (-TILT, TILT, "rad"),
+    "geom_compliance": (0.2, 10.0, "1"),
+    "geom_radius": (0.7, 1.4, "1"),
+    "gravity_compensation": (-1.0, 1.0, "1"),
+    "log_clock": (-FASTEST, FASTEST, "1"),
+}
+"""of effects on parts of the model that have the same on all of them"""
 EXCITE = {
     "joint_damping": "fast motion of that joint",
     "joint_friction": "slow motion and reversals of that joint",
@@ -220,27 +232,13 @@ def _of_model(
     if part not in known:
         raise UnknownNameError(f"{kind} in [effects] {name}", part, known)
     at = known.index(part)
-    if name == "actuator_torque_limit":
-        return LEAST, 3.0, "1"
-    if name == "actuator_period":
-        return 0.0, SLOWEST, "s"
+    if name in RANGES:
+        return RANGES[name]
     if name == "actuator_lag":
         filtered = int(model.actuator_dyntype[at]) in FILTERS
         return -0.9 * model.actuator_dynprm[at, 0] * filtered, LATE[-1], "s"
-    if name == "log_clock":
-        return -FASTEST, FASTEST, "1"
-    if name in ("geom_radius", "actuator_gear"):
-        return 0.7, 1.4, "1"
-    if name == "geom_compliance":
-        return 0.2, 10.0, "1"
     if kind in ("actuator", "geom", "model"):
         return 0.2, 3.0, "1"
-    if name == "gravity_compensation":
-        return -1.0, 1.0, "1"
-    if name == "body_tilt":
-        return -TILT, TILT, "rad"
-    if name == "body_length":
-        return 0.7, 1.4, "1"
     if kind == "body":
         mass = float(model.body_mass[at])
         if name == "body_mass":

@@ -45,11 +45,10 @@ USUAL = (
 gains the description gives, a limit of force of these and of servos of speed,
 `actuator_gain` and `command_limit` of all but position servos, the tilt of what is
 bolted to the world, `gravity_compensation` and a fluid's numbers where the model has
-some;
-`joint_stop` of joints that are seen; `command_lag` of each command where there are
-few, and of all; `reading_delay` of each reading where there are few, else of places,
-by a camera, beside joints, by encoders; the radius of wheels and feet, and grip and
-softness of all that touch, where they touch something"""
+some; `joint_stop` of joints that are seen; `command_lag` of each command where there
+are few, and of all; `reading_delay` of each reading where there are few, else of
+places, by a camera, beside joints, by encoders; the radius of wheels and feet, and
+grip and softness of all that touch, where they touch something"""
 PUSHED = ("joint_damping", "joint_friction", "body_mass")
 """... also on what is seen and has no motor: a block that is gripped, a door"""
 FEW = 6  # joints up to which `RARER` are considered, too; commands, readings
@@ -73,23 +72,8 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
     owned = {int(model.jnt_bodyid[j]) for j in moved}
     seen = tuple(item.channel.name for item in config.seen)
     channels = tuple(item.channel.name for item in config.told)
-    affine = model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE
-    servos = {n for n in told if affine[n] and model.actuator_biasprm[n][1]}
-    looped = servos | {n for n in told if affine[n] and model.actuator_biasprm[n][2]}
-    damped = {number for number in servos if model.actuator_biasprm[number][2]}
-    limited = {number for number in told if model.actuator_forcelimited[number]}
     of = {
-        "actuator_gain": set(told) - servos,
-        "actuator_gear": looped - servos,
-        "actuator_kp": servos,
-        "actuator_kd": damped,
-        "actuator_lag": {n for n in told if model.actuator_dyntype[n] in FILTERS},
-        "actuator_torque_limit": limited & looped,
-        "command_limit": [
-            item.channel.name
-            for item, number in zip(config.told, told, strict=True)
-            if number not in servos
-        ],
+        **_on_actuators(config, model),
         "joint_stop": [item.part for item in config.seen if item.quantity == "joint"],
         "command_lag": channels if 1 < len(channels) <= FEW else (ALL,),
         "reading_delay": seen if 1 < len(seen) <= FEW else _by_camera(config),
@@ -105,16 +89,43 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
     made: dict[str, tuple[str, ...]] = {}
     for name in (*USUAL, *(RARER if len(moved) <= FEW else ())):
         kind = effects.OWNERS.get(name)
-        if name == "actuator_period":
-            made[name] = (ALL,) if any(item.kd for item in config.told) else ()
-        elif kind == "actuator":
-            made[name] = tuple(model.actuator(n).name for n in told if n in of[name])
-        elif kind in ("joint", "body") and name not in of:
+        if kind in ("joint", "body") and name not in of:
             parts = _parts(model, kind, moved)
             made[name] = parts + (_parts(model, kind, pushed) if name in PUSHED else ())
         else:
             made[name] = tuple(of.get(name, (ALL,)))
     return {name: parts for name, parts in made.items() if parts}
+
+
+def _on_actuators(
+    config: OwnConfig, model: mujoco.MjModel
+) -> dict[str, tuple[str, ...]]:
+    """Names of the actuators that each effect on them may be on, and of the commands
+    that may be limited."""
+    told = [model.actuator(item.actuator).id for item in config.told]
+    affine = model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE
+    servos = {n for n in told if affine[n] and model.actuator_biasprm[n][1]}
+    looped = servos | {n for n in told if affine[n] and model.actuator_biasprm[n][2]}
+    on = {
+        "actuator_gain": set(told) - servos,
+        "actuator_gear": looped - servos,
+        "actuator_kp": servos,
+        "actuator_kd": {n for n in servos if model.actuator_biasprm[n][2]},
+        "actuator_lag": {n for n in told if model.actuator_dyntype[n] in FILTERS},
+        "actuator_torque_limit": {n for n in looped if model.actuator_forcelimited[n]},
+    }
+    named = {
+        name: tuple(model.actuator(n).name for n in told if n in which)
+        for name, which in on.items()
+    }
+    return named | {
+        "actuator_period": (ALL,) if any(item.kd for item in config.told) else (),
+        "command_limit": tuple(
+            item.channel.name
+            for n, item in zip(told, config.told, strict=True)
+            if n not in servos
+        ),
+    }
 
 
 def _parts(model: mujoco.MjModel, kind: str, joints: Iterable[int]) -> tuple[str, ...]:

@@ -266,9 +266,8 @@ def _mapping(table: Any, where: str, path: Path) -> Mapping[str, Any]:
 def _bounds(name: str, row: Any, path: Path) -> Mapping[str, float]:
     row = _mapping(row, f"bounds of {name}", path)
     _known(row, ("low", "high", "slack"), f"bound of {name} in {path}")
-    least = {"slack": 0.0}
     return {
-        key: _number(value, key, path, least.get(key, -BEYOND))
+        key: _number(value, key, path, 0.0 if key == "slack" else -BEYOND)
         for key, value in row.items()
     }
 

@@ -91,7 +91,7 @@ class OwnModel(GapModel):
     def read_log(self, path: str, columns: str = "") -> list[Trial]:
         """Trials of a log, none longer than the model foresees."""
         config = self.config.mapped(columns) if columns else self.config
-        trials = self.physics.held(log.read(path, config))
+        trials = start.held(log.read(path, config), config, self.physics.stood)
         log.possible(trials, config, self.physics.model)
         return cuts.foreseen(trials, self.config, self.physics.model, self)
 

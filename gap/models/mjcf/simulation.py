@@ -284,25 +284,25 @@ class Simulation:
             made[:, piece.columns] = found[key]
         return made
 
-    def held(self, trials: Sequence[Trial]) -> list[Trial]:
-        """Trials with what was told before them, if their first commands held the
-        robot (`start.held`)."""
-        at_rest = [trial for trial in trials if start.at_rest(trial)]
-        if self.config.recorded or not at_rest:
-            return list(trials)
-        ctrls = []
-        for trial in at_rest:
-            rest = self._rest(self.model)
-            first = rest.copy()
-            first[self.actuators] = trial.commands.values[0]
-            ctrls.append((rest, first))
-        begun = [self._begun_in(trial, self.model) for trial in at_rest]
-        if not start.held(at_rest, begun, self.model, self._view(self.model), ctrls):
-            return list(trials)
-        return [
-            start.told_before(trial, self.dt) if start.at_rest(trial) else trial
-            for trial in trials
-        ]
+    def stood(
+        self, trial: Trial, lasting: float, told: np.ndarray | None
+    ) -> np.ndarray:
+        """Readings ``(C,)`` of the nominal model after it stood where a trial begins.
+
+        Args:
+            trial: recorded trial.
+            lasting: how long it stood [s].
+            told: commands ``(K,)``; None = the control at rest.
+        """
+        data = mujoco.MjData(self.model)
+        state = self._begun_in(trial, self.model)
+        mujoco.mj_setState(self.model, data, state, STATE)
+        data.ctrl[:] = self._rest(self.model)
+        if told is not None:
+            data.ctrl[self.actuators] = told
+        mujoco.mj_step(self.model, data, nstep=round(lasting / self.dt))
+        mujoco.mj_getState(self.model, data, state, STATE)
+        return self._view(self.model).read(self.model, state[None])[0]
 
     def _lead(self, dt: float) -> int:
         return round(self.config.settle / dt)

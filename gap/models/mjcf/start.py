@@ -1,7 +1,7 @@
 """What is observed of a user's own model, from its physics states (`View`); and where a
 recorded trial begins: the state of the joints, and what was told before."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -9,7 +9,6 @@ import numpy as np
 
 from bns.gap.models.mjcf import prepared
 from bns.gap.models.mjcf.config import OwnConfig
-from bns.worlds.physics.rollout import STATE as PHYSICS
 from bns.worlds.trial import Trial
 
 STATE = "start"
@@ -198,53 +197,42 @@ def before(
     return np.array(rows, dtype=float)[np.clip(at, 0, None)]
 
 
-def at_rest(trial: Trial) -> bool:
-    """Whether nothing is known of what went before a trial."""
-    return STATE not in trial.conditions and BEFORE not in trial.conditions
-
-
-def told_before(trial: Trial, dt: float) -> Trial:
-    """A trial whose first command was told before it, too.
-
-    Args:
-        trial: recorded trial.
-        dt: physics step [s].
-    """
-    first = [[float(value) for value in trial.commands.values[0]]]
-    return trial.replace(conditions={**trial.conditions, BEFORE: first, STEP: dt})
-
-
 def held(
-    trials: Sequence[Trial],
-    begun: Sequence[np.ndarray],
-    model: mujoco.MjModel,
-    view: View,
-    ctrls: Sequence[Sequence[np.ndarray]],
-) -> bool:
-    """Whether the first command of trials held the robot before them, where it was: the
-    controls at rest would have taken it from its first samples. A drone hovers, and
-    muscles pull, when a log begins.
+    trials: Sequence[Trial], config: OwnConfig, stood: Callable[..., np.ndarray]
+) -> list[Trial]:
+    """Trials with their first command told before them, too, if it held the robot where
+    it was: the control at rest would have taken it from its first samples. A drone
+    hovers, and muscles pull, when a log begins.
 
     Args:
-        trials: recorded trials.
-        begun: physics state in which each begins to settle.
-        model: the nominal model.
-        view: of its channels.
-        ctrls: of each trial the control at rest, and that of the first command.
+        trials: recorded trials; what is known to have gone before some stays.
+        config: of the robot.
+        stood: readings ``(C,)`` after a robot stood where a trial begins for some
+            seconds, under a control at rest or commands ``(K,)``.
     """
-    lasting = max(view.config.settle, STOOD)
-    noise = np.array([item.noise for item in view.config.seen])
-    data, errors = mujoco.MjData(model), np.zeros(2)
-    for trial, state, pair in zip(trials, begun, ctrls, strict=True):
+    unknown = [trial for trial in trials if not _known_before(trial)]
+    if config.recorded or not unknown:
+        return list(trials)
+    lasting = max(config.settle, STOOD)
+    noise = np.array([item.noise for item in config.seen])
+    errors = np.zeros(2)
+    for trial in unknown:
         seen = np.array([_first(column) for column in trial.observed.T])
-        for number, ctrl in enumerate(pair):
-            mujoco.mj_setState(model, data, state, PHYSICS)
-            data.ctrl[:] = ctrl
-            mujoco.mj_step(model, data, nstep=round(lasting / model.opt.timestep))
-            mujoco.mj_getState(model, data, made := np.empty(len(state)), PHYSICS)
-            away = (view.read(model, made[None])[0] - seen) / noise
+        for number, told in enumerate((None, trial.commands.values[0])):
+            away = (stood(trial, lasting, told) - seen) / noise
             errors[number] += np.sum(away**2, where=np.isfinite(seen))
-    return bool(errors[1] < CLEARLY * errors[0])
+    if not errors[1] < CLEARLY * errors[0]:
+        return list(trials)
+    return [trial if _known_before(trial) else _told_before(trial) for trial in trials]
+
+
+def _known_before(trial: Trial) -> bool:
+    return STATE in trial.conditions or BEFORE in trial.conditions
+
+
+def _told_before(trial: Trial) -> Trial:
+    first = trial.commands.values[:1].tolist()
+    return trial.replace(conditions={**trial.conditions, BEFORE: first, STEP: STOOD})
 
 
 def _first(column: np.ndarray) -> float:

@@ -136,6 +136,15 @@ class TestBodies:
         assert one.qpos == pytest.approx(other.qpos, abs=1e-9)
         assert abs(one.qpos[0] - 0.5) > 1e-3
 
+    @pytest.mark.parametrize("part", ["rod", "all"])
+    def test_what_carries_half_of_a_weight_leaves_half_of_its_torque(self, part):
+        xml = ROD.replace('name="rod"', 'name="rod" gravcomp="0.8"')
+        model = compiled(f"gravity_compensation:part={part},added=-0.3", xml=xml)
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        held = data.qfrc_bias[0] - data.qfrc_gravcomp[0]
+        assert abs(held) == pytest.approx(0.5 * 0.6 * G * 0.2)
+
     def test_a_centre_of_mass_further_out_pulls_harder(self):
         def pull(*texts):
             model = compiled(*texts, xml=ROD)
@@ -213,15 +222,6 @@ class TestActuators:
             data.qvel[0], data.qpos[0], data.ctrl[0] = 3.0, 0.1, 0.1
             mujoco.mj_forward(model, data)
             assert data.actuator_force[0] == pytest.approx(-3 * kd)
-
-    @pytest.mark.parametrize("part", ["rod", "all"])
-    def test_what_carries_half_of_a_weight_leaves_half_of_its_torque(self, part):
-        xml = ROD.replace('name="rod"', 'name="rod" gravcomp="0.8"')
-        model = compiled(f"gravity_compensation:part={part},added=-0.3", xml=xml)
-        data = mujoco.MjData(model)
-        mujoco.mj_forward(model, data)
-        held = data.qfrc_bias[0] - data.qfrc_gravcomp[0]
-        assert abs(held) == pytest.approx(0.5 * 0.6 * G * 0.2)
 
     def test_a_larger_wheel_goes_farther_a_turn_and_pushes_less(self):
         servo = '<velocity name="a" joint="knee" kv="9" gear="20"/>'
