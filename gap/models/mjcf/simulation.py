@@ -27,6 +27,7 @@ from bns.worlds.trial import Trial
 
 LEAD = 1.0  # [s] of rest before a trial, so that what is late has something before it
 KEPT, MODELS = 20_000, 300  # simulated trials and compiled models kept in memory
+READ = 2**28  # bytes of what sensors would read that are kept
 FINE = 0.005  # [s] between kept states; the step if that is longer
 FINEST, CUT = 0.0025, 4  # [s] longer steps are cut, shorter ones in so many parts
 EXACT = 0.2  # of the noise: predictions that differ by less are alike
@@ -81,6 +82,7 @@ class Simulation:
         self._pool = Pool(threads)
         self._compiled: OrderedDict[tuple, Compiled] = OrderedDict()
         self._kept: OrderedDict[tuple, np.ndarray] = OrderedDict()
+        self._motions: OrderedDict[tuple, np.ndarray] = OrderedDict()
         self._trees = trees.Trees.one(config)
         self._starts: dict[tuple, np.ndarray] = {}
         model = self.model
@@ -264,16 +266,46 @@ class Simulation:
                 held = dict(item for item in row if item)
                 run = trees.joined(group.trial, group.common, held.values())
                 runs.append((held, group.lead, *run))
-        jobs = [self._job(trial, items, parts) for _, _, trial, items in runs]
-        motions = self._pool.map(jobs) if jobs else []
-        for (held, lead, trial, items), motion in zip(runs, motions, strict=True):
-            states = motion.states[self._lead(self.dt / parts) :]
-            seen = self._samples(trial, items, states, self.dt / parts, lead)
+        moved = self._moved([(trial, items) for _, _, trial, items in runs], parts)
+        for (held, lead, trial, items), motion in zip(runs, moved, strict=True):
+            seen = self._samples(trial, items, motion, self.dt / parts, lead)
             for key, piece in held.items():
                 self._kept[key] = found[key] = seen[:, piece.columns]
         while len(self._kept) > KEPT:
             self._kept.popitem(last=False)
         return [self._put_together(pieces, found) for pieces in asked]
+
+    def _moved(
+        self, pairs: Sequence[tuple[Trial, Sequence[Effect]]], parts: int
+    ) -> list[np.ndarray]:
+        """What sensors without an effect would read of each trial, ``(T, C)``, every
+        `FINE`. Effects on readings move nothing: one motion serves all of them.
+
+        Args:
+            pairs: trials with their effects.
+            parts: into how many a step is cut.
+        """
+        keys, missing = [], {}
+        for trial, effects in pairs:
+            physical = [item for item in effects if not _on_readings(item)]
+            state = str(trial.conditions.get(start.STATE))
+            keys.append((parts, state, *_key(trial, physical)))
+            if keys[-1] not in self._motions:
+                missing[keys[-1]] = trial, physical
+        jobs = [self._job(trial, items, parts) for trial, items in missing.values()]
+        motions = self._pool.map(jobs) if jobs else []
+        dt = self.dt / parts
+        for (key, (_, items)), motion in zip(missing.items(), motions, strict=True):
+            states, model = (
+                motion.states[self._lead(dt) :: _every(dt)],
+                self.compiled(items).model,
+            )
+            self._motions[key] = self._view(model).read(model, states)
+        found = [self._motions[key] for key in keys]
+        most = READ // max((each.nbytes for each in found), default=1)
+        while len(self._motions) > most:
+            self._motions.popitem(last=False)
+        return found
 
     def _put_together(
         self, pieces: Mapping[tuple, trees.Piece], found: Mapping[tuple, np.ndarray]
@@ -373,15 +405,11 @@ class Simulation:
         self,
         trial: Trial,
         effects: Sequence[Effect],
-        states: np.ndarray,
+        read: np.ndarray,
         dt: float,
         ahead: float,
     ) -> np.ndarray:
-        every = max(1, int(FINE / dt + 1e-9))
-        grid = np.arange(0, len(states), every)
-        times = grid * dt
-        scene = self.compiled(effects)
-        read = self._view(scene.model).read(scene.model, states[grid])
+        times = np.arange(len(read)) * _every(dt) * dt
         names = tuple(item.channel.name for item in self.config.seen)
         on, rng = np.ones(len(times), bool), np.random.default_rng(0)
         for effect in effects:
@@ -397,6 +425,17 @@ def _edit(made: mujoco.MjSpec, effects: Sequence[Effect]) -> None:
         wanted = effect.stage == "body" and not effect.is_nominal
         if wanted and isinstance(effect, ModelEdit):
             effect.edit(made)
+
+
+def _every(dt: float) -> int:
+    """How many steps lie between kept states."""
+    return max(1, int(FINE / dt + 1e-9))
+
+
+def _on_readings(effect: Effect) -> bool:
+    """Whether an effect changes what is read and not how the robot moves."""
+    moves = isinstance(effect, CommandEffect | ModelEdit)
+    return isinstance(effect, SensorEffect) and not moves
 
 
 def _key(trial: Trial, effects: Sequence[Effect]) -> tuple:
