@@ -7,7 +7,7 @@ is unsure about; `bns gap describe` prints the same.
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +23,7 @@ from bns.gap.models.mjcf.channels import (
     tolds,
 )
 from bns.gap.models.mjcf.config import WINDOW
-from bns.gap.models.mjcf.log import split
+from bns.gap.models.mjcf.log import held, split
 from bns.gap.models.mjcf.measured import observed
 from bns.worlds.data.units import FACTORS, factor, si_unit
 
@@ -96,6 +96,7 @@ def describe(
     )
     _clock(work)
     told, seen = _columns(work)
+    told = _filled(work, told)
     commands(work, told, seen)
     observed(work, seen)
     begin.hold(work)
@@ -168,6 +169,9 @@ def _columns(work: Work) -> tuple[list[Column], list[Column]]:
         for column in work.table.columns
         if column.name not in used and column.name.lower() not in matching.COUNTS
     ]
+    empty = [column for column in rest if not np.isfinite(column.values).any()]
+    work.unsure.extend(f"{c.name}: holds no number, left out" for c in empty)
+    rest = [column for column in rest if column not in empty]
     model = work.model
     actuators = [model.actuator(a).name for a in range(model.nu)]
     joints = [model.joint(j).name for j in range(model.njnt)]
@@ -185,6 +189,29 @@ def _columns(work: Work) -> tuple[list[Column], list[Column]]:
             "JOINT_goal."
         )
     return told, seen
+
+
+def _filled(work: Work, told: Sequence[Column]) -> list[Column]:
+    """Commands that are held over empty cells; rows before the first are left out."""
+    count = len(work.times)
+    columns = {column.name: column.values for column in told}
+    names = [*columns]
+    parts = [held(columns | {"": np.arange(count)}, names, r) for r in work.rows]
+    rows = [part[""].astype(int) for part in parts]
+    made = []
+    for column in told:
+        values = column.values.copy()
+        for part, at in zip(parts, rows, strict=True):
+            values[at] = part[column.name]
+        made.append(replace(column, values=values))
+    before = sum(map(len, work.rows)) - sum(map(len, rows))
+    empty = np.isnan([column.values for column in told]).any(axis=0).sum() - before
+    if before:
+        work.guessed.append(f"commands: {before} rows before the first are left out")
+    if empty:
+        work.guessed.append(f"commands: held over the empty cells of {empty} rows")
+    work.rows = rows
+    return made
 
 
 def toml(work: Work, out: Path) -> str:

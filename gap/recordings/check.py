@@ -21,6 +21,7 @@ LONG_GAP = 10.0  # times the usual step
 COARSE = 12  # fewer distinct steps than this while moving: quantised
 CLOCK = 0.05  # relative disagreement of recorded and commanded time
 BEYOND = 30.0  # times as far as the model moves: degrees for radians, mm for m
+AGAINST = -0.5  # median correlation with what the model does
 SHOWS = 30.0  # times the resolution that a channel has to move to be compared
 FAR = 1e3  # [m] beyond it a position is a slip of a unit
 
@@ -73,8 +74,7 @@ def check(
             "No trial of the recording is usable: "
             + "; ".join(notes or ["it is empty"])
         )
-    _units(kept, model)
-    return tuple(kept), (*_moments(kept), *notes)
+    return tuple(kept), (*_moved(kept, model), *_moments(kept), *notes)
 
 
 def _moments(trials: Sequence[Trial]) -> list[str]:
@@ -89,22 +89,33 @@ def _moments(trials: Sequence[Trial]) -> list[str]:
     ]
 
 
-def _units(trials: Sequence[Trial], model: GapModel) -> None:
-    """Stop at channels that move much farther than their commands can make them."""
+def _moved(trials: Sequence[Trial], model: GapModel) -> list[str]:
+    """Stop at channels that move much farther than their commands can make them; those
+    that move against the model."""
     (predicted,) = model.simulate(trials, [()])
+    notes = []
     for column, channel in enumerate(model.channels):
-        shares = []
+        shares, agree = [], []
         for trial, path in zip(trials, predicted, strict=True):
-            seen = trial.observed[np.isfinite(trial.observed).all(axis=1), column]
+            good = np.isfinite(trial.observed).all(axis=1)
+            seen, made = trial.observed[good, column], path[good, column]
             told = np.ptp(path[:, column])
             if told > SHOWS * model.resolution[column]:  # not where it diverged
                 shares.append(np.ptp(seen) / told)
+                if min(np.ptp(seen), np.ptp(made)) > 0:
+                    agree.append(np.corrcoef(seen, made)[0, 1])
         if shares and np.median(shares) > BEYOND:
             raise FormatError(
                 f"{channel.name} moves {np.median(shares):.3g} times as far as its "
                 f"commands make the model move: its unit, {channel.unit}, or that of "
                 "the commands seems wrong."
             )
+        if agree and np.median(agree) < AGAINST:
+            notes.append(
+                f"{channel.name} moves against the model (correlation "
+                f"{np.median(agree):.2f}): are its column and sign those of the model?"
+            )
+    return notes
 
 
 def _channels(trial: Trial, model: GapModel, label: str) -> None:

@@ -26,9 +26,10 @@ SERVO, UNICYCLE = "servo_pendulum", "irobot_create"
 MODELS = {"kscale_sts3215": SERVO, "xl330": SERVO, "mrclam6": UNICYCLE}
 """what importers read is of these models"""
 
-SAMPLES = 300
-"""samples of a trial that are used at most; more of them tell no more of its motion,
-and what has to be kept of their noise grows with their square"""
+SAMPLES, WHOLE = 300, 1_500
+"""samples of a trial that are used at most, more where all trials have fewer together:
+more of them tell no more of its motion, and what has to be kept of their noise grows
+with their square"""
 
 RUN = "dataset"  # where the directory of a run keeps its recordings
 PART = 20.0  # [s] length of the trials that long recordings are cut into
@@ -117,7 +118,8 @@ def trials(
             "No trial is left: nothing was recorded, or --only and --trials drop all."
         )
     _of_robot(found, model)
-    fitting = [thinned(_fitting(trial, model)) for trial in found]
+    most = max(SAMPLES, WHOLE // len(found))
+    fitting = [thinned(_fitting(trial, model), most) for trial in found]
     return [on_grid(t, model.grid(t) if len(t.commands) else 0.0) for t in fitting]
 
 

@@ -46,10 +46,12 @@ SPEEDS = tuple(channel.name for channel in WHEEL_CHANNELS)
 
 
 class Source(NamedTuple):
-    """Where a channel is found: a column or topic field, and its unit."""
+    """Where a channel is found: a column or topic field, its unit, and what its values
+    are multiplied by besides (-1 turns their sign)."""
 
     column: str
     unit: str
+    scale: float = 1.0
 
 
 @dataclass(frozen=True)

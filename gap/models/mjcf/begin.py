@@ -67,7 +67,7 @@ def begin(work: Work) -> None:
     if settle and not _settled(work, longest, pose or ""):
         settle = 0.0
     loose = bool(start.free(work.model))
-    if span > guesses.LONG and guesses.curved(told[longest]) and not loose:
+    if span > guesses.LONG and guesses.curved(told[longest], span) and not loose:
         work.start = {"recorded": True, "cut": guesses.CUT}
         work.start |= {"keyframe": pose} if pose else {}
         work.guessed.append(

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+from scipy import optimize
 
 from bns.errors import BnsError, FormatError
 from bns.gap.importers import tables
@@ -16,6 +17,8 @@ from bns.gap.models.mjcf.rehearsal import Part
 from bns.worlds.data.units import factor, per_si, si_unit
 from bns.worlds.trial import Channel
 
+FOLLOWS = 0.7  # correlation with a command of a joint that follows it
+FOLLOWED = "for its joint follows it, which the order of names does not say"
 DEGREES = 20.0  # times a joint's range: limits of control in degrees (57), not radians
 GOAL = {"goal", "des", "desired", "target"}
 """words for a position that a joint is told"""
@@ -102,6 +105,7 @@ def commands(work: Work, told: list[Column], seen: list[Column]) -> None:
         if column.name not in found and column.name in by_joint:
             found[column.name] = owners[by_joint[column.name]]
             why[column.name] = reasons[column.name]
+    _followed(model, told, seen, found, why)
     for column in told:
         if column.name in found:
             actuator = found[column.name]
@@ -109,7 +113,8 @@ def commands(work: Work, told: list[Column], seen: list[Column]) -> None:
             work.told.append((column, actuator, unit))
             reason = why[column.name]
             line = f"{column.name}: told to actuator {actuator!r} in {unit}, {reason}"
-            (work.unsure if reason in matching.UNSURE else work.guessed).append(line)
+            unsure = reason in (*matching.UNSURE, FOLLOWED)
+            (work.unsure if unsure else work.guessed).append(line)
         else:
             work.unsure.append(f"{column.name}: a command of no actuator, left out")
     if not work.told:
@@ -126,6 +131,49 @@ def commands(work: Work, told: list[Column], seen: list[Column]) -> None:
             if name not in told_to
         )
     work.model = compiled(work.path, tolds(work))
+
+
+def _followed(
+    model: mujoco.MjModel,
+    told: Sequence[Column],
+    seen: Sequence[Column],
+    found: dict[str, str],
+    why: dict[str, str],
+) -> None:
+    """Commands that order alone gave to position loops, given to those whose joints
+    follow them: a controller may list its joints in an order of its own.
+
+    Args:
+        model: of the robot.
+        told: columns of commands.
+        seen: columns of readings.
+        found: actuator by column; changed where joints follow other columns better.
+        why: reason by column; the same.
+    """
+    places = [c for c in seen if matching.quantity(c) == tables.POSITION]
+    joint, _ = matching.match(places, joints(model))
+    reading = {joint[c.name]: c.values for c in places if c.name in joint}
+    loops = {
+        model.actuator(a).name: joint_of(model, a)
+        for a in range(model.nu)
+        if model.actuator_biasprm[a][1] < 0 and joint_of(model, a) in reading
+    }
+    columns = [c for c in told if why.get(c.name) == matching.BY_ORDER]
+    columns = [c for c in columns if found[c.name] in loops]
+    actuators = [found[column.name] for column in columns]
+    alike = np.array(
+        [
+            [matching.alike(c.values, reading[loops[a]]) for a in actuators]
+            for c in columns
+        ]
+    )
+    if len(columns) < 2:
+        return
+    rows, best = optimize.linear_sum_assignment(alike, maximize=True)
+    if alike[rows, best].min() > FOLLOWS > np.diagonal(alike).min():
+        for column, number in zip(columns, best, strict=True):
+            found[column.name] = actuators[number]
+            why[column.name] = FOLLOWED
 
 
 def joints(model: mujoco.MjModel) -> list[str]:
@@ -223,10 +271,7 @@ def _no_loop(work: Work, column: Column, seen: Sequence[Column]) -> None:
     said = set(matching.words(column.name))
     goal = column.quantity == tables.POSITION or bool(said & GOAL)
     for other in measured[:1]:
-        good = np.isfinite(other.values) & np.isfinite(column.values)
-        pair = column.values[good], other.values[good]
-        follows = len(pair[0]) > 5 and min(np.ptp(pair[0]), np.ptp(pair[1])) > 0
-        goal = goal or (follows and np.corrcoef(*pair)[0, 1] > 0.95)
+        goal = goal or matching.alike(column.values, other.values) > 0.95
     if goal:
         raise BnsError(
             f"{column.name!r} is a goal of a joint, but its actuator in {work.path} is "

@@ -1,5 +1,6 @@
 """The TOML file that describes a model of one's own; see docs/gap_your_robot.md."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -300,4 +301,10 @@ def _source(name: str, item: Any, path: Path) -> Source:
             f"{path}: {name} needs a column and a unit among "
             f"{', '.join(sorted(known))}."
         )
-    return Source(str(table["column"]), unit)
+    scale = table.get("scale", 1.0)
+    if not isinstance(scale, int | float) or not 0 < abs(scale) < math.inf:
+        raise FormatError(
+            f"{path}: the scale of {name} is {scale!r}; give a number that its column "
+            "is multiplied by, -1 to turn its sign."
+        )
+    return Source(str(table["column"]), unit, float(scale))

@@ -12,7 +12,7 @@ RATES = (4.0, 5000.0)  # [Hz] of logs
 USUAL = 0.01  # [s] between samples; the unit that comes nearest is taken
 LONG = 8.0  # [s] a trial that is longer, and told anew all the time, is cut
 CUT = 3.0  # [s]
-ANEW = 0.2  # share of samples with a new command from which on it is a curve
+ANEW = 0.1  # [s] between new commands, up to which they are a curve
 SETTLE = 0.5  # [s]
 NEAR = 0.05  # of a joint's range, by which a start may be off
 SIGMAS = 6.0  # times the noise, the same
@@ -57,9 +57,9 @@ def limits(told: np.ndarray, allowed: tuple[float, float]) -> tuple[float, float
     return max(low - pad, min(allowed[0], low)), min(high + pad, max(allowed[1], high))
 
 
-def curved(told: np.ndarray) -> bool:
-    """Whether commands, ``(T, C)``, change all the time."""
-    return bool(changed(told).mean() > ANEW)
+def curved(told: np.ndarray, span: float) -> bool:
+    """Whether commands, ``(T, C)``, change all the time in so many seconds."""
+    return bool(changed(told).sum() * ANEW > span)
 
 
 def changed(told: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from bns.gap.importers import tables
 from bns.gap.importers.tables import SENT, TIME, TRIAL, Column, Table
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.worlds.data import dataset_checks as checks
-from bns.worlds.data.importing import MOMENTS
+from bns.worlds.data.importing import MOMENTS, Source
 from bns.worlds.data.units import factor
 from bns.worlds.trial import Commands, Trial
 
@@ -28,19 +28,58 @@ def read(path: str, config: OwnConfig) -> list[Trial]:
     `trial` and `command_time` [s]; [log] in the description names others. A stretch of
     equal commands becomes one command, which begins at its `command_time`, else with
     its first row; commands that are held for a few rows may then have begun since the
-    row before. Empty cells are lost samples.
+    row before, unless rows of commands hold no readings: these have stamps of their
+    own. Empty cells of readings are lost samples, those of commands hold the last one.
 
     Raises:
         FormatError: no such file, a column missing, or time going backwards.
     """
     table = tables.read(path)
     columns = channels(table, config, path)
+    told = [item.channel.name for item in config.told]
+    _empty(columns, config, path)
     return [
-        _trial(
-            {n: v[rows] for n, v in columns.items()}, config, f"{path}, trial {number}"
-        )
+        _trial(held(columns, told, rows), config, f"{path}, trial {number}")
         for number, rows in enumerate(split(columns[TRIAL]))
     ]
+
+
+def held(
+    columns: Mapping[str, np.ndarray], told: Sequence[str], rows: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Some rows of a log; what was told is held over cells that are empty, and rows
+    before the first command are left out.
+
+    Args:
+        columns: of the log, ``(T,)`` each.
+        told: names of those that are commands.
+        rows: that are wanted; all stay, where a command has no value at all.
+    """
+    made = {name: values[rows] for name, values in columns.items()}
+    first = 0
+    for name in told:
+        given = np.isfinite(made[name])
+        if given.any() and not given.all():
+            last = np.maximum.accumulate(np.where(given, np.arange(len(given)), -1))
+            made[name] = made[name][np.maximum(last, 0)]
+            first = max(first, int(np.argmax(given)))
+    return {name: values[first:] for name, values in made.items()}
+
+
+def _empty(columns: Mapping[str, np.ndarray], config: OwnConfig, path: str) -> None:
+    """Stop at a channel without a number.
+
+    Raises:
+        FormatError: there is one.
+    """
+    kinds = {item.channel.name: "commands" for item in config.told}
+    kinds |= {item.channel.name: "observed" for item in config.seen}
+    for name, kind in kinds.items():
+        if not np.isfinite(columns[name]).any():
+            raise FormatError(
+                f"{path}: {name} holds no number; take [{kind}.{name!r}] out of the "
+                "description."
+            )
 
 
 def possible(trials: Sequence[Trial], config: OwnConfig, model: mujoco.MjModel) -> None:
@@ -96,14 +135,19 @@ def channels(table: Table, config: OwnConfig, path: str) -> dict[str, np.ndarray
                 f"{', '.join(table.names)}. Name it in [log] or in a map "
                 "(--columns)."
             )
-        found[name] = table[column] * factor(source.unit if source else "")
+        found[name] = table[column] * _scale(source)
     for name in (TRIAL, SENT):
         source = config.log.get(name)
         column = source.column if source else name
         if column in table:
-            found[name] = table[column] * factor(source.unit if source else "")
+            found[name] = table[column] * _scale(source)
     found.setdefault(TRIAL, np.zeros(len(found[TIME])))
     return found
+
+
+def _scale(source: Source | None) -> float:
+    """What a column is multiplied by for SI."""
+    return source.scale * factor(source.unit) if source else 1.0
 
 
 def split(marks: np.ndarray) -> list[np.ndarray]:
@@ -132,6 +176,7 @@ def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> 
     begins = np.concatenate([[0], np.flatnonzero(change) + 1])
     begins = begins[np.diff(times[np.append(begins, len(times) - 1)]) > 0]
     bounds = np.append(begins, len(times) - 1)
+    exact |= _stamped(seen, begins[1:])
     exact |= not HELD[0] <= np.median(np.diff(bounds)) <= HELD[1]
     kinds = tuple(item.channel for item in config.told)
     made = Trial(
@@ -146,6 +191,17 @@ def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> 
     )
     checks.plausible(made, where)
     return made
+
+
+def _stamped(seen: np.ndarray, begins: np.ndarray) -> bool:
+    """Whether commands have rows of their own, at their own times.
+
+    Args:
+        seen: readings, ``(T, C)``.
+        begins: rows in which a command begins, ``(n,)``.
+    """
+    lost = ~np.isfinite(seen).any(axis=1)
+    return bool(len(begins) and lost[begins].mean() > USUAL > lost.mean())
 
 
 def _exact(

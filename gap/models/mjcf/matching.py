@@ -208,6 +208,15 @@ def second_choice(
     return [], ""
 
 
+def alike(one: np.ndarray, other: np.ndarray) -> float:
+    """Correlation of columns ``(T,)`` where both have numbers; 0 if one is still."""
+    good = np.isfinite(one) & np.isfinite(other)
+    pair = one[good], other[good]
+    if good.sum() <= 5 or not min(np.ptp(pair[0]), np.ptp(pair[1])) > 0:
+        return 0.0
+    return float(np.corrcoef(*pair)[0, 1])
+
+
 def _held(values: np.ndarray) -> bool:
     steps = np.diff(values)
     return bool(np.isfinite(values).all() and 0.8 < (steps == 0).mean() < 1.0)

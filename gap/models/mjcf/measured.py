@@ -16,6 +16,7 @@ from bns.worlds.data.units import factor
 
 REHEARSED = 5.0  # [s] of a trial that the nominal model moves along
 AGREES = 0.5  # score from which on a column moves as the model says
+SHARES = 60.0  # of 100, that joints of a dataset in shares of their range come to
 ALIKE = 0.1  # two parts whose scores are nearer cannot be told apart
 
 
@@ -76,6 +77,7 @@ def _rehearsed(
         if column.name not in fitted and matching.quantity(column) != tables.SPEED:
             fitted[column.name] = drives.fits(column, drives.free())
         _chosen(work, column, fitted, found, why, named.get(column.name))
+    work.unsure.extend(_shares(work))
     if not work.seen:
         raise BnsError(
             f"No column of {work.log} is a joint, site or body of {work.path}; call "
@@ -140,11 +142,28 @@ def _chosen(
         )
     sure = fit.score > AGREES and reason not in (*matching.UNSURE, "for it moves so")
     if fit.correlation < -AGREES:
-        line += "; it moves against the model: is its sign another?"
+        line += (
+            "; it moves against the model: if its sign is another, give its line in "
+            "[log] scale = -1"
+        )
         sure = False
     elif fit.score <= AGREES:
         line += "; it hardly moves as the model does"
     (work.guessed if sure else work.unsure).append(line)
+
+
+def _shares(work: Work) -> list[str]:
+    """A doubt about a LeRobot dataset in degrees that come near 100, not beyond: they
+    may be shares of each joint's range."""
+    read = [column.values for column, _, unit in work.seen if unit == "deg"]
+    most = max((float(np.nanmax(np.abs(values))) for values in read), default=0.0)
+    if "LeRobot" not in work.table.kind or not SHARES < most <= 100.0:
+        return []
+    return [
+        "degrees: a LeRobot dataset may hold shares of each joint's range instead, "
+        "from -100 to 100; then add to each line of [log] the scale, the degrees of "
+        "half the range, over 100"
+    ]
 
 
 def _usual(

@@ -173,7 +173,7 @@ def test_the_description_in_the_documentation_is_one(tmp_path):
     bounds = {item.name: item for item in made.listed}
     assert bounds["joint_damping[elbow]"].high == 0.5
     assert bounds["body_mass[forearm]"].slack == 0.01
-    assert made.config.log["shoulder"] == ("q1", "deg")
+    assert made.config.log["shoulder"] == ("q1", "deg", 1.0)
 
 
 def test_commands_between_steps_of_the_model_begin_when_they_were_told(arm, tmp_path):
