@@ -27,7 +27,7 @@ from bns.worlds.trial import Trial
 HALF = 0.03  # [s] on each side of a start, of the samples that tell its state
 LEAST = 4  # samples on each side at least
 BEFORE = 0.5  # [s] of commands before a piece
-GRID = 0.005  # [s] between them
+GRID = 0.001  # [s] between them
 REFINED = 2  # times that starts are fitted to the nominal motion, which may be wrong
 RESTARTED = 6  # the same, at most, to the motion that was found
 STILL = 0.1  # standard deviations of a start: it stays

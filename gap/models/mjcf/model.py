@@ -21,7 +21,6 @@ from bns.worlds.trial import Trial
 LEAST = 0.3  # of the noise that is told: the smallest that is believed
 LEVEL = (0, 1)  # axes of places over the floor
 SHORT, SHARE = 5.0, 0.01  # of the noise, of a joint's travel: sooner by more is stopped
-BETWEEN = 0.02  # steps that commands are held for beyond a whole number: stamps jitter
 STRIDE = 0.5  # [s] over which those of a free body are compared
 
 
@@ -102,11 +101,8 @@ class OwnModel(GapModel):
         return self, cuts.restarted(trials, self.config, self, known)
 
     def grid(self, trial: Trial) -> float:
-        """See `GapModel.grid`: the model's step, where commands are held for so many
-        of them, else the finest: commands at 200 Hz lie between steps of 2 ms."""
-        held = float(np.median(trial.commands.durations)) / self.dt
-        between = abs(held - round(held)) > BETWEEN
-        return self.dt / self.physics.finest if between else self.dt
+        """See `GapModel.grid`: none, commands may end between steps."""
+        return 0.0
 
     @property
     def least(self) -> np.ndarray:

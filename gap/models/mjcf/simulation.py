@@ -30,6 +30,7 @@ KEPT, MODELS = 20_000, 300  # simulated trials and compiled models kept in memor
 READ = 2**28  # bytes of what sensors would read that are kept
 FINE = 0.005  # [s] between kept states; the step if that is longer
 FINEST, CUT = 0.0025, 4  # [s] longer steps are cut, shorter ones in so many parts
+ON = 1e-6  # of a step, by which a command that ends with one may be off
 EXACT = 0.2  # of the noise: predictions that differ by less are alike
 BY_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
 TRIED = 4  # trials on which steps are compared, and forces and contacts looked at
@@ -355,17 +356,15 @@ class Simulation:
 
     def _told(self, trial: Trial, effects: Sequence[Effect], dt: float) -> np.ndarray:
         """Commands at each physics step after the effects, settling included."""
-        ends = np.rint(np.cumsum(trial.commands.durations) / dt).astype(int)
-        counts = np.diff(ends, prepend=0)  # steps add up to the whole trial
+        values, number = stepped(trial, dt)
         lead, extra = self._lead(dt), round(LEAD / dt)
         rest = self._rest(self.model)[self.actuators]
-        values = np.repeat(trial.commands.values, counts, axis=0)
         before = start.before(trial, rest, lead + extra, self.config, dt)
         values = np.concatenate([before, values])
         signal = ControlSignal(
             times=np.arange(len(values)) * dt,
             values=values,
-            command=np.repeat(np.arange(-1, len(counts)), [len(before), *counts]),
+            command=np.concatenate([np.full(len(before), -1), number]),
             channels=tuple(item.channel.name for item in self.config.told),
             dt=dt,
         )
@@ -425,6 +424,42 @@ def _edit(made: mujoco.MjSpec, effects: Sequence[Effect]) -> None:
         wanted = effect.stage == "body" and not effect.is_nominal
         if wanted and isinstance(effect, ModelEdit):
             effect.edit(made)
+
+
+def stepped(trial: Trial, dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """What is told in each step of a simulation, and the number of that command.
+
+    In a step in which a command ends, it is the mean over the step: else a piece whose
+    commands end between steps would be told all of them too late or too early. What
+    MuJoCo itself recorded had ends that were rounded.
+
+    Args:
+        trial: recorded.
+        dt: step [s].
+
+    Returns:
+        commands ``(S, K)`` and numbers ``(S,)``.
+    """
+    told = trial.commands.values
+    ends = np.cumsum(trial.commands.durations) / dt
+    near = np.abs(ends - np.rint(ends)) < ON
+    ends = np.where(near | ("mujoco" in trial.conditions), np.rint(ends), ends)
+    steps = np.arange(round(float(ends[-1])))
+    middle = np.searchsorted(ends, steps + 0.5, side="right")
+    number = np.minimum(middle, len(told) - 1)
+    values = told[number]
+    cut = np.unique(np.floor(ends[:-1][ends[:-1] % 1 > 0]).astype(int))
+    cut = cut[cut < len(steps)]
+    area = np.vstack(
+        [0 * told[:1], np.cumsum(told * np.diff(ends, prepend=0)[:, None], 0)]
+    )
+    marks = np.append(0.0, ends)
+    for column, total in enumerate(area.T):
+        upto = np.interp(np.stack([cut, cut + 1]), marks, total)
+        values[cut, column] = np.clip(
+            upto[1] - upto[0], told[:, column].min(), told[:, column].max()
+        )
+    return values, number
 
 
 def _every(dt: float) -> int:

@@ -7,7 +7,9 @@ from bns.errors import FormatError
 from bns.gap.describe import describe
 from bns.gap.models.mjcf import guesses, matching
 from bns.gap.models.mjcf.model import OwnModel
-from bns.gap.recordings import check
+from bns.gap.models.mjcf.simulation import stepped
+from bns.gap.recordings import check, load_recordings
+from bns.worlds.trial import Channel, Commands, Trial
 from tests.sources import ROOT
 
 ARM = ROOT / "examples" / "arm" / "arm.xml"
@@ -142,3 +144,53 @@ def test_columns_are_alike_where_both_have_numbers():
     one = np.r_[np.arange(10.0), np.nan]
     assert matching.alike(one, one) == pytest.approx(1.0)
     assert matching.alike(one, np.zeros(11)) == 0.0
+
+
+def timed(durations, **conditions):
+    """A trial of one joint whose commands are 1, 2, 3, ..."""
+    times = np.append(0.0, np.cumsum(durations))
+    told = np.arange(1.0, len(durations) + 1)[:, None]
+    return Trial(
+        commands=Commands(told, np.array(durations), (Channel("u", "1"),)),
+        times=times,
+        observed=np.zeros((len(times), 1)),
+        boundaries=np.arange(len(times)),
+        channels=(Channel("q", "rad"),),
+        conditions=conditions,
+    )
+
+
+@pytest.mark.parametrize(
+    ("durations", "told", "number"),
+    [
+        ((0.004, 0.004, 0.004), (1, 1, 2, 2, 3, 3), (0, 0, 1, 1, 2, 2)),
+        ((0.005, 0.005, 0.004), (1, 1, 1.5, 2, 2, 3, 3), (0, 0, 1, 1, 1, 2, 2)),
+        ((0.0005, 0.0005, 0.003), (2.25, 3), (2, 2)),
+    ],
+)
+def test_a_command_that_ends_within_a_step_is_its_mean(durations, told, number):
+    values, numbers = stepped(timed(durations), 0.002)
+    assert values[:, 0] == pytest.approx(told)
+    assert tuple(numbers) == number
+    whole = np.array(durations) @ np.arange(1.0, len(durations) + 1)
+    assert values.sum() * 0.002 == pytest.approx(whole)
+
+
+def test_ends_that_mujoco_rounded_stay_rounded():
+    values, _ = stepped(timed((0.005, 0.005, 0.004), mujoco="3"), 0.002)
+    assert values[:, 0].tolist() == [1, 1, 2, 2, 2, 3, 3]
+
+
+def test_pieces_of_a_recording_are_told_what_the_whole_was(tmp_path):
+    """Pieces begin between the steps of the model: each on a grid of its own, their
+    commands would come up to half a step early or late."""
+    model = OwnModel.read(ARM.with_suffix(".toml"), threads=1)
+    told = goals()
+    times = np.arange(COUNT) / RATE + np.where(np.arange(COUNT) % 150 < 75, 0, 0.0009)
+    names = ("shoulder_goal", "elbow_goal", "shoulder", "elbow")
+    columns = dict(zip(names, [*told.T, *followed(told).T], strict=True))
+    path = written(tmp_path / "log.csv", {"time": times} | columns)
+    (trial,) = load_recordings.trials([str(path)], model)
+    ends = np.cumsum(trial.commands.durations)
+    kept = np.cumsum(np.diff(times))
+    assert set(np.round(ends, 9)) <= set(np.round(kept, 9))
