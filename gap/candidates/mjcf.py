@@ -18,6 +18,7 @@ from bns.gap.models.mjcf import effects
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.worlds.effects.parts import ALL, FILTERS, WIDE
 
+DEAD = ("command_dead_band", "command_dead_zone")  # sizes, from 0
 RATIOS = (0.4, 0.6, 0.8, 0.9, 1.1, 1.25, 1.6, 2.5)
 SHARES = (0.02, 0.05, 0.12, 0.3, 1.0)  # of the largest value, beyond the nominal
 LOWER = (0.9, 0.5, 0.2)  # of the nominal value, taken off
@@ -58,6 +59,7 @@ EXCITE = {
     "command_lag": "steps",
     "command_gain": "large commands",
     "command_offset": "any command",
+    "command_dead_band": "small commands",
     "command_dead_zone": "small commands",
     "reading_gain": "large excursions",
     "reading_offset": "any command",
@@ -215,7 +217,7 @@ def _of_channel(name: str, part: str, config: OwnConfig) -> tuple[float, float, 
             return LEAST * size, size, item.channel.unit
         if name == "command_rate":  # two seconds for the whole way
             return 0.0, 2.0 / size, f"s/({item.channel.unit})"
-        low = 0.0 if name == "command_dead_zone" else -0.3 * size
+        low = 0.0 if name in DEAD else -0.3 * size
         return low, 0.3 * size if low else 0.6 * size, item.channel.unit
     if part in seen:
         size = 100 * seen[part].noise

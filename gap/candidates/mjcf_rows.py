@@ -91,7 +91,7 @@ def rows(
 
     Args:
         candidates: of the model.
-        trials: a recording; levels of dead zones lie between what it was told.
+        trials: a recording; levels of dead bands lie between what it was told.
         dt: physics step [s].
         bodies: whose mass may be off, by name.
         stepped: whether finer steps change the motion. Robots know no steps, and what
@@ -177,7 +177,7 @@ def _of(
         joins=item.joins,
     )
     third = (item.high - item.low) / 3
-    if item.effect == "command_dead_zone":
+    if item.effect == "command_dead_band":
         if levels := _levels(item, trials):
             yield row(item.name, 0.0, third, smooth=False, stepped=True, levels=levels)
         return
@@ -257,7 +257,7 @@ def _told(item: Row, trials: Sequence[Trial]) -> np.ndarray:
 
 
 def _levels(item: Row, trials: Sequence[Trial]) -> tuple[float, ...]:
-    """Sizes of a dead zone between the magnitudes that were told."""
+    """Sizes of a dead band between the magnitudes that were told."""
     sizes = np.unique(np.abs(_told(item, trials)).round(9))
     sizes = sizes[sizes > 0]
     if not len(sizes):

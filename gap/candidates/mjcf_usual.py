@@ -52,8 +52,9 @@ grip and softness of all that touch, where they touch something"""
 PUSHED = ("joint_damping", "joint_friction", "body_mass")
 """... also on what is seen and has no motor: a block that is gripped, a door"""
 FEW = 6  # joints up to which `RARER` are considered, too; commands, readings
-RARER = ("joint_backlash", "body_length")
-"""the same of a model of few joints: many would cost more than they tell"""
+RARER = ("joint_backlash", "body_length", "command_dead_zone", "command_offset")
+"""the same of a model of few joints: many would cost more than they tell; a dead
+zone of the commands to all but position servos, a trim of the commands to these"""
 TOUCHING = ("geom_radius", "geom_friction", "geom_compliance")
 """effects that nothing shows where nothing touches"""
 
@@ -118,13 +119,15 @@ def _on_actuators(
         name: tuple(model.actuator(n).name for n in told if n in which)
         for name, which in on.items()
     }
+    channels = [item.channel.name for item in config.told]
+    pushing = tuple(
+        name for n, name in zip(told, channels, strict=True) if n not in servos
+    )
     return named | {
         "actuator_period": (ALL,) if any(item.kd for item in config.told) else (),
-        "command_limit": tuple(
-            item.channel.name
-            for n, item in zip(told, config.told, strict=True)
-            if n not in servos
-        ),
+        "command_limit": pushing,
+        "command_dead_zone": pushing,
+        "command_offset": tuple(n for n in channels if n not in pushing),
     }
 
 

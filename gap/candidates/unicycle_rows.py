@@ -35,7 +35,7 @@ def _rows() -> Iterator[Row]:
     for channel, (size, unit) in LARGEST.items():
         yield _row(f"command_offset[{channel}]", size / 3, -size, size, unit=unit)
         yield _row(
-            f"command_dead_zone[{channel}]", size / 3, 0.0, size, unit=unit,
+            f"command_dead_band[{channel}]", size / 3, 0.0, size, unit=unit,
             smooth=False, levels=tuple(size * share for share in ZONES),
         )  # fmt: skip
     yield _row("turning_loss", 0.05, 0.0, 0.3)

@@ -105,9 +105,23 @@ class CommandOffset(_Command):
 
 
 class CommandDeadZone(_Command):
-    """Small commands do nothing."""
+    """Commands lose a size, and do nothing below it: play of a valve, a thruster."""
 
     name = "command_dead_zone"
+    memoryless = True
+    parameter = _number(
+        "size", "unit of the command", 0.0, "taken off every magnitude", 0.05
+    )
+
+    def change(self, told: np.ndarray, dt: float) -> np.ndarray:
+        """The signal nearer to zero by the size, ``(S,)``."""
+        return np.sign(told) * np.maximum(np.abs(told) - self["size"], 0.0)
+
+
+class CommandDeadBand(_Command):
+    """Small commands do nothing; larger ones arrive whole."""
+
+    name = "command_dead_band"
     memoryless = True
     parameter = _number(
         "size", "unit of the command", 0.0, "largest magnitude of no effect", 0.05
