@@ -402,3 +402,10 @@ def test_a_stop_is_met_beside_those_that_the_model_has(limits, ends):
     model = compiled("joint_stop:part=knee,high=0.3", xml=xml)
     assert model.jnt_limited[0]
     assert tuple(model.jnt_range[0]) == pytest.approx(ends)
+
+    def test_a_dead_zone_takes_its_size_off_and_a_dead_band_does_not(self):
+        signal = np.array([-0.3, -0.1, 0.05, 0.3])
+        zone = registry.make("command_dead_zone", size=0.1).change(signal, 0.01)
+        assert zone == pytest.approx([-0.2, 0.0, 0.0, 0.2])
+        band = registry.make("command_dead_band", size=0.1).change(signal, 0.01)
+        assert band == pytest.approx([-0.3, -0.1, 0.0, 0.3])
