@@ -94,6 +94,7 @@ def describe(
     work = Work(
         Path(model), str(log), tables.read(log), loop, compiled(Path(model), ())
     )
+    work.guessed.extend(work.table.notes)
     _clock(work)
     told, seen = _columns(work)
     told = _filled(work, told)
@@ -136,12 +137,11 @@ def _clock(work: Work) -> None:
     if not np.isfinite(work.times).all():
         row = int(np.argmin(np.isfinite(work.times)))
         raise FormatError(f"{work.log}: the time in {clock!r} is missing in row {row}.")
+    tables.forward(work.table[clock][longest], work.log, repr(clock))
     steps = np.diff(work.times[longest])
     rate = 1 / max(float(np.median(steps[steps > 0])), 1e-9) if (steps > 0).any() else 0
-    if rate <= 0 or (steps < 0).any():
-        raise FormatError(
-            f"{work.log}: time stands still or goes backwards in {clock!r}."
-        )
+    if rate <= 0:
+        raise FormatError(f"{work.log}: time stands still in {clock!r}.")
     work.guessed.append(f"time: {clock!r} in {unit}, {rate:.4g} samples a second")
     work.sources[tables.TIME] = (clock, unit)
     if trial:

@@ -7,7 +7,6 @@ columns of numbers.
 """
 
 import hashlib
-import re
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -148,83 +147,22 @@ def read_csv(
         FormatError: not there, no table, a column missing, twice or not of numbers.
     """
     data = reading.read_bytes(path, most=reading.DATA)
-    table, names = _parsed(data, path, delimiter)
+    table, names = parsed(data, path, delimiter)
     chosen = names if wanted is None else list(dict.fromkeys(wanted))
     _once(chosen, names, path)
     return {name: _csv_column(table.column(name), name, path) for name in chosen}
 
 
-def read_csv_numbers(path: Path | str) -> dict[str, np.ndarray]:
-    """Columns of numbers and of truth values as doubles; those of text are left out.
-
-    A column of which most cells that are filled are numbers is one, and no cell of it
-    may be text. What parts the names parts the columns: a comma, a semicolon or a tab;
-    beside the latter two numbers may have a decimal comma.
-
-    Args:
-        path: of the file; one that ends with `.gz` is unpacked.
-
-    Returns:
-        name -> column, ``(N,)``, N rows; empty cells are NaN.
-
-    Raises:
-        FormatError: not there, no table, a column twice, or text among numbers.
-    """
-    from pyarrow import types
-
-    packed = str(path).lower().endswith(".gz")
-    load = reading.read_packed if packed else reading.read_bytes
-    data = load(path, most=reading.DATA)
-    table, names = _parsed(data, path, *_separators(data))
-    _once(names, names, path)
-    found = {}
-    for name, column in zip(names, table.columns, strict=True):
-        column = column.cast("int8") if types.is_boolean(column.type) else column
-        if _is_number(column.type):
-            found[name] = _csv_column(column, name, path)
-        elif types.is_string(column.type):
-            _check_text(column.to_pylist(), name, path)
-    return found
-
-
-def _check_text(cells: Sequence[str | None], name: str, path: Path | str) -> None:
-    """Stop at a cell of text in a column of numbers.
-
-    Raises:
-        FormatError: there is one.
-    """
-    filled = [(row, cell) for row, cell in enumerate(cells) if cell]
-    texts = [(row, cell) for row, cell in filled if not _reads(cell)]
-    if texts and len(texts) < len(filled) / 2:
-        row, cell = texts[0]
-        raise FormatError(
-            f"{path}: the column {name!r} holds {cell!r} in line {row + 2}, "
-            "which is no number; leave a cell empty where nothing was measured."
-        )
-
-
-def _reads(cell: str) -> bool:
-    """Whether a cell is a number."""
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
-
-
-def _separators(data: bytes) -> tuple[str, str]:
-    """What parts the columns of the bytes of a file, and its decimal point."""
-    head, _, rows = data.partition(b"\n")
-    delimiter = max(",;\t", key=lambda sign: head.count(sign.encode()))
-    if delimiter == "," or re.search(rb"\d\.\d", rows):
-        return delimiter, "."
-    return delimiter, "," if re.search(rb"\d,\d", rows) else "."
-
-
-def _parsed(
+def parsed(
     data: bytes, path: Path | str, delimiter: str, decimal: str = "."
 ) -> tuple[Any, list[str]]:
-    """The `pyarrow.Table` in the bytes of a file, and the names of its columns.
+    """The `pyarrow.Table` in the bytes of a CSV file, and the names of its columns.
+
+    Args:
+        data: of the file.
+        path: of the file, for messages.
+        delimiter: what parts columns.
+        decimal: point of its numbers.
 
     Raises:
         FormatError: there is none.

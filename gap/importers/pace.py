@@ -73,7 +73,17 @@ def _loaded(path: Path) -> dict[str, np.ndarray]:
         }
     except FormatError:
         raise
-    except (*arrays.DAMAGE, pickle.UnpicklingError) as error:
+    except pickle.UnpicklingError:
+        raise FormatError(
+            f"{path} cannot be read as a PACE file: it holds more than tensors; save a "
+            f"dictionary of the tensors {', '.join(NEEDED)}."
+        ) from None
+    except zipfile.BadZipFile:
+        raise FormatError(
+            f"{path} cannot be read as a PACE file: it is none that torch.save wrote, "
+            "or a part of one."
+        ) from None
+    except arrays.DAMAGE as error:
         first = (str(error).splitlines() or [type(error).__name__])[0]
         raise FormatError(f"{path} cannot be read as a PACE file: {first}") from None
     for name in NEEDED:

@@ -1,155 +1,128 @@
 """MCAP logs of ROS 2: joint states, and the commands of a controller.
 
 States are sensor_msgs/JointState; commands are JointState, trajectory_msgs/
-JointTrajectory (its first point) or std_msgs/Float64MultiArray on a topic whose name
-says so. Messages may be CDR or JSON. Stamps are those of the headers where all messages
-have one, else those of the log: two clocks are not mixed.
+JointTrajectory or std_msgs/Float64MultiArray on a topic whose name says so. Points of a
+trajectory that lie ahead are gone to as a controller does (`ros2_trajectory`). Messages
+may be CDR or JSON. Stamps are those of the headers where all messages have one, else
+those of the log: two clocks are not mixed.
 """
 
-import re
 from pathlib import Path
-from typing import Any
 
-import msgspec
 import numpy as np
 
 from bns.errors import FormatError
-from bns.gap.importers import tables
+from bns.gap.importers import ros2_bag, ros2_topics, ros2_trajectory, tables
+from bns.gap.importers.ros2_messages import FIELDS, Message, typed
+from bns.gap.importers.ros2_trajectory import Plan
 from bns.gap.importers.tables import Column, Table
-from bns.worlds.data import mcap_log
 
-STATE, TRAJECTORY, ARRAY = "JointState", "JointTrajectory", "Float64MultiArray"
-COMMAND = re.compile(r"command|cmd|goal|desired|target|reference|setpoint|trajectory")
-FIELDS = {
-    "position": tables.POSITION,
-    "velocity": tables.SPEED,
-    "effort": tables.EFFORT,
-}
-Values = list[float | None] | None
-Log = list[tuple[tuple[int, int], Any]]
-
-
-class Stamp(msgspec.Struct):
-    """A moment, as ROS 2 writes it."""
-
-    sec: int = 0
-    nanosec: int = 0
-    nsec: int = 0
-
-
-class Header(msgspec.Struct):
-    """What is used of a std_msgs/Header."""
-
-    stamp: Stamp = msgspec.field(default_factory=Stamp)
-
-    @property
-    def moment(self) -> int:
-        """The stamp [ns]; 0 = none."""
-        return self.stamp.sec * 1_000_000_000 + (self.stamp.nanosec or self.stamp.nsec)
-
-
-class Point(msgspec.Struct):
-    """What is used of a trajectory_msgs/JointTrajectoryPoint."""
-
-    positions: Values = None
-    velocities: Values = None
-    effort: Values = None
-
-
-class Message(msgspec.Struct):
-    """What is used of a message of any kind that is read."""
-
-    header: Header = msgspec.field(default_factory=Header)
-    name: list[str] | None = None
-    joint_names: list[str] | None = None
-    points: list[Point] | None = None
-    position: Values = None
-    velocity: Values = None
-    effort: Values = None
-    data: Values = None
-
-    @property
-    def joints(self) -> list[str]:
-        """Names of the joints; none in an array."""
-        return self.name or self.joint_names or []
-
-    @property
-    def given(self) -> dict[str, list[float | None]]:
-        """What is given of the joints, by field."""
-        if self.points:
-            point = self.points[0]
-            three = point.positions, point.velocities, point.effort
-        elif self.data is not None:
-            three = self.data, None, None
-        else:
-            three = self.position, self.velocity, self.effort
-        return {
-            field: values or [] for field, values in zip(FIELDS, three, strict=True)
-        }
+AHEAD = "told as points ahead: gone to as joint_trajectory_controller does"
+ARRIVED = "headers without a stamp: times are those at which messages were logged"
+STAMPED = "Give headers no stamp to use the times at which messages were logged."
+Stamps = tuple[int, int]
+Log = list[tuple[Stamps, Message]]
 
 
 def read(path: Path) -> Table:
     """The table of a log; columns are named as `/joint_states:position.JOINT`.
 
+    Args:
+        path: a file, or a directory of rosbag2 with some.
+
     Raises:
         MissingDependencyError: `mcap`, or `mcap-ros2-support` for CDR messages.
-        FormatError: no joint states or no commands in it, or more than one of them.
+        FormatError: no joint states or no commands in it, or several of them and it
+            cannot be told which are the robot's.
     """
-    state, command = _chosen(mcap_log.topics(path), path)
+    bag = ros2_bag.opened(path)
+    state, command, notes = ros2_topics.chosen(bag)
     logs = {
-        topic: _typed(log, topic, path)
-        for topic, log in mcap_log.messages(path, {state, command}).items()
+        topic: typed(log, topic, path)
+        for topic, log in bag.messages({state, command}).items()
     }
     own = all(m.header.moment > 0 for log in logs.values() for _, m in log)
     zero = min(_moment(log[0], own) for log in logs.values())
-    seen = _columns([m for _, m in logs[state]], state, tables.SEEN, path)
-    told = _columns([m for _, m in logs[command]], command, tables.TOLD, path)
-    times = np.array([(_moment(item, own) - zero) * 1e-9 for item in logs[state]])
-    sent = np.array([(_moment(item, own) - zero) * 1e-9 for item in logs[command]])
-    for stamps, topic in ((times, state), (sent, command)):
-        if (np.diff(stamps) < 0).any():
-            raise FormatError(f"{path}: stamps on {topic} go backwards.")
+    states = [m for _, m in logs[state]]
+    times = _times(logs[state], own, zero, path, state)
+    sent = _times(logs[command], own, zero, path, command)
+    seen = _columns(states, state, tables.SEEN, path)
+    messages = [m for _, m in logs[command]]
+    if any(point.ahead for message in messages for point in message.points or ()):
+        sent, told = _followed(messages, sent, times, seen, command, path)
+        notes = (*notes, f"{command}: {AHEAD}")
+    else:
+        told = _columns(messages, command, tables.TOLD, path)
     moments, columns = tables.joined(times, seen, sent, told)
-    return tables.stamped(moments, columns, "MCAP log", None)
+    notes = notes if own else (*notes, ARRIVED)
+    return tables.stamped(moments, columns, "MCAP log", None, notes)
 
 
-def _chosen(topics: dict[str, str], path: Path) -> tuple[str, str]:
-    """The topics of states and of commands."""
-    kinds = {name: schema.rpartition("/")[2] for name, schema in topics.items()}
-    told = [
-        name
-        for name, kind in kinds.items()
-        if kind == TRAJECTORY
-        or (kind in (STATE, ARRAY) and COMMAND.search(name.lower()))
-    ]
-    seen = [name for name, kind in kinds.items() if kind == STATE and name not in told]
-    for found, what in ((seen, "joint states"), (told, "commands")):
-        if len(found) != 1:
-            there = ", ".join(f"{n} ({topics[n]})" for n in sorted(topics)) or "none"
-            raise FormatError(
-                f"{path} has {len(found)} topics of {what}, one is needed; its topics: "
-                f"{there}. Filter it with `mcap filter`."
-            )
-    return seen[0], told[0]
-
-
-def _typed(log: Log, topic: str, path: Path) -> list[tuple[tuple[int, int], Message]]:
-    """Messages of a topic, decoded to objects or to dictionaries, as one type.
+def _times(log: Log, own: bool, zero: int, path: Path, topic: str) -> np.ndarray:
+    """Stamps of messages [s].
 
     Raises:
-        FormatError: a field of one holds something else than it should.
+        FormatError: they go backwards.
     """
-    made = []
-    for stamps, message in log:
-        try:
-            typed = msgspec.convert(message, Message, from_attributes=True)
-        except (msgspec.ValidationError, ValueError, RecursionError) as error:
-            raise FormatError(f"{path}: a message on {topic}: {error}.") from None
-        made.append((stamps, typed))
-    return made
+    stamps = np.array([(_moment(item, own) - zero) * 1e-9 for item in log])
+    tables.forward(stamps, path, f"the stamp on {topic}", STAMPED if own else "")
+    return stamps
 
 
-def _moment(item: tuple[tuple[int, int], Message], own: bool) -> int:
+def _followed(
+    messages: list[Message],
+    sent: np.ndarray,
+    times: np.ndarray,
+    seen: list[Column],
+    topic: str,
+    path: Path,
+) -> tuple[np.ndarray, list[Column]]:
+    """Moments and columns of the commands between points that lie ahead.
+
+    Raises:
+        FormatError: see `_plan`.
+    """
+    names = messages[0].joints
+    plans = [_plan(message, names, topic, path) for message in messages]
+    last = max(int(np.searchsorted(times, sent[0], side="right")) - 1, 0)
+    angles = {c.part: c.values[last] for c in seen if c.quantity == tables.POSITION}
+    first = np.array([angles.get(name, np.nan) for name in names])
+    when = ros2_trajectory.moments(times, sent)
+    made = ros2_trajectory.goals(plans, sent, first, when)
+    about = tables.TOLD, tables.POSITION
+    return when, [
+        Column(f"{topic}:position.{name}", made[:, at], about[0], name, about[1])
+        for at, name in enumerate(names)
+    ]
+
+
+def _plan(message: Message, names: list[str], topic: str, path: Path) -> Plan:
+    """The points of a message, its joints in the order of `names`.
+
+    Raises:
+        FormatError: other joints, points without positions, or times that do not grow.
+    """
+    points = message.points or []
+    if sorted(message.joints) != sorted(names) or len(set(names)) < len(names):
+        raise FormatError(f"{path}: the joints on {topic} change on the way.")
+    times = np.array([point.ahead for point in points])
+    states = np.full((len(points), 3, len(names)), np.nan)
+    for at, point in enumerate(points):
+        for kind, values in enumerate(point.states):
+            if values and len(values) == len(names):
+                states[at, kind] = np.array(values, dtype=float)
+    order = [message.joints.index(name) for name in names]
+    whole = len(points) and np.isfinite(states[:, 0]).all()
+    if not whole or (np.diff(times, prepend=0.0) < 0).any():
+        raise FormatError(
+            f"{path}: a message on {topic} is no trajectory that a controller takes: "
+            "it needs points with a position of each joint, and a time_from_start "
+            "that grows."
+        )
+    return Plan(times, states[:, :, order])
+
+
+def _moment(item: tuple[Stamps, Message], own: bool) -> int:
     return item[1].header.moment if own else item[0][0]
 
 

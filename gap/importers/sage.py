@@ -77,8 +77,7 @@ def _vectors(
         raise FormatError(f"{path}: a cell is no list of numbers ({error}).") from None
     if not np.isfinite(times).all():
         raise FormatError(f"{path}: a timestamp is NaN or infinity.")
-    if (np.diff(times) < 0).any():
-        raise FormatError(f"{path}: time goes backwards; sort the rows by timestamp.")
+    tables.forward(times, path, "timestamp", "Sort the rows by timestamp.")
     joints = _joints(path.parent / JOINTS, values["positions"], path)
     prefix = "control." if role == tables.TOLD else ""
     return times, [

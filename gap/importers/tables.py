@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from bns.errors import FormatError
-from bns.storage import reading, tables
+from bns.gap.importers import other_files
+from bns.storage import reading
 
 TIME, TRIAL, SENT = "time", "trial", "command_time"
 """columns that a log may have under these names, beside its channels"""
@@ -26,6 +27,10 @@ SAME = 1e-6  # [s] moments that are nearer are one
 
 ENDS = ([".csv"], [".tsv"], [".txt"])
 PACKED = ".gz"
+SORT = (
+    "Sort the rows by time, or number recordings that follow one another in a column "
+    f"{TRIAL!r}."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +59,12 @@ class Table:
     Attributes:
         columns: all of the same length, in the order of the file.
         kind: of the file, in words.
+        notes: what was left out or chosen on the way, one line each.
     """
 
     columns: tuple[Column, ...]
     kind: str
+    notes: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -87,16 +94,18 @@ def reader(path: str | Path) -> Callable[[Path], Table] | None:
     suffixes = [suffix.lower() for suffix in path.suffixes]
     name = ""
     if path.is_dir():
-        if (path / "meta" / "info.json").is_file():
+        if other_files.is_lerobot(path):
             name = "lerobot"
-        elif (path / "control.csv").is_file() and (path / "state_motor.csv").is_file():
+        elif other_files.is_sage(path):
             name = "sage"
+        elif any(path.glob("*.mcap")):
+            name = "ros2_mcap"
     elif suffixes[-1:] in ([".pt"], [".pth"]):
         name = "pace"
     elif suffixes[-1:] == [".mcap"]:
         name = "ros2_mcap"
     elif [end for end in suffixes if end != PACKED][-1:] in ENDS:
-        return _csv
+        name = "csv_log"
     return import_module(f"bns.gap.importers.{name}").read if name else None
 
 
@@ -110,13 +119,12 @@ def read(path: str | Path) -> Table:
     path = Path(path)
     if not path.exists():
         raise FormatError(f"There is no log {path}.")
+    if part := other_files.whole(path):
+        home, what = part
+        raise FormatError(f"{path} is a part of {what}: give its directory {home}.")
     found = reader(path)
     if found is None:
-        raise FormatError(
-            f"{path} is no log that is known: give a CSV table (.csv, .tsv, .csv.gz), "
-            "a PACE file (.pt), an MCAP log (.mcap), or the directory of a SAGE motion "
-            "(control.csv, state_motor.csv) or of a LeRobotDataset (meta/info.json)."
-        )
+        raise FormatError(other_files.advice(path))
     return checked(found(path), path)
 
 
@@ -162,7 +170,11 @@ def _replaced(column: Column, values: np.ndarray) -> Column:
 
 
 def stamped(
-    times: np.ndarray, columns: Sequence[Column], kind: str, trial: np.ndarray | None
+    times: np.ndarray,
+    columns: Sequence[Column],
+    kind: str,
+    trial: np.ndarray | None,
+    notes: Sequence[str] = (),
 ) -> Table:
     """A table of a format that has names for nothing but joints.
 
@@ -171,19 +183,35 @@ def stamped(
         columns: of commands and measurements.
         kind: of the file, in words.
         trial: number of the trial of each sample; None = one.
+        notes: see `Table`.
     """
     first = [Column(TIME, np.asarray(times, float))]
     if trial is not None:
         first.append(Column(TRIAL, np.asarray(trial, float)))
-    return Table((*first, *columns), kind)
+    return Table((*first, *columns), kind, tuple(notes))
 
 
-def _csv(path: Path) -> Table:
-    """Columns of numbers; others are left out."""
-    found = tables.read_csv_numbers(path)
-    if not found or not len(next(iter(found.values()))):
-        raise FormatError(f"{path} is no CSV table of numbers with a line of names.")
-    return Table(tuple(Column(n, v) for n, v in found.items()), "CSV table")
+def forward(
+    times: np.ndarray, where: object, what: str = TIME, todo: str = SORT
+) -> None:
+    """Stop at stamps that go backwards.
+
+    Args:
+        times: stamps ``(T,)``, in any unit.
+        where: of the file, for the message.
+        what: name of the column or topic, for the message.
+        todo: what to do about it, a sentence.
+
+    Raises:
+        FormatError: they do.
+    """
+    fell = np.flatnonzero(np.diff(times) < 0)
+    if len(fell):
+        row = int(fell[0])
+        raise FormatError(
+            f"{where}: {what} goes backwards, from {times[row]:.10g} in row {row} to "
+            f"{times[row + 1]:.10g} in row {row + 1}. {todo}"
+        )
 
 
 def checked(table: Table, path: Path) -> Table:

@@ -163,8 +163,9 @@ def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> 
     if not np.isfinite(times).all():
         row = int(np.flatnonzero(~np.isfinite(times))[0])
         raise FormatError(f"{where}: no time in its sample {row}.")
-    if len(times) < 2 or not (np.diff(times) >= 0).all():
-        raise FormatError(f"{where}: fewer than two samples, or time goes backwards.")
+    tables.forward(times, where)
+    if len(times) < 2:
+        raise FormatError(f"{where}: fewer than two samples.")
     told = np.stack([columns[item.channel.name] for item in config.told], axis=1)
     seen = np.stack([columns[item.channel.name] for item in config.seen], axis=1)
     seen[~np.isfinite(seen).all(axis=1)] = np.nan

@@ -1,0 +1,195 @@
+"""CSV tables: a line of names, and columns of numbers.
+
+Moments in ISO 8601 become seconds; other columns of text are left out. A last line
+that was cut off is dropped, and so are rows that are there again.
+"""
+
+import codecs
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bns.errors import FormatError
+from bns.gap.importers.tables import Column, Table
+from bns.storage import reading, tables
+
+PACKED = ".gz"
+WIDE = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+
+
+def read(path: Path) -> Table:
+    """The numbers in a table.
+
+    A column of which most cells that are filled are numbers is one, and no cell of it
+    may be text. What parts the names parts the columns: a comma, a semicolon or a tab;
+    beside the latter two numbers may have a decimal comma.
+
+    Args:
+        path: of the file; one that ends with `.gz` is unpacked.
+
+    Raises:
+        FormatError: not there, no table, a column twice, or text among numbers.
+    """
+    packed = str(path).lower().endswith(PACKED)
+    load = reading.read_packed if packed else reading.read_bytes
+    data = load(path, most=reading.DATA)
+    _text(data, path)
+    found, notes = _numbers(data, path)
+    if not found or not len(next(iter(found.values()))):
+        raise FormatError(f"{path} is no CSV table of numbers with a line of names.")
+    kept = _once(found)
+    if kept is not None:
+        count = len(next(iter(found.values()))) - len(kept)
+        notes.append(f"{count} rows are there again as they were, left out")
+        found = {name: values[kept] for name, values in found.items()}
+    columns = tuple(Column(name, values) for name, values in found.items())
+    return Table(columns, "CSV table", tuple(notes))
+
+
+def _text(data: bytes, path: Path) -> None:
+    """Stop at what is no text in UTF-8 at the first look.
+
+    Raises:
+        FormatError: empty, or in UTF-16.
+    """
+    if not data.strip():
+        raise FormatError(
+            f"{path} is empty, so that it cannot be read as CSV: give a table with a "
+            "line of names."
+        )
+    if data.startswith(WIDE):
+        raise FormatError(f"{path} is text in UTF-16: save it as UTF-8.")
+
+
+def _numbers(data: bytes, path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Columns of numbers, and what was left out; without the last line, if that helps.
+
+    Raises:
+        FormatError: not there, no table, a column twice, or text among numbers.
+    """
+    try:
+        return _columns(data, path), []
+    except FormatError as error:
+        whole, _, last = data.rstrip(b"\r\n\0").rpartition(b"\n")
+        try:
+            found = _columns(whole, path)
+        except FormatError:
+            raise error from None
+        if not len(next(iter(found.values()), ())):
+            raise
+        shown = last[-40:].decode(errors="replace").strip()
+        return found, [f"the last line is cut off or no row, left out: ...{shown}"]
+
+
+def _columns(data: bytes, path: Path) -> dict[str, np.ndarray]:
+    """Columns of numbers, truth values and moments as doubles; empty cells are NaN."""
+    from pyarrow import types
+
+    table, names = tables.parsed(data, path, *_separators(data))
+    for name in names:
+        if names.count(name) > 1:
+            raise FormatError(
+                f"{path}: the column {name!r} is there twice; there are "
+                f"{', '.join(names)}."
+            )
+    moments, found = {}, {}
+    for name, column in zip(names, table.columns, strict=True):
+        kind = column.type
+        if types.is_timestamp(kind):
+            moments[name] = column
+        elif types.is_string(kind):
+            _check_text(column.to_pylist(), name, path)
+            continue
+        found[name] = column
+    seconds = _seconds(moments)
+    return {
+        name: seconds[name] if name in seconds else _doubles(column)
+        for name, column in found.items()
+        if name in seconds or _is_number(column.type)
+    }
+
+
+def _is_number(kind: Any) -> bool:
+    """Whether a type of Arrow is one of numbers; so is that of a column left empty."""
+    from pyarrow import types
+
+    numbers = (types.is_integer, types.is_floating, types.is_null, types.is_boolean)
+    return any(is_kind(kind) for is_kind in numbers)
+
+
+def _doubles(column: Any) -> np.ndarray:
+    from pyarrow import types
+
+    column = column.cast("int8") if types.is_boolean(column.type) else column
+    return column.cast("float64", safe=False).fill_null(np.nan).to_numpy()
+
+
+def _seconds(moments: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Columns of moments as seconds since the first of all of them."""
+    whole = {name: column.cast("int64") for name, column in moments.items()}
+    ticks = {name: TICKS[column.type.unit] for name, column in moments.items()}
+    filled = {n: c.drop_null().to_numpy() for n, c in whole.items() if len(c)}
+    firsts = {n: int(values.min()) for n, values in filled.items() if len(values)}
+    zero = min((first * ticks[n] for n, first in firsts.items()), default=0.0)
+    made = {}
+    for name, column in whole.items():
+        first = firsts.get(name, 0)  # whole numbers keep the fractions of a second
+        later = (column.fill_null(first).to_numpy() - first) * ticks[name]
+        values = later + (first * ticks[name] - zero)
+        made[name] = np.where(column.is_null().to_numpy(), np.nan, values)
+    return made
+
+
+def _check_text(cells: Sequence[str | None], name: str, path: Path) -> None:
+    """Stop at a cell of text in a column of numbers.
+
+    Raises:
+        FormatError: there is one.
+    """
+    filled = [(row, cell) for row, cell in enumerate(cells) if cell]
+    texts = [(row, cell) for row, cell in filled if not _reads(cell)]
+    if texts and len(texts) < len(filled) / 2:
+        row, cell = texts[0]
+        raise FormatError(
+            f"{path}: the column {name!r} holds {cell!r} in line {row + 2}, "
+            "which is no number; leave a cell empty where nothing was measured."
+        )
+
+
+def _reads(cell: str) -> bool:
+    """Whether a cell is a number."""
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _separators(data: bytes) -> tuple[str, str]:
+    """What parts the columns of the bytes of a file, and its decimal point."""
+    head, _, rows = data.partition(b"\n")
+    delimiter = max(",;\t", key=lambda sign: head.count(sign.encode()))
+    if delimiter == "," or re.search(rb"\d\.\d", rows):
+        return delimiter, "."
+    return delimiter, "," if re.search(rb"\d,\d", rows) else "."
+
+
+def _once(found: Mapping[str, np.ndarray]) -> np.ndarray | None:
+    """Rows without those that are there again; None = all.
+
+    Where no column grows all the way there are no stamps that tell one row from the
+    next, and equal rows are a robot that stands.
+    """
+    if any((np.diff(values) > 0).all() for values in found.values()):
+        return None
+    table = np.ascontiguousarray(np.stack(list(found.values()), axis=1))
+    rows = table.view(np.dtype((np.void, table.dtype.itemsize * table.shape[1])))
+    kept = np.sort(np.unique(rows.ravel(), return_index=True)[1])
+    if len(kept) == len(table) or len(kept) < len(table) / 2:
+        return None
+    grows = (np.diff(table[kept], axis=0) > 0).all(axis=0)
+    return kept if grows.any() else None
