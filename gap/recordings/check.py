@@ -15,6 +15,7 @@ SPIKE = 8.0  # robust standard deviations from both neighbours
 DEGREES = (300.0, 420.0)  # jumps of an angle that is wrapped in degrees
 OFTEN = 0.05  # of the samples, that no angle in radians jumps by `WRAP`
 WRAP = 0.6  # of a full turn, between two samples, that counts as a wrap
+FEWEST = 8  # samples of a trial
 LOST = 0.5  # share of samples that may be missing
 STUCK = 0.9  # share of equal neighbours, while commands move, that counts as stuck
 LONG_GAP = 10.0  # times the usual step
@@ -308,8 +309,9 @@ def _sampled(trial: Trial, lost: np.ndarray) -> np.ndarray:
 def _unusable(trial: Trial, wanted: Sequence[str]) -> str:
     seen = np.isfinite(trial.observed).all(axis=1)
     count = _sampled(trial, ~seen).sum()
-    if seen.sum() < max(LOST * count, 8):
-        return f"only {seen.sum()} of {count} samples were seen"
+    if seen.sum() < max(LOST * count, FEWEST):
+        least = int(np.ceil(max(LOST * count, FEWEST)))
+        return f"{seen.sum()} of {count} samples were seen, {least} are needed"
     values = trial.observed[seen][:, : len(wanted)]
     if (np.ptp(values, axis=0) == 0).all() and np.abs(trial.commands.values).any():
         return "nothing moves although it is told to"

@@ -107,11 +107,11 @@ def piece(trial: Trial, first: int, last: int) -> Trial:
         first, last: numbers of its samples; both are kept.
     """
     bounds = trial.boundaries
-    inner = bounds[(bounds > first) & (bounds < last)]
+    begun, ends = trial.times[bounds], trial.times[[first, last]]
+    inner = bounds[(begun > ends[0]) & (begun < ends[1])]
     marks = np.concatenate([[first], inner, [last]])
-    index = np.clip(
-        np.searchsorted(bounds, marks[:-1], side="right") - 1, 0, len(bounds) - 2
-    )
+    index = np.searchsorted(begun, trial.times[marks[:-1]], side="right") - 1
+    index = np.clip(index, 0, len(bounds) - 2)
     lasting = np.diff(trial.times[marks])
     told = Commands(trial.commands.values[index], lasting, trial.commands.channels)
     return trial.replace(

@@ -16,7 +16,7 @@ class Describe:
     """
 
     model: Positional[str]
-    """MJCF file of the robot"""
+    """MJCF or URDF file of the robot; a URDF has no motors: give --kp and --kd"""
     log: Positional[str]
     """CSV, PACE (.pt) or MCAP file, or directory of a SAGE motion or LeRobotDataset"""
     out: str = ""

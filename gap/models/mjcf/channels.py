@@ -70,6 +70,9 @@ def compiled(
             f"There is no model file {path}: give an MJCF file; a robot of `bns "
             "robots` needs no description."
         )
+    if path.suffix == ".xacro":
+        urdf = path.with_suffix(".urdf")
+        raise FormatError(f"{path}: run `xacro {path} > {urdf}`, then give {urdf}.")
     try:
         config = OwnConfig(path.stem, path, tuple(told), (), held)
         return prepared.spec(config).compile()

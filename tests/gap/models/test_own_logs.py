@@ -194,3 +194,24 @@ def test_pieces_of_a_recording_are_told_what_the_whole_was(tmp_path):
     ends = np.cumsum(trial.commands.durations)
     kept = np.cumsum(np.diff(times))
     assert set(np.round(ends, 9)) <= set(np.round(kept, 9))
+
+
+def test_stamps_of_a_coarse_clock_come_in_pairs(tmp_path):
+    """A clock that ticks at half the rate: pieces begin between two alike."""
+    told, seen = goals(), followed(goals())
+    names = ("shoulder_goal", "elbow_goal", "shoulder", "elbow")
+    columns = {"time": np.arange(COUNT) // 2 * 2 / RATE}
+    columns |= dict(zip(names, [*told.T, *seen.T], strict=True))
+    path = written(tmp_path / "log.csv", columns)
+    found = describe(ARM, path, out=tmp_path / "arm.toml")
+    model, trials = read(found, tmp_path, path)
+    assert len(trials) > 1
+    assert len(check.check(trials, model)[0]) == len(trials)
+
+
+def test_a_xacro_is_to_be_expanded_first(tmp_path):
+    model = tmp_path / "arm.xacro"
+    model.write_text("<robot/>")
+    path = log(tmp_path / "log.csv", goals(), followed(goals()))
+    with pytest.raises(FormatError, match=r"run `xacro .*arm.urdf`"):
+        describe(model, path)

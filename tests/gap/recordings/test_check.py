@@ -48,7 +48,7 @@ def test_a_stuck_channel_and_a_wrong_clock_are_left_out(model, told):
     text = "\n".join(notes)
     assert len(made) == 3
     assert "trial 0: its clock runs 1.2 times as fast" in text
-    assert "trial 1: y is stuck" in text and "seen, left out" in text
+    assert "trial 1: y is stuck" in text and "are needed, left out" in text
     assert np.isnan(made[0].observed[30:50]).all()
     assert np.isfinite(made[0].observed[:30]).all()
     # all clocks alike: a drift, which is for the diagnosis to find
