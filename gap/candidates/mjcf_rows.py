@@ -243,6 +243,9 @@ def _plausible(item: Row) -> tuple[float, float]:
     elif item.effect.endswith("_offset") and not sd:
         sd = OFFSET * (item.high - item.low)
         slack = SHARE * sd
+    elif item.effect == "command_dead_zone":
+        sd = EIGHTH * (item.high - item.low)
+        slack = SHARE * sd
     if item.joins:
         slack = 0.0
     return sd or EIGHTH * (item.high - item.low), slack
