@@ -6,7 +6,7 @@ import pytest
 
 from bns.errors import BnsError, UnknownNameError
 from bns.worlds.effects import registry
-from tests.worlds.effects.subjects import ARM, edited, told
+from tests.worlds.effects.subjects import ARM, edited
 
 G = 9.81  # [m/s2]
 ROD = """
@@ -284,30 +284,6 @@ class TestParts:
         assert str(light) == "sensor_gain:sensor=left,factor=0.5"
 
 
-class TestCommands:
-    @pytest.mark.parametrize("name, channel", [("left_speed", 0), ("right_speed", 1)])
-    def test_a_limit_cuts_one_channel(self, name, channel):
-        signal = told(("left_speed", "right_speed"))
-        effect = registry.make("command_limit", part=name, limit=0.05)
-        on = np.ones(len(signal.times), bool)
-        made = effect.apply(signal, on, np.random.default_rng(0))
-        other = 1 - channel
-        assert np.abs(made[:, channel]).max() == 0.05
-        assert (made[:, other] == signal.values[:, other]).all()
-
-    def test_a_milder_limit_is_wider(self):
-        limit = registry.make("command_limit", limit=0.1)
-        assert limit.scaled(0.5)["limit"] == pytest.approx(0.2)
-        assert limit.scaled(0.0).is_nominal
-
-    def test_a_rate_limit_takes_its_time(self):
-        effect = registry.make("command_rate", time_per_unit=0.5)  # 2 rad/s
-        step = np.r_[np.zeros(10), np.ones(90)]
-        made = effect.change(step, 0.01)
-        assert made[9] == 0 and made[10] == pytest.approx(0.02)
-        assert made[58] == pytest.approx(0.98) and made[59] == 1.0
-
-
 LOOP = """
 <mujoco><option timestep="0.001" integrator="implicitfast"/><worldbody><body>
   <joint name="knee" axis="0 1 0" armature="0.01" damping="0.05"/>
@@ -402,10 +378,3 @@ def test_a_stop_is_met_beside_those_that_the_model_has(limits, ends):
     model = compiled("joint_stop:part=knee,high=0.3", xml=xml)
     assert model.jnt_limited[0]
     assert tuple(model.jnt_range[0]) == pytest.approx(ends)
-
-    def test_a_dead_zone_takes_its_size_off_and_a_dead_band_does_not(self):
-        signal = np.array([-0.3, -0.1, 0.05, 0.3])
-        zone = registry.make("command_dead_zone", size=0.1).change(signal, 0.01)
-        assert zone == pytest.approx([-0.2, 0.0, 0.0, 0.2])
-        band = registry.make("command_dead_band", size=0.1).change(signal, 0.01)
-        assert band == pytest.approx([-0.3, -0.1, 0.0, 0.3])
