@@ -12,12 +12,11 @@ import mujoco
 import numpy as np
 
 from bns.errors import FormatError
-from bns.gap.models.mjcf import prepared, start, trees
+from bns.gap.models.mjcf import command_steps, prepared, start, trees
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.models import mjcf as mjcf_file
 from bns.worlds.effects.base import (
     CommandEffect,
-    ControlSignal,
     Effect,
     ModelEdit,
     SensorEffect,
@@ -25,12 +24,10 @@ from bns.worlds.effects.base import (
 from bns.worlds.physics.rollout import STATE, Compiled, Job, Pool, Segment
 from bns.worlds.trial import Trial
 
-LEAD = 1.0  # [s] of rest before a trial, so that what is late has something before it
 KEPT, MODELS = 20_000, 300  # simulated trials and compiled models kept in memory
 READ = 2**28  # bytes of what sensors would read that are kept
 FINE = 0.005  # [s] between kept states; the step if that is longer
 FINEST, CUT = 0.0025, 4  # [s] longer steps are cut, shorter ones in so many parts
-ON = 1e-6  # of a step, by which a command that ends with one may be off
 EXACT = 0.2  # of the noise: predictions that differ by less are alike
 BY_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
 TRIED = 4  # trials on which steps are compared, and forces and contacts looked at
@@ -297,10 +294,8 @@ class Simulation:
         motions = self._pool.map(jobs) if jobs else []
         dt = self.dt / parts
         for (key, (_, items)), motion in zip(missing.items(), motions, strict=True):
-            states, model = (
-                motion.states[self._lead(dt) :: _every(dt)],
-                self.compiled(items).model,
-            )
+            model = self.compiled(items).model
+            states = motion.states[self._lead(dt) :: _every(dt)]
             self._motions[key] = self._view(model).read(model, states)
         found = [self._motions[key] for key in keys]
         most = READ // max((each.nbytes for each in found), default=1)
@@ -342,7 +337,9 @@ class Simulation:
 
     def _job(self, trial: Trial, effects: Sequence[Effect], parts: int) -> Job:
         scene = self.compiled(effects, parts)
-        told = self._told(trial, effects, self.dt / parts)
+        rest = self._rest(self.model)[self.actuators]
+        dt = self.dt / parts
+        told = command_steps.arriving(trial, effects, rest, self.config, dt)
         begin = self._start(trial, scene.model)
         ctrl = np.tile(self._rest(scene.model), (len(told), 1))
         ctrl[:, self.actuators] = told
@@ -353,29 +350,6 @@ class Simulation:
             key = prepared.number(model, "key", self.config.keyframe)
             return np.array(model.key_ctrl[key])
         return np.zeros(model.nu)
-
-    def _told(self, trial: Trial, effects: Sequence[Effect], dt: float) -> np.ndarray:
-        """Commands at each physics step after the effects, settling included."""
-        values, number = stepped(trial, dt)
-        lead, extra = self._lead(dt), round(LEAD / dt)
-        rest = self._rest(self.model)[self.actuators]
-        before = start.before(trial, rest, lead + extra, self.config, dt)
-        values = np.concatenate([before, values])
-        signal = ControlSignal(
-            times=np.arange(len(values)) * dt,
-            values=values,
-            command=np.concatenate([np.full(len(before), -1), number]),
-            channels=tuple(item.channel.name for item in self.config.told),
-            dt=dt,
-        )
-        on, rng = np.ones(len(values), bool), np.random.default_rng(0)
-        for effect in effects:
-            if isinstance(effect, CommandEffect) and effect.stage == "command":
-                made = effect.apply(signal, on, rng)
-                signal = ControlSignal(
-                    signal.times, made, signal.command, signal.channels, dt
-                )
-        return signal.values[extra:]
 
     def _start(self, trial: Trial, model: mujoco.MjModel) -> np.ndarray:
         """The state that a trial begins in, kept: effects do not change it, but for
@@ -424,42 +398,6 @@ def _edit(made: mujoco.MjSpec, effects: Sequence[Effect]) -> None:
         wanted = effect.stage == "body" and not effect.is_nominal
         if wanted and isinstance(effect, ModelEdit):
             effect.edit(made)
-
-
-def stepped(trial: Trial, dt: float) -> tuple[np.ndarray, np.ndarray]:
-    """What is told in each step of a simulation, and the number of that command.
-
-    In a step in which a command ends, it is the mean over the step: else a piece whose
-    commands end between steps would be told all of them too late or too early. What
-    MuJoCo itself recorded had ends that were rounded.
-
-    Args:
-        trial: recorded.
-        dt: step [s].
-
-    Returns:
-        commands ``(S, K)`` and numbers ``(S,)``.
-    """
-    told = trial.commands.values
-    ends = np.cumsum(trial.commands.durations) / dt
-    near = np.abs(ends - np.rint(ends)) < ON
-    ends = np.where(near | ("mujoco" in trial.conditions), np.rint(ends), ends)
-    steps = np.arange(round(float(ends[-1])))
-    middle = np.searchsorted(ends, steps + 0.5, side="right")
-    number = np.minimum(middle, len(told) - 1)
-    values = told[number]
-    cut = np.unique(np.floor(ends[:-1][ends[:-1] % 1 > 0]).astype(int))
-    cut = cut[cut < len(steps)]
-    area = np.vstack(
-        [0 * told[:1], np.cumsum(told * np.diff(ends, prepend=0)[:, None], 0)]
-    )
-    marks = np.append(0.0, ends)
-    for column, total in enumerate(area.T):
-        upto = np.interp(np.stack([cut, cut + 1]), marks, total)
-        values[cut, column] = np.clip(
-            upto[1] - upto[0], told[:, column].min(), told[:, column].max()
-        )
-    return values, number
 
 
 def _every(dt: float) -> int:

@@ -6,8 +6,8 @@ import pytest
 from bns.errors import FormatError
 from bns.gap.describe import describe
 from bns.gap.models.mjcf import guesses, matching
+from bns.gap.models.mjcf.command_steps import stepped
 from bns.gap.models.mjcf.model import OwnModel
-from bns.gap.models.mjcf.simulation import stepped
 from bns.gap.recordings import check, load_recordings
 from bns.worlds.trial import Channel, Commands, Trial
 from tests.sources import ROOT
@@ -181,9 +181,9 @@ def test_ends_that_mujoco_rounded_stay_rounded():
     assert values[:, 0].tolist() == [1, 1, 2, 2, 2, 3, 3]
 
 
-def test_pieces_of_a_recording_are_told_what_the_whole_was(tmp_path):
-    """Pieces begin between the steps of the model: each on a grid of its own, their
-    commands would come up to half a step early or late."""
+def test_commands_that_last_whole_steps_may_end_between_them(tmp_path):
+    """As in pieces of a recording: each on a grid of its own, the commands of one would
+    come up to half a step early or late."""
     model = OwnModel.read(ARM.with_suffix(".toml"), threads=1)
     told = goals()
     times = np.arange(COUNT) / RATE + np.where(np.arange(COUNT) % 150 < 75, 0, 0.0009)
