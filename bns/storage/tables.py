@@ -149,8 +149,8 @@ def read_csv(
     data = reading.read_bytes(path, most=reading.DATA)
     table, names = parsed(data, path, delimiter)
     chosen = names if wanted is None else list(dict.fromkeys(wanted))
-    _once(chosen, names, path)
-    return {name: _csv_column(table.column(name), name, path) for name in chosen}
+    once(chosen, names, path)
+    return {name: doubles(table.column(name), name, path) for name in chosen}
 
 
 def parsed(
@@ -184,8 +184,13 @@ def parsed(
     return table, names
 
 
-def _once(chosen: Sequence[str], names: Sequence[str], path: Path | str) -> None:
+def once(chosen: Sequence[str], names: Sequence[str], path: Path | str) -> None:
     """Stop at a column that is not there, or there twice.
+
+    Args:
+        chosen: names that are wanted.
+        names: of the columns of a file.
+        path: of the file, for messages.
 
     Raises:
         FormatError: there is one.
@@ -198,7 +203,7 @@ def _once(chosen: Sequence[str], names: Sequence[str], path: Path | str) -> None
             )
 
 
-def _is_number(kind: Any) -> bool:
+def is_number(kind: Any) -> bool:
     """Whether a type of Arrow is one of numbers; so is that of a column left empty."""
     from pyarrow import types
 
@@ -207,8 +212,18 @@ def _is_number(kind: Any) -> bool:
     )
 
 
-def _csv_column(column: Any, name: str, path: Path | str) -> np.ndarray:
-    if not _is_number(column.type):
+def doubles(column: Any, name: str, path: Path | str) -> np.ndarray:
+    """A column of `pyarrow.Table` as doubles; empty cells are NaN.
+
+    Args:
+        column: of numbers.
+        name: of the column, for messages.
+        path: of the file, for messages.
+
+    Raises:
+        FormatError: it is none of numbers.
+    """
+    if not is_number(column.type):
         raise FormatError(
             f"{path}: column {name!r} is {column.type}, it needs numbers."
         )

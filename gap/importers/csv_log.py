@@ -90,42 +90,19 @@ def _columns(data: bytes, path: Path) -> dict[str, np.ndarray]:
     from pyarrow import types
 
     table, names = tables.parsed(data, path, *_separators(data))
-    for name in names:
-        if names.count(name) > 1:
-            raise FormatError(
-                f"{path}: the column {name!r} is there twice; there are "
-                f"{', '.join(names)}."
-            )
-    moments, found = {}, {}
-    for name, column in zip(names, table.columns, strict=True):
-        kind = column.type
-        if types.is_timestamp(kind):
-            moments[name] = column
-        elif types.is_string(kind):
+    tables.once(names, names, path)
+    columns = dict(zip(names, table.columns, strict=True))
+    seconds = _seconds({n: c for n, c in columns.items() if types.is_timestamp(c.type)})
+    found = {}
+    for name, column in columns.items():
+        column = column.cast("int8") if types.is_boolean(column.type) else column
+        if types.is_string(column.type):
             _check_text(column.to_pylist(), name, path)
-            continue
-        found[name] = column
-    seconds = _seconds(moments)
-    return {
-        name: seconds[name] if name in seconds else _doubles(column)
-        for name, column in found.items()
-        if name in seconds or _is_number(column.type)
-    }
-
-
-def _is_number(kind: Any) -> bool:
-    """Whether a type of Arrow is one of numbers; so is that of a column left empty."""
-    from pyarrow import types
-
-    numbers = (types.is_integer, types.is_floating, types.is_null, types.is_boolean)
-    return any(is_kind(kind) for is_kind in numbers)
-
-
-def _doubles(column: Any) -> np.ndarray:
-    from pyarrow import types
-
-    column = column.cast("int8") if types.is_boolean(column.type) else column
-    return column.cast("float64", safe=False).fill_null(np.nan).to_numpy()
+        elif name in seconds:
+            found[name] = seconds[name]
+        elif tables.is_number(column.type):
+            found[name] = tables.doubles(column, name, path)
+    return found
 
 
 def _seconds(moments: Mapping[str, Any]) -> dict[str, np.ndarray]:

@@ -7,9 +7,9 @@ file. It is loaded with `weights_only`: tensors and plain containers, no code.
 Format: https://github.com/leggedrobotics/pace-sim2real
 """
 
-import pickle
 import zipfile
 from pathlib import Path
+from pickle import UnpicklingError  # torch raises it; nothing is unpickled here
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -73,7 +73,7 @@ def _loaded(path: Path) -> dict[str, np.ndarray]:
         }
     except FormatError:
         raise
-    except pickle.UnpicklingError:
+    except UnpicklingError:
         raise FormatError(
             f"{path} cannot be read as a PACE file: it holds more than tensors; save a "
             f"dictionary of the tensors {', '.join(NEEDED)}."

@@ -61,7 +61,7 @@ def opened(path: Path) -> Bag:
     kinds, counts = [], dict[str, int]()
     for file in files:
         _complete(file)
-        heard = _heard(file, mcap_log.topics(file))
+        heard = mcap_log.topics(file)
         kinds.append({topic: schema for topic, (schema, _) in heard.items()})
         for topic, (_, count) in heard.items():
             counts[topic] = counts.get(topic, 0) + count
@@ -105,19 +105,3 @@ def _complete(path: Path) -> None:
             f"{path} ends before its end record, for its recording was cut off: run "
             f"`mcap recover {path} -o {mended}`, then give {mended}."
         )
-
-
-def _heard(path: Path, topics: dict[str, str]) -> dict[str, tuple[str, int]]:
-    """Topics with messages: their schema, and how many; 1 if the file does not say."""
-    from mcap.reader import make_reader
-
-    with reading.regular(path) as file:
-        summary = make_reader(file).get_summary()
-    said = summary.statistics if summary else None
-    if summary is None or said is None:
-        return {topic: (schema, 1) for topic, schema in topics.items()}
-    counts: dict[str, int] = {}
-    for number, channel in summary.channels.items():
-        count = said.channel_message_counts.get(number, 0)
-        counts[channel.topic] = counts.get(channel.topic, 0) + count
-    return {t: (schema, counts[t]) for t, schema in topics.items() if counts.get(t)}

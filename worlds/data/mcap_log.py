@@ -182,8 +182,9 @@ def _field(message: Any, names: tuple[str, ...], path: Path) -> float:
     return float(value)
 
 
-def topics(path: Path) -> dict[str, str]:
-    """The topics of a log, each with the name of its schema.
+def topics(path: Path) -> dict[str, tuple[str, int]]:
+    """The topics of a log that have messages, each with the name of its schema and how
+    many messages it has; 1 if the file does not say.
 
     Raises:
         MissingDependencyError: the package `mcap`.
@@ -200,4 +201,11 @@ def topics(path: Path) -> dict[str, str]:
     if found is None:
         raise FormatError(f"{path} has no summary: mend it with `mcap recover`.")
     names = {number: schema.name for number, schema in found.schemas.items()}
-    return {c.topic: names.get(c.schema_id, "") for c in found.channels.values()}
+    said = found.statistics
+    made: dict[str, tuple[str, int]] = {}
+    for number, channel in found.channels.items():
+        count = said.channel_message_counts.get(number, 0) if said else 1
+        if count:
+            others = made[channel.topic][1] if said and channel.topic in made else 0
+            made[channel.topic] = names.get(channel.schema_id, ""), count + others
+    return made
