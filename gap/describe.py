@@ -23,7 +23,7 @@ from bns.gap.models.mjcf.channels import (
     tolds,
 )
 from bns.gap.models.mjcf.config import WINDOW
-from bns.gap.models.mjcf.log import held, split
+from bns.gap.models.mjcf.log import filled, split
 from bns.gap.models.mjcf.measured import observed
 from bns.worlds.data.units import FACTORS, factor, si_unit
 
@@ -196,7 +196,7 @@ def _filled(work: Work, told: Sequence[Column]) -> list[Column]:
     count = len(work.times)
     columns = {column.name: column.values for column in told}
     names = [*columns]
-    parts = [held(columns | {"": np.arange(count)}, names, r) for r in work.rows]
+    parts = [filled(columns | {"": np.arange(count)}, names, r) for r in work.rows]
     rows = [part[""].astype(int) for part in parts]
     made = []
     for column in told:

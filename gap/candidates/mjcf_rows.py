@@ -240,15 +240,11 @@ def _plausible(item: Row) -> tuple[float, float]:
     sd, slack = PLAUSIBLE.get(item.effect, (0.0, 0.0))
     if item.effect.startswith("joint_"):
         sd, slack = item.sd, SHARE * item.sd
-    elif item.effect.endswith("_offset") and not sd:
-        sd = OFFSET * (item.high - item.low)
-        slack = SHARE * sd
-    elif item.effect == "command_dead_zone":
-        sd = EIGHTH * (item.high - item.low)
-        slack = SHARE * sd
-    if item.joins:
-        slack = 0.0
-    return sd or EIGHTH * (item.high - item.low), slack
+    if not sd:
+        offset = item.effect.endswith("_offset")
+        sd = (OFFSET if offset else EIGHTH) * (item.high - item.low)
+        slack = SHARE * sd if offset or item.effect == "command_dead_zone" else 0.0
+    return sd, 0.0 if item.joins else slack
 
 
 def _told(item: Row, trials: Sequence[Trial]) -> np.ndarray:

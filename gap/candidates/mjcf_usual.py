@@ -120,14 +120,12 @@ def _on_actuators(
         for name, which in on.items()
     }
     channels = [item.channel.name for item in config.told]
-    pushing = tuple(
-        name for n, name in zip(told, channels, strict=True) if n not in servos
-    )
+    pushing = tuple(c for n, c in zip(told, channels, strict=True) if n not in servos)
     return named | {
         "actuator_period": (ALL,) if any(item.kd for item in config.told) else (),
         "command_limit": pushing,
         "command_dead_zone": pushing,
-        "command_offset": tuple(n for n in channels if n not in pushing),
+        "command_offset": tuple(c for c in channels if c not in pushing),
     }
 
 

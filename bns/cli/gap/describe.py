@@ -18,7 +18,8 @@ class Describe:
     model: Positional[str]
     """MJCF or URDF file of the robot; a URDF has no motors: give --kp and --kd"""
     log: Positional[str]
-    """CSV, PACE (.pt) or MCAP file, or directory of a SAGE motion or LeRobotDataset"""
+    """CSV, PACE (.pt) or MCAP file, or directory of a rosbag2, SAGE motion or
+    LeRobotDataset"""
     out: str = ""
     """file for the description; default: MODEL.toml in the working directory"""
     kp: tuple[float, ...] = ()

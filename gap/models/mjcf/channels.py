@@ -163,6 +163,8 @@ def _followed(
     }
     columns = [c for c in told if why.get(c.name) == matching.BY_ORDER]
     columns = [c for c in columns if found[c.name] in loops]
+    if len(columns) < 2:
+        return
     actuators = [found[column.name] for column in columns]
     alike = np.array(
         [
@@ -170,8 +172,6 @@ def _followed(
             for c in columns
         ]
     )
-    if len(columns) < 2:
-        return
     rows, best = optimize.linear_sum_assignment(alike, maximize=True)
     if alike[rows, best].min() > FOLLOWS > np.diagonal(alike).min():
         for column, number in zip(columns, best, strict=True):

@@ -39,12 +39,12 @@ def read(path: str, config: OwnConfig) -> list[Trial]:
     told = [item.channel.name for item in config.told]
     _empty(columns, config, path)
     return [
-        _trial(held(columns, told, rows), config, f"{path}, trial {number}")
+        _trial(filled(columns, told, rows), config, f"{path}, trial {number}")
         for number, rows in enumerate(split(columns[TRIAL]))
     ]
 
 
-def held(
+def filled(
     columns: Mapping[str, np.ndarray], told: Sequence[str], rows: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Some rows of a log; what was told is held over cells that are empty, and rows
@@ -163,7 +163,7 @@ def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> 
     if not np.isfinite(times).all():
         row = int(np.flatnonzero(~np.isfinite(times))[0])
         raise FormatError(f"{where}: no time in its sample {row}.")
-    tables.forward(times, where)
+    tables.forward(columns[TIME], where)
     if len(times) < 2:
         raise FormatError(f"{where}: fewer than two samples.")
     told = np.stack([columns[item.channel.name] for item in config.told], axis=1)
