@@ -213,7 +213,7 @@ def is_number(kind: Any) -> bool:
 
 
 def doubles(column: Any, name: str, path: Path | str) -> np.ndarray:
-    """A column of `pyarrow.Table` as doubles; empty cells are NaN.
+    """A column of `pyarrow.Table` as doubles ``(N,)``; empty cells are NaN.
 
     Args:
         column: of numbers.
