@@ -60,7 +60,7 @@ def sooner(trial: Trial, dt: float) -> list[Sooner]:
     count = len(trial.commands)
     if not 2 <= count <= LONGEST or not trial_conditions.moments_sampled([trial]):
         return []
-    step = float(np.median(np.diff(trial.times)))
+    step = trial_conditions.sample_step(trial)
     move = step / 2 if dt == 0 else max(1, round(step / 2 / dt)) * dt
     lasting = trial.commands.durations
     starts = trial.times[trial.boundaries[0]] + np.cumsum(lasting) - lasting

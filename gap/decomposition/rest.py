@@ -9,6 +9,7 @@ from scipy import stats
 from bns import seeding
 from bns.gap.decomposition.latent import Latent
 from bns.gap.decomposition.problem import Problem
+from bns.gap.recordings import trial_conditions
 
 THIRD = np.sqrt(20.0)  # third differences of noise: 1 + 9 + 9 + 1
 NORMAL = 1.4826
@@ -52,12 +53,8 @@ def floor(problem: Problem, latent: Latent, *, seed: int = 0) -> Floor:
         seed: of the noise that is drawn.
     """
     count = len(problem.model.channels)
-    found = []
-    for trial in problem.trials:
-        seen = trial.observed[:, :count]
-        seen = seen[np.isfinite(seen).all(axis=1)]
-        found.append(np.abs(np.diff(seen, n=3, axis=0)))
-    sigma = NORMAL * np.median(np.concatenate(found), axis=0) / THIRD
+    found = [trial_conditions.third_differences(trial) for trial in problem.trials]
+    sigma = NORMAL * np.median(np.concatenate(found)[:, :count], axis=0) / THIRD
     rng = seeding.generator(seed, "gap", "floor")
     squares = np.zeros_like(problem.recorded)
     for _ in range(DRAWS):

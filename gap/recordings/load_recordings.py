@@ -32,6 +32,7 @@ more of them tell no more of its motion, and what has to be kept of their noise 
 with their square"""
 
 RUN = "dataset"  # where the directory of a run keeps its recordings
+SMOOTH = 0.01  # [s] over which robots move smoothly, and measurements scatter
 PART = 20.0  # [s] length of the trials that long recordings are cut into
 
 
@@ -225,10 +226,18 @@ def thinned(trial: Trial, most: int = SAMPLES) -> Trial:
     kept = np.union1d(seen[::every], trial.boundaries)
     if len(kept) > 2 * most:  # more commands than samples wanted
         kept = np.union1d(seen[::every], trial.boundaries[[0, -1]])
+    step = trial_conditions.sample_step(trial)
+    apart = int(np.clip(SMOOTH / max(step, 1e-9), 1, every))
+    rough = [
+        np.diff(trial.observed[seen[at::apart]], n=3, axis=0) for at in range(apart)
+    ]
+    sizes = np.abs(np.concatenate(rough))
+    sampled = {"step": step, "rough": np.median(sizes, axis=0).tolist()}
     return trial.replace(
         times=trial.times[kept],
         observed=trial.observed[kept],
         boundaries=np.searchsorted(kept, trial.boundaries),
+        conditions={**trial.conditions, trial_conditions.SAMPLED: sampled},
         truth={},
     )
 

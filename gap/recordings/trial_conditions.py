@@ -14,6 +14,10 @@ NUMBER, RUN, RECORDING = "number", "run", "recording"
 """conditions that say which trial it was; `bns.gap.recordings.load_recordings` writes
 them"""
 
+SAMPLED = "sampled"
+"""condition of a trial of which every k-th sample is kept: of all samples the time
+between them (`step` [s]) and the median third difference of each channel (`rough`)"""
+
 
 def as_number(
     conditions: Mapping[str, object], name: str, default: float = 0.0
@@ -76,4 +80,23 @@ def moments_unknown(trials: Sequence[Trial]) -> float:
     found = moments_sampled(trials)
     if not found:
         return 0.0
-    return float(np.median(np.concatenate([np.diff(trial.times) for trial in found])))
+    return float(np.median([sample_step(trial) for trial in found]))
+
+
+def sample_step(trial: Trial) -> float:
+    """Time between samples of a trial as it was recorded [s]."""
+    known = trial.conditions.get(SAMPLED)
+    if isinstance(known, Mapping):
+        return as_number(known, "step")
+    return float(np.median(np.diff(trial.times)))
+
+
+def third_differences(trial: Trial) -> np.ndarray:
+    """Sizes of the third differences of what was seen, ``(n, n_channels)``: those of
+    all samples, where samples were left out their median."""
+    seen = trial.observed[np.isfinite(trial.observed).all(axis=1)]
+    sizes = np.abs(np.diff(seen, n=3, axis=0))
+    known = trial.conditions.get(SAMPLED)
+    if isinstance(known, Mapping):
+        return np.broadcast_to(known["rough"], sizes.shape)
+    return sizes

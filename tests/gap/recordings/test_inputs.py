@@ -7,9 +7,10 @@ import pytest
 
 from bns.errors import BnsError
 from bns.gap import store, warnings
+from bns.gap.decomposition import rest
 from bns.gap.diagnose import diagnose
 from bns.gap.models.unicycle import UnicycleModel
-from bns.gap.recordings import load_recordings
+from bns.gap.recordings import load_recordings, trial_conditions
 from bns.worlds import registry
 from bns.worlds.data import dataset
 from bns.worlds.effects import registry as effects
@@ -121,6 +122,20 @@ def test_many_samples_are_thinned():
     made = load_recordings.thinned(Trial(told, times, np.zeros((count, 3)), at))
     assert len(made.times) <= load_recordings.SAMPLES + 4
     np.testing.assert_array_equal(made.times[made.boundaries], times[at])
+
+
+def test_noise_is_that_of_all_samples():
+    """At 5 Hz a motion of 1 Hz is rough; at 200 Hz its measurement alone is."""
+    rng = np.random.default_rng(0)
+    times = np.arange(5000) * 0.005
+    noise = np.array([1e-3, 2e-3, 5e-3])
+    seen = np.sin(2 * np.pi * times)[:, None] + noise * rng.standard_normal((5000, 3))
+    told = Commands(np.ones((1, 2)) * 0.1, [times[-1]])
+    made = load_recordings.thinned(Trial(told, times, seen, np.array([0, 4999])), 120)
+    sizes = trial_conditions.third_differences(made)
+    assert trial_conditions.sample_step(made) == pytest.approx(0.005)
+    median = 0.6745 * rest.THIRD * noise
+    np.testing.assert_allclose(np.median(sizes, axis=0), median, rtol=0.05)
 
 
 def driven(model, text, seed):
