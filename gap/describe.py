@@ -288,8 +288,9 @@ def _log(work: Work) -> list[str]:
         if column != name or unit not in ("", "s"):
             lines[name] = (column, unit)
     for item, _, unit in (*work.told, *work.seen):
-        if factor(unit) != 1.0:
-            lines[work.channel(item, unit)] = (item.name, unit)
+        name = work.channel(item, unit)
+        if name != item.name or factor(unit) != 1.0:
+            lines[name] = (item.name, unit)
     made = ["", "[log]"] if lines else []
     for name, (column, unit) in lines.items():
         more = f", unit = {_text(unit)}" if unit else ""

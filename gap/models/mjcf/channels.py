@@ -45,11 +45,35 @@ class Work:
 
     def channel(self, column: Column, unit: str) -> str:
         """What the description calls a column: by its name, without a unit there that
-        is none of SI, since channels are in these; unless another is called so."""
+        is none of SI, since channels are in these, or by the joint of a topic; unless
+        another is called so."""
+        if column.name.startswith("/") and ":" in column.name:
+            return self._joint(column)
         plain = matching.unitless(column.name)
         others = {n for n in self.table.names if n != column.name}
         taken = {plain} & (others | set(map(matching.unitless, others)))
         return column.name if taken or factor(unit) == 1.0 else plain
+
+    def _joint(self, column: Column) -> str:
+        """The shorter of `_shorter` that no other command has, nor, of what was seen,
+        anything else that was seen, nor a command; else the name."""
+        alike = [other.name for other, _, _ in self.told]
+        taken: set[str] = set()
+        if column.name not in alike:
+            alike = [other.name for other, _, _ in self.seen]
+            taken = {self.channel(other, unit) for other, _, unit in self.told}
+        for name in _shorter(column.name):
+            others = [other for other in alike if other != column.name]
+            mine = all(name not in _shorter(other) for other in others)
+            if mine and name not in taken and not name.isdigit():
+                return name
+        return column.name
+
+
+def _shorter(name: str) -> tuple[str, str]:
+    """ "knee" and "velocity.knee" of "/topic:velocity.knee"."""
+    field = name.partition(":")[2]
+    return field.partition(".")[2], field
 
 
 def compiled(

@@ -1,12 +1,14 @@
 """MCAP logs of ROS 2: trajectories, several topics, and bags of several files."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bns.errors import FormatError
 from bns.gap.importers import tables
+from bns.gap.models.mjcf.channels import Work
 
 ZERO = 10**18
 KINDS = {"j": "JointState", "t": "JointTrajectory", "a": "Float64MultiArray"}
@@ -182,3 +184,21 @@ def test_times_of_arrival_are_noted(tmp_path, sec):
     }
     found = tables.read(log(tmp_path / "a.mcap", topics))
     assert any("logged" in note for note in found.notes) == (sec == 0)
+
+
+def test_channels_of_topics_are_called_by_their_joints():
+    """A topic's whole name would not fit beside an axis."""
+    names = {
+        "/cmd:position.knee": "knee",
+        "/state:position.knee": "position.knee",
+        "/state:velocity.knee": "velocity.knee",
+        "/state:position.hip": "hip",
+        "/other:position.ankle": "/other:position.ankle",
+        "/state:position.ankle": "/state:position.ankle",
+    }
+    columns = [tables.Column(name, np.zeros(3)) for name in names]
+    table = tables.Table(tuple(columns), "log")
+    work = Work(Path("robot.xml"), "log.mcap", table, {}, None)
+    work.told = [(columns[0], "knee", "rad")]
+    work.seen = [(column, None, "rad") for column in columns[1:]]
+    assert [work.channel(column, "rad") for column in columns] == [*names.values()]
