@@ -22,8 +22,9 @@ COUNTS = {"large": 56, "none": 32, "lost": 16}
 # Those from 790 000 on, begun: 7 of 12 named, no gap in 7 without one, 4 of 4 lost.
 # Those from 890 000 on were scored once: 44 of 53, no gap in 32, 16 of 16 lost.
 # 16 from 990 000 on: a limit of duty near its nominal value was not tried.
-# Those from 1 090 000 on, with that limit fitted from its nominal value on.
-CASES = Cases("gap_hexapod12", COUNTS, first=1_090_000)
+# Those from 1 090 000 on were scored once: 42 of 52, three of the ten missed within
+# what the model is unsure of a foot's grip, which sizes left out of account.
+CASES = Cases("gap_hexapod13", COUNTS, first=1_190_000)
 QUICK = {"large": 1, "none": 1, "lost": 1}
 LARGE = 3.0  # sizes from which effects have to be named
 SLOWEST = 300.0  # [s] a case on two cores

@@ -140,7 +140,7 @@ def _features(problem: Problem, effects: Sequence[Effect]) -> np.ndarray:
 
 def lengths(problem: Problem, point: Point, effects: Sequence[Effect]) -> np.ndarray:
     """What effects change, in deviations of independent residuals, ``(E,)``; what
-    slack and nuisances could as well be is left out.
+    slack, nuisances and what the model is unsure of could as well be is left out.
 
     Args:
         problem: a recording without an effect.
@@ -149,7 +149,9 @@ def lengths(problem: Problem, point: Point, effects: Sequence[Effect]) -> np.nda
     """
     base, *made = _features(problem, effects)
     linear = point.linear
-    prior = linear.prior(())
+    rows = [problem.rows[number] for number in linear.columns]
+    unsure = np.array([row.unsure / row.sd for row in rows])
+    prior = np.maximum(linear.prior(()), unsure)
     used = np.flatnonzero(prior)
     design = linear.design[..., used].reshape(-1, len(used)) * prior[used]
     weight = linear.weight.ravel() / linear.lam
