@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from bns.errors import FormatError
 from bns.gap.importers import tables
@@ -15,6 +16,8 @@ from bns.worlds.data.units import factor
 from bns.worlds.trial import Commands, Trial
 
 LATE = 0.5  # samples by which a command may be sent after its first row
+LOST = 1.75  # steps between rows from which one is lost, and not late
+LONGEST = 0.5  # [s] without a row over which commands are taken to go on
 FARTHEST = 5.0  # times a joint's range
 USUAL = 0.9  # quantile of what was seen of a joint: some samples are wild
 HELD = 2, 10  # samples that a loop of its own holds its commands: who tells anew at
@@ -38,9 +41,10 @@ def read(path: str, config: OwnConfig) -> list[Trial]:
     columns = channels(table, config, path)
     told = [item.channel.name for item in config.told]
     _empty(columns, config, path)
+    parts = [filled(columns, told, rows) for rows in split(columns[TRIAL])]
     return [
-        _trial(filled(columns, told, rows), config, f"{path}, trial {number}")
-        for number, rows in enumerate(split(columns[TRIAL]))
+        _trial(bridged(part, told), config, f"{path}, trial {number}")
+        for number, part in enumerate(parts)
     ]
 
 
@@ -64,6 +68,41 @@ def filled(
             made[name] = made[name][np.maximum(last, 0)]
             first = max(first, int(np.argmax(given)))
     return {name: values[first:] for name, values in made.items()}
+
+
+def bridged(
+    columns: Mapping[str, np.ndarray], told: Sequence[str]
+) -> Mapping[str, np.ndarray]:
+    """Columns with rows where some were lost and commands change from row to row: what
+    was told meanwhile is taken to go on smoothly (monotone cubics), not to stand still.
+
+    Args:
+        columns: of a trial, ``(T,)`` each.
+        told: names of those that are commands.
+    """
+    times = columns[TIME]
+    apart = np.diff(times)
+    if SENT in columns or len(times) < 4 or not (apart > 0).all():
+        return columns
+    step = float(np.median(apart))
+    changed = np.any([np.diff(columns[name]) != 0 for name in told], axis=0)
+    steady = np.append(changed[1:], True) & np.append(True, changed[:-1]) & changed
+    missing = np.rint(apart / step).astype(int) - 1
+    missing[~steady | (apart < LOST * step) | (apart > LONGEST)] = 0
+    if not missing.any():
+        return columns
+    after = np.repeat(np.arange(len(apart)), missing)
+    count = np.concatenate([np.arange(1, n + 1) / (n + 1) for n in missing if n])
+    new = times[after] + count * apart[after]
+    made = {}
+    for name, values in columns.items():
+        between = np.full(len(new), np.nan)
+        if name == TIME:
+            between = new
+        elif name in told:
+            between = PchipInterpolator(times, values)(new)
+        made[name] = np.insert(values.astype(float), after + 1, between)
+    return made
 
 
 def _empty(columns: Mapping[str, np.ndarray], config: OwnConfig, path: str) -> None:

@@ -7,6 +7,7 @@ from bns.errors import FormatError
 from bns.gap.describe import describe
 from bns.gap.models.mjcf import guesses, matching
 from bns.gap.models.mjcf.command_steps import stepped
+from bns.gap.models.mjcf.log import bridged
 from bns.gap.models.mjcf.model import OwnModel
 from bns.gap.recordings import check, load_recordings
 from bns.worlds.trial import Channel, Commands, Trial
@@ -115,6 +116,27 @@ def test_a_turned_sign_is_told_and_can_be_turned_back(tmp_path):
     turned.write_text(text + '\n[log]\nelbow = { column = "elbow", scale = 0 }\n')
     with pytest.raises(FormatError, match="scale of elbow is 0"):
         OwnModel.read(turned, threads=1)
+
+
+def with_rows(told, kept):
+    """Columns of some rows of a log, and the names of its commands."""
+    columns = {"time": np.arange(COUNT)[kept] / RATE, "angle": told[kept, 0]}
+    return columns | dict(zip(("a", "b"), told[kept].T, strict=True)), ("a", "b")
+
+
+def test_commands_go_on_where_rows_are_lost():
+    """A command held over a lost row would come late, and pass for a gap."""
+    kept = ~np.isin(np.arange(COUNT), [40, 90, 91, 92, 93])
+    made = bridged(*with_rows(goals(), kept))
+    np.testing.assert_allclose(made["time"], np.arange(COUNT) / RATE)
+    np.testing.assert_allclose(np.c_[made["a"], made["b"]], goals(), atol=1e-3)
+    np.testing.assert_array_equal(np.isfinite(made["angle"]), kept)
+
+
+def test_steps_are_held_where_rows_are_lost():
+    kept = ~np.isin(np.arange(COUNT), [24, 25, 26, 60])
+    columns, names = with_rows(goals()[np.arange(COUNT) // 25 * 25], kept)
+    assert bridged(columns, names) is columns
 
 
 def test_commands_with_rows_of_their_own_have_their_own_times(tmp_path):
