@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bns.gap.decomposition import moments
+from bns.gap.decomposition import moments, unknown
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, Windows
 from bns.gap.recordings import segments, trial_conditions
@@ -187,10 +187,13 @@ class Problem:
     @cached_property
     def late(self) -> list[np.ndarray]:
         """What a standard deviation of when each command began changes of the features
-        of its trial by the nominal model, where a log tells it to a sample only: by
-        trial ``(K, n, C)``."""
+        of its trial by the nominal model, where a log tells it to a sample only, and of
+        what was told in rows that it lost: by trial ``(K, n, C)``."""
         dt = self.model.dt
-        sooner = [[] if self.dated else moments.sooner(t, dt) for t in self.trials]
+        sooner: list[list[moments.Sooner | unknown.Unknown]] = [
+            [*([] if self.dated else moments.sooner(t, dt)), *unknown.unknown(t)]
+            for t in self.trials
+        ]
         trials = [*self.trials, *(item.trial for row in sooner for item in row)]
         made = []
         if len(trials) > len(self.trials):

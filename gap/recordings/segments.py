@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bns.gap.models.base import Windows
+from bns.gap.recordings import trial_conditions
 from bns.worlds.trial import Commands, Trial
 
 # Place and heading in a regime are told this coarsely [m, m, rad]: finer, they would
@@ -120,6 +121,7 @@ def piece(trial: Trial, first: int, last: int) -> Trial:
         observed=trial.observed[first : last + 1],
         boundaries=marks - first,
         handled=np.zeros(0, bool),
+        conditions=trial_conditions.since(trial.conditions, trial.times[first]),
         truth={},
     )
 

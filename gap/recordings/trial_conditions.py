@@ -14,6 +14,12 @@ NUMBER, RUN, RECORDING = "number", "run", "recording"
 """conditions that say which trial it was; `bns.gap.recordings.load_recordings` writes
 them"""
 
+BETWEEN = "commands_between"
+"""condition of a trial of which rows were lost: when commands began that were put
+between those that are known [s]"""
+
+SAME = 1e-6  # [s] moments that are nearer are one
+
 SAMPLED = "sampled"
 """condition of a trial of which every k-th sample is kept: of all samples the time
 between them (`step` [s]) and the median third difference of each channel (`rough`)"""
@@ -59,6 +65,23 @@ def label(trial: Trial, place: int) -> str:
     parts += [f"run {known[RUN]}"] if RUN in known else []
     parts += [str(known[RECORDING])] if RECORDING in known else []
     return " of ".join(parts)
+
+
+def since(conditions: Mapping[str, object], time: float) -> Mapping[str, object]:
+    """Conditions of what of a trial comes after a time [s], counted from there."""
+    known = conditions.get(BETWEEN)
+    if not isinstance(known, list):
+        return conditions
+    return {**conditions, BETWEEN: [begun - time for begun in known if begun > time]}
+
+
+def between(trial: Trial) -> np.ndarray:
+    """Which commands were put between those that are known, ``(K,)``."""
+    lasting = trial.commands.durations
+    begun = trial.times[trial.boundaries[0]] + np.cumsum(lasting) - lasting
+    known = trial.conditions.get(BETWEEN)
+    moments = np.array(known if isinstance(known, list) else [], dtype=float)
+    return (np.abs(begun[:, None] - moments) < SAME).any(axis=1)
 
 
 def numbers(trials: Sequence[Trial]) -> list[int]:

@@ -10,12 +10,14 @@ from bns.errors import FormatError
 from bns.gap.importers import tables
 from bns.gap.importers.tables import SENT, TIME, TRIAL, Column, Table
 from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.recordings import trial_conditions
 from bns.worlds.data import dataset_checks as checks
 from bns.worlds.data.importing import MOMENTS, Source
 from bns.worlds.data.units import factor
 from bns.worlds.trial import Commands, Trial
 
 LATE = 0.5  # samples by which a command may be sent after its first row
+BETWEEN = "between"  # column of rows that were lost
 LOST = 1.75  # steps between rows from which one is lost, and not late
 LONGEST = 0.5  # [s] without a row over which commands are taken to go on
 FARTHEST = 5.0  # times a joint's range
@@ -79,6 +81,9 @@ def bridged(
     Args:
         columns: of a trial, ``(T,)`` each.
         told: names of those that are commands.
+
+    Returns:
+        the same, if none were lost, else with `BETWEEN`, 1 in such a row.
     """
     times = columns[TIME]
     apart = np.diff(times)
@@ -102,7 +107,7 @@ def bridged(
         elif name in told:
             between = PchipInterpolator(times, values)(new)
         made[name] = np.insert(values.astype(float), after + 1, between)
-    return made
+    return made | {BETWEEN: np.insert(np.zeros(len(times)), after + 1, 1.0)}
 
 
 def _empty(columns: Mapping[str, np.ndarray], config: OwnConfig, path: str) -> None:
@@ -219,6 +224,10 @@ def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> 
     exact |= _stamped(seen, begins[1:])
     exact |= not HELD[0] <= np.median(np.diff(bounds)) <= HELD[1]
     kinds = tuple(item.channel for item in config.told)
+    conditions: dict[str, object] = {} if exact else {MOMENTS: "sampled"}
+    if BETWEEN in columns:
+        lost = np.isin(begins, np.flatnonzero(columns[BETWEEN]))
+        conditions[trial_conditions.BETWEEN] = times[begins[lost]].tolist()
     made = Trial(
         commands=Commands(told[begins], np.diff(times[bounds]), kinds),
         times=times,
@@ -227,7 +236,7 @@ def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> 
         channels=tuple(item.channel for item in config.seen),
         robot=config.name,
         world="imported",
-        conditions={} if exact else {MOMENTS: "sampled"},
+        conditions=conditions,
     )
     checks.plausible(made, where)
     return made
