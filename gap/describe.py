@@ -53,7 +53,9 @@ class Description:
             with path.open("x", encoding="utf-8") as file:
                 file.write(self.toml)
         except FileExistsError:
-            raise BnsError(f"{path} exists and is not overwritten.") from None
+            raise BnsError(
+                f"{path} exists and is not overwritten; give another --out."
+            ) from None
         except OSError as error:
             raise BnsError(f"{path} cannot be written: {error.strerror}.") from None
         return path

@@ -165,7 +165,7 @@ def _candidates(
             levels=_grid(nominal, low, high),
             fixed={"part": part},
             slack=given.get("slack", 0.0),
-            excite=EXCITE[name],
+            excite=EXCITE.get(name, "any motion"),
             aliases=_DELAYS.get(f"{stem}[{part}]", ()),
         )
 
@@ -218,11 +218,19 @@ def _of_channel(name: str, part: str, config: OwnConfig) -> tuple[float, float, 
         if name == "command_rate":  # two seconds for the whole way
             return 0.0, 2.0 / size, f"s/({item.channel.unit})"
         low = 0.0 if name in DEAD else -0.3 * size
-        return low, 0.3 * size if low else 0.6 * size, item.channel.unit
+        unit = _unit(name, item.channel.unit)
+        return low, 0.3 * size if low else 0.6 * size, unit
     if part in seen:
         size = 100 * seen[part].noise
-        return -size, size, seen[part].channel.unit
+        return -size, size, _unit(name, seen[part].channel.unit)
     raise BnsError(f"[effects] {name} needs the name of one channel, not {part!r}.")
+
+
+def _unit(name: str, of: str) -> str:
+    """Unit of an effect's strength on a channel in a unit."""
+    (about,) = (item for item in effects.CLASSES[name].parameters if item.scales)
+    unit = about.unit.replace("unit of the command", of)
+    return unit.replace("unit of the reading", of)
 
 
 def _of_model(

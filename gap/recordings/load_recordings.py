@@ -116,7 +116,8 @@ def trials(
     found = trial_selection.with_conditions(found, only)
     if not found:
         raise BnsError(
-            "No trial is left: nothing was recorded, or --only and --trials drop all."
+            "No trial is left: nothing was recorded, or --only and --trials drop all; "
+            "trials are counted from 0."
         )
     _of_robot(found, model)
     most = max(SAMPLES, WHOLE // len(found))

@@ -36,9 +36,9 @@ CAPTIONS = {
     "horizons": (
         "Where the gap is",
         "Root mean square of recorded minus predicted motion, by channel and by how "
-        "far ahead was predicted. For a robot that drives, an error that grows is one "
-        "of motion, one that stays is one of a sensor. Bars are 90 % intervals over "
-        "trials.",
+        "far ahead was predicted. Of a robot on wheels or legs an error that grows is "
+        "one of motion, one that stays is one of a sensor. Bars are 90 % intervals "
+        "over trials.",
     ),
     "over_time": (
         "Residuals over time",
@@ -338,7 +338,13 @@ def next_steps(found: Diagnosis, known: Sequence[Row]) -> list[str]:
             "bns gap edit DIR --remove EFFECT --predict OTHER tests the explanation on "
             "a recording without the effect."
         )
-        steps.append("bns gap apply DIR --world NAME keeps the corrected world.")
+        own = str(found.provenance.get("model", "")).endswith(".toml")
+        kept = (
+            "--xml FILE keeps the corrected MJCF"
+            if own
+            else ("--world NAME keeps the corrected world")
+        )
+        steps.append(f"bns gap apply DIR {kept}.")
     quiet = [row for row in detectable(found, known)["rows"] if row[1] == "not excited"]
     for name, _, excite in quiet[:4]:
         steps.append(f"{name} could not have been seen; it would take {excite}.")

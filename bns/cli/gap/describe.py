@@ -48,6 +48,6 @@ def main(verb: str, argv: list[str]) -> int:
         for line in lines:
             print(f"{title}:  {line}")
     path = found.write(place(given.model, given.out))
-    print(f"{path}: look at what is unsure, then")
+    print(f"{path}: {'look at what is unsure, then' if found.unsure else 'next:'}")
     print(f"  bns gap diagnose {given.log} --model {path}")
     return 0

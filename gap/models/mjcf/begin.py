@@ -64,7 +64,7 @@ def begin(work: Work) -> None:
                 guesses.SIGMAS * guesses.noise(pieces), wide * factor(unit)
             )
     pose, settle = guesses.rests(work.model, first, tolerance)
-    if settle and not _settled(work, longest, pose or ""):
+    if settle and not _settled(work, longest, pose or "", settle):
         settle = 0.0
     loose = bool(start.free(work.model))
     if span > guesses.LONG and guesses.curved(told[longest], span) and not loose:
@@ -115,13 +115,13 @@ def _stood(work: Work, rows: np.ndarray) -> mujoco.MjData:
     return data
 
 
-def _settled(work: Work, rows: np.ndarray, pose: str) -> bool:
-    """Whether a trial begins as a robot does that has come to rest, not as one that was
-    let go: by which of the two predicts its first samples better."""
+def _settled(work: Work, rows: np.ndarray, pose: str, settle: float) -> bool:
+    """Whether a trial begins as a robot does that has come to rest in a time [s], not
+    as one that was let go: by which of the two predicts its first samples better."""
     rows = rows[work.times[rows] <= work.times[rows[0]] + guesses.SETTLE]
     errors = [
         _missed(work, rows, guesses.posed(work.model, pose, lasting))
-        for lasting in (guesses.SETTLE, 0.0)
+        for lasting in (settle, 0.0)
     ]
     return errors[0] <= errors[1]
 

@@ -13,7 +13,7 @@ from bns.gap.importers.tables import SENT, TIME, TRIAL
 from bns.storage import reading
 from bns.storage.reading import BEYOND
 from bns.worlds.data.importing import Source, read_map
-from bns.worlds.data.units import FACTORS
+from bns.worlds.data.units import FACTORS, si_unit
 from bns.worlds.trial import Channel
 
 KEYS = (
@@ -37,6 +37,7 @@ QUANTITIES = ("joint", "speed", *PLACES)
 """what an observed channel can be: position or speed of a joint, place of a site or
 body"""
 AXES = ("x", "y", "z")
+UNITS = ("rad", "m", "rad/s", "m/s")
 MARKS = (TIME, TRIAL, SENT)  # columns of a log beside its channels
 WINDOW = 0.1  # [s] between two samples that are compared
 
@@ -214,7 +215,7 @@ def _told(name: str, table: Any, path: Path) -> Told:
     low, high = (_number(table[key], key, path) for key in ("low", "high"))
     if not low < high:
         raise BnsError(f"{path}: [commands.{name}] needs low < high.")
-    channel = Channel(name, str(table["unit"]))
+    channel = _channel(name, table["unit"], path)
     loop = {key: _number(table[key], key, path) for key in LOOP if key in table}
     if loop and not (loop.get("kp", 0) > 0 and min(loop.values()) >= 0):
         raise BnsError(
@@ -248,14 +249,36 @@ def _seen(name: str, table: Any, path: Path) -> Seen:
     axis = str(table.get("axis", "x"))
     if axis not in AXES:
         raise UnknownNameError(f"axis of [observed.{name}]", axis, AXES)
+    channel = _channel(name, table["unit"], path)
+    if channel.unit not in UNITS:
+        raise FormatError(
+            f"{path}: [observed.{name}] is in {channel.unit!r}; joints and places are "
+            f"in {', '.join(UNITS)}."
+        )
     return Seen(
-        Channel(name, str(table["unit"])),
+        channel,
         what[0],
         str(table[what[0]]),
         AXES.index(axis),
         noise,
         _number(table.get("scatter", noise), "scatter", path, 0.0),
     )
+
+
+def _channel(name: str, unit: Any, path: Path) -> Channel:
+    """A channel, which is in SI units.
+
+    Raises:
+        FormatError: it is in another one that is known.
+    """
+    unit, right = str(unit), si_unit(str(unit))
+    if unit != right:
+        raise FormatError(
+            f"{path}: {name} is in {unit!r}; channels are in SI units. Give unit = "
+            f'"{right}" here, and of its column in the log [log] "{name}" = '
+            f'{{ column = "...", unit = "{unit}" }}.'
+        )
+    return Channel(name, unit)
 
 
 def _mapping(table: Any, where: str, path: Path) -> Mapping[str, Any]:

@@ -14,6 +14,8 @@ LONG = 8.0  # [s] a trial that is longer, and told anew all the time, is cut
 CUT = 3.0  # [s]
 ANEW = 0.1  # [s] between new commands, up to which they are a curve
 SETTLE = 0.5  # [s]
+LONGEST = 5.0  # [s] of settling
+STILL = 3e-4  # [rad or m] that what rests moves at most in `SETTLE`
 NEAR = 0.05  # of a joint's range, by which a start may be off
 SIGMAS = 6.0  # times the noise, the same
 PAD = 0.02  # of the range of commands, by which limits are wider
@@ -80,16 +82,32 @@ def rests(
     Returns:
         the keyframe ("" = the model's own pose), None = none fits; settling time [s].
     """
-    for settle in (0.0, SETTLE):
+    for settled in (False, True):
         for name in reversed(_poses(model)):  # keyframes before the model's own pose
-            data = posed(model, name, settle)
+            data = posed(model, name, settling(model, name) if settled else 0.0)
             off = [
                 abs(float(data.joint(joint).qpos[0]) - at) <= tolerance[joint]
                 for joint, at in first.items()
             ]
             if off and all(off):
-                return name, SETTLE if settle or _sinks(model, data) else 0.0
+                moves = settled or _moved(model, data) > 1e-5
+                return name, settling(model, name) if moves else 0.0
     return None, 0.0
+
+
+def settling(model: mujoco.MjModel, pose: str) -> float:
+    """How long a model settles in a pose until it rests [s]: whole times of `SETTLE`,
+    one of them where it does not rest within `LONGEST`.
+
+    Args:
+        model: that is recorded.
+        pose: name of the keyframe; "" = the model's own.
+    """
+    data = posed(model, pose, 0.0)
+    for count in range(round(LONGEST / SETTLE) + 1):
+        if _moved(model, data) < STILL:
+            return max(count, 1) * SETTLE
+    return SETTLE
 
 
 def nearest(model: mujoco.MjModel, first: Mapping[str, float]) -> str:
@@ -130,9 +148,9 @@ def posed(model: mujoco.MjModel, pose: str, settle: float) -> mujoco.MjData:
     return data
 
 
-def _sinks(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
-    """Whether the model moves by itself in that pose."""
+def _moved(model: mujoco.MjModel, data: mujoco.MjData) -> float:
+    """How far a coordinate of the model goes at most in the next `SETTLE`."""
     before = data.qpos.copy()
     for _ in range(round(SETTLE / model.opt.timestep)):
         mujoco.mj_step(model, data)
-    return bool(np.abs(data.qpos - before).max() > 1e-5)
+    return float(np.abs(data.qpos - before).max(initial=0.0))

@@ -16,6 +16,7 @@ from bns.worlds.data.importing import MOMENTS, Source
 from bns.worlds.data.units import factor
 from bns.worlds.trial import Commands, Trial
 
+RATES = (1.0, 50_000.0)  # [Hz] of samples
 LATE = 0.5  # samples by which a command may be sent after its first row
 BETWEEN = "between"  # column of rows that were lost
 LOST = 1.75  # steps between rows from which one is lost, and not late
@@ -210,6 +211,7 @@ def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> 
     tables.forward(columns[TIME], where)
     if len(times) < 2:
         raise FormatError(f"{where}: fewer than two samples.")
+    _rated(times, where)
     told = np.stack([columns[item.channel.name] for item in config.told], axis=1)
     seen = np.stack([columns[item.channel.name] for item in config.seen], axis=1)
     seen[~np.isfinite(seen).all(axis=1)] = np.nan
@@ -240,6 +242,22 @@ def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> 
     )
     checks.plausible(made, where)
     return made
+
+
+def _rated(times: np.ndarray, where: str) -> None:
+    """Stop at stamps that no log of a robot has.
+
+    Raises:
+        FormatError: samples come too seldom or too often.
+    """
+    steps = np.diff(times)
+    rate = 1 / max(float(np.median(steps[steps > 0])), 1e-12) if steps.any() else 0.0
+    if not RATES[0] <= rate <= RATES[1]:
+        raise FormatError(
+            f"{where}: {rate:.3g} samples a second, and {RATES[0]:g} to {RATES[1]:g} "
+            "are read: is the unit of `time` right? Give it in the description, "
+            '[log] time = { column = "...", unit = "ms" }, or "s", "us", "ns".'
+        )
 
 
 def _stamped(seen: np.ndarray, begins: np.ndarray) -> bool:

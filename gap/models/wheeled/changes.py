@@ -67,7 +67,7 @@ class Changes:
             made += [effect(name, part) for part in parts]
         body = _edits(made)
         told = [item for item in made if isinstance(item, CommandEffect)]
-        told.sort(key=lambda item: ORDER.index(item.name))
+        told.sort(key=lambda item: _place(item.name))
         return cls(body, tuple(told), late, lost, seen)
 
     @classmethod

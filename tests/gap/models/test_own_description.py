@@ -150,6 +150,13 @@ def test_former_names_in_a_description_are_read(arm):
     assert str(made.make(1.2)) == "reading_gain:part=elbow,factor=1.2"
 
 
+def test_an_effect_that_says_nothing_of_its_motion_is_a_candidate(arm, monkeypatch):
+    monkeypatch.delitem(mjcf.EXCITE, "command_rate")
+    config = replace(OwnConfig.read(ARM), effects={"command_rate": ("elbow_goal",)})
+    (item,) = mjcf.candidates(replace(config, bounds={}), arm.physics.model)
+    assert item.excite == "any motion" and item.unit == "s/(rad)"
+
+
 @pytest.mark.parametrize("given", [{"low": 2.0, "high": 0.5}, {"low": 9.0}])
 def test_bounds_with_nothing_between_are_refused(arm, given):
     config = replace(

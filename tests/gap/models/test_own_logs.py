@@ -237,3 +237,33 @@ def test_a_xacro_is_to_be_expanded_first(tmp_path):
     path = log(tmp_path / "log.csv", goals(), followed(goals()))
     with pytest.raises(FormatError, match=r"run `xacro .*arm.urdf`"):
         describe(model, path)
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-6])
+def test_a_time_in_another_unit_is_refused_at_once(tmp_path, factor):
+    path = log(tmp_path / "log.csv", goals(), followed(goals()))
+    model, _ = read(describe(ARM, path, out=tmp_path / "arm.toml"), tmp_path, path)
+    columns = {"time": np.arange(COUNT) / RATE * factor}
+    names = ("shoulder_goal", "elbow_goal", "shoulder", "elbow")
+    columns |= dict.fromkeys(names, np.linspace(0, 1, COUNT))
+    other = written(tmp_path / "other.csv", columns)
+    with pytest.raises(FormatError, match="samples a second"):
+        model.read_log(str(other))
+
+
+@pytest.mark.parametrize(
+    ("section", "unit", "said"),
+    [
+        ("commands", "deg", 'unit = "rad" here, and of its column'),
+        ("observed", "deg", 'unit = "rad" here, and of its column'),
+        ("observed", "furlong", "joints and places are in rad, m"),
+    ],
+)
+def test_channels_in_other_units_are_refused(tmp_path, section, unit, said):
+    path = log(tmp_path / "log.csv", goals(), followed(goals()))
+    describe(ARM, path, out=tmp_path / "arm.toml").write(tmp_path / "arm.toml")
+    before, mark, after = (tmp_path / "arm.toml").read_text().partition(f"[{section}.")
+    after = after.replace('unit = "rad"', f'unit = "{unit}"', 1)
+    (tmp_path / "arm.toml").write_text(before + mark + after)
+    with pytest.raises(FormatError, match=said):
+        OwnModel.read(tmp_path / "arm.toml", threads=1)
