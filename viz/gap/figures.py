@@ -129,9 +129,10 @@ def shares(found: Diagnosis) -> "Figure":
     it is added last, and what is left."""
     parts = found.decomposition["parts"]
     names = [part["name"] for part in parts] + ["what is left"]
-    last = [100 * part["last"] for part in parts] + [100 * found.decomposition["left"]]
-    alone = [100 * part["alone"] for part in parts] + [0.0]
-    place = np.arange(len(names))
+    last = [100 * part["last"] for part in parts]
+    alone = [100 * part["alone"] for part in parts]
+    left = 100 * found.decomposition["left"]
+    place = np.arange(len(parts))
     with style.plotting() as figure_class:
         figure = figure_class(
             figsize=(7.0, 1.2 + 0.42 * len(names)), layout="constrained"
@@ -139,12 +140,13 @@ def shares(found: Diagnosis) -> "Figure":
         axes = figure.subplots()
         axes.barh(place - 0.18, alone, height=0.34, color=style.GREY, label="alone")
         axes.barh(place + 0.18, last, height=0.34, color=CORRECTED, label="added last")
-        axes.set_yticks(place, names)
+        axes.barh(len(parts), left, height=0.34, color=NOMINAL, label="left")
+        axes.set_yticks(range(len(names)), names)
         axes.set_ylim(len(names) - 0.4, -0.6)
         axes.set_xlim(left=min(0.0, *last, *alone))
         axes.grid(axis="y", visible=False)
-        axes.set_xlabel("share of the gap that goes [%]")
-        figure.legend(loc="outside lower center", ncols=2)
+        axes.set_xlabel("share of the gap that goes, or is left [%]")
+        figure.legend(loc="outside lower center", ncols=3)
     return figure
 
 
@@ -169,12 +171,12 @@ def closing(found: Diagnosis) -> "Figure":
         )
         axes = figure.subplots()
         labels, values, colours = zip(*rows, strict=True)
-        axes.barh(range(len(rows)), values, color=colours, height=0.62, left=0)
+        axes.scatter(values, range(len(rows)), color=colours, s=44, zorder=3)
         axes.set_yticks(range(len(rows)), labels)
         axes.axvline(closed["floor"], color=style.GREEN, ls="--", lw=1.4)
         axes.set_ylim(len(rows) - 0.4, -0.6)
         style.logarithmic(axes.xaxis, axes.set_xscale)
-        axes.set_xlim(left=0.7 * min(closed["floor"], *values))
+        axes.set_xlim(0.7 * min(closed["floor"], *values), 1.4 * max(values))
         axes.text(
             closed["floor"],
             1.01,
@@ -184,7 +186,7 @@ def closing(found: Diagnosis) -> "Figure":
             va="bottom",
             transform=axes.get_xaxis_transform(),
         )
-        axes.grid(axis="y", visible=False)
+        axes.grid(axis="y", visible=True)
         axes.set_xlabel("held-out loss per residual (1 = noise alone), log scale")
     return figure
 
@@ -277,12 +279,13 @@ def over_time(view: View) -> "Figure":
 
 def _legend(figure: "Figure", view: View, third: str) -> None:
     from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
 
-    known = [("recorded minus nominal", NOMINAL), (third, style.GREEN)]
-    if view.effects:
-        known.insert(1, ("recorded minus corrected", CORRECTED))
+    known = [("recorded minus nominal", NOMINAL)]
+    known += [("recorded minus corrected", CORRECTED)] if view.effects else []
     lines = [Line2D([], [], color=colour, label=name) for name, colour in known]
-    figure.legend(handles=lines, loc="outside lower center", ncols=3)
+    band = Patch(color=style.GREEN, alpha=0.18, lw=0, label=third)
+    figure.legend(handles=[*lines, band], loc="outside lower center", ncols=3)
 
 
 def motion(view: View) -> Any:
