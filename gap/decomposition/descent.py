@@ -18,6 +18,7 @@ from bns.gap.decomposition.shares import HeldOut
 from bns.gap.decomposition.singles import Single, Singles, wide
 
 TURNS = 4  # of fitting and searching
+INSTEAD = 3  # explanations one of which another may replace, and such others
 FEW = 2  # explanations that need no other start if they leave little
 ENOUGH = 1.2  # times what all explanations leave: little more
 NEARLY = 1.5  # the same where these, all together, only describe the recording
@@ -144,7 +145,7 @@ def decompose(tried: Singles) -> Point:
         best = chosen
     if problem.model.many:
         best = _renewed(problem, best)
-    best = _simplest(problem, best)
+    best = _instead(tried, _simplest(problem, best))
     return _beyond_chance(problem, start, best, len(start.linear.free))
 
 
@@ -183,6 +184,32 @@ def _simplest(problem: Problem, point: Point) -> Point:
         return made
     again = descend(problem, made.values, made.support, made.noise, made)
     return refit.better(problem, [made, again])
+
+
+def _instead(tried: Singles, best: Point) -> Point:
+    """A point of few explanations with another one in the place of one that changes
+    alike, if that is better: begun as it is by itself, for of what is strong and not
+    linear (friction in whose place a damping was found) no slope beside it tells."""
+    problem, support = tried.problem, best.support
+    if problem.model.singly or not 1 < len(support) <= INSTEAD:
+        return best
+    rivals = [one for one in tried.fitted if one.name not in support][:INSTEAD]
+    others = []
+    for one, gone in itertools.product(rivals, sorted(support)):
+        if best.linear.alike(one.name, gone) < simpler.ALIKE:
+            continue
+        values = best.values.copy()
+        back, put = (list(problem.terms[name]) for name in (gone, one.name))
+        values[back] = problem.nominal[back]
+        values[put] = one.values[put]
+        begun = replace(best, values=values)
+        names = (support - {gone}) | {one.name}
+        others.append(refit.fitted_at(problem, begun, names, near=True))
+    found = refit.better(problem, [best, *others])
+    if found is best:
+        return best
+    again = descend(problem, found.values, found.support, found.noise)
+    return refit.better(problem, [best, _simplest(problem, again)])
 
 
 def _renewed(problem: Problem, best: Point) -> Point:
