@@ -74,7 +74,7 @@ class OutOfBoundsError(BnsError):
     """
 
     def __init__(self, name: str, given: object, low: float, high: float, unit: str):
-        shown = f" {unit}" if unit and unit != "1" else ""
+        shown = f" {unit}" if unit not in ("", "1", name) else ""
         super().__init__(
             f"{name} = {given}{shown} is not allowed: "
             f"give a number from {_plain(low)} to {_plain(high)}{shown}."

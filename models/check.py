@@ -39,7 +39,7 @@ def check(robot: RobotModel) -> list[Checked]:
     except (BnsError, ValueError) as error:
         return [*done, Checked("scene.xml compiles", (str(error),))]
     done.append(Checked("scene.xml compiles", ()))
-    for says, point in POINTS.items():
+    for says, point in points_of(robot).items():
         done.append(Checked(says, tuple(point(robot, model))))
         if point in _NEEDED and done[-1].faults:
             break  # what follows would only fail for the same reason
@@ -110,8 +110,6 @@ def _base(robot: RobotModel, model: Any) -> list[str]:
 
 def _legs(robot: RobotModel, model: Any) -> list[str]:
     """A walking robot has what effects and the world look for by name."""
-    if robot.kind != "legged":
-        return []
     names = {command.name for command in robot.commands}
     own, faults = legs.names(names), _servo(robot)
     if not own:
@@ -239,8 +237,6 @@ def _touches(robot: RobotModel, model: Any) -> list[str]:
 
 def _speeds(robot: RobotModel, model: Any) -> list[str]:
     """A wheeled robot goes as fast as it is told, forwards and the right way round."""
-    if robot.kind != "wheeled":
-        return []
     faults = []
     told, found = straight(robot, model)
     if not abs(found / told - 1) <= SPEED_TOLERANCE:
@@ -268,6 +264,24 @@ POINTS: dict[str, Callable[[RobotModel, Any], list[str]]] = {
     "a wheeled robot has the speed and the spin that it is told": _speeds,
 }
 _NEEDED = (_names, _base, _controls)
+_OF_KIND: dict[Any, str] = {_legs: "legged", _speeds: "wheeled"}
+"""points that only robots of one kind have to keep"""
+
+
+def points_of(robot: RobotModel) -> dict[str, Callable[[RobotModel, Any], list[str]]]:
+    """The points that a robot of its kind has to keep once its scene compiles.
+
+    Args:
+        robot: as its directory says.
+
+    Returns:
+        what is checked, in words -> what gives the faults.
+    """
+    return {
+        says: point
+        for says, point in POINTS.items()
+        if _OF_KIND.get(point, robot.kind) == robot.kind
+    }
 
 
 SHARE = 0.4

@@ -60,6 +60,16 @@ class Facts:
         )
 
 
+def foresees(record: RunRecord) -> bool:
+    """Whether the learner said where its robots would go."""
+    return bool(np.isfinite(record.predicted).any())
+
+
+def who(record: RunRecord) -> str:
+    """What foresees, in a word: the SNN where the learner has one."""
+    return "SNN" if "snn_forward" in record.columns else "learner"
+
+
 def to_solve(record: RunRecord) -> np.ndarray:
     """Trials until first solved, ``(R,)``; inf = never, or not before the damage."""
     waits = stats.trials_to_solve(record)

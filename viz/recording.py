@@ -23,7 +23,7 @@ from bns.errors import install
 from bns.experiment import loading
 from bns.experiment.config import RunConfig
 from bns.experiment.record import RunRecord, Step
-from bns.viz import charts, moments, rrd, scene
+from bns.viz import charts, facts, moments, rrd, scene
 from bns.viz.choices import Choice, choose, typical
 from bns.viz.pictures import LOOPBACK, executable, free_port, wait
 from bns.viz.rrd import blueprint
@@ -132,9 +132,9 @@ def _about(record: RunRecord, replicate: int, chosen: Sequence[Choice]) -> Any:
     lines = [
         f"# {record.config.preset or shown.name}, replicate {replicate}",
         "",
-        "**World.** Solid trails are where the robot went, dashed trails where its "
-        "simulator network (SNN) said it would go. " + shown.discs + " Press "
-        "play: the robot goes through the trials below, one after another.",
+        f"**World.** Solid trails are where the robot went{_dashed(record)}. "
+        f"{shown.discs} Press play: the robot goes through the trials below, one after "
+        "another.",
         "",
         *(f"- trial {choice.trial}: {choice.label}" for choice in chosen),
         "",
@@ -146,6 +146,13 @@ def _about(record: RunRecord, replicate: int, chosen: Sequence[Choice]) -> Any:
         "`trial` at the bottom left: the paths then are those of each trial.",
     ]
     return rr.TextDocument("\n".join(lines), media_type=rr.MediaType.MARKDOWN)
+
+
+def _dashed(record: RunRecord) -> str:
+    """What dashed trails are, where there are any."""
+    if not facts.foresees(record):
+        return ""
+    return f", dashed trails where the {facts.who(record)} said it would go"
 
 
 def _onset(record: RunRecord, replicate: int) -> str:

@@ -15,57 +15,9 @@ from bns.learners.base import Curves
 from bns.progress import Each, uncounted
 from bns.storage import files
 from bns.tasks import registry as tasks
-from bns.viz import facts, figures, scene
+from bns.viz import captions, facts, figures, scene
 from bns.viz.facts import Facts, interval
 from bns.viz.page import picture, portrait, render
-
-BAND = (
-    "The line is the median over runs, the band holds the middle half of them; "
-    "the dashed orange line marks the onset of damage."
-)
-
-CAPTIONS = {
-    "path": (
-        "One run, chosen as the typical one. Solid: where the robot went. Dashed: "
-        "where its simulator network (SNN) had said it would go. Discs are the "
-        "objectives, reached in the order {order}; within their radius counts as "
-        "reached; what follows the last one is faint. Paths are cut at the board's "
-        "edge. Where solid and dashed part, the SNN is wrong about the robot."
-    ),
-    "fitness": (
-        "Cost of the controller tried in each trial, lower is better, on a "
-        "logarithmic axis: each objective missed costs {penalty:g}, so the curve "
-        "falls in steps as more objectives are reached. The dotted line is the mean, "
-        "which a few failing runs dominate. {band}"
-    ),
-    "solved": (
-        "First: objectives reached in order, of {goals}. Then: share of runs whose "
-        "trial reached them all. {band}"
-    ),
-    "waits": (
-        "Share of runs that had solved the task before the damage, and then, "
-        "counted from the first damaged trial, that had solved it again. A "
-        "curve that ends below 100 % tells of runs that never did. The dotted line "
-        "drops from the median."
-    ),
-    "displacement": (
-        "Each dot is one command: the motion the SNN predicted against the motion that "
-        "came. On the diagonal the SNN is right; a cloud off the diagonal shows what "
-        "the damage changed, and the dots of the last trials whether it was learned. "
-        "Dots beyond the frame are drawn at its edge."
-    ),
-}
-
-TITLES = {
-    "readings": "What the light sensors read",
-    "starts": "Paths by start",
-    "path": "Where the robot went",
-    "fitness": "Fitness",
-    "solved": "Objectives reached",
-    "waits": "Trials needed",
-    "displacement": "Predicted against real motion",
-}
-
 
 SHARED = ("fitness", "solved", "waits")
 """Figures of all tasks and learners; several batches can be laid over one another."""
@@ -139,15 +91,19 @@ def _context(runs: Mapping[str, RunRecord], each: Each = uncounted) -> dict:
         "batches": batches,
         "title": _title(list(runs)) if several else batches[0]["name"],
         "figures": _drawn(runs, each),
+        "notes": captions.notes(runs),
     }
     if several:
         context["comparison"] = comparison(runs)
         context["differences"] = differences(runs)
         context["paths"] = [
-            (label, picture(figures.path(record)))
+            (
+                label,
+                picture(figures.path(record)),
+                captions.caption("path", {label: record}),
+            )
             for label, record in each(list(runs.items()))
         ]
-        context["path_caption"] = _caption("path", next(iter(runs.values())))
     return context
 
 
@@ -198,7 +154,7 @@ def _drawable(figure: Curves | str, record: RunRecord) -> bool:
     """Whether a record has what a figure shows."""
     if isinstance(figure, Curves):
         return all(panel.column in record.columns for panel in figure.panels)
-    return figure != "displacement" or bool(np.isfinite(record.predicted).any())
+    return figure != "displacement" or facts.foresees(record)
 
 
 def _shared_figures(runs: Mapping[str, RunRecord]) -> list[Curves | str]:
@@ -217,34 +173,17 @@ def _shared_figures(runs: Mapping[str, RunRecord]) -> list[Curves | str]:
 def _entry(figure: Curves | str, runs: Mapping[str, RunRecord]) -> dict:
     record = next(iter(runs.values()))
     if isinstance(figure, Curves):
-        shown = scene.picture(record.config)
-        caption = shown.captions.get(figure.name, figure.caption)
+        name, title = figure.name, figure.title
         drawn = figures.curves(runs, figure)
-        return {
-            "name": figure.name,
-            "title": figure.title,
-            "caption": caption.format(band=BAND),
-            "image": picture(drawn),
-        }
-    draw = getattr(figures, figure)
-    shown = scene.picture(record.config)
+    else:
+        name, title = figure, captions.title(figure, record)
+        drawn = getattr(figures, figure)(runs if figure in SHARED else record)
     return {
-        "name": figure,
-        "title": (TITLES | dict(shown.titles))[figure],
-        "caption": _caption(figure, record),
-        "image": picture(draw(runs if figure in SHARED else record)),
+        "name": name,
+        "title": title,
+        "caption": captions.caption(figure, runs),
+        "image": picture(drawn),
     }
-
-
-def _caption(name: str, record: RunRecord) -> str:
-    shown = scene.picture(record.config)
-    return (CAPTIONS | dict(shown.captions))[name].format(
-        band=BAND,
-        order=", ".join(shown.order),
-        goals=len(shown.order),
-        penalty=record.config.task.penalty,
-        adequate=record.config.walk.adequate,
-    )
 
 
 def comparison(runs: Mapping[str, RunRecord]) -> dict:
@@ -252,8 +191,8 @@ def comparison(runs: Mapping[str, RunRecord]) -> dict:
 
     Every batch is tested against the first on trials to recover (on trials to solve
     where nothing was damaged): two-sided Mann-Whitney p, Holm's adjustment over the
-    rows, and A12, the probability that a run of the row takes longer than one of the
-    first batch.
+    rows, and A12, the probability that a run of the first batch takes longer than one
+    of the row: that of `bns compare`, the first batch being a and the row b.
     """
     facts = [Facts.of(record, label) for label, record in runs.items()]
     waits = [_waits(record) for record in runs.values()]
@@ -264,7 +203,7 @@ def comparison(runs: Mapping[str, RunRecord]) -> dict:
     for fact, other, p in zip(facts[1:], waits[1:], raw, strict=True):
         tests = ["-", "-", "-"]
         if p is not None:
-            effect = stats.a12(other, waits[0])
+            effect = stats.a12(waits[0], other)
             tests = [
                 _show_p(p),
                 _show_p(float(next(adjusted))),
@@ -273,7 +212,7 @@ def comparison(runs: Mapping[str, RunRecord]) -> dict:
         rows.append([*_figures(fact), *tests])
     header = (
         "batch, runs, solved, trials to solve, recovered, trials to recover, p, "
-        "p (Holm), A12 against the first"
+        "p (Holm), A12 of the first against it"
     )
     return {"header": header.split(", "), "rows": rows}
 

@@ -12,7 +12,7 @@ from bns.campaign.results import Results
 from bns.errors import BnsError
 from bns.experiment.validate import leaves
 from bns.stats import Interval
-from bns.stats.compare import values
+from bns.stats.compare import unequal, values
 from bns.stats.designs import power
 from bns.stats.measures import bootstrap_median
 
@@ -58,11 +58,19 @@ class Versus:
 
 @dataclass(frozen=True)
 class Table:
-    """A campaign on one measure."""
+    """A campaign on one measure.
+
+    Attributes:
+        measure: one of `bns.stats.compare.MEASURES`.
+        rows: members that have a value.
+        pairs: pairs of them.
+        notes: what keeps figures from being comparable, a sentence each.
+    """
 
     measure: str
     rows: tuple[Row, ...]
     pairs: tuple[Versus, ...]
+    notes: tuple[str, ...] = ()
 
 
 def table(found: Results, measure: str = "observation") -> Table:
@@ -81,15 +89,35 @@ def table(found: Results, measure: str = "observation") -> Table:
         and len(sample := values(record, measure))
     ]
     if not have:
-        raise BnsError(
-            f"{found.store.directory} has nothing on {measure!r} yet: see "
-            f"`bns campaign status {found.store.directory}`."
-        )
+        raise BnsError(_nothing(found, measure))
     rows = [
         Row(m.label, len(s), int(np.isfinite(s).sum()), bootstrap_median(s))
         for m, s in have
     ]
-    return Table(measure, tuple(rows), tuple(_pairs(have, found.campaign.sampled)))
+    pairs = tuple(_pairs(have, found.campaign.sampled))
+    names = [member.label for member, _ in have]
+    records = [found.records[member.identity] for member, _ in have]
+    return Table(measure, tuple(rows), pairs, tuple(unequal(names, records, measure)))
+
+
+def _nothing(found: Results, measure: str) -> str:
+    """Why no member has a value, and what to do."""
+    where = found.store.directory
+    done = [r for m in found.campaign.members if (r := found.of(m)) is not None]
+    if not done:
+        return (
+            f"{where} has nothing on {measure!r} yet, since no runs are done: see "
+            f"`bns campaign status {where}`."
+        )
+    first = min(int(record.damage_onset.min()) for record in done)
+    trials = max(record.trials for record in done)
+    why = "nothing is damaged in it"
+    if first >= 0:
+        why = f"damage comes at trial {first}, counted from 0, and runs have {trials}"
+    return (
+        f"{where} has nothing on {measure!r}, which counts from the damage on: {why}. "
+        "Give --measure solve, or run more trials."
+    )
 
 
 def differing(one: Member, other: Member) -> list[str]:

@@ -113,7 +113,8 @@ class Plot:
     directory: Positional[str]
     """a campaign's directory"""
     out: str = field(default="")
-    """folder for curves.png and sensitivity.png (default: the directory)"""
+    """folder for curves.png and, where a setting is varied, sensitivity.png (default:
+    the directory)"""
     measure: Measure = "observation"
     """what sensitivity.png shows"""
 
@@ -218,7 +219,7 @@ def _table(given: TableOf) -> int:
     from bns.campaign import results
     from bns.campaign.table import table
     from bns.cli.results import span, text
-    from bns.stats.compare import MEASURES
+    from bns.stats.compare import A12, MEASURES
 
     found = table(results.read(given.directory), given.measure)
     head = ["member", "runs", "reached", "median", "95 % interval"]
@@ -248,7 +249,9 @@ def _table(given: TableOf) -> int:
     if lines:
         show(pairs, lines, json=False)
     print(f"{given.measure}: {MEASURES[given.measure]}")
-    print("A12: probability that a's value is larger than b's, ties counted half")
+    print(A12)
+    for note in found.notes:
+        print(f"Note: {note}")
     return 0
 
 
@@ -265,6 +268,12 @@ def _plot(given: Plot) -> int:
     from bns.viz import campaign as pictures
 
     out = Path(given.out or given.directory)
-    for path in pictures.write(results.read(given.directory), out, given.measure):
+    made = pictures.write(results.read(given.directory), out, given.measure)
+    for path in made:
         print(path)
+    if out / "sensitivity.png" not in made:
+        print(
+            f"No sensitivity.png: no setting has two values whose runs have "
+            f"{given.measure!r}. See docs/campaigns.md, or give another --measure."
+        )
     return 0

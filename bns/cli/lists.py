@@ -4,6 +4,7 @@
 
 import ast
 import shutil
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,8 @@ from bns.errors import BnsError, UnknownNameError
 PLACE = Path(__file__).parents[1] / "examples"
 LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.pyc", ".*")
 BAD = 1
-"""exit code of `bns doctor` when something must be changed"""
+"""exit code of `bns doctor`, and of a list that leaves something out, when something
+must be changed"""
 FEW = 4  # commands of a robot that a list shows
 Stage = Literal["", "command", "actuator", "body", "optics", "sensor", "tracking"]
 Rows = tuple[list[str], list[list[str]]]
@@ -81,7 +83,21 @@ def main(verb: str, argv: list[str]) -> int:
     given = parse(Arguments, argv, prog=f"bns {verb}")
     head, rows = LISTS[verb]()
     show(head, rows, json=given.json)
-    return 0
+    return _left_out(verb)
+
+
+def _left_out(verb: str) -> int:
+    """Say what a list lacks because it cannot be used; gives the exit code."""
+    if verb == "learners":
+        from bns.learners.registry import faults
+    elif verb == "tasks":
+        from bns.tasks.registry import faults
+    else:
+        return 0
+    found = faults()
+    for error in found.values():
+        print(f"Left out: {error}", file=sys.stderr)
+    return BAD if found else 0
 
 
 def presets() -> Rows:
@@ -97,20 +113,22 @@ def presets() -> Rows:
 
 
 def learners() -> Rows:
-    """Every learner."""
+    """Every learner that can be used."""
     from bns.learners import registry
 
-    rows = [[name, registry.describe(name)] for name in registry.names()]
+    bad = registry.faults()
+    good = [name for name in registry.names() if name not in bad]
+    rows = [[name, registry.describe(name)] for name in good]
     return ["learner", "what it is"], rows
 
 
 def tasks() -> Rows:
-    """Every task with its kind."""
+    """Every task that can be read, with its kind."""
     from bns.tasks import registry
 
     rows = [
         [name, registry.kind(name), registry.describe(name)]
-        for name in registry.names()
+        for name in registry.readable()
     ]
     return ["task", "kind", "what it is"], rows
 

@@ -117,7 +117,7 @@ def check(given: Check) -> int:
         for fault in point.faults:
             print(f"           {fault}")
     wrong = sum(bool(point.faults) for point in done)
-    left = 2 + len(points.POINTS) - len(done)
+    left = 2 + len(points.points_of(robot)) - len(done)
     rest = f", {left} not looked at because of that" if left else ""
     print(f"{len(done) - wrong} of {len(done)} points hold{rest}.")
     return 2 if wrong else 0
@@ -156,8 +156,9 @@ def _told(place: str, run: str, usual: str) -> int:
     """Check a robot that was made, and say what to do with it; 2 if it has faults."""
     code = check(Check(robot=place))
     print(f"{place} is made. What is assumed stands in {Path(place) / 'numbers.toml'}.")
-    print(f"  bns models view {place} --png {Path(place).name}.png")
-    print(f"  bns run {run} --out runs/mine")
+    name = Path(place).name
+    print(f"  bns models view {place} --png {name}.png")
+    print(f"  bns run {run} --out runs/{name}")
     print(f"Presets are made for {usual}: docs/your_robot.md says what to look at.")
     return code
 

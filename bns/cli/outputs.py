@@ -156,7 +156,7 @@ def sentence(word: str, values: np.ndarray, phrase: str) -> str:
         return f"{text}."
     middle = stats.median_interval(values)
     if middle.value == np.inf:
-        return f"{text}, so not in the median."
+        return f"{text}. Half of the runs or more did not, so there is no median."
     text += f", {phrase.format(number(middle.value))} in the median"
     if middle.low == -np.inf:
         return f"{text}."

@@ -101,7 +101,7 @@ def ours(path: Path) -> bool:
 
 
 def _compare(given: Compare) -> int:
-    from bns.stats.compare import MEASURES, compare
+    from bns.stats.compare import A12, MEASURES, compare
     from bns.storage.store import load
 
     with counting("comparing") as each:
@@ -138,7 +138,9 @@ def _compare(given: Compare) -> int:
     show(head, rows, json=False)
     for measure in dict.fromkeys(s.measure for s in found.sides):
         print(f"{measure}: {MEASURES[measure]}")
-    print("A12: probability that a's value is larger than b's, ties counted half")
+    print(A12)
+    for note in found.notes:
+        print(f"Note: {note}")
     return 0
 
 
@@ -151,6 +153,8 @@ def span(interval: tuple[float, float, float]) -> str:
     """An interval to read."""
     if interval[1] == float("-inf"):
         return "too few runs"
+    if interval[1] == float("inf"):
+        return text(interval[1])
     return f"{text(interval[1])} to {text(interval[2])}"
 
 

@@ -54,7 +54,7 @@ class Goals:
         if robot.kind != "legged":
             raise BnsError(
                 f"Robot {config.world.robot!r} is {robot.kind} and cannot walk: take "
-                "world.robot = 'phantomx', or learner = 'navigation'."
+                "world.robot = 'phantomx', or another task."
             )
         bounds = torch.tensor(robot.ranges, dtype=torch.float32, device=config.device)
         farthest = torch.from_numpy(reaches(walk, robot.channels)).to(bounds)

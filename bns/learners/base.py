@@ -14,6 +14,7 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.experiment.config import LearnerSettings, RunConfig
+from bns.learners import contract
 from bns.tasks import registry as tasks
 from bns.tasks.base import Task
 from bns.worlds.trial import Trial
@@ -94,6 +95,8 @@ class Learner(ABC):
     """other sections and settings of a configuration that are its own"""
     columns: ClassVar[Mapping[str, str]] = {}
     """per-trial figures that `observe` gives for every task, with their meaning"""
+    open_columns: ClassVar[bool] = False
+    """whether it gives others beside, as task and settings have it"""
     figures: ClassVar[tuple[Curves | str, ...]] = ()
     """what a report shows of it: own columns, or figures of `bns.viz.figures`"""
 
@@ -107,6 +110,10 @@ class Learner(ABC):
     deploys: bool = False
     """whether `Proposal.best` is what a user would run, and its figures are recorded
     apart from those of what is tried: the column `solved_best`"""
+
+    def __init_subclass__(cls, **named: Any) -> None:
+        super().__init_subclass__(**named)
+        contract.hold(cls)
 
     def __init__(
         self,
@@ -192,7 +199,8 @@ class Learner(ABC):
 
         Returns:
             `columns`, each ``(R,)``, and arrays with the run first; "predicted"
-            ``(R, K + 1, 3)`` are the poses it had foreseen.
+            ``(R, K + 1, 3)`` are the poses it had foreseen. A column that is missing or
+            not declared is a `BnsError` (`bns.learners.contract`).
         """
 
     @abstractmethod

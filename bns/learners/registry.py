@@ -4,20 +4,21 @@ An installed package adds one by the entry point `bns.learners`, a script by `re
 """
 
 import pkgutil
+from collections.abc import Callable
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
 import bns.learners
-from bns.errors import BnsError, UnknownNameError
+from bns.errors import BnsError, UnknownNameError, missing
 from bns.learners.bns.config import BNS_SECTIONS
 
 if TYPE_CHECKING:
     from bns.learners.base import Learner
 
 GROUP = "bns.learners"
-_NO_LEARNERS = ("base", "registry")
+_NO_LEARNERS = ("base", "contract", "registry")
 _registered: dict[str, "type[Learner]"] = {}
 
 
@@ -47,6 +48,19 @@ def _installed() -> dict[str, Any]:
     return {entry.name: entry for entry in entry_points(group=GROUP)}
 
 
+def faults() -> dict[str, BnsError]:
+    """Learners that cannot be used, and what is wrong with each."""
+    found = {}
+    for name in names():
+        try:
+            get(name)
+        except BnsError as error:
+            found[name] = error
+        except ModuleNotFoundError as error:
+            found[name] = BnsError(f"Learner {name!r}: {missing(error)}")
+    return found
+
+
 def names() -> tuple[str, ...]:
     """The learners that exist, sorted."""
     return tuple(sorted({*_here(), *_installed(), *_registered}))
@@ -74,16 +88,17 @@ def get(name: str) -> "type[Learner]":
 
     Raises:
         UnknownNameError: no such learner.
-        BnsError: the name of a task.
+        BnsError: the name of a task, or a learner whose file is not as it should be.
+        ModuleNotFoundError: an extra of this package that it needs.
     """
     if name in _registered:
         return _registered[name]
     if name in _here():
-        found: type[Learner] = import_module(_here()[name]).LEARNER
-        return found
+        place = _here()[name]
+        return _loaded(name, place, lambda: import_module(place).LEARNER)
     if name in _installed():
-        loaded: type[Learner] = _installed()[name].load()
-        return loaded
+        entry = _installed()[name]
+        return _loaded(name, entry.value, entry.load)
     from bns.tasks import registry as tasks
 
     if name in (*tasks.names(), *tasks.kinds()):
@@ -92,3 +107,34 @@ def get(name: str) -> "type[Learner]":
             f"--task.name, and as learner one of {', '.join(names())}."
         )
     raise UnknownNameError("learner", name, names())
+
+
+def _loaded(name: str, place: str, load: Callable[[], Any]) -> "type[Learner]":
+    """The learner that `load` gives, or a `BnsError` that says where and why not."""
+    from bns.learners.base import Learner
+
+    try:
+        found = load()
+    except ModuleNotFoundError as error:
+        if missing(error):
+            raise
+        raise _unusable(name, place, f"No module {error.name!r}") from error
+    except AttributeError as error:
+        if error.name != "LEARNER":
+            raise _unusable(name, place, f"AttributeError: {error}") from error
+        wanted = "it has no LEARNER: let it be its subclass of Learner"
+        raise _unusable(name, place, wanted) from error
+    except Exception as error:
+        said = f"{type(error).__name__}: {error}"
+        raise _unusable(name, place, said) from error
+    if not (isinstance(found, type) and issubclass(found, Learner)):
+        said = (
+            f"its learner is {found!r}, to be a subclass of bns.learners.base.Learner"
+        )
+        raise _unusable(name, place, said)
+    return found
+
+
+def _unusable(name: str, place: str, why: str) -> BnsError:
+    file = place if name in _installed() else f"{place.replace('.', '/')}.py"
+    return BnsError(f"Learner {name!r} ({file}) cannot be used: {why.rstrip('.')}.")

@@ -20,6 +20,15 @@ MEASURES = {
 }
 """what is compared, and what it means"""
 
+UNEQUAL = {
+    "observation": "the cost is summed over more trials in some runs than in others",
+    "solve": "a run that solves later than its last trial counts as never",
+    "recover": "a run that recovers later than its last trial counts as never",
+}
+"""what it means that runs are compared over different numbers of trials"""
+A12 = "A12: probability that a's value is larger than b's, ties counted half"
+NAMED = 6  # runs that a note names
+
 
 @dataclass(frozen=True)
 class Side:
@@ -62,10 +71,17 @@ class Pair:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All runs and all pairs of them."""
+    """All runs and all pairs of them.
+
+    Attributes:
+        sides: runs on every measure.
+        pairs: pairs of runs on every measure.
+        notes: what keeps figures from being comparable, a sentence each.
+    """
 
     sides: tuple[Side, ...]
     pairs: tuple[Pair, ...]
+    notes: tuple[str, ...] = ()
 
     def to_mapping(self) -> dict[str, Any]:
         """Plain values, ready for JSON (infinity as null, intervals as tables)."""
@@ -74,6 +90,7 @@ class Comparison:
             "runs": [
                 _plain(asdict(side), side.median, "median") for side in self.sides
             ],
+            "notes": list(self.notes),
             "pairs": [_plain(asdict(pair), pair.a12, "a12") for pair in self.pairs],
         }
 
@@ -103,12 +120,44 @@ def compare(
             )
     sides: list[Side] = []
     pairs: list[Pair] = []
+    notes: list[str] = []
     for measure in each(tuple(MEASURES)):
         samples = [values(record, measure) for record in records]
         if all(len(sample) for sample in samples):
             sides += [side(n, measure, s) for n, s in zip(names, samples, strict=True)]
             pairs += _pairs(names, samples, measure)
-    return Comparison(tuple(sides), tuple(pairs))
+            notes += unequal(names, records, measure)
+    return Comparison(tuple(sides), tuple(pairs), tuple(notes))
+
+
+def unequal(
+    names: Sequence[str], records: Sequence[RunRecord], measure: str
+) -> list[str]:
+    """A sentence where a measure looks at more trials of some runs than of others.
+
+    Args:
+        names: of the runs.
+        records: the runs.
+        measure: one of `MEASURES`.
+    """
+    looked = [trials_of(record, measure) for record in records]
+    if len(set(looked)) < 2:
+        return []
+    named = [f"{n} {text}" for n, text in zip(names[:NAMED], looked, strict=False)]
+    more = len(names) - len(named)
+    listed = ", ".join([*named, f"and {more} more"] if more > 0 else named)
+    return [f"{measure} looks at unequal numbers of trials ({listed}): "
+            f"{UNEQUAL[measure]}."]  # fmt: skip
+
+
+def trials_of(record: RunRecord, measure: str) -> str:
+    """How many trials of its runs a measure looks at: "30", or "10 to 30"."""
+    first = np.maximum(record.damage_onset, 0) * (measure != "solve")
+    left = record.trials - first[first < record.trials]
+    if not len(left):
+        return "0"
+    least, most = int(left.min()), int(left.max())
+    return f"{least}" if least == most else f"{least} to {most}"
 
 
 def values(record: RunRecord, measure: str) -> np.ndarray:

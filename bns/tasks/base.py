@@ -100,7 +100,8 @@ class Picture:
         reached: title of the figure of objectives reached.
         wheels: whether what is sent are wheel speeds, to be shown over time.
         figures: of a single run, drawn before those that all tasks have.
-        titles, captions: of figures, where they read otherwise than in navigation.
+        titles, captions: of figures, where they read otherwise than is usual
+            (`bns.viz.captions`, which says what may stand in braces).
         lamps: fields of each lamp that stands on the board.
         ring: radius of a circle around each lamp [m].
     """
@@ -137,6 +138,9 @@ class Task(ABC):
 
     sections: ClassVar[tuple[str, ...]] = ()
     """sections of a configuration that belong to the task, beside `task`"""
+    keys: ClassVar[tuple[str, ...] | None] = None
+    """keys of its TOML file beside `description` and `kind`, others being refused;
+    None, or inherited = any"""
     columns: ClassVar[Mapping[str, str]] = {}
     """per-trial figures beside fitness, fitness_best, solved, reached and commands"""
     closed_loop: ClassVar[bool] = False

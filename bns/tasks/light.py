@@ -208,6 +208,7 @@ class LightTask(Task):
     """Drive to the first lamp by sight, and circle it."""
 
     sections = ("light", "controller")
+    keys = ()
     columns: ClassVar[Mapping[str, str]] = {
         "edge_turns": "how often it was turned at the board's edge",
         "lamp_stops": "how often it was stopped, or turned, at a lamp",
@@ -358,8 +359,8 @@ def _moving(trial: Trial) -> int:
 
 CAPTIONS = {
     "path": (
-        "One run, chosen as the typical one. Solid: where the robot went. Dashed: "
-        "where its simulator networks (SNN) had said it would go. The disc has the "
+        "One run, chosen as the typical one. Solid: where the robot went. {foreseen}"
+        "The disc has the "
         "radius at which the robot is to circle the lamp. Jumps of the heading are "
         "where the robot was turned at the board's edge."
     ),
@@ -379,7 +380,7 @@ CAPTIONS = {
     ),
     "readings": (
         "What the two virtual light sensors read in the trials shown (smaller is "
-        "brighter), and what the SNNs had said they would read."
+        "brighter){read}."
     ),
     "starts": (
         "The last trials of the same run, each from its own random start (dots); "

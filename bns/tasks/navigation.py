@@ -15,11 +15,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from bns.errors import UnknownNameError
 from bns.evolution.chromosome import Encoding, Population
+from bns.experiment.config import RunConfig
 from bns.experiment.task_settings import TaskConfig
-from bns.tasks import registry
 from bns.tasks.base import Arrays, Curve, Picture, Space, Task, seen_places
+from bns.tasks.route_file import objectives, order, stops
 from bns.worlds.trial import Commands, Trial
 
 if TYPE_CHECKING:
@@ -28,36 +28,6 @@ if TYPE_CHECKING:
 CENTIMETRES = 100.0  # [cm/m]
 MARGIN = 0.25
 """m of board shown around the outermost objectives"""
-
-
-def order(name: str) -> str:
-    """Letters of a task's objectives, in the order in which they are to be reached.
-
-    Raises:
-        UnknownNameError: no such task, or not one of navigation.
-    """
-    content = registry.content(name)
-    if "order" not in content:
-        routes = [n for n in registry.names() if "order" in registry.content(n)]
-        raise UnknownNameError("navigation task", name, routes)
-    return str(content["order"])
-
-
-def objectives(config: TaskConfig) -> dict[str, tuple[float, float]]:
-    """Positions of a task's objectives on the board [m], the centre E the origin.
-
-    The dissertation gives them in a picture only; the corners are an assumption:
-    A bottom right, B bottom left, C top left, D top right. A task's file may place
-    its own.
-
-    Raises:
-        UnknownNameError: no such task.
-    """
-    own = registry.content(config.name).get("objectives")
-    if own:
-        return {letter: (float(x), float(y)) for letter, (x, y) in own.items()}
-    x, y = config.corner_x, config.corner_y
-    return {"A": (x, -y), "B": (-x, -y), "C": (-x, y), "D": (x, y), "E": (0.0, 0.0)}
 
 
 class PathGoal(Protocol):
@@ -94,11 +64,9 @@ class Route:
         """The route a configuration asks for.
 
         Raises:
-            UnknownNameError: no such task.
+            BnsError: as `stops`.
         """
-        places = objectives(config)
-        points = [places[letter] for letter in order(config.name)]
-        return cls(torch.tensor(points, device=device), config)
+        return cls(torch.tensor(stops(config), device=device), config)
 
     @property
     def start(self) -> tuple[float, float, float]:
@@ -261,6 +229,12 @@ class WheeledTask(Task):
 class NavigationTask(WheeledTask):
     """Objectives that are to be reached in order."""
 
+    keys = ("order", "objectives")
+
+    def __init__(self, config: RunConfig):
+        super().__init__(config)
+        stops(config.task)
+
     @cached_property
     def route(self) -> Route:
         """The objectives, on the CPU."""
@@ -309,12 +283,13 @@ class NavigationTask(WheeledTask):
             ),
             extent=(float(half[0]), float(half[1])),
             curve=Curve(marks=marks if penalty > 0 else ()),
+            captions=CAPTIONS,
         )
 
     def finish(self, poses_world: np.ndarray) -> int:
         """Row at which the last objective was reached; see `Task.finish`."""
-        places, row = objectives(self.config.task), 0
-        for goal in (places[letter] for letter in order(self.config.task.name)):
+        row = 0
+        for goal in stops(self.config.task):
             away = np.hypot(*(poses_world[row + 1 :, :2] - goal).T)
             near = np.flatnonzero(away < self.config.task.radius)
             if not len(near):
@@ -322,5 +297,25 @@ class NavigationTask(WheeledTask):
             row += 1 + int(near[0])
         return row
 
+
+CAPTIONS = {
+    "path": (
+        "One run, chosen as the typical one. Solid: where the robot went. {foreseen}"
+        "Discs are the objectives, reached in the order {order}; within their radius "
+        "counts as reached; what follows the last one is faint. Paths are cut at the "
+        "board's edge.{parted}"
+    ),
+    "fitness": (
+        "Cost of the controller tried in each trial, lower is better, on a "
+        "logarithmic axis: each objective missed costs {penalty:g}, so the curve "
+        "falls in steps as more objectives are reached. The dotted line is the mean, "
+        "which a few failing runs dominate. {band}"
+    ),
+    "solved": (
+        "First: objectives reached in order, of {goals}. Then: share of runs whose "
+        "trial reached them all. {band}"
+    ),
+}
+"""How to read figures of navigation."""
 
 TASK = NavigationTask

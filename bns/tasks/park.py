@@ -12,10 +12,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from bns.errors import FormatError
 from bns.experiment.task_settings import TaskConfig
 from bns.tasks import registry
 from bns.tasks.base import Arrays, Curve, Picture
 from bns.tasks.navigation import CENTIMETRES, MARGIN, WheeledTask
+from bns.tasks.route_file import on_board
 from bns.worlds.trial import Trial
 
 TURN_COST = 50.0  # [cm/rad] of heading that is wrong; assumed
@@ -65,11 +67,31 @@ class Bay:
 class ParkTask(WheeledTask):
     """End in the bay that the task's file names."""
 
+    keys = ("goal",)
+
     def path_goal(self, device: str = "cpu") -> Bay:
-        """See `WheeledTask.path_goal`."""
+        """See `WheeledTask.path_goal`.
+
+        Raises:
+            FormatError: the file's goal is not three numbers.
+            OutOfBoundsError: it is off the board.
+        """
         del device
-        x, y, degrees = registry.content(self.config.task.name)["goal"]
-        return Bay((float(x), float(y), math.radians(degrees)), self.config.task)
+        name = self.config.task.name
+        given = registry.content(name).get("goal")
+        if not isinstance(given, list) or len(given) != 3:
+            raise FormatError(
+                f"Task {name!r}: goal = {given!r} is not allowed: give x, y [m] and "
+                "heading [deg], as goal = [0.3, 0.3, 180.0]."
+            )
+        heading = given[2]
+        if type(heading) not in (int, float) or not math.isfinite(heading):
+            raise FormatError(
+                f"Task {name!r}: the heading {heading!r} of goal is not allowed: give "
+                "a number [deg]."
+            )
+        x, y = on_board(name, "goal", given[:2])
+        return Bay((x, y, math.radians(heading)), self.config.task)
 
     def _ends(self, trials: Sequence[Trial]) -> Tensor:
         """The last pose that was seen of each, ``(3, N)``."""
@@ -117,8 +139,7 @@ class ParkTask(WheeledTask):
             captions={
                 "path": (
                     "One run, chosen as the typical one. Solid: where the robot went. "
-                    "Dashed: where the learner had predicted it would go. The disc is "
-                    "the place to end at."
+                    "{foreseen}The disc is the place to end at."
                 ),
                 "fitness": (
                     "Cost of the controller tried in each trial, lower is better: "

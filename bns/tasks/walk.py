@@ -67,6 +67,7 @@ class WalkTask(Task):
     """
 
     sections = ("walk",)
+    keys = ()
     from_zero = True
     makes_controllers = ("walk.commands", "walk.limit", "walk.reach")
     columns: ClassVar[Mapping[str, str]] = {
@@ -209,7 +210,7 @@ class WalkTask(Task):
 CAPTIONS = {
     "path": (
         "One run, chosen as the typical one. Solid: where the robot went, command by "
-        "command. Dashed: where its simulator network (SNN) had said it would go. An "
+        "command. {foreseen}An "
         "adequate gait gets out of the disc."
     ),
     "fitness": (
@@ -222,8 +223,7 @@ CAPTIONS = {
         "whose trial was. {band}"
     ),
     "waits": (
-        "Share of runs that had found an adequate gait before the damage, and then, "
-        "counted from the first damaged trial, again. A curve that ends below "
+        "Share of runs that had found an adequate gait{again}. A curve that ends below "
         "100 % tells of runs that never did. The dotted line drops from the median."
     ),
 }

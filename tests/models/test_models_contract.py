@@ -25,9 +25,14 @@ def compiled():
 
 @robots
 def test_every_point_of_the_check_holds(name):
-    points = check.check(models.robot(name))
+    robot = models.robot(name)
+    points = check.check(robot)
     assert [point for point in points if point.faults] == []
-    assert len(points) == 2 + len(check.POINTS)
+    said = " ".join(point.says for point in points)
+    assert ("a wheeled robot" in said) == (robot.kind == "wheeled")
+    assert ("a walking robot's legs" in said) == (robot.kind == "legged")
+    others = {"wheeled": 1, "legged": 1, "servo": 2}[robot.kind]
+    assert len(points) == 2 + len(check.POINTS) - others
 
 
 @robots

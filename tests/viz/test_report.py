@@ -10,6 +10,7 @@ import pytest
 
 from bns.errors import BnsError, FormatError
 from bns.stats import Interval
+from bns.stats.compare import compare
 from bns.viz import facts, figures, recording, report, style
 from bns.viz.page import Picture
 
@@ -91,6 +92,16 @@ def test_several_runs_are_compared(record, tmp_path, unpictured):
     cells = '<td data-label="one">0</td><td data-label="two">7</td>'
     assert f'<th scope="row">seed</th>{cells}' in text
     assert "0.50 (" in text  # A12 of equal samples
+
+
+def test_a12_is_that_of_bns_compare(record):
+    """Of a pair both say how often the first, a, takes longer than the other, b."""
+    slow = never(record)
+    (row,) = report.comparison({"a": slow, "b": record})["rows"][1:]
+    pairs = compare([slow, record], ["a", "b"]).pairs
+    (pair,) = [pair for pair in pairs if pair.measure == "recover"]
+    assert pair.a12.value == 1.0
+    assert row[-1].startswith("1.00 (")
 
 
 def test_runs_of_the_same_name_are_told_apart(record, tmp_path, unpictured):

@@ -8,6 +8,7 @@ from bns.experiment.record import RunRecord
 from bns.tasks.base import BOARD
 from bns.viz import scene, style
 from bns.viz.choices import choose, typical
+from bns.viz.facts import who
 from bns.viz.paths import listed
 from bns.worlds.light.law import LightField
 from bns.worlds.light.sensors import LightSensors
@@ -30,9 +31,7 @@ def readings(record: RunRecord, *, replicate: int | None = None) -> "Figure":
     replicate = typical(record) if replicate is None else replicate
     chosen = choose(record, replicate)
     real = record.extra["readings"][replicate]
-    foreseen = np.full_like(real, np.nan)
-    if "readings_predicted" in record.extra:
-        foreseen = record.extra["readings_predicted"][replicate]
+    foreseen = record.extra.get("readings_predicted")
     with style.plotting() as figure_class:
         figure = figure_class(figsize=(7.0, 3.6), layout="constrained")
         panels = figure.subplots(
@@ -43,14 +42,15 @@ def readings(record: RunRecord, *, replicate: int | None = None) -> "Figure":
             times = np.concatenate([[0.0], np.cumsum(sent)])
             for row, side in enumerate(SIDES):
                 axes = panels[row, column]
-                axes.plot(
-                    times,
-                    foreseen[choice.trial, :, row],
-                    color=style.BLACK,
-                    linewidth=1.0,
-                    ls=(0, (3, 2)),
-                    label="as the SNN predicted it",
-                )
+                if foreseen is not None:
+                    axes.plot(
+                        times,
+                        foreseen[replicate, choice.trial, :, row],
+                        color=style.BLACK,
+                        linewidth=1.0,
+                        ls=(0, (3, 2)),
+                        label=f"as the {who(record)} predicted it",
+                    )
                 axes.plot(
                     times,
                     real[choice.trial, :, row],

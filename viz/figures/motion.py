@@ -1,4 +1,4 @@
-"""Where the robot went, each command's motion; what its SNN foresaw of either."""
+"""Where the robot went, each command's motion; what was foreseen of either."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -10,6 +10,7 @@ from bns.tasks import registry as tasks
 from bns.tasks.base import BOARD as HALF
 from bns.viz import style
 from bns.viz.choices import Choice, choose, typical
+from bns.viz.facts import who
 from bns.viz.paths import arcs, listed
 from bns.worlds.trial import body_displacements
 
@@ -31,7 +32,7 @@ _DOTS = {"markersize": 3, "alpha": 0.55, "markeredgewidth": 0}
 
 
 def displacement(record: RunRecord) -> "Figure":
-    """Motion per command as foreseen by the SNN against the real one, per output."""
+    """Motion per command as foreseen against the real one, per output."""
     with style.plotting() as figure_class:
         figure = figure_class(figsize=(7.0, 3.0), layout="constrained")
         panels = figure.subplots(1, 3)
@@ -161,9 +162,10 @@ def _objectives(axes: "Axes", record: RunRecord) -> None:
 
 def _paths(axes: "Axes", record: RunRecord, at: tuple[int, int], colour: str) -> None:
     """Foreseen and real path; what follows the last objective is faint."""
+    foreseen = f"as the {who(record)} predicted it"
     shown: Any = (
-        (record.predicted[at], _FORESEEN, "as the SNN predicted it"),
-        (record.poses[at], {"color": colour, "linewidth": 2.0}, "as the robot drove"),
+        (record.predicted[at], _FORESEEN, foreseen),
+        (record.poses[at], {"color": colour, "linewidth": 2.0}, "as the robot went"),
     )
     for poses, line, label in shown:
         poses = listed(poses)

@@ -90,6 +90,7 @@ class Bns(Learner):
         "diversity_51": "thesis equation 5.1",
         "diversity_73": "thesis equation 7.3",
     }
+    open_columns = True
     figures: ClassVar[tuple[Curves | str, ...]] = (
         SNN_ERROR,
         "displacement",

@@ -26,6 +26,7 @@ from bns.evolution.chromosome import Population
 from bns.evolution.generation import Rates
 from bns.evolution.goals import TICK, GoalBreeder, Goals, reaches
 from bns.experiment.config import RunConfig
+from bns.experiment.robots import told
 from bns.experiment.task_settings import WalkConfig
 from bns.learners.bns import change_detection
 from bns.learners.bns.bearing import Bearing
@@ -194,6 +195,28 @@ def of_trial(trial: Trial) -> tuple[np.ndarray, np.ndarray]:
     return seen[good], moved[good]
 
 
+def check_walker(config: RunConfig) -> None:
+    """Refuse a robot, or networks, that the task cannot be learned with.
+
+    Raises:
+        BnsError: says all that has to be changed.
+    """
+    wrong, give, kind = [], [], told(config.world.robot).kind
+    if kind != "legged":
+        robot, world = config.world.robot, config.world.name
+        wrong.append(f"a robot with legs (world.robot = {robot!r} is {kind} and cannot "
+                     f"walk; world.name = {world!r})")  # fmt: skip
+        give.append("--world.robot phantomx --world.name hexapod")
+    if config.snn.kind != "ensemble":
+        wrong.append(f"networks that can disagree (snn.kind = {config.snn.kind!r})")
+        give.append("--snn.kind ensemble")
+    if wrong:
+        raise BnsError(
+            f"task.name = {config.task.name!r} needs {' and '.join(wrong)}: start from "
+            f"the preset hexapod-walk, or give {' '.join(give)}."
+        )
+
+
 class WalkProblem(OpenLoopProblem):
     """BNS for lists of servo goals (investigation D).
 
@@ -218,11 +241,7 @@ class WalkProblem(OpenLoopProblem):
     def set_up(self) -> None:
         """See `Problem.set_up`."""
         config = self.config
-        if config.snn.kind != "ensemble":
-            raise BnsError(
-                "task.name = 'walk' weighs how far networks disagree; set "
-                "snn.kind = 'ensemble' (the preset hexapod-walk does)."
-            )
+        check_walker(config)
         self.encoding = Goals.of(config)
         self.shape = Shape(
             groups=config.snn.members,

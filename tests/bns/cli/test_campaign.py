@@ -119,6 +119,19 @@ def test_ray_that_cannot_be_used_leaves_nothing_behind(said, tiny, monkeypatch):
     assert not (tiny.parent / "out").exists()
 
 
+def test_a_campaign_that_ends_before_its_damage(said, tiny):
+    """There is no measure from the damage on, and it is said why and what to do."""
+    tiny.write_text(TINY.replace("@1", "@9").partition("[grid]")[0])
+    said("campaign", "run", tiny, "--out", "out", "--engine", "inline")
+    table = ("campaign", "table", "out")
+    told = said(*table, code=WRONG_INPUT)
+    assert "damage comes at trial 9, counted from 0, and runs have 3" in told
+    assert "Give --measure solve" in told
+    assert "trials until solved" in said(*table, "--measure", "solve")
+    drawn = said("campaign", "plot", "out")
+    assert "curves.png" in drawn and "No sensitivity.png: no setting has two" in drawn
+
+
 def test_what_failed_is_said_and_tried_again(said, tiny, monkeypatch):
     from bns.campaign import work
 

@@ -16,6 +16,7 @@ from bns import presets
 from bns.__main__ import INTERRUPTED, SPINS, WRONG_INPUT, main
 from bns.cli import VERBS
 from bns.cli.outputs import sentence
+from bns.cli.results import span
 from bns.cli.run import STOPPED, until_interrupted
 from bns.doctor import OPTIONAL, pins
 from bns.errors import EXTRAS, install
@@ -333,7 +334,11 @@ def test_progress_without_a_terminal_is_a_line_now_and_then(capsys, fakes, monke
     ("values", "told"),
     [
         ([np.inf, np.inf], "Solved by 0 of 2."),
-        ([3, np.inf, np.inf], "Solved by 1 of 3, so not in the median."),
+        (
+            [3, np.inf, np.inf],
+            "Solved by 1 of 3. Half of the runs or more did not, "
+            "so there is no median.",
+        ),
         ([3, 4], "Solved by 2 of 2, at trial 3.5 in the median."),
         (
             [2, 3, 4, 5, 6, np.inf],
@@ -343,3 +348,15 @@ def test_progress_without_a_terminal_is_a_line_now_and_then(capsys, fakes, monke
 )
 def test_what_happened_is_told_in_words(values, told):
     assert sentence("Solved", np.array(values, dtype=float), "at trial {}") == told
+
+
+@pytest.mark.parametrize(
+    ("interval", "told"),
+    [
+        ((np.inf, np.inf, np.inf), "never"),
+        ((3, 2, np.inf), "2 to never"),
+        ((3, -np.inf, np.inf), "too few runs"),
+    ],
+)
+def test_intervals_are_told_in_words(interval, told):
+    assert span(interval) == told

@@ -5,6 +5,7 @@ A new one brings no new test.
 
 from dataclasses import replace
 from itertools import product
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -129,8 +130,39 @@ def advance(learner, task: str, trials: range) -> list[dict[str, np.ndarray]]:
             run(place, part, trial=trial, seeds=[0, 1]) if part else None
             for part in (proposal.tried, proposal.best)
         ]
-        rows.append(learner.observe(trial, *both))
+        rows.append(learner.observe(trial, *both) | driven(learner, both[0]))
     return rows
+
+
+def driven(learner, tried) -> dict[str, np.ndarray]:
+    """What a task measures of trials, as columns that no learner has."""
+    found = learner.task.measured(tried)
+    return {f"world.{name}": np.asarray(value) for name, value in found.items()}
+
+
+def differ(row, other) -> bool:
+    """Whether two rows differ in anything; unknown numbers do not."""
+    return any(
+        not np.array_equal(value, other[column], equal_nan=True)
+        for column, value in row.items()
+    )
+
+
+def test_seeds_differ_in_what_is_tried_where_columns_are_alike(monkeypatch):
+    class Steady(registry.get("random")):
+        columns: ClassVar = {"step": "size"}
+
+        def observe(self, trial, tried, best):
+            return {"step": np.ones(self.runs)}
+
+    monkeypatch.setattr(registry, "_registered", {"steady": Steady})
+    config = small("steady", "navigation")
+    one, again, other = (
+        advance(made(replace(config, seed=seed), "navigation"), "navigation", range(1))
+        for seed in (0, 0, 1)
+    )
+    assert not differ(one[-1], again[-1])
+    assert differ(one[-1], other[-1])
 
 
 @pytest.mark.parametrize(("name", "task"), KNOWN)
@@ -143,10 +175,7 @@ class TestEveryLearnerOnEveryTask:
         differing = advance(made(other, task), task, range(2))
         for column, value in first[-1].items():
             np.testing.assert_array_equal(value, again[-1][column])
-        assert any(
-            not np.array_equal(value, differing[-1][column])
-            for column, value in first[-1].items()
-        )
+        assert differ(first[-1], differing[-1])
 
     def test_restored_it_goes_on_to_the_same_bytes(self, name, task):
         whole, cut = made(small(name, task), task), made(small(name, task), task)

@@ -12,6 +12,7 @@ from bns.draws import Draws
 from bns.errors import BnsError
 from bns.evolution.chromosome import Population
 from bns.evolution.goals import TICK, Goals
+from bns.experiment.config import RunConfig
 from bns.experiment.run import train
 from bns.learners.bns import change_detection as forgetting
 from bns.learners.bns import walking
@@ -265,10 +266,18 @@ class TestLearner:
         with pytest.raises(BnsError, match="is wheeled and cannot walk"):
             Bns([wheels], replicates=[0], onsets=[-1])
 
+    def test_all_that_is_wrong_is_said_at_once(self):
+        wheels = RunConfig().with_({"task.name": "walk"})
+        with pytest.raises(BnsError) as error:
+            Bns([wheels], replicates=[0], onsets=[-1])
+        give = "--world.robot phantomx --world.name hexapod --snn.kind ensemble"
+        for said in ("robot with legs", "snn.kind = 'three'", "hexapod-walk", give):
+            assert said in str(error.value)
+
     def test_networks_that_cannot_disagree_are_refused(self):
         config = small()
         three = replace(config, snn=replace(config.snn, kind="three"))
-        with pytest.raises(BnsError, match=r"set snn\.kind = 'ensemble'"):
+        with pytest.raises(BnsError, match=r"give --snn\.kind ensemble\."):
             Bns([three], replicates=[0], onsets=[-1])
 
     @pytest.mark.parametrize("form", ["printed", "repaired"])

@@ -173,6 +173,24 @@ def test_compare_by_hand():
     assert plain["runs"][0]["median"]["value"] == 2.0
 
 
+def test_unequal_numbers_of_trials_are_said():
+    cost = np.ones((2, 6))
+    long, short = (record(cost[:, :n], onset=[2, 2], cost=cost[:, :n]) for n in (6, 4))
+    assert compare([long, long], ["a", "b"]).notes == ()
+    found = compare([long, short], ["a", "b"])
+    observed, solved, recovered = found.notes
+    assert observed.startswith(
+        "observation looks at unequal numbers of trials (a 4, b 2): the cost is summed"
+    )
+    assert "trials (a 6, b 4)" in solved and "counts as never" in solved
+    assert "trials (a 4, b 2)" in recovered and "counts as never" in recovered
+    assert found.to_mapping()["notes"] == list(found.notes)
+    later = record(cost, onset=[2, 3], cost=cost)
+    assert "(a 3 to 4, b 2)" in compare([later, short], ["a", "b"]).notes[0]
+    many = compare([long] * 7 + [short] * 2, [f"r{i}" for i in range(9)]).notes[0]
+    assert "r5 4, and 3 more)" in many
+
+
 def test_compare_needs_two_finished_runs():
     one = record([[0, 1]], onset=[0])
     with pytest.raises(BnsError, match="1 run was given"):

@@ -1,10 +1,12 @@
 """One explanation for several: what is the same motion with less."""
 
 import numpy as np
+import pytest
 
 from bns.gap.bench import mjcf_cases
 from bns.gap.decomposition import descent, refit, simpler
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.singles import Singles
 from bns.gap.models.mjcf import effects
 from bns.gap.models.mjcf.model import OwnModel
 from tests.gap.own_robots import ARM, MOTORS
@@ -33,7 +35,9 @@ def motors():
     return made
 
 
-def test_a_gain_of_both_motors_is_one_of_one_with_nothing_to_undo_it(tmp_path):
+@pytest.fixture
+def problem(tmp_path):
+    """A recording of an arm with a stronger hip motor and a calf that rubs."""
     (tmp_path / "robot.xml").write_text(ARM.replace("ACTUATORS", motors()))
     (tmp_path / "own.toml").write_text(DESCRIBED)
     model = OwnModel.read(tmp_path / "own.toml", threads=1)
@@ -42,7 +46,10 @@ def test_a_gain_of_both_motors_is_one_of_one_with_nothing_to_undo_it(tmp_path):
         effects.make("actuator_gain", {"part": "hip", "factor": 1.2}),
         effects.make("joint_friction", {"part": "FL_calf_joint", "added": 0.1}),
     ]
-    problem = Problem.of(mjcf_cases.record(model, told, planted), model)
+    return Problem.of(mjcf_cases.record(model, told, planted), model)
+
+
+def test_a_gain_of_both_motors_is_one_of_one_with_nothing_to_undo_it(problem):
     start = descent.nothing(problem)
     both = refit.fitted_at(problem, start, {GAINS, DAMPING, FRICTION})
     assert both.support == {GAINS, DAMPING, FRICTION}
@@ -50,3 +57,13 @@ def test_a_gain_of_both_motors_is_one_of_one_with_nothing_to_undo_it(tmp_path):
     assert HIP in one.support and GAINS not in one.support
     (hip,) = problem.terms[HIP]
     assert abs(one.values[hip] - 1.2) < 0.02
+
+
+def test_friction_takes_the_place_of_a_damping_that_was_found_first(problem):
+    start = descent.nothing(problem)
+    wrong = refit.fitted_at(problem, start, {HIP, DAMPING})
+    assert wrong.support == {HIP, DAMPING}
+    found = descent._instead(Singles(problem, start), wrong)
+    assert found.support == {HIP, FRICTION}
+    (friction,) = problem.terms[FRICTION]
+    assert abs(found.values[friction] - 0.1) < 0.01
