@@ -78,7 +78,7 @@ WRONG = {
     ),
     "a schema as a directory": (["schema", "--out", "."], "is there and is no file"),
     "nothing alike": (["nosuch"], "Unknown command 'nosuch'. Available: campaign, "),
-    "a large bound": (["run", "demo", "--trials", "0"], "from 1 to 1000000 trials"),
+    "a large bound": (["run", "demo", "--trials", "0"], "from 1 to 1000000."),
     "seed": (
         ["repertoire", "make", "x", "--evaluations", "9", "--seed", "-1"],
         "--seed = -1 is not allowed: give a number from 0 to ",
