@@ -6,7 +6,7 @@ on one line and exits with code 2, without a traceback.
 
 import shutil
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -117,6 +117,24 @@ EXTRAS = {
     "imageio_ffmpeg": "video",
 }
 """module that may be missing -> extra of bns-testbed that brings it"""
+
+
+def refused(names: Iterable[str], use: Callable[[str], object]) -> dict[str, BnsError]:
+    """Names that can not be used, and what is wrong with each.
+
+    Args:
+        names: that are tried.
+        use: fails for such a name.
+    """
+    found = {}
+    for name in names:
+        try:
+            use(name)
+        except BnsError as error:
+            found[name] = error
+        except ModuleNotFoundError as error:
+            found[name] = BnsError(f"{name!r}: {missing(error)}")
+    return found
 
 
 def missing(error: ModuleNotFoundError) -> str:

@@ -11,7 +11,7 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
 import bns.learners
-from bns.errors import BnsError, UnknownNameError, missing
+from bns.errors import BnsError, UnknownNameError, missing, refused
 from bns.learners.bns.config import BNS_SECTIONS
 
 if TYPE_CHECKING:
@@ -50,15 +50,7 @@ def _installed() -> dict[str, Any]:
 
 def faults() -> dict[str, BnsError]:
     """Learners that cannot be used, and what is wrong with each."""
-    found = {}
-    for name in names():
-        try:
-            get(name)
-        except BnsError as error:
-            found[name] = error
-        except ModuleNotFoundError as error:
-            found[name] = BnsError(f"Learner {name!r}: {missing(error)}")
-    return found
+    return refused(names(), get)
 
 
 def names() -> tuple[str, ...]:
@@ -119,13 +111,10 @@ def _loaded(name: str, place: str, load: Callable[[], Any]) -> "type[Learner]":
         if missing(error):
             raise
         raise _unusable(name, place, f"No module {error.name!r}") from error
-    except AttributeError as error:
-        if error.name != "LEARNER":
-            raise _unusable(name, place, f"AttributeError: {error}") from error
-        wanted = "it has no LEARNER: let it be its subclass of Learner"
-        raise _unusable(name, place, wanted) from error
-    except Exception as error:
+    except Exception as error:  # a file that anyone may have written
         said = f"{type(error).__name__}: {error}"
+        if isinstance(error, AttributeError) and error.name == "LEARNER":
+            said = "it has no LEARNER: let it be its subclass of Learner"
         raise _unusable(name, place, said) from error
     if not (isinstance(found, type) and issubclass(found, Learner)):
         said = (

@@ -18,7 +18,7 @@ from importlib.resources.abc import Traversable
 from types import ModuleType
 from typing import Any
 
-from bns.errors import BnsError, FormatError, UnknownNameError
+from bns.errors import BnsError, FormatError, UnknownNameError, refused
 from bns.experiment.config import RunConfig
 from bns.experiment.task_settings import TaskConfig
 from bns.storage import reading
@@ -110,13 +110,7 @@ def kind(name: str) -> str:
 
 def faults() -> dict[str, BnsError]:
     """Tasks whose file cannot be read, and what is wrong with each."""
-    found = {}
-    for name in names():
-        try:
-            content(name)
-        except BnsError as error:
-            found[name] = error
-    return found
+    return refused(names(), content)
 
 
 def readable() -> tuple[str, ...]:

@@ -280,7 +280,7 @@ def _begun(problem: Problem, seed: int) -> tuple[Problem, Point, rest.Floor]:
     latent = start.noise.latent.beside(problem, start.rest)
     known = rest.floor(problem, latent, seed=seed)
     large = rest.excess(start.rest, known, problem.seen) > BEYOND_LATE
-    if large or not problem.open_moments:
+    if large or not problem.any_open:
         return exact, start, known
     return problem, descent.nothing(problem, start), known
 

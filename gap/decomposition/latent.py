@@ -57,7 +57,7 @@ class Latent:
             problem: the recording.
             rest: residuals, ``(N, C)``.
         """
-        if not problem.open_moments:
+        if not problem.any_open:
             return self
         left = self(np.nan_to_num(rest))
         return self._made(problem, self.begun, np.where(problem.seen, left, np.nan))
@@ -65,10 +65,10 @@ class Latent:
     @classmethod
     def _made(cls, problem: Problem, begun: np.ndarray, rest: np.ndarray) -> "Latent":
         sd, seen = problem.model.least, problem.seen
-        share = sd / np.maximum(noise.level(rest), sd) if problem.open_moments else 1.0
+        share = sd / np.maximum(noise.level(rest), sd) if problem.any_open else 1.0
         square = (begun**2).sum(axis=0)
         parts = []
-        for number, sooner in enumerate(problem.late):
+        for number, sooner in enumerate(problem.open_commands):
             rows = np.flatnonzero(problem.trial == number)
             moved = np.concatenate([begun[:, rows], share * sooner])
             square[rows] += (sooner**2).sum(axis=0)

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bns.gap.decomposition import moments, unknown
+from bns.gap.decomposition import untold
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, Windows
 from bns.gap.recordings import segments, trial_conditions
@@ -185,21 +185,21 @@ class Problem:
         return np.nan_to_num(np.stack(moved) - base)
 
     @cached_property
-    def late(self) -> list[np.ndarray]:
+    def open_commands(self) -> list[np.ndarray]:
         """What a standard deviation of when each command began changes of the features
         of its trial by the nominal model, where a log tells it to a sample only, and of
         what was told in rows that it lost: by trial ``(K, n, C)``."""
         dt = self.model.dt
-        sooner: list[list[moments.Sooner | unknown.Unknown]] = [
-            [*([] if self.dated else moments.sooner(t, dt)), *unknown.unknown(t)]
+        other = [
+            [*([] if self.dated else untold.sooner(t, dt)), *untold.lost(t)]
             for t in self.trials
         ]
-        trials = [*self.trials, *(item.trial for row in sooner for item in row)]
+        trials = [*self.trials, *(item.trial for row in other for item in row)]
         made = []
         if len(trials) > len(self.trials):
             (paths,) = self.model.paths(trials, [[{}] * len(trials)], fine=False)
-            bases, moved = paths[: len(sooner)], iter(paths[len(sooner) :])
-        for number, row in enumerate(sooner):
+            bases, moved = paths[: len(other)], iter(paths[len(other) :])
+        for number, row in enumerate(other):
             trial, windows = self.trials[number], self.windows[number]
             found = [np.zeros((0, len(windows), len(self.channels)))]
             for item in row:
@@ -210,9 +210,9 @@ class Problem:
         return made
 
     @property
-    def open_moments(self) -> bool:
-        """Whether it is left open when some command began."""
-        return any(map(len, self.late))
+    def any_open(self) -> bool:
+        """Whether it is left open when some command began, or what it was."""
+        return any(map(len, self.open_commands))
 
     def features(self, paths: Sequence[np.ndarray]) -> np.ndarray:
         """Features ``(N, C)`` of a path of each trial."""

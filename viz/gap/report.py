@@ -339,12 +339,8 @@ def next_steps(found: Diagnosis, known: Sequence[Row]) -> list[str]:
             "a recording without the effect."
         )
         own = str(found.provenance.get("model", "")).endswith(".toml")
-        kept = (
-            "--xml FILE keeps the corrected MJCF"
-            if own
-            else ("--world NAME keeps the corrected world")
-        )
-        steps.append(f"bns gap apply DIR {kept}.")
+        kept = ("--world NAME", "world"), ("--xml FILE", "MJCF")
+        steps.append("bns gap apply DIR {} keeps the corrected {}.".format(*kept[own]))
     quiet = [row for row in detectable(found, known)["rows"] if row[1] == "not excited"]
     for name, _, excite in quiet[:4]:
         steps.append(f"{name} could not have been seen; it would take {excite}.")

@@ -84,14 +84,16 @@ def rests(
     """
     for settled in (False, True):
         for name in reversed(_poses(model)):  # keyframes before the model's own pose
-            data = posed(model, name, settling(model, name) if settled else 0.0)
+            lasting = settling(model, name) if settled else 0.0
+            data = posed(model, name, lasting)
             off = [
                 abs(float(data.joint(joint).qpos[0]) - at) <= tolerance[joint]
                 for joint, at in first.items()
             ]
             if off and all(off):
-                moves = settled or _moved(model, data) > 1e-5
-                return name, settling(model, name) if moves else 0.0
+                if not settled and _moved(model, data) > 1e-5:
+                    lasting = settling(model, name)
+                return name, lasting
     return None, 0.0
 
 

@@ -23,8 +23,8 @@ def problem():
         trials=(None,) * TRIALS,
         trial=np.repeat(np.arange(TRIALS), LENGTH),
         begun=lambda values: moved,
-        late=[np.zeros((0, LENGTH, 2))] * TRIALS,
-        open_moments=False,
+        open_commands=[np.zeros((0, LENGTH, 2))] * TRIALS,
+        any_open=False,
     )
 
 

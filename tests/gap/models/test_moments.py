@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bns.gap.bench import mjcf_cases
-from bns.gap.decomposition import moments
+from bns.gap.decomposition import untold
 from bns.gap.diagnose import diagnose
 from bns.gap.models.base import Windows
 from bns.gap.models.mjcf import log
@@ -80,7 +80,7 @@ def test_an_effect_beside_them_is_named_alone(arm, text, name, value, tolerance)
 
 def test_commands_are_moved_so_far_apart_that_each_is_felt_by_itself(arm):
     (trial, *_) = recorded(arm, "", 1)
-    made = moments.sooner(trial, arm.dt)
+    made = untold.sooner(trial, arm.dt)
     assert sorted(np.concatenate([item.commands for item in made])) == [
         *range(1, LENGTH)
     ]
@@ -92,12 +92,12 @@ def test_commands_are_moved_so_far_apart_that_each_is_felt_by_itself(arm):
         )
         assert shift == pytest.approx(item.size * SAMPLE / np.sqrt(12))
         assert item.trial.commands.duration == pytest.approx(trial.commands.duration)
-        assert (np.diff(begins[item.commands]) > moments.AFTER / 2).all()
+        assert (np.diff(begins[item.commands]) > untold.AFTER / 2).all()
 
 
 def test_each_command_has_the_change_after_it_alone(arm):
     (trial, *_) = recorded(arm, "", 1)
-    item = moments.sooner(trial, arm.dt)[0]
+    item = untold.sooner(trial, arm.dt)[0]
     last = np.arange(1, len(trial.times))
     windows = Windows(last - 1, last, trial.times[last], np.full(len(last), SAMPLE))
     made = item.directions(np.ones((len(last), 2)), windows)
@@ -108,7 +108,7 @@ def test_each_command_has_the_change_after_it_alone(arm):
 
 def test_a_trial_whose_moments_are_known_has_none(arm):
     (trial, *_) = recorded(arm, "", 1)
-    assert moments.sooner(trial.replace(conditions={}), arm.dt) == []
+    assert untold.sooner(trial.replace(conditions={}), arm.dt) == []
 
 
 @pytest.mark.parametrize(

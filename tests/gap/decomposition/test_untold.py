@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bns.gap.decomposition.unknown import MOST, unknown
+from bns.gap.decomposition.untold import STRETCHES, lost
 from bns.gap.recordings import segments, trial_conditions
 from bns.worlds.trial import Channel, Commands, Trial
 
@@ -29,7 +29,7 @@ def recording(lost):
 
 def test_commands_may_be_off_as_far_as_others_are_from_those_beside_them():
     trial = recording([50, 51, 52, 300])
-    made = unknown(trial)
+    made = lost(trial)
     off = [item.trial.commands.values - trial.commands.values for item in made]
     rows = [sorted(set(np.argwhere(change)[:, 0].tolist())) for change in off]
     assert sorted(rows) == [[50, 51, 52], [50, 51, 52], [300], [300]]
@@ -42,12 +42,12 @@ def test_commands_may_be_off_as_far_as_others_are_from_those_beside_them():
 
 
 def test_none_are_made_where_all_rows_are_there():
-    assert unknown(recording([])) == []
+    assert lost(recording([])) == []
 
 
 def test_the_least_sure_ones_are_open():
-    made = unknown(recording(range(5, 395, 10)))
-    assert len(made) == MOST
+    made = lost(recording(range(5, 395, 10)))
+    assert len(made) == STRETCHES
     trial = recording([])
     for item in made:
         assert (item.trial.commands.values != trial.commands.values)[:, 0].any()
