@@ -65,7 +65,7 @@ def sooner(trial: Trial, dt: float) -> list[Untold]:
     step = trial_conditions.sample_step(trial)
     move = step / 2 if dt == 0 else max(1, round(step / 2 / dt)) * dt
     lasting = trial.commands.durations
-    starts = trial.times[trial.boundaries[0]] + np.cumsum(lasting) - lasting
+    starts = trial_conditions.begun(trial)
     apart = int(np.clip(np.ceil(AFTER / np.median(lasting)), 1, MOST))
     ends = np.append(starts[apart:], np.full(min(apart, count), np.inf)) - step
     able = np.flatnonzero(lasting[:-1] > move) + 1

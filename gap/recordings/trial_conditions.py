@@ -77,11 +77,16 @@ def since(conditions: Mapping[str, object], time: float) -> Mapping[str, object]
 
 def between(trial: Trial) -> np.ndarray:
     """Which commands were put between those that are known, ``(K,)``."""
-    lasting = trial.commands.durations
-    begun = trial.times[trial.boundaries[0]] + np.cumsum(lasting) - lasting
     known = trial.conditions.get(BETWEEN)
     moments = np.array(known if isinstance(known, list) else [], dtype=float)
-    return (np.abs(begun[:, None] - moments) < SAME).any(axis=1)
+    return (np.abs(begun(trial)[:, None] - moments) < SAME).any(axis=1)
+
+
+def begun(trial: Trial) -> np.ndarray:
+    """When each command of a trial began by its log [s], ``(K,)``."""
+    lasting = trial.commands.durations
+    made: np.ndarray = trial.times[trial.boundaries[0]] + np.cumsum(lasting) - lasting
+    return made
 
 
 def numbers(trials: Sequence[Trial]) -> list[int]:
