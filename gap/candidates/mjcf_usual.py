@@ -189,6 +189,8 @@ def _owner(model: mujoco.MjModel, item: Seen) -> int:
         return int(model.body(item.part).id)
     if item.quantity == "site":
         return int(model.site(item.part).bodyid[0])
+    if item.quantity == "tendon":
+        return max(prepared.by_tendon(model)[model.tendon(item.part).id], default=0)
     return int(model.joint(item.part).bodyid[0])
 
 

@@ -102,7 +102,11 @@ def _at(values: np.ndarray, number: int, levels: Iterable[float]) -> list[np.nda
 
 
 def screened(
-    problem: Problem, point: Point, most: int, only: list[int] | None = None
+    problem: Problem,
+    point: Point,
+    most: int,
+    only: list[int] | None = None,
+    names: Collection[str] | None = None,
 ) -> list[tuple[str, np.ndarray]]:
     """Explanations that say most by themselves at one of their levels, or at one of the
     model's departures: where a tangent at the nominal says little.
@@ -112,6 +116,7 @@ def screened(
         point: the nominal model.
         most: how many.
         only: trials that are looked at, None = all.
+        names: of the explanations that are looked at, None = all.
 
     Returns:
         names and values of all rows, ``(R,)``, nuisances fitted; the best first.
@@ -119,7 +124,7 @@ def screened(
     todo = [
         (number, value)
         for number, row in enumerate(problem.rows)
-        if not row.nuisance
+        if not row.nuisance and (names is None or row.term in names)
         for value in _departures(row, problem.model.spread)
     ]
     best: dict[str, tuple[float, np.ndarray]] = {}

@@ -1,7 +1,7 @@
 """Explanations by themselves, each fitted to the simulation: through a tangent at the
 nominal a strong one looks like several, or like another."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -51,6 +51,12 @@ class Singles:
         most = problem.model.starts
         screened = levels.screened(problem, self.start, most, only)
         return self._best((*self._tangent, *self._fits(screened)))
+
+    def among(self, names: Collection[str]) -> tuple[Single, ...]:
+        """The fits of some explanations, whatever others promise; the best first."""
+        only, names = self._looked_at, frozenset(names)
+        begun = levels.screened(self.problem, self.start, len(names), only, names)
+        return self._best(self._fits(begun))
 
     @cached_property
     def by_tangent(self) -> tuple[Single, ...]:

@@ -4,12 +4,14 @@ CSV, PACE (`.pt`), SAGE, LeRobotDataset and MCAP. What a format says of its colu
 (told or seen, which joint, which quantity) is kept; units are left as they are.
 """
 
+import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from bns.errors import FormatError
 from bns.gap.importers import other_files
@@ -23,6 +25,7 @@ TOLD, SEEN = "told", "seen"
 
 POSITION, SPEED, EFFORT = "position", "speed", "effort"
 MOST = 1e20  # of numbers of any kind; stamps in nanoseconds are below
+QUATERNION = r"(?i)(q|quat|quaternion|orientation|rot|rotation)[._]?$"
 SAME = 1e-6  # [s] moments that are nearer are one
 
 ENDS = ([".csv"], [".tsv"], [".txt"])
@@ -87,6 +90,10 @@ class Table:
     def __contains__(self, name: str) -> bool:
         return name in self.names
 
+    def has(self, names: Sequence[str]) -> bool:
+        """Whether all these columns are there."""
+        return {*names} <= {*self.names}
+
 
 def reader(path: str | Path) -> Callable[[Path], Table] | None:
     """What reads a log; None if it is of no known kind."""
@@ -125,7 +132,28 @@ def read(path: str | Path) -> Table:
     found = reader(path)
     if found is None:
         raise FormatError(other_files.advice(path))
-    return checked(found(path), path)
+    return turned(checked(found(path), path))
+
+
+def turned(table: Table) -> Table:
+    """A log with roll, pitch and yaw [rad] beside each quaternion in it, four columns
+    that end with w, x, y and z: "base_qw" gives "base_yaw"."""
+    made, notes = [], []
+    for column in table.columns:
+        four = [column.name[:-1] + letter for letter in "xyzw"]
+        stem = re.sub(QUATERNION, "", four[0][:-1])
+        if stem == four[0][:-1] or column.name != four[-1] or not table.has(four):
+            continue
+        values = np.stack([table[name] for name in four], axis=1)
+        good = np.isfinite(values).all(axis=1) & values.any(axis=1)
+        angles = np.full((len(values), 3), np.nan)
+        angles[good] = Rotation.from_quat(values[good]).as_euler("ZYX")
+        names = [f"{stem}{turn}" for turn in ("yaw", "pitch", "roll")]
+        if not {*names} & {*table.names}:
+            pairs = zip(names, angles.T, strict=True)
+            made += [Column(name, each, column.role) for name, each in pairs]
+            notes.append(f"{', '.join(names)}: from {', '.join(four)}")
+    return replace(table, columns=(*table.columns, *made), notes=(*table.notes, *notes))
 
 
 def joined(

@@ -33,10 +33,13 @@ LOOP = ("kp", "kd", "torque")
 """of a position loop that the MJCF file lacks"""
 
 PLACES = ("site", "body")
-QUANTITIES = ("joint", "speed", *PLACES)
+QUANTITIES = ("joint", "speed", *PLACES, "tendon")
 """what an observed channel can be: position or speed of a joint, place of a site or
-body"""
+body, or how that is turned, length of a tendon"""
 AXES = ("x", "y", "z")
+TURNS = ("roll", "pitch", "yaw")
+"""how a site or body is turned in the world: by yaw, pitch and roll, in this order,
+about its own z, y and x axes"""
 UNITS = ("rad", "m", "rad/s", "m/s")
 MARKS = (TIME, TRIAL, SENT)  # columns of a log beside its channels
 WINDOW = 0.1  # [s] between two samples that are compared
@@ -71,8 +74,8 @@ class Seen:
     Attributes:
         channel: name and unit.
         quantity: one of `QUANTITIES`.
-        part: name of the joint, site or body.
-        axis: of a site or body, in the world frame.
+        part: name of the joint, site, body or tendon.
+        axis: of a site or body, in the world frame: number among `AXES` and `TURNS`.
         noise: standard deviation of its measurement, in its unit.
         scatter: of what the robot itself scatters, per square root of a second.
     """
@@ -83,6 +86,11 @@ class Seen:
     axis: int
     noise: float
     scatter: float
+
+    @property
+    def turning(self) -> bool:
+        """Whether it is how a site or body is turned, and not where that is."""
+        return self.quantity in PLACES and self.axis >= len(AXES)
 
 
 @dataclass(frozen=True)
@@ -247,22 +255,31 @@ def _seen(name: str, table: Any, path: Path) -> Seen:
             "and a positive noise (standard deviation of its measurement)."
         )
     axis = str(table.get("axis", "x"))
-    if axis not in AXES:
-        raise UnknownNameError(f"axis of [observed.{name}]", axis, AXES)
+    axes = (*AXES, *TURNS)
+    if axis not in axes:
+        raise UnknownNameError(f"axis of [observed.{name}]", axis, axes)
     channel = _channel(name, table["unit"], path)
     if channel.unit not in UNITS:
         raise FormatError(
             f"{path}: [observed.{name}] is in {channel.unit!r}; joints and places are "
             f"in {', '.join(UNITS)}."
         )
-    return Seen(
+    made = Seen(
         channel,
         what[0],
         str(table[what[0]]),
-        AXES.index(axis),
+        axes.index(axis),
         noise,
         _number(table.get("scatter", noise), "scatter", path, 0.0),
     )
+    unit = "rad" if made.turning else "m"
+    if made.quantity in PLACES and channel.unit != unit:
+        raise FormatError(
+            f"{path}: [observed.{name}] is in {channel.unit!r}, and {axis} of a "
+            f"{made.quantity} in {unit!r}; how it is turned is axis = "
+            f"{', '.join(map(repr, TURNS))}."
+        )
+    return made
 
 
 def _channel(name: str, unit: Any, path: Path) -> Channel:

@@ -215,6 +215,10 @@ def _trial(columns: Mapping[str, np.ndarray], config: OwnConfig, where: str) -> 
     told = np.stack([columns[item.channel.name] for item in config.told], axis=1)
     seen = np.stack([columns[item.channel.name] for item in config.seen], axis=1)
     seen[~np.isfinite(seen).all(axis=1)] = np.nan
+    good = np.isfinite(seen).all(axis=1)
+    for column, item in enumerate(config.seen):
+        if item.turning:
+            seen[good, column] = np.unwrap(seen[good, column])
     if not np.isfinite(told).all():
         row, column = np.argwhere(~np.isfinite(told))[0]
         name = config.told[column].channel.name

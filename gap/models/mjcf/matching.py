@@ -7,6 +7,8 @@ import numpy as np
 
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column
+from bns.gap.models.mjcf.config import AXES
+from bns.gap.models.mjcf.rehearsal import Part
 from bns.worlds.data.units import FACTORS, RATES
 
 
@@ -51,7 +53,20 @@ TIMES = _set("time t stamp timestamp timestamps secs clock elapsed")
 TRIALS = _set("trial run episode episode_index rep repetition")
 SENT = _set("command_time sent cmd_time sent_time t_sent t_cmd time_sent")
 COUNTS = _set("frame index frame_index seq sequence task_index step row")
-AXES = ("x", "y", "z")
+TURNED = {
+    "roll": "roll",
+    "phi": "roll",
+    "pitch": "pitch",
+    "yaw": "yaw",
+    "heading": "yaw",
+    "theta": "yaw",
+    "psi": "yaw",
+}
+"""words for how a body is turned, as `config.TURNS` calls it"""
+WHOLE = POSITION | _set("pose place robot base body mocap odom tracker camera")
+"""words for a free robot as a whole"""
+ONLY = "for the model has one alone"
+LENGTH, TENDON = _set("length len"), _set("tendon cable rope string wire")
 QUATERNION = _set("qw qx qy qz quat quaternion")
 
 
@@ -301,28 +316,48 @@ def _one(stem: str, parts: Sequence[str]) -> str:
 
 
 def by_place(
-    columns: Sequence[Column], table: Mapping[str, Sequence[str]]
-) -> dict[str, tuple[str, str, str]]:
-    """Columns that are called as a site or body, with an axis in the name or not.
+    columns: Sequence[Column], table: Mapping[str, Sequence[str]], free: str = ""
+) -> dict[str, tuple[Part, ...]]:
+    """Columns that are called as a site, body or tendon, with an axis or not.
 
     Args:
         columns: that are no joints.
-        table: names of parts by kind, "site" and "body".
+        table: names of parts by kind, "site", "body" and "tendon".
+        free: the one body on a free joint, that a column "x" or "heading" is of; "" =
+            there is none, or several.
 
     Returns:
-        by column: kind, part, axis ("" = not said).
+        by column what it may be of: one part, unless no axis is said.
     """
-    found: dict[str, tuple[str, str, str]] = {}
+    found: dict[str, tuple[Part, ...]] = {}
     for column in columns:
-        if unit(column.name) in FACTORS["rad"]:
-            continue  # an angle is no place
+        angle = unit(column.name) in FACTORS["rad"]
         pieces = column.name.split("_")
         size = _ending([piece.lower() for piece in pieces])[0]
         plain = "_".join(pieces[: len(pieces) - size])
         stem, _, last = plain.rpartition("_")
+        axis = last if last in AXES and not angle else TURNED.get(last.lower(), "")
         for kind, parts in table.items():
             called = next((name for name in (column.name, plain) if name in parts), "")
-            axis = "" if called else last
-            if called or (last in AXES and (called := _one(stem, parts))):
-                found.setdefault(column.name, (kind, called, axis))
+            if kind == "tendon":
+                called = called or _wound(column, parts)
+                made: tuple[Part, ...] = (Part(kind, called),)
+            elif called:
+                made = () if angle else tuple(Part(kind, called, a) for a in AXES)
+            else:
+                called = _one(stem, parts) if axis else ""
+                made = (Part(kind, called, axis),)
+            if called and made:
+                found.setdefault(column.name, made)
+        if axis and free and {*words(stem)} <= WHOLE:
+            found.setdefault(column.name, (Part("body", free, axis),))
     return found
+
+
+def _wound(column: Column, tendons: Sequence[str]) -> str:
+    """The tendon whose length a column is by its name: called so, or the only one."""
+    said = set(words(column.name))
+    alike = [name for name in tendons if name and core(name) in _own(column.name)]
+    if said & LENGTH and len(alike) == 1:
+        return alike[0]
+    return tendons[0] if said & TENDON and len(tendons) == 1 else ""

@@ -9,8 +9,9 @@ import numpy as np
 from bns.errors import BnsError
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column
-from bns.gap.models.mjcf import matching, rehearsal
+from bns.gap.models.mjcf import matching, prepared, rehearsal
 from bns.gap.models.mjcf.channels import Work, joint_of, joints
+from bns.gap.models.mjcf.config import AXES, PLACES, TURNS
 from bns.gap.models.mjcf.rehearsal import Fit, Part
 from bns.worlds.data.units import factor
 
@@ -32,19 +33,23 @@ def observed(work: Work, seen: list[Column]) -> None:
     seen = [c for c in seen if c not in turned]
     if turned:
         listed = ", ".join(c.name for c in turned)
-        work.guessed.append(f"left out, for no orientation is compared: {listed}")
+        work.guessed.append(f"left out, for angles are compared: {listed}")
     model = work.model
     driven = [joint_of(model, model.actuator(a).id) for _, a, _ in work.told]
     driven = [joint for joint in joints(model) if joint in driven]
     found: dict[str, Part] = {}
     why: dict[str, str] = {}
+    counts = {"site": model.nsite, "body": model.nbody, "tendon": model.ntendon}
     places = {
         kind: [getattr(model, kind)(n).name for n in range(count)]
-        for kind, count in (("site", model.nsite), ("body", model.nbody))
+        for kind, count in counts.items()
     }
     speeds = [c for c in seen if matching.quantity(c) == tables.SPEED]
     others = [c for c in seen if c not in speeds]
-    named = matching.by_place(others, places)
+    _, hits = matching.match(others, joints(model))
+    jointed = {name for name, how in hits.items() if how not in matching.UNSURE}
+    placed = [c for c in others if c.name not in jointed]
+    named = matching.by_place(placed, places, _free(model))
     for kind, group in (("speed", speeds), ("joint", others)):
         rest = [c for c in group if c.name not in named or c.name in joints(model)]
         # a flywheel is seen by its speed alone: what turns otherwise is another joint
@@ -64,19 +69,22 @@ def _rehearsed(
     seen: Sequence[Column],
     found: dict[str, Part],
     why: Mapping[str, str],
-    named: Mapping[str, tuple[str, str, str]],
+    named: Mapping[str, tuple[Part, ...]],
 ) -> None:
     """Fill in what names do not tell by the nominal motion, units too."""
     drives = Drives(work, found)
     fitted = {
-        column.name: drives.fits(column, _called(column, found, named))
+        column.name: drives.fits(
+            column,
+            [found[column.name]] if column.name in found else named[column.name],
+        )
         for column in seen
         if column.name in found or column.name in named
     }
     for column in seen:
         if column.name not in fitted and matching.quantity(column) != tables.SPEED:
             fitted[column.name] = drives.fits(column, drives.free())
-        _chosen(work, column, fitted, found, why, named.get(column.name))
+        _chosen(work, column, fitted, found, why, named.get(column.name, ()))
     work.unsure.extend(_shares(work))
     if not work.seen:
         raise BnsError(
@@ -85,16 +93,17 @@ def _rehearsed(
         )
 
 
-def _called(
-    column: Column,
-    found: Mapping[str, Part],
-    named: Mapping[str, tuple[str, str, str]],
-) -> list[Part]:
-    """Parts that a column may be of by its name."""
-    if column.name in found:
-        return [found[column.name]]
-    kind, part, axis = named[column.name]
-    return [Part(kind, part, a) for a in (axis or "xyz")]
+def _free(model: mujoco.MjModel) -> str:
+    """The one body on a free joint, of several the one that is driven; "" = none is."""
+    every = [
+        model.body(number).name
+        for number in range(model.nbody)
+        if prepared.free_joint(model, number) >= 0
+    ]
+    for names in (every, prepared.loose(model)):
+        if len(names) == 1:
+            return str(names[0])
+    return ""
 
 
 def _units(model: mujoco.MjModel, part: Part, column: Column) -> dict[str, float]:
@@ -111,7 +120,7 @@ def _chosen(
     fitted: Mapping[str, Mapping[Part, Fit]],
     found: dict[str, Part],
     why: Mapping[str, str],
-    named: tuple[str, str, str] | None,
+    named: tuple[Part, ...],
 ) -> None:
     fits = fitted.get(column.name, {})
     if not fits:
@@ -119,16 +128,19 @@ def _chosen(
         return
     best = max(fits, key=lambda part: fits[part].score)
     fit = fits[best]
-    called = column.name in found or (named is not None and bool(named[2]))
+    called = column.name in found or len(named) == 1
     if not called and fit.score < AGREES:
         work.unsure.append(f"{column.name}: moves as no part of the model, left out")
         return
     unit = fit.unit
     if fit.score < AGREES:
         unit = _usual(best, _units(work.model, best, column), fitted)
-    reason = why.get(column.name, "by its name" if named else "for it moves so")
+    reason = why.get(column.name, "for it moves so")
+    if named and column.name not in why:
+        alike = matching.core(best.name) in matching.core(column.name)
+        reason = "by its name" if alike else matching.ONLY
     found[column.name] = best
-    axis = f" along {best.axis}" if best.axis else ""
+    axis = f" along {best.axis}" if best.axis in AXES else f" {best.axis}".rstrip()
     line = f"{column.name}: {best.quantity} {best.name!r}{axis} in {unit}, {reason}"
     work.seen.append((column, best, unit))
     near = [
@@ -206,7 +218,8 @@ class Drives:
         """Joints and places that no column is of yet."""
         taken = set(self.found.values())
         every = self._moved(self._trial([c.values for c, _, _ in self.work.told]))
-        return [p for p in every if p.quantity != "speed" and p not in taken]
+        placed = [p for p in every if p.quantity in ("joint", *PLACES)]
+        return [p for p in placed if p.axis not in TURNS and p not in taken]
 
     def fits(self, column: Column, options: Sequence[Part]) -> dict[Part, Fit]:
         """How well a column agrees with parts: in the trial whose commands move most,
@@ -221,6 +234,7 @@ class Drives:
                     moved[part],
                     _units(self.work.model, part, column),
                     joint=part.quantity == "joint",
+                    turning=part.axis in TURNS,
                 )
                 for part in options
             }

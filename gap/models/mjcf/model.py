@@ -11,7 +11,7 @@ from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, Windows
 from bns.gap.models.mjcf import cuts, log, masses, roughness, start
 from bns.gap.models.mjcf import effects as own_effects
-from bns.gap.models.mjcf.config import PLACES, OwnConfig
+from bns.gap.models.mjcf.config import AXES, PLACES, TURNS, OwnConfig
 from bns.gap.models.mjcf.simulation import Simulation
 from bns.gap.recordings import segments
 from bns.storage import files
@@ -19,7 +19,7 @@ from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Trial
 
 LEAST = 0.3  # of the noise that is told: the smallest that is believed
-LEVEL = (0, 1)  # axes of places over the floor
+FLOOR = ("x", "y", "yaw")  # axes of what goes over a floor
 SHORT, SHARE = 5.0, 0.01  # of the noise, of a joint's travel: sooner by more is stopped
 STRIDE = 0.5  # [s] over which those of a free body are compared
 
@@ -66,11 +66,12 @@ class OwnModel(GapModel):
             for item in self.listed
             if item.effect == "body_mass"
         }
-        carried = start.free(self.physics.model)
-        self._carried = [
+        self._carried = _carried(config, start.free(self.physics.model))
+        carried = {column for part in self._carried for column in part.values()}
+        self._turning = [
             column
             for column, item in enumerate(config.seen)
-            if item.part in carried and item.axis in LEVEL and item.quantity in PLACES
+            if item.turning and column not in carried
         ]
         self._tried = {item.effect for item in self.listed}
         self._terms = {
@@ -280,15 +281,27 @@ class OwnModel(GapModel):
         self, trial: Trial, observed: np.ndarray, windows: Windows
     ) -> np.ndarray:
         """See `GapModel.compare`: what is observed at the end of each window; of what
-        a free body carries, how far it came over the floor in the last `STRIDE`. Where
+        a free body carries, how far it came over the floor, and turned, in the last
+        `STRIDE`: forwards and to the left of how it stood, if that is observed. Where
         it began is not the robot's, and what it slipped long ago is no error anew."""
         made = observed[..., windows.last, :]
-        if len(self._carried):
-            seen = np.flatnonzero(np.isfinite(trial.observed).all(axis=1))
+        seen = np.flatnonzero(np.isfinite(trial.observed).all(axis=1))
+        if self._turning:  # whole turns are none
+            apart = observed[..., seen[:1], :] - trial.observed[seen[:1]]
+            whole = 2 * np.pi * np.round(apart / (2 * np.pi))
+            made[..., self._turning] -= whole[..., self._turning]
+        if self._carried:
             begin = trial.times[windows.last] - STRIDE
             at = np.searchsorted(trial.times[seen], begin, side="right") - 1
             before = observed[..., seen[np.maximum(at, 0)], :]
-            made[..., self._carried] -= before[..., self._carried]
+        for part in self._carried:
+            columns = [*part.values()]
+            made[..., columns] -= before[..., columns]
+            if len(part) == len(FLOOR):
+                x, y, yaw = (part[axis] for axis in FLOOR)
+                way = made[..., x] + 1j * made[..., y]
+                way = way * np.exp(-1j * before[..., yaw])
+                made[..., x], made[..., y] = way.real, way.imag
         return made
 
     def regime(self, trial: Trial, windows: Windows) -> Mapping[str, np.ndarray]:
@@ -328,3 +341,18 @@ class OwnModel(GapModel):
         spec.compile()
         files.write_text(path, spec.to_xml())
         return [str(effect) for effect in made if effect.stage != "body"]
+
+
+def _carried(config: OwnConfig, free: frozenset[str]) -> list[dict[str, int]]:
+    """Columns of each body and site on a free joint that goes over the floor, by axis.
+
+    Args:
+        config: the description.
+        free: names of what a free joint carries.
+    """
+    found: dict[tuple[str, str], dict[str, int]] = {}
+    for column, item in enumerate(config.seen):
+        axis = (*AXES, *TURNS)[item.axis]
+        if item.quantity in PLACES and item.part in free and axis in FLOOR:
+            found.setdefault((item.quantity, item.part), {})[axis] = column
+    return [*found.values()]

@@ -57,7 +57,7 @@ def tied(model: mujoco.MjModel, roots: Collection[int]) -> set[int]:
         model: that is recorded.
         roots: numbers of bodies on the world, see `MjModel.body_rootid`.
     """
-    groups = [*_by_equality(model), *_by_tendon(model)]
+    groups = [*_by_equality(model), *by_tendon(model)]
     sets = [
         {int(model.body_rootid[body]) for body in bodies} - {0} for bodies in groups
     ]
@@ -84,19 +84,21 @@ def _by_equality(model: mujoco.MjModel) -> Iterable[list[int]]:
         yield [int(owner[end]) for end in ends if end >= 0]
 
 
-def _by_tendon(model: mujoco.MjModel) -> Iterable[list[int]]:
+def by_tendon(model: mujoco.MjModel) -> list[list[int]]:
     """Numbers of the bodies that each tendon runs over."""
     owners = {
         mujoco.mjtWrap.mjWRAP_JOINT: model.jnt_bodyid,
         mujoco.mjtWrap.mjWRAP_SITE: model.site_bodyid,
     }
+    found = []
     for first, count in zip(model.tendon_adr, model.tendon_num, strict=True):
         bodies = []
         for place in range(first, first + count):
             owner = owners.get(mujoco.mjtWrap(int(model.wrap_type[place])))
             if owner is not None:
                 bodies.append(int(owner[model.wrap_objid[place]]))
-        yield bodies
+        found.append(bodies)
+    return found
 
 
 def hinged(model: mujoco.MjModel, joint: int) -> bool:
@@ -373,7 +375,7 @@ def number(model: mujoco.MjModel, kind: str, name: str) -> int:
 
     Args:
         model: compiled.
-        kind: "joint", "site", "body", "actuator" or "key".
+        kind: "joint", "site", "body", "tendon", "actuator" or "key".
         name: of the part.
 
     Raises:
@@ -386,6 +388,7 @@ def number(model: mujoco.MjModel, kind: str, name: str) -> int:
             "joint": model.njnt,
             "site": model.nsite,
             "body": model.nbody,
+            "tendon": model.ntendon,
             "actuator": model.nu,
             "key": model.nkey,
         }[kind]

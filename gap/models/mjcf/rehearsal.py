@@ -6,16 +6,20 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from bns.gap.models.mjcf import prepared
+from bns.gap.models.mjcf import prepared, view
+from bns.gap.models.mjcf.config import AXES, TURNS
 from bns.worlds.data.units import per_si
 
-JOINT, SITE, BODY, SPEED = "joint", "site", "body", "speed"
+JOINT, SITE, BODY, SPEED, TENDON = "joint", "site", "body", "speed", "tendon"
+STATE = ("qpos", "qvel", "ten_length", "site_xpos", "site_xmat", "xpos", "xmat")
+"""what `mujoco.MjData` calls the motion of joints, tendons, sites and bodies"""
 OWN = 0.03  # by which a joint is preferred to a place that moves alike
 STILL = 1e-6  # [m or rad] less is no motion
 
 
 class Part(NamedTuple):
-    """What a column may be of: a joint's position or speed, a place along an axis."""
+    """What a column may be of: a joint's position or speed, a place along an axis or
+    how it is turned there, the length of a tendon."""
 
     quantity: str
     name: str
@@ -43,7 +47,8 @@ def motions(
     times: np.ndarray,
     told: np.ndarray,
 ) -> dict[Part, np.ndarray]:
-    """Positions of all joints, named sites and bodies at some times, each ``(T,)``.
+    """Positions of all joints, named sites, bodies and tendons at some times, and how
+    they are turned, each ``(T,)``.
 
     Args:
         model: that moves.
@@ -60,40 +65,47 @@ def motions(
     for step in range(count):
         data.ctrl[actuators] = told[which[step]]
         mujoco.mj_forward(model, data) if step == 0 else None
-        rows.append(
-            np.concatenate(
-                [data.qpos, data.qvel, data.site_xpos.ravel(), data.xpos.ravel()]
-            )
-        )
+        rows.append([np.copy(getattr(data, name)) for name in STATE])
         mujoco.mj_step(model, data)
-    table = np.array(rows)[np.minimum(due, count - 1)]
-    return _by_part(model, table)
+    rows = [rows[at] for at in np.minimum(due, count - 1)]
+    state = (np.stack(each) for each in zip(*rows, strict=True))
+    return _by_part(model, dict(zip(STATE, state, strict=True)))
 
 
-def _by_part(model: mujoco.MjModel, table: np.ndarray) -> dict[Part, np.ndarray]:
+def _by_part(
+    model: mujoco.MjModel, state: Mapping[str, np.ndarray]
+) -> dict[Part, np.ndarray]:
+    """The motion of each part, ``(T,)``, from `STATE`, ``(T, n, ...)`` each."""
     found = {}
     for number in range(model.njnt):
         joint = model.joint(number)
         if prepared.hinged(model, number) and joint.name:
-            found[Part(JOINT, joint.name)] = table[:, joint.qposadr[0]]
-            found[Part(SPEED, joint.name)] = table[:, model.nq + joint.dofadr[0]]
-    base = model.nq + model.nv
-    for kind, count, first in (
-        (SITE, model.nsite, base),
-        (BODY, model.nbody, base + 3 * model.nsite),
+            found[Part(JOINT, joint.name)] = state["qpos"][:, joint.qposadr[0]]
+            found[Part(SPEED, joint.name)] = state["qvel"][:, joint.dofadr[0]]
+    for number in range(model.ntendon):
+        if name := model.tendon(number).name:
+            found[Part(TENDON, name)] = state["ten_length"][:, number]
+    for kind, count, places, frames in (
+        (SITE, model.nsite, state["site_xpos"], state["site_xmat"]),
+        (BODY, model.nbody, state["xpos"], state["xmat"]),
     ):
         for number in range(count):
             name = getattr(model, kind)(number).name
-            if name and name != "world":
-                for axis, letter in enumerate("xyz"):
-                    part = Part(kind, name, letter)
-                    found[part] = table[:, first + 3 * number + axis]
+            if not name or name == "world":
+                continue
+            for axis, letter in enumerate(AXES):
+                found[Part(kind, name, letter)] = places[:, number, axis]
+            for turn in TURNS:
+                turned = view.angle(frames[:, number], turn)
+                found[Part(kind, name, turn)] = turned
     return found
 
 
 def factors(model: mujoco.MjModel, part: Part) -> Mapping[str, float]:
     """What a part may be measured in, and how much of it makes one SI unit."""
-    turning = part.quantity in (JOINT, SPEED) and turns(model, part.name)
+    turning = part.axis in TURNS
+    if part.quantity in (JOINT, SPEED):
+        turning = turns(model, part.name)
     name = "rad" if turning else "m"
     return per_si(f"{name}/s" if part.quantity == SPEED else name)
 
@@ -104,7 +116,12 @@ def turns(model: mujoco.MjModel, joint: str) -> bool:
 
 
 def fit(
-    values: np.ndarray, moved: np.ndarray, units: Mapping[str, float], *, joint: bool
+    values: np.ndarray,
+    moved: np.ndarray,
+    units: Mapping[str, float],
+    *,
+    joint: bool,
+    turning: bool = False,
 ) -> Fit:
     """How well samples agree with a motion, in the unit in which they do best.
 
@@ -113,16 +130,19 @@ def fit(
         moved: the motion in SI units, ``(T,)``.
         units: that the samples may be in.
         joint: whether it is a joint's; these are preferred.
+        turning: whether it is how something is turned: whole turns are none.
     """
     good = np.isfinite(values) & np.isfinite(moved)
     best = Fit(-np.inf, next(iter(units)), 0.0)
     if good.sum() < 5 or np.ptp(moved[good]) < STILL or not np.ptp(values[good]):
         return best
-    seen, made = values[good], moved[good]
-    correlation = float(np.corrcoef(seen, made)[0, 1])
+    made = moved[good]
     for name, factor in units.items():
-        ratio = abs(np.log(seen.std() / factor / made.std()))
-        away = abs(seen.mean() / factor - made.mean()) / made.std()
+        seen = values[good] / factor
+        seen = np.unwrap(seen) if turning else seen
+        correlation = float(np.corrcoef(seen, made)[0, 1])
+        ratio = abs(np.log(seen.std() / made.std()))
+        away = abs(seen.mean() - made.mean()) / made.std()
         score = abs(correlation) - 0.3 * ratio - 0.1 * min(away, 3.0) + OWN * joint
         if score > best.score:
             best = Fit(float(score), name, correlation)

@@ -14,6 +14,7 @@ import numpy as np
 from bns.errors import FormatError
 from bns.gap.models.mjcf import command_steps, prepared, start, trees
 from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.models.mjcf.view import View
 from bns.models import mjcf as mjcf_file
 from bns.worlds.effects.base import (
     CommandEffect,
@@ -93,17 +94,17 @@ class Simulation:
             prepared.number(
                 model, "key", config.keyframe
             )  # there, before anything runs
-        self._views = {model.names: start.View.of(config, model)}
+        self._views = {model.names: View.of(config, model)}
 
     @property
     def model(self) -> mujoco.MjModel:
         """The nominal model, compiled."""
         return self.compiled(()).model
 
-    def _view(self, model: mujoco.MjModel) -> start.View:
+    def _view(self, model: mujoco.MjModel) -> View:
         """Where the observed channels are in a model: play is a joint more."""
         if model.names not in self._views:
-            self._views[model.names] = start.View.of(self.config, model)
+            self._views[model.names] = View.of(self.config, model)
         return self._views[model.names]
 
     def spec(self, effects: Sequence[Effect], *, held: bool = True) -> mujoco.MjSpec:

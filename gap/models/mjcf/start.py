@@ -1,14 +1,13 @@
-"""What is observed of a user's own model, from its physics states (`View`); and where a
-recorded trial begins: the state of the joints, and what was told before."""
+"""Where a recorded trial of a user's own model begins: the state of the joints, and
+what was told before."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
-from bns.gap.models.mjcf import prepared
 from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.models.mjcf.view import View
 from bns.worlds.trial import Trial
 
 STATE = "start"
@@ -25,76 +24,6 @@ BEFORE, STEP = "told_before", "told_before_step"
 
 STOOD = 0.3  # [s] over which a robot that nothing holds has left its first samples
 CLEARLY = 0.25  # of the squared error, less of which says what held it
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """Where each observed channel is found.
-
-    Attributes:
-        config: the description.
-        columns: per channel the column of the full physics state, -1 = kinematics.
-        parts: per channel the number of the site or body, -1 = it has a column.
-    """
-
-    config: OwnConfig
-    columns: tuple[int, ...]
-    parts: tuple[int, ...]
-
-    @classmethod
-    def of(cls, config: OwnConfig, model: mujoco.MjModel) -> "View":
-        """Find the channels in a model.
-
-        Raises:
-            UnknownNameError: a joint, site or body that the model lacks.
-        """
-        columns, parts = [], []
-        for item in config.seen:
-            kind = "joint" if item.quantity == "speed" else item.quantity
-            number = prepared.number(model, kind, item.part)
-            at = -1
-            if item.quantity == "joint":
-                at = 1 + int(model.jnt_qposadr[number])
-            elif item.quantity == "speed":
-                at = 1 + model.nq + int(model.jnt_dofadr[number])
-            elif item.quantity == "body":
-                at = _floating(model, number, item.axis)
-            columns.append(at)
-            parts.append(-1 if at >= 0 else number)
-        return cls(config, tuple(columns), tuple(parts))
-
-    def read(self, model: mujoco.MjModel, states: np.ndarray) -> np.ndarray:
-        """Readings ``(T, C)`` from full physics states ``(T, n)``."""
-        made = np.empty((len(states), len(self.columns)))
-        for channel, column in enumerate(self.columns):
-            if column >= 0:
-                made[:, channel] = states[:, column]
-        placed = [c for c, column in enumerate(self.columns) if column < 0]
-        if not placed:
-            return made
-        data = mujoco.MjData(model)
-        seen = [(self.config.seen[channel], self.parts[channel]) for channel in placed]
-        where = {"site": data.site_xpos, "body": data.xpos}
-        found = [where[s.quantity][part, s.axis : s.axis + 1] for s, part in seen]
-        made[:, placed] = np.nan
-        for row in np.flatnonzero(np.isfinite(states).all(axis=1)):
-            data.qpos[:] = states[row, 1 : 1 + model.nq]
-            mujoco.mj_kinematics(model, data)
-            made[row, placed] = np.concatenate(found)
-        return made
-
-    def place(self, data: mujoco.MjData, seen: np.ndarray) -> None:
-        """Set the observed joints to what was recorded, ``(C,)``."""
-        for channel, item in enumerate(self.config.seen):
-            if item.quantity == "joint":
-                data.qpos[self.columns[channel] - 1] = seen[channel]
-
-
-def _floating(model: mujoco.MjModel, body: int, axis: int) -> int:
-    """Column of the full physics state that holds the place of a body on a free joint;
-    -1 = it has none."""
-    joint = prepared.free_joint(model, body)
-    return 1 + int(model.jnt_qposadr[joint]) + axis if joint >= 0 else -1
 
 
 def free(model: mujoco.MjModel) -> frozenset[str]:

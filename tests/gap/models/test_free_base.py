@@ -79,7 +79,7 @@ def test_its_log_is_not_cut_and_columns_are_found(stander):
     (trial,) = own.read_log(str(log))
     assert len(trial.commands) > 400
     told = " ".join(found.guessed)
-    assert "no orientation is compared: trunk_qw" in told
+    assert "trunk_yaw, trunk_pitch, trunk_roll: from trunk_qx" in told
     told += " ".join(found.unsure)  # it hardly moves
     assert all(f"trunk_pos_{a}: body 'trunk' along {a} in m, by" in told for a in SEEN)
 

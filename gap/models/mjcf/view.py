@@ -1,0 +1,130 @@
+"""What is observed of a user's own model, from its physics states."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from bns.gap.models.mjcf import prepared
+from bns.gap.models.mjcf.config import AXES, TURNS, OwnConfig, Seen
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Where each observed channel is found.
+
+    Attributes:
+        config: the description.
+        columns: per channel the column of the full physics state, -1 = kinematics; of
+            how a free body is turned the first of its quaternion's.
+        parts: per channel the number of the site, body or tendon, -1 = it has a column.
+    """
+
+    config: OwnConfig
+    columns: tuple[int, ...]
+    parts: tuple[int, ...]
+
+    @classmethod
+    def of(cls, config: OwnConfig, model: mujoco.MjModel) -> "View":
+        """Find the channels in a model.
+
+        Raises:
+            UnknownNameError: a joint, site, body or tendon that the model lacks.
+        """
+        columns, parts = [], []
+        for item in config.seen:
+            kind = "joint" if item.quantity == "speed" else item.quantity
+            number = prepared.number(model, kind, item.part)
+            at = -1
+            if item.quantity == "joint":
+                at = 1 + int(model.jnt_qposadr[number])
+            elif item.quantity == "speed":
+                at = 1 + model.nq + int(model.jnt_dofadr[number])
+            elif item.quantity == "body":
+                at = _floating(model, number, item)
+            columns.append(at)
+            parts.append(-1 if at >= 0 else number)
+        return cls(config, tuple(columns), tuple(parts))
+
+    def read(self, model: mujoco.MjModel, states: np.ndarray) -> np.ndarray:
+        """Readings ``(T, C)`` from full physics states ``(T, n)``, one after the other:
+        angles go on beyond half a turn. NaN where a state is not valid."""
+        made = np.full((len(states), len(self.columns)), np.nan)
+        good = np.isfinite(states).all(axis=1)
+        placed = [c for c, column in enumerate(self.columns) if column < 0]
+        for channel, item in enumerate(self.config.seen):
+            column = self.columns[channel]
+            if column >= 0 and item.turning and good.any():
+                turned = Rotation.from_quat(
+                    states[good, column : column + 4], scalar_first=True
+                )
+                frames = turned.as_matrix().reshape(-1, 9)
+                made[good, channel] = angle(frames, TURNS[item.axis - len(AXES)])
+            elif column >= 0:
+                made[:, channel] = states[:, column]
+        if placed and good.any():
+            made[np.ix_(good, placed)] = self._placed(model, states[good], placed)
+        return made
+
+    def _placed(
+        self, model: mujoco.MjModel, states: np.ndarray, channels: Sequence[int]
+    ) -> np.ndarray:
+        """Readings ``(T, K)`` of channels that kinematics tell, of valid states."""
+        data, seen = mujoco.MjData(model), [self.config.seen[c] for c in channels]
+        where = {
+            ("site", False): data.site_xpos,
+            ("site", True): data.site_xmat,
+            ("body", False): data.xpos,
+            ("body", True): data.xmat,
+            ("tendon", False): data.ten_length[:, None],
+        }
+        found, sizes = [], []
+        for channel, item in zip(channels, seen, strict=True):
+            row = where[item.quantity, item.turning][self.parts[channel]]
+            found.append(row if len(row) != 3 else row[item.axis : item.axis + 1])
+            sizes.append(len(found[-1]))
+        tendons = any(item.quantity == "tendon" for item in seen)
+        rows = np.empty((len(states), sum(sizes)))
+        for number, state in enumerate(states):
+            data.qpos[:] = state[1 : 1 + model.nq]
+            mujoco.mj_kinematics(model, data)
+            if tendons:
+                mujoco.mj_comPos(model, data)
+                mujoco.mj_tendon(model, data)
+            rows[number] = np.concatenate(found)
+        parts = np.split(rows, np.cumsum(sizes)[:-1], axis=1)
+        made = [
+            angle(part, TURNS[item.axis - len(AXES)]) if item.turning else part[:, 0]
+            for item, part in zip(seen, parts, strict=True)
+        ]
+        return np.stack(made, axis=1)
+
+    def place(self, data: mujoco.MjData, seen: np.ndarray) -> None:
+        """Set the observed joints to what was recorded, ``(C,)``."""
+        for channel, item in enumerate(self.config.seen):
+            if item.quantity == "joint":
+                data.qpos[self.columns[channel] - 1] = seen[channel]
+
+
+def angle(frames: np.ndarray, turn: str) -> np.ndarray:
+    """Roll, pitch or yaw [rad], ``(T,)``, going on beyond half a turn.
+
+    Args:
+        frames: axes of what is turned, a row-major matrix each, ``(T, 9)``.
+        turn: one of `TURNS`.
+    """
+    if turn == "pitch":
+        made: np.ndarray = np.arcsin(np.clip(-frames[:, 6], -1.0, 1.0))
+        return made
+    over, under = (7, 8) if turn == "roll" else (3, 0)
+    return np.unwrap(np.arctan2(frames[:, over], frames[:, under]))
+
+
+def _floating(model: mujoco.MjModel, body: int, item: Seen) -> int:
+    """Column of the full physics state that holds where a body on a free joint is, or
+    the first of those of how it is turned; -1 = it has none."""
+    joint = prepared.free_joint(model, body)
+    first = 1 + int(model.jnt_qposadr[joint])
+    return -1 if joint < 0 else first + (3 if item.turning else item.axis)
