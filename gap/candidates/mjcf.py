@@ -29,6 +29,7 @@ EIGHTH = 0.125  # of a range: a plausible departure where nothing else is known
 WIDER = 10.0
 SLOWEST = 0.03  # [s] period of a loop
 FASTEST = 0.1  # of a clock, which may be as slow
+FADED = 0.2  # lost with each trial at most
 LEAST = 0.002  # of a limit in the model, which may be far beyond the robot's
 TILT = 0.5  # [rad] largest tilt of a body
 FREE = ((-np.pi, np.pi), (-1.0, 1.0))  # [rad], [m] of a joint without stops
@@ -58,6 +59,7 @@ EXCITE = {
     "command_delay": "steps",
     "command_lag": "steps",
     "command_gain": "large commands",
+    "command_fade": "the same commands in many trials",
     "command_offset": "any command",
     "command_dead_band": "small commands",
     "command_dead_zone": "small commands",
@@ -193,6 +195,9 @@ def _range(
     if name in ("command_delay", "reading_delay", "command_lag"):
         _channel(part, config)
         return 0.0, LATE[-1], "s"
+    if name == "command_fade":
+        _channel(part, config)
+        return 0.0, FADED, "1"
     if name in ("command_gain", "reading_gain"):
         _channel(part, config)
         return RATIOS[0], RATIOS[-1], "1"

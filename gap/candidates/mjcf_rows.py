@@ -43,14 +43,15 @@ BESIDE = (0.0, 0.02, -0.02)  # of its travel, beside which one is tried
 SOONER = 0.2  # of its travel, by which a stop may be sooner; later by a quarter of it
 MORE, FULL = (1.25, 1.6), 0.98  # limits that are tried where the model's own is reached
 TOLD = (0.05, 0.12, 0.2, 0.3, 0.4, 0.55)  # quantiles of what was told, for dead zones
+FADING = 3  # trials from which one sees that less is done in each
 EIGHTH = 0.125  # of the largest value: the plausible one
 OFFSET = 0.0625  # of the span of an offset
 
 # plausible departure and slack of what has no scale of its own (assumed): a gain of a
-# motor is known to 10 %, of a sensor, a gear and a tyre to 3 %, a delay to 40 ms; loops
-# run at 1 kHz, or at some 200 Hz; what balances a weight is known as a motor is, and
-# drag no better. A clock is known to 1 %; its slack is that of gains, which make a
-# robot as much faster or slower
+# motor is known to 10 %, of a sensor, a gear and a tyre to 3 %, a delay to 40 ms, a
+# battery to 1 % a trial; loops run at 1 kHz, or at some 200 Hz; what balances a weight
+# is known as a motor is, and drag no better. A clock is known to 1 %; its slack is that
+# of gains, which make a robot as much faster or slower
 PLAUSIBLE = {
     "actuator_gain": (0.1, 0.003),
     "actuator_kp": (0.05, 0.003),
@@ -63,6 +64,7 @@ PLAUSIBLE = {
     "geom_friction": (0.3, 0.0),
     "geom_radius": (0.03, 0.001),
     "geom_compliance": (0.5, 0.02),
+    "command_fade": (0.01, 0.0),
     "command_delay": (0.04, 8e-4),
     "command_lag": (0.04, 8e-4),
     "reading_delay": (0.04, 8e-4),
@@ -196,6 +198,8 @@ def _of(
         if levels:
             yield row(item.name, 1.0, third, smooth=False, levels=levels)
         return
+    if item.effect == "command_fade" and len(trials) < FADING:
+        return
     sd, slack = _plausible(item)
     late = item.effect in LATE
     step = LATER if late else sd if item.effect in TOUCHING else 0.0
@@ -206,6 +210,7 @@ def _of(
         slack=item.slack or slack,
         levels=(0.15, 0.3) if late else (),
         step=step,  # of a small one contacts show their chatter
+        per_trial=item.effect == "command_fade",
     )
 
 

@@ -29,6 +29,7 @@ USUAL = (
     "command_limit",
     "command_delay",
     "command_lag",
+    "command_fade",
     "reading_delay",
     "reading_gain",
     "reading_offset",
@@ -43,12 +44,13 @@ USUAL = (
 `actuator_kp` and `actuator_kd` of position servos, `actuator_gear` of servos of speed,
 `actuator_lag` of those whose control the model filters, `actuator_period` of all whose
 gains the description gives, a limit of force of these and of servos of speed,
-`actuator_gain` and `command_limit` of all but position servos, the tilt of what is
-bolted to the world, `gravity_compensation` and a fluid's numbers where the model has
-some; `joint_stop` of joints that are seen; `command_lag` of each command where there
-are few, and of all; `reading_delay` of each reading where there are few, else of
-places, by a camera, beside joints, by encoders; the radius of wheels and feet, and
-grip and softness of all that touch, where they touch something"""
+`actuator_gain` and `command_limit` of all but position servos, `command_fade` where
+there are none of these, the tilt of what is bolted to the world, `gravity_compensation`
+and a fluid's numbers where the model has some; `joint_stop` of joints that are seen;
+`command_lag` of each command where there are few, and of all; `reading_delay` of each
+reading where there are few, else of places, by a camera, beside joints, by encoders;
+the radius of wheels and feet, and grip and softness of all that touch, where they touch
+something"""
 PUSHED = ("joint_damping", "joint_friction", "body_mass")
 """... also on what is seen and has no motor: a block that is gripped, a door"""
 FEW = 6  # joints up to which `RARER` are considered, too; commands, readings
@@ -126,6 +128,7 @@ def _on_actuators(
         "command_limit": pushing,
         "command_dead_zone": pushing,
         "command_offset": tuple(c for c in channels if c not in pushing),
+        "command_fade": (ALL,) if len(pushing) == len(channels) else (),
     }
 
 

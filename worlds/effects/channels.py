@@ -17,7 +17,7 @@ from bns.worlds.effects.base import (
     factor,
     strength,
 )
-from bns.worlds.effects.command import lagged
+from bns.worlds.effects.command import Fading, lagged
 from bns.worlds.effects.parts import ANY, WIDE
 
 
@@ -88,6 +88,17 @@ class CommandGain(_Command):
     def change(self, told: np.ndarray, dt: float) -> np.ndarray:
         """The signal scaled, ``(S,)``."""
         return told * self["factor"]
+
+
+class CommandFade(Fading, _Command):
+    """Commands do less from trial to trial: one battery drives all of them."""
+
+    name = "command_fade"
+    memoryless = True
+
+    def change(self, told: np.ndarray, dt: float) -> np.ndarray:
+        """The signal scaled, ``(S,)``."""
+        return told * self.share
 
 
 class CommandOffset(_Command):

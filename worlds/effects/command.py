@@ -5,6 +5,7 @@ What effects on signals share is here too: wheel columns, spans of time, lags.
 
 from abc import abstractmethod
 from collections.abc import Iterator
+from typing import Self
 
 import numpy as np
 
@@ -32,6 +33,43 @@ MINIMUM_SPEED = round(8000 * SPEED_UNIT, 6)
 MAXIMUM_SPEED = round(17500 * SPEED_UNIT, 6)
 
 WHEEL = Choice("wheel", ("left", "right", "both"), "both", "which wheel is affected")
+
+
+class Fading(Effect):
+    """What arrives is less from trial to trial."""
+
+    parameters = (
+        strength(
+            "per_trial",
+            "1",
+            (0.0, 0.5),
+            "share lost with each trial; bounds assumed",
+            example=0.02,
+        ),
+        strength(
+            "trials",
+            "1",
+            (0, 1_000_000),
+            "run since the battery was full, before the first one",
+            example=10,
+            integer=True,
+            scales=False,
+        ),
+    )
+
+    @property
+    def is_nominal(self) -> bool:
+        """Whether nothing is lost, at all or yet."""
+        return super().is_nominal or not self["trials"]
+
+    def in_trial(self, since: int) -> Self:
+        """The effect after so many trials more."""
+        return type(self)({**self.values, "trials": self["trials"] + since})
+
+    @property
+    def share(self) -> float:
+        """What is left of what arrived at first."""
+        return float(np.exp(-self["per_trial"] * self["trials"]))
 
 
 def columns(effect: Effect, signal: ControlSignal) -> list[int]:

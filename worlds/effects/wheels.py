@@ -14,7 +14,7 @@ from bns.worlds.effects.base import (
     factor,
     strength,
 )
-from bns.worlds.effects.command import WHEEL, columns, lagged, spans
+from bns.worlds.effects.command import WHEEL, Fading, columns, lagged, spans
 
 
 class AxleLength(BodyEffect):
@@ -322,7 +322,7 @@ class BatterySag(ActuatorEffect):
         signal.values[active] *= left[active, None]
 
 
-class BatteryFade(ActuatorEffect):
+class BatteryFade(Fading, ActuatorEffect):
     """The speed reached falls from trial to trial.
 
     In an experiment the trials since the onset are counted; with a recurrence the
@@ -331,33 +331,6 @@ class BatteryFade(ActuatorEffect):
 
     name = "battery_fade"
     source = "assumed: speed in proportion to supply, exponential discharge"
-    parameters = (
-        strength(
-            "per_trial",
-            "1",
-            (0.0, 0.5),
-            "share of the speed lost with each trial; bounds assumed",
-            example=0.02,
-        ),
-        strength(
-            "trials",
-            "1",
-            (0, 1_000_000),
-            "driven since the battery was full, before the first one",
-            example=10,
-            integer=True,
-            scales=False,
-        ),
-    )
-
-    @property
-    def is_nominal(self) -> bool:
-        """Whether nothing is lost, at all or yet."""
-        return super().is_nominal or not self["trials"]
-
-    def in_trial(self, since: int) -> "BatteryFade":
-        """The effect after so many trials more."""
-        return type(self)({**self.values, "trials": self["trials"] + since})
 
     def _change(self, signal: ControlSignal, active: np.ndarray) -> None:
-        signal.values[active] *= np.exp(-self["per_trial"] * self["trials"])
+        signal.values[active] *= self.share

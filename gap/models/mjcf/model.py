@@ -13,7 +13,7 @@ from bns.gap.models.mjcf import cuts, log, masses, roughness, start
 from bns.gap.models.mjcf import effects as own_effects
 from bns.gap.models.mjcf.config import AXES, PLACES, TURNS, OwnConfig
 from bns.gap.models.mjcf.simulation import Simulation
-from bns.gap.recordings import segments
+from bns.gap.recordings import segments, trial_conditions
 from bns.storage import files
 from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Trial
@@ -203,7 +203,9 @@ class OwnModel(GapModel):
             if item and item.effect == "body_mass":
                 loads.setdefault(item.name, {})[name] = value
             elif item:
-                made.append(item.make(value))
+                made.append(
+                    item.make(value).in_trial(1)
+                )  # comes as what it has grown to
         for name, rows in loads.items():
             part = self._terms[name].fixed["part"]
             made += masses.changes(name, rows, part, self._bodies[part])
@@ -268,7 +270,12 @@ class OwnModel(GapModel):
         self, trials: Sequence[Trial], effects: Sequence[Sequence[Effect]]
     ) -> list[list[np.ndarray]]:
         """See `GapModel.simulate`: predicted samples, each ``(T, n_channels)``."""
-        pairs = [(trial, items) for items in effects for trial in trials]
+        numbers = trial_conditions.numbers(trials)
+        pairs = [
+            (trial, [item.in_trial(number) for item in items])
+            for items in effects
+            for trial, number in zip(trials, numbers, strict=True)
+        ]
         made = self.physics.predicted(pairs, self._parts)
         count = len(trials)
         return [made[at * count : (at + 1) * count] for at in range(len(effects))]

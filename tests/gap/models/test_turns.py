@@ -46,7 +46,7 @@ RATE = 50  # [Hz]
 NOISE = np.array([1e-3, 1e-3, 5e-3, 5e-3, 5e-3])
 
 
-def driven(folder, *, gear=1.0, yaw=0.0, seconds=3.0, trials=4):
+def driven(folder, *, gear=1.0, fade=0.0, yaw=0.0, seconds=3.0, trials=4):
     """A log of a cart that turns on the spot and drives off, in a frame of its own."""
     robot = mujoco.MjModel.from_xml_string(CART)
     robot.actuator_gear[0, 0] *= gear
@@ -63,7 +63,7 @@ def driven(folder, *, gear=1.0, yaw=0.0, seconds=3.0, trials=4):
             heading = (turned + yaw + np.pi) % (2 * np.pi) - np.pi
             seen = [place.real, place.imag, heading, *data.qpos[7:9]]
             rows.append([trial, step / RATE, *now, *rng.normal(seen, NOISE)])
-            data.ctrl[:] = now
+            data.ctrl[:] = now * np.exp(-fade * trial)
             mujoco.mj_step(robot, data, round(1 / RATE / 0.005))
     head = (
         "trial,time,left_wheel_cmd,right_wheel_cmd,x,y,heading,left_wheel,right_wheel"
@@ -183,6 +183,20 @@ def test_a_planted_gear_is_named_with_its_value(tmp_path):
     found = diagnose(own.read_log(str(log)), own, rows=TRIED, full=False)
     assert found.verdict.named == (("actuator_gear[left_wheel]",),)
     assert found.best.magnitudes[0] == pytest.approx(1.1, abs=0.02)
+
+
+def test_a_battery_that_fades_over_trials_is_named_with_its_value(tmp_path):
+    log = driven(tmp_path, fade=0.02, trials=6)
+    _, own = described(tmp_path, CART, log)
+    names = (*TRIED, "command_fade[all]", "joint_damping[all]", "actuator_gear[all]")
+    trials = own.read_log(str(log))
+    found = diagnose(trials, own, rows=names, full=False)
+    assert found.verdict.named == (("command_fade[all]",),)
+    assert found.best.magnitudes[0] == pytest.approx(0.02, abs=0.002)
+    effects = [own.parse(text) for text in found.best.effects]
+    (paths,) = own.simulate(trials, [effects])
+    last = trials[-1].observed[-1] - paths[-1][-1]
+    assert np.abs(last[3:]).max() < 0.1
 
 
 def test_the_length_of_a_tendon_is_told_and_read(tmp_path):
