@@ -14,6 +14,7 @@ from bns.gap.decomposition.row import Row
 
 FAR = 0.3  # prior standard deviations beyond which slopes are taken anew
 MOVED = 0.5  # the same for what is not in, where many may depart
+WATCHED = 16  # explanations beside those that are in whose slopes are taken anew there
 APART = 0.25  # plausible departures from which it counts how exact a row is simulated
 MEASURED = 4  # times that noise is measured from what it leaves
 ROUGH = 20.0  # [s] of recording for comparing these
@@ -305,8 +306,9 @@ def lasting(
     problem: Problem, point: Point, support: Iterable[str], values: np.ndarray
 ) -> Mapping[int, np.ndarray] | None:
     """A point's derivatives that are kept at other values: all if these are next to
-    where they were taken; where many may depart those of what is not in, if they are
-    not far, since taking all of them is what costs time. None = none are kept.
+    where they were taken; where many may depart those of what is not in, and if they
+    are far of what promises little beside it, since taking all of them is what costs
+    time (`descent` takes all near its best point). None = none are kept.
 
     Args:
         problem: the recording.
@@ -317,9 +319,15 @@ def lasting(
     away = np.abs((values - point.at) / problem.sd).max()
     if away <= FAR:
         return point.slopes
-    if not problem.model.many or away > MOVED:
+    if not problem.model.many:
         return None
-    inside = {k for n in {*support, *nuisances(problem)} for k in problem.terms[n]}
+    support, linear = frozenset(support), point.linear
+    anew = {*support, *nuisances(problem)}
+    if away > MOVED:
+        known = support & linear.terms.keys()
+        others = sorted(set(linear.free) - anew)
+        anew |= {*sorted(others, key=lambda n: linear.cost(known | {n}))[:WATCHED]}
+    inside = {k for name in anew for k in problem.terms[name]}
     return {k: slope for k, slope in point.slopes.items() if k not in inside}
 
 
