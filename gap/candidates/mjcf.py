@@ -33,6 +33,14 @@ FADED = 0.2  # lost with each trial at most
 LEAST = 0.002  # of a limit in the model, which may be far beyond the robot's
 TILT = 0.5  # [rad] largest tilt of a body
 FREE = ((-np.pi, np.pi), (-1.0, 1.0))  # [rad], [m] of a joint without stops
+MOST = {
+    "damping": 10.0,
+    "friction": 5.0,
+    "stribeck": 5.0,
+    "armature": 1.0,
+    "stiffness": 20.0,
+}
+"""largest number of a joint or tendon over the inertia that it moves, SI; assumed"""
 PLAY = 0.3  # [rad or m] largest play, or offset of an encoder
 RANGES = {
     "actuator_gear": (0.7, 1.4, "1"),
@@ -52,6 +60,9 @@ EXCITE = {
     "joint_armature": "sudden changes of speed of that joint",
     "joint_stiffness": "large excursions of that joint",
     "body_mass": "motion against gravity, or sudden changes of speed",
+    "tendon_damping": "fast motion of that tendon",
+    "tendon_friction": "slow motion and reversals of that tendon",
+    "tendon_stiffness": "large excursions of that tendon",
     "actuator_gain": "large commands",
     "geom_friction": "sliding",
     "geom_radius": "rolling, or steps",
@@ -262,6 +273,8 @@ def _of_model(
             return -0.9 * mass, max(2.0 * mass, lifted), "kg"
         size = float(np.sqrt(model.body_inertia[at].max() / max(mass, 1e-9)))
         return -size, size, "m"
+    if kind == "tendon":
+        return _of_tendon(name, at, model)
     return _of_joint(name, at, model)
 
 
@@ -279,17 +292,50 @@ def _of_joint(name: str, joint: int, model: mujoco.MjModel) -> tuple[float, floa
     if name in ("encoder_offset", "joint_backlash"):
         low = -PLAY if name == "encoder_offset" else 0.0
         return low, PLAY, "m" if slide else "rad"
-    now, high, unit = {
-        "joint_damping": (model.dof_damping[dof], 10.0 * inertia, "N m s/rad"),
-        "joint_friction": (model.dof_frictionloss[dof], 5.0 * inertia, "N m"),
-        "joint_stribeck": (0.0, 5.0 * inertia, "N m"),
-        "joint_armature": (model.dof_armature[dof], inertia, "kg m2"),
-        "joint_stiffness": (model.jnt_stiffness[joint], 20.0 * inertia, "N m/rad"),
-    }[name]
+    number = name.removeprefix("joint_")
+    now, unit = {
+        "damping": (model.dof_damping[dof], "N m s/rad"),
+        "friction": (model.dof_frictionloss[dof], "N m"),
+        "stribeck": (0.0, "N m"),
+        "armature": (model.dof_armature[dof], "kg m2"),
+        "stiffness": (model.jnt_stiffness[joint], "N m/rad"),
+    }[number]
     if slide:
         unit = {"N m s/rad": "N s/m", "N m": "N", "kg m2": "kg"}.get(unit, "N/m")
+    return *_about(now, MOST[number] * inertia), unit
+
+
+def _of_tendon(
+    name: str, tendon: int, model: mujoco.MjModel
+) -> tuple[float, float, str]:
+    """Lowest and highest value, and the unit, from the mass that it feels: that of the
+    joints, in the model's first pose, by its lever arms."""
+    data, step = mujoco.MjData(model), 1e-6
+    mujoco.mj_forward(model, data)
+    full, first = np.zeros((model.nv, model.nv)), data.ten_length[tendon]
+    mujoco.mj_fullM(model, data, full)
+    begun, arms = data.qpos.copy(), np.zeros(model.nv)
+    for dof in range(model.nv):
+        data.qpos[:] = begun
+        mujoco.mj_integratePos(model, data.qpos, step * np.eye(model.nv)[dof], 1.0)
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_tendon(model, data)
+        arms[dof] = (data.ten_length[tendon] - first) / step
+    felt = float(arms @ np.linalg.solve(full, arms))
+    number = name.removeprefix("tendon_")
+    now, unit = {
+        "damping": (model.tendon_damping[tendon], "N s/m"),
+        "friction": (model.tendon_frictionloss[tendon], "N"),
+        "stiffness": (model.tendon_stiffness[tendon], "N/m"),
+    }[number]
+    return *_about(now, MOST[number] / max(felt, 1e-9)), unit
+
+
+def _about(now: float | np.ndarray, most: float) -> tuple[float, float]:
+    """Lowest and highest of what is added to a number that may not be below 0."""
     now = float(np.ravel(now)[0])
-    return -now, float(max(high, 5.0 * now)), unit
+    return -now, float(max(most, 5.0 * now))
 
 
 def _names(model: mujoco.MjModel, kind: str) -> list[str]:
@@ -300,5 +346,6 @@ def _names(model: mujoco.MjModel, kind: str) -> list[str]:
         "body": model.nbody,
         "actuator": model.nu,
         "geom": model.ngeom,
+        "tendon": model.ntendon,
     }[kind]
     return [getattr(model, kind)(number).name for number in range(count)]

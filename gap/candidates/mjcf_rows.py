@@ -243,7 +243,7 @@ def _stop(item: Row, ends: np.ndarray | None) -> Iterable[Row]:
 def _plausible(item: Row) -> tuple[float, float]:
     """Plausible departure of a number, and how well it is known."""
     sd, slack = PLAUSIBLE.get(item.effect, (0.0, 0.0))
-    if item.effect.startswith("joint_"):
+    if item.effect.startswith(("joint_", "tendon_")):
         sd, slack = item.sd, SHARE * item.sd
     if not sd:
         offset = item.effect.endswith("_offset")

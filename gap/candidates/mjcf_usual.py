@@ -16,6 +16,9 @@ USUAL = (
     "joint_armature",
     "joint_stiffness",
     "joint_stop",
+    "tendon_damping",
+    "tendon_friction",
+    "tendon_stiffness",
     "body_mass",
     "body_tilt",
     "gravity_compensation",
@@ -51,6 +54,7 @@ and a fluid's numbers where the model has some; `joint_stop` of joints that are 
 reading where there are few, else of places, by a camera, beside joints, by encoders;
 the radius of wheels and feet, and grip and softness of all that touch, where they touch
 something"""
+TENDONS = ("tendon_damping", "tendon_friction", "tendon_stiffness")
 PUSHED = ("joint_damping", "joint_friction", "body_mass")
 """... also on what is seen and has no motor: a block that is gripped, a door"""
 FEW = 6  # joints up to which `RARER` are considered, too; commands, readings
@@ -75,6 +79,9 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
     owned = {int(model.jnt_bodyid[j]) for j in moved}
     seen = tuple(item.channel.name for item in config.seen)
     channels = tuple(item.channel.name for item in config.told)
+    tendons = tuple(
+        name for n in range(model.ntendon) if (name := model.tendon(n).name)
+    )
     of = {
         **_on_actuators(config, model),
         "joint_stop": [item.part for item in config.seen if item.quantity == "joint"],
@@ -82,6 +89,7 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
         "reading_delay": seen if 1 < len(seen) <= FEW else _by_camera(config),
         "reading_gain": seen,
         "reading_offset": seen,
+        **dict.fromkeys(TENDONS, tendons),
         "body_tilt": _bolted(model, owned),
         "fluid_density": (ALL,) if model.opt.density else (),
         "fluid_viscosity": (ALL,) if model.opt.viscosity else (),

@@ -1,5 +1,6 @@
 """Joints of any model and their actuators: friction, inertia, play, zero, gains."""
 
+from abc import abstractmethod
 from typing import Any, ClassVar
 
 import numpy as np
@@ -10,52 +11,69 @@ from bns.worlds.effects.base import BodyEffect, Parameter, factor, place, streng
 from bns.worlds.effects.parts import ALL, ANY, UNSERVOED, WIDE
 
 
-def _added(unit: str, number: str, example: float) -> Parameter:
-    doc = f"added to the joint's {number}, which stays 0 at least"
+def added(unit: str, number: str, example: float, what: str = "joint") -> Parameter:
+    """What is added to a number of a part, see `Parameter`."""
+    doc = f"added to the {what}'s {number}, which stays 0 at least"
     return strength("added", unit, (-WIDE, WIDE), doc, example=example)
 
 
-class _JointNumber(BodyEffect):
+class PartNumber(BodyEffect):
+    """Something is added to a number of a part.
+
+    Attributes:
+        field: what a `mujoco.MjSpec` calls it.
+    """
+
+    field: ClassVar[str]
+
+    @abstractmethod
+    def _held(self, spec: Any) -> list[Any]:
+        """The parts."""
+
+    def _write(self, spec: Any) -> None:
+        for item in self._held(spec):
+            value = np.array(getattr(item, self.field), dtype=float)
+            flat = value.reshape(-1)
+            flat[0] = max(flat[0] + self["added"], 0.0)
+            setattr(item, self.field, value if value.ndim else float(value))
+
+
+class _JointNumber(PartNumber):
     """Something is added to a number of a joint."""
 
     choices = parts.part("joint")
     source = "MuJoCo's joint model"
-    field: ClassVar[str]
 
-    def _write(self, spec: Any) -> None:
-        for joint in parts.joints(spec, self["part"]):
-            value = np.array(getattr(joint, self.field), dtype=float)
-            flat = value.reshape(-1)
-            flat[0] = max(flat[0] + self["added"], 0.0)
-            setattr(joint, self.field, value if value.ndim else float(value))
+    def _held(self, spec: Any) -> list[Any]:
+        return parts.joints(spec, self["part"])
 
 
 class JointDamping(_JointNumber):
     """A joint is damped more, or less, than the model says."""
 
     name, field, robots = "joint_damping", "damping", UNSERVOED
-    parameter = _added("N m s/rad or N s/m", "damping", 0.05)
+    parameter = added("N m s/rad or N s/m", "damping", 0.05)
 
 
 class JointFriction(_JointNumber):
     """A joint has more, or less, dry friction than the model says."""
 
     name, field, robots = "joint_friction", "frictionloss", UNSERVOED
-    parameter = _added("N m or N", "friction loss", 0.1)
+    parameter = added("N m or N", "friction loss", 0.1)
 
 
 class JointArmature(_JointNumber):
     """A joint carries more, or less, rotor inertia than the model says."""
 
     name, field, robots = "joint_armature", "armature", UNSERVOED
-    parameter = _added("kg m2 or kg", "armature", 0.02)
+    parameter = added("kg m2 or kg", "armature", 0.02)
 
 
 class JointStiffness(_JointNumber):
     """A joint is held by a spring that the model does not know."""
 
     name, field, robots = "joint_stiffness", "stiffness", ANY
-    parameter = _added("N m/rad or N/m", "stiffness", 2.0)
+    parameter = added("N m/rad or N/m", "stiffness", 2.0)
 
 
 class JointStribeck(BodyEffect):

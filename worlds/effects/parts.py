@@ -36,8 +36,8 @@ class Part(Choice):
     """A choice among the names of a model that is known later.
 
     Attributes:
-        kind: "joint", "body", "actuator", "geom" or "channel"; "model" = of the whole
-            of it, which is `ALL`.
+        kind: "joint", "body", "actuator", "tendon", "geom" or "channel"; "model" = of
+            the whole of it, which is `ALL`.
     """
 
     kind: str = "channel"
@@ -105,6 +105,11 @@ def bodies(spec: Any, which: str) -> list[Any]:
 def actuators(spec: Any, which: str) -> list[Any]:
     """Actuators of an `MjSpec` that a part stands for."""
     return _of(list(spec.actuators), which, "actuator of the model")
+
+
+def tendons(spec: Any, which: str) -> list[Any]:
+    """Tendons of an `MjSpec` that a part stands for."""
+    return _of(list(spec.tendons), which, "tendon of the model")
 
 
 def geoms(spec: Any, which: str) -> list[Any]:

@@ -50,7 +50,7 @@ SAMPLES = 31
 FILES = {  # in which the effects of a stage stand
     "command": ("command", "channels", "legs", "servo"),
     "actuator": ("wheels", "servo"),
-    "body": ("joints", "links", "wheels", "legs", "servo", "clock", "fluid"),
+    "body": ("joints", "tendons", "links", "wheels", "legs", "servo", "clock", "fluid"),
     "sensor": ("sensors", "channels", "light", "servo"),
     "tracking": ("tracking",),
 }

@@ -53,6 +53,26 @@ class TestJoints:
             [0.5, 0.3 * 12 / (12 + 4)], abs=1e-3
         )
 
+    def test_a_tendon_of_a_stiffness_holds_its_joint_by_its_lever_squared(self):
+        model = compiled("tendon_stiffness:part=cord,added=400", gravity=False)
+        assert at_rest(model).qpos == pytest.approx(
+            [0.5, 0.3 * 12 / (12 + 400 * 0.1**2)], abs=1e-3
+        )
+
+    def test_a_tendon_is_damped_and_rubs_as_a_joint_is_by_its_lever(self):
+        for what, joint in (
+            ("tendon_damping:part=cord,added=50", "joint_damping:part=elbow,added=0.5"),
+            (
+                "tendon_friction:part=cord,added=4",
+                "joint_friction:part=elbow,added=0.4",
+            ),
+        ):
+            one, other = (
+                at_rest(compiled(text, gravity=False), seconds=0.2)
+                for text in (what, joint)
+            )
+            assert one.qpos == pytest.approx(other.qpos, abs=1e-3)
+
     def test_stribeck_friction_fades_with_speed(self):
         model = compiled("joint_stribeck:part=pivot,torque=0.5,speed=0.2", xml=ROD)
         for speed in (0.02, 0.1, 0.2, 0.4):

@@ -1,4 +1,4 @@
-"""How bodies are turned, and how long tendons are: told apart, read, compared."""
+"""Rovers and tendons of a user: turns and lengths are told apart, and what departs."""
 
 import mujoco
 import numpy as np
@@ -199,26 +199,42 @@ def test_a_battery_that_fades_over_trials_is_named_with_its_value(tmp_path):
     assert np.abs(last[3:]).max() < 0.1
 
 
-def test_the_length_of_a_tendon_is_told_and_read(tmp_path):
+def pulled(folder, friction=0.0, seconds=24.0):
+    """A log of a finger whose tendon is pulled, and let go."""
     robot = mujoco.MjModel.from_xml_string(FINGER)
-    data, rows = mujoco.MjData(robot), []
-    for step in range(200):
-        told = np.round(1.0 + np.sin(step // 10), 3)
-        rows.append([step / RATE, told, data.qpos[0], data.ten_length[0]])
+    robot.tendon_frictionloss[0] += friction
+    rng, data, rows = np.random.default_rng(5), mujoco.MjData(robot), []
+    for step in range(round(seconds * RATE)):
+        told = np.round(1.0 + np.sin(step // 10) + 0.5 * np.sin(0.37 * (step // 10)), 3)
+        mujoco.mj_forward(robot, data)
+        seen = rng.normal([data.qpos[0], data.ten_length[0]], [2e-3, 1e-4])
+        rows.append([step / RATE, told, *seen])
         data.ctrl[:] = told
         mujoco.mj_step(robot, data, round(1 / RATE / 0.005))
-        mujoco.mj_forward(robot, data)
-    rows[0][3] = rows[1][3]
-    log = tmp_path / "log.csv"
+    log = folder / "log.csv"
     head = "time,pull_cmd,mcp,tendon_length"
     np.savetxt(log, rows, delimiter=",", header=head, comments="")
+    return log
+
+
+def test_the_length_of_a_tendon_is_told_and_read(tmp_path):
+    log = pulled(tmp_path, seconds=4.0)
     _, own = described(tmp_path, FINGER, log)
     (item,) = [item for item in own.config.seen if item.quantity == "tendon"]
     assert item.part == "flexor"
     (trial, *_) = own.read_log(str(log))
     ((path, *_),) = own.simulate([trial], [()])
     length = [item.name for item in own.channels].index("tendon_length")
-    assert np.nanmax(np.abs(path - trial.observed)[5:, length]) < 5e-4
+    assert np.nanmax(np.abs(path - trial.observed)[5:, length]) < 1e-3
+
+
+def test_a_tendon_that_rubs_is_named_with_its_value(tmp_path):
+    log = pulled(tmp_path, friction=0.3)
+    _, own = described(tmp_path, FINGER, log)
+    names = ("tendon_friction[flexor]", "tendon_damping[flexor]", "actuator_gain[pull]")
+    found = diagnose(own.read_log(str(log)), own, rows=names, full=False)
+    assert found.verdict.named == (("tendon_friction[flexor]",),)
+    assert found.best.magnitudes[0] == pytest.approx(0.3, abs=0.02)
 
 
 def test_a_quaternion_is_read_as_roll_pitch_and_yaw(tmp_path):
