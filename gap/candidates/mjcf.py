@@ -41,6 +41,7 @@ MOST = {
     "stiffness": 20.0,
 }
 """largest number of a joint or tendon over the inertia that it moves, SI; assumed"""
+SLACK = 0.02  # [m] of a tendon at most
 PLAY = 0.3  # [rad or m] largest play, or offset of an encoder
 RANGES = {
     "actuator_gear": (0.7, 1.4, "1"),
@@ -51,6 +52,7 @@ RANGES = {
     "geom_compliance": (0.2, 10.0, "1"),
     "geom_radius": (0.7, 1.4, "1"),
     "gravity_compensation": (-1.0, 1.0, "1"),
+    "tendon_slack": (0.0, SLACK, "m"),
     "log_clock": (-FASTEST, FASTEST, "1"),
 }
 """of effects on parts of the model that have the same on all of them"""
@@ -63,6 +65,7 @@ EXCITE = {
     "tendon_damping": "fast motion of that tendon",
     "tendon_friction": "slow motion and reversals of that tendon",
     "tendon_stiffness": "large excursions of that tendon",
+    "tendon_slack": "reversals of that tendon",
     "actuator_gain": "large commands",
     "geom_friction": "sliding",
     "geom_radius": "rolling, or steps",

@@ -19,6 +19,7 @@ USUAL = (
     "tendon_damping",
     "tendon_friction",
     "tendon_stiffness",
+    "tendon_slack",
     "body_mass",
     "body_tilt",
     "gravity_compensation",
@@ -55,6 +56,7 @@ reading where there are few, else of places, by a camera, beside joints, by enco
 the radius of wheels and feet, and grip and softness of all that touch, where they touch
 something"""
 TENDONS = ("tendon_damping", "tendon_friction", "tendon_stiffness")
+"""on every tendon; `tendon_slack` where it has a spring"""
 PUSHED = ("joint_damping", "joint_friction", "body_mass")
 """... also on what is seen and has no motor: a block that is gripped, a door"""
 FEW = 6  # joints up to which `RARER` are considered, too; commands, readings
@@ -82,6 +84,7 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
     tendons = tuple(
         name for n in range(model.ntendon) if (name := model.tendon(n).name)
     )
+    sprung = model.tendon_stiffness.reshape(model.ntendon, -1)
     of = {
         **_on_actuators(config, model),
         "joint_stop": [item.part for item in config.seen if item.quantity == "joint"],
@@ -90,6 +93,7 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
         "reading_gain": seen,
         "reading_offset": seen,
         **dict.fromkeys(TENDONS, tendons),
+        "tendon_slack": [n for n in tendons if sprung[model.tendon(n).id].any()],
         "body_tilt": _bolted(model, owned),
         "fluid_density": (ALL,) if model.opt.density else (),
         "fluid_viscosity": (ALL,) if model.opt.viscosity else (),

@@ -1,8 +1,9 @@
-"""Tendons of any model: damping, dry friction, stiffness."""
+"""Tendons of any model: damping, dry friction, stiffness, slack."""
 
 from typing import Any
 
 from bns.worlds.effects import parts
+from bns.worlds.effects.base import BodyEffect, strength
 from bns.worlds.effects.joints import PartNumber, added
 
 
@@ -36,3 +37,23 @@ class TendonStiffness(_TendonNumber):
 
     name, field = "tendon_stiffness", "stiffness"
     parameter = added("N/m", "stiffness", 50.0, "tendon")
+
+
+class TendonSlack(BodyEffect):
+    """A tendon's spring does not pull within a length: a belt that is not tight.
+
+    It is added to that of the model, half of it on either side.
+    """
+
+    name = "tendon_slack"
+    choices = parts.part("tendon")
+    source = "MuJoCo's tendon springs, which have such a length (springlength)"
+    robots = ("own",)
+    parameter = strength("slack", "m", (0.0, 1.0), "whole length", example=0.01)
+
+    def _write(self, spec: Any) -> None:
+        model = spec.copy().compile()
+        for item in parts.tendons(spec, self["part"]):
+            low, high = model.tendon_lengthspring[model.tendon(item.name).id]
+            half = self["slack"] / 2
+            item.springlength = (low - half, high + half)

@@ -73,6 +73,12 @@ class TestJoints:
             )
             assert one.qpos == pytest.approx(other.qpos, abs=1e-3)
 
+    def test_a_slack_tendon_pulls_from_its_end_on(self):
+        stiff = "tendon_stiffness:part=cord,added=1200"
+        slack = "tendon_slack:part=cord,slack=0.02"
+        held = at_rest(compiled(stiff, slack, gravity=False)).qpos[1]
+        assert 12 * (0.3 - held) == pytest.approx(120 * (0.1 * held - 0.01), abs=0.02)
+
     def test_stribeck_friction_fades_with_speed(self):
         model = compiled("joint_stribeck:part=pivot,torque=0.5,speed=0.2", xml=ROD)
         for speed in (0.02, 0.1, 0.2, 0.4):
