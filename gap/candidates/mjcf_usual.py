@@ -84,7 +84,6 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
     tendons = tuple(
         name for n in range(model.ntendon) if (name := model.tendon(n).name)
     )
-    sprung = model.tendon_stiffness.reshape(model.ntendon, -1)
     of = {
         **_on_actuators(config, model),
         "joint_stop": [item.part for item in config.seen if item.quantity == "joint"],
@@ -93,7 +92,7 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
         "reading_gain": seen,
         "reading_offset": seen,
         **dict.fromkeys(TENDONS, tendons),
-        "tendon_slack": [n for n in tendons if sprung[model.tendon(n).id].any()],
+        "tendon_slack": [n for n in tendons if _sprung(model, n)],
         "body_tilt": _bolted(model, owned),
         "fluid_density": (ALL,) if model.opt.density else (),
         "fluid_viscosity": (ALL,) if model.opt.viscosity else (),
@@ -110,6 +109,10 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
         else:
             made[name] = tuple(of.get(name, (ALL,)))
     return {name: parts for name, parts in made.items() if parts}
+
+
+def _sprung(model: mujoco.MjModel, tendon: str) -> bool:
+    return bool(np.any(model.tendon_stiffness[model.tendon(tendon).id]))
 
 
 def _on_actuators(
