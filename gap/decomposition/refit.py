@@ -141,7 +141,7 @@ def newton(
     names = [k for name in sorted(support) for k in problem.terms[name]]
     first = _rest(part, values, only)
     begun = values
-    for fine in (False, True):
+    for fine in (True,) if problem.model.one_step else (False, True):
         values, rest = _descended(
             part, begun, first, names, known, turns, only, slopes, fine=fine
         )

@@ -72,6 +72,7 @@ class GapModel(ABC):
         longest: seconds of a recording that are fitted; of a longer one each trial is
             shortened (`bns.gap.recordings.segments`).
         before: seconds after which a simulation begun at rest moves as the robot.
+        one_step: whether `paths` has one step alone, and no coarse one beside.
         singly: whether fits are started from single explanations alone: where there
             are more rows than a tangent at the nominal can tell apart.
         spread: plausible departures at which each row is tried by itself, beside its
@@ -94,6 +95,7 @@ class GapModel(ABC):
     longest: float = float("inf")
     before: float = 0.0
     starts: int = 4
+    one_step: bool = False
     singly: bool = False
     spread: tuple[float, ...] = ()
     odds: float = 3.0

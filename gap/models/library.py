@@ -23,6 +23,7 @@ class LibraryModel(GapModel):
     """
 
     known: Mapping[str, tuple[Row, ...]] = {}
+    one_step = True
 
     def remembered(self, rows: Sequence[Row]) -> tuple[Row, ...]:
         """Rows, kept so that effects can be made of them."""

@@ -58,6 +58,7 @@ class UnicycleModel(GapModel):
         }
 
     dt = STEP
+    one_step = True
 
     @property
     def least(self) -> np.ndarray:

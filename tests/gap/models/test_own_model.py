@@ -168,16 +168,27 @@ PARTS = {
     "body": "forearm",
     "actuator": "elbow_servo",
     "geom": "forearm",
+    "tendon": "cord",
     "model": "all",
 }
+CORD = """<tendon><fixed name="cord" stiffness="200"><joint joint="elbow" coef="0.1"/>
+  </fixed></tendon></mujoco>"""
+
+
+@pytest.fixture(scope="module")
+def corded(arm, tmp_path_factory):
+    """The arm with a tendon."""
+    path = tmp_path_factory.mktemp("corded") / "arm.xml"
+    path.write_text(arm.config.model.read_text().replace("</mujoco>", CORD))
+    return OwnModel(replace(arm.config, model=path), threads=1)
 
 
 @pytest.mark.parametrize("name", sorted(CLASSES))
-def test_every_effect_can_be_a_candidate(arm, name):
+def test_every_effect_can_be_a_candidate(corded, name):
     channel = "elbow" if name.startswith("reading") else "elbow_goal"
     part = PARTS.get(OWNERS.get(name, ""), channel)
-    config = replace(OwnConfig.read(ARM), effects={name: (part,)}, bounds={})
-    made = mjcf.candidates(config, arm.physics.model)
+    config = replace(corded.config, effects={name: (part,)}, bounds={})
+    made = mjcf.candidates(config, corded.physics.model)
     strengths = [item.name for item in CLASSES[name].parameters if item.scales]
     assert [item.parameter for item in made] == strengths
     for item in made:
@@ -211,15 +222,16 @@ UNFELT = {
 
 
 @pytest.mark.parametrize("name", sorted(set(CLASSES) - UNFELT))
-def test_every_effect_changes_the_motion_of_its_candidates(arm, told, name):
-    trials = mjcf_cases.record(arm, told[:1], [])
+def test_every_effect_changes_the_motion_of_its_candidates(corded, told, name):
+    trials = mjcf_cases.record(corded, [told[0], told[0]], [])
     channel = "elbow" if name.startswith("reading") else "elbow_goal"
     part = PARTS.get(OWNERS.get(name, ""), channel)
-    config = replace(OwnConfig.read(ARM), effects={name: (part,)}, bounds={})
+    config = replace(corded.config, effects={name: (part,)}, bounds={})
     most = 0.0
-    for item in mjcf.candidates(config, arm.physics.model):
+    for item in mjcf.candidates(config, corded.physics.model):
         magnitude = item.levels[0] if item.nominal == item.high else item.levels[-1]
-        (plain,), (changed,) = arm.simulate(trials, [(), (item.make(magnitude),)])
+        made = corded.simulate(trials, [(), (item.make(magnitude),)])
+        plain, changed = map(np.concatenate, made)
         assert np.isfinite(changed).all()
         most = max(most, np.abs(changed - plain).max())
     assert most > 1e-3  # a plane arm does not feel all ways to shift a mass
