@@ -30,13 +30,16 @@ class Body:
 
     Attributes:
         mass: [kg].
-        gyration: largest radius of gyration [m].
+        gyration: largest radius of gyration [m] about its centre of mass, with all that
+            is fixed to it: a load may sit there.
         spread: least second moment of the mass about its centre [kg m2].
+        whole: mass with all that is fixed to it [kg].
     """
 
     mass: float
     gyration: float
     spread: float
+    whole: float
 
     @classmethod
     def of(cls, model: mujoco.MjModel, name: str) -> "Body":
@@ -45,7 +48,16 @@ class Body:
         mass = max(float(model.body_mass[at]), 1e-9)
         inertia = model.body_inertia[at]
         spread = max(float(inertia.sum() / 2 - inertia.max()), 0.0)
-        return cls(mass, float(np.sqrt(inertia.max() / mass)), spread)
+        fixed = np.arange(model.nbody) == at
+        if model.body_weldid[at]:
+            fixed |= model.body_weldid == model.body_weldid[at]
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        away = np.linalg.norm(data.xipos[fixed] - data.xipos[at], axis=1)
+        masses = model.body_mass[fixed]
+        turned = float((model.body_inertia[fixed].max(axis=1) + masses * away**2).sum())
+        whole = max(float(masses.sum()), mass)
+        return cls(mass, float(np.sqrt(turned / whole)), spread, whole)
 
 
 def rows(item: Row, body: Body, excite: str) -> list[Row]:
@@ -56,7 +68,7 @@ def rows(item: Row, body: Body, excite: str) -> list[Row]:
         body: that it is of.
         excite: which commands make it felt.
     """
-    sd, slack = PLAUSIBLE * body.mass, item.slack or SLACK * body.mass
+    sd, slack = PLAUSIBLE * body.whole, item.slack or SLACK * body.whole
     part = item.fixed["part"]
     shared: dict[str, Any] = {
         "group": item.name,

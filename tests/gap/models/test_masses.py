@@ -9,7 +9,7 @@ from bns.gap.models.mjcf import masses
 from bns.gap.models.mjcf.masses import Body
 
 NAME = "body_mass[load]"
-BODY = Body(mass=0.9, gyration=0.11, spread=0.002)
+BODY = Body(mass=0.9, gyration=0.11, spread=0.002, whole=0.9)
 MODEL = """
 <mujoco><worldbody><body name="load">
   <joint name="swing" axis="0 1 0"/>
@@ -67,3 +67,20 @@ def test_mass_and_moments_are_one_explanation_that_covers_a_shifted_centre():
     assert [row.name for row in rows] == [NAME, *(f"{NAME}.m{a}" for a in "xyz")]
     assert {row.term for row in rows} == {NAME}
     assert rows[0].covers == tuple(f"body_centre.d{a}[load]" for a in "xyz")
+
+
+def test_a_load_may_sit_on_what_is_fixed_to_a_body():
+    text = """<mujoco><worldbody><body name="boom"><joint axis="0 0 1"/>
+      <inertial pos="0.5 0 0" mass="0.3" diaginertia="1e-9 0.025 0.025"/>
+      <body name="trunk" pos="1 0 0">
+        <inertial pos="0 0 0" mass="1.2" diaginertia="1e-3 1e-3 1e-3"/>
+        <body name="leg"><joint axis="0 1 0"/>
+          <inertial pos="0 0 0" mass="9" diaginertia="1 1 1"/></body></body>
+      </body></worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(text)
+    body = Body.of(model, "boom")
+    turned = 0.025 + 1e-3 + 1.2 * 0.5**2
+    assert (body.mass, body.whole) == pytest.approx((0.3, 1.5))
+    assert body.gyration == pytest.approx(np.sqrt(turned / 1.5))
+    leg = Body.of(model, "leg")
+    assert (leg.mass, leg.whole, leg.gyration) == pytest.approx((9, 9, 1 / 3))
