@@ -20,7 +20,7 @@ from bns.gap.decomposition.singles import Single, Singles, wide
 TURNS = 4  # of fitting and searching
 INSTEAD = 3  # explanations one of which another may replace
 RIVALS = 2  # explanations that may replace it
-SAME = 0.98  # cosine of what two explanations change, from which they are one
+SAME = 0.98  # cosine of what two explanations change, from which they are tied
 FEW = 2  # explanations that need no other start if they leave little
 ENOUGH = 1.2  # times what all explanations leave: little more
 NEARLY = 1.5  # the same where these, all together, only describe the recording
@@ -246,8 +246,8 @@ def _instead(tried: Singles, best: Point) -> Point:
 
 
 def _rivals(linear: Linear, name: str, others: Iterable[str]) -> list[str]:
-    """The explanations that change most alike to one, and not the same to the eye:
-    these are tied."""
+    """Names of the explanations that change most alike to one, but not the same: what
+    does is tied to it."""
     sizes = sorted((linear.alike(other, name), other) for other in others)
     near = [n for size, n in sizes if simpler.ALIKE <= size < SAME]
     return near[-RIVALS:]

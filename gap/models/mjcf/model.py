@@ -203,9 +203,8 @@ class OwnModel(GapModel):
             if item and item.effect == "body_mass":
                 loads.setdefault(item.name, {})[name] = value
             elif item:
-                made.append(
-                    item.make(value).in_trial(1)
-                )  # comes as what it has grown to
+                grown = item.make(value).in_trial(1)  # what grows comes as it has
+                made.append(grown)
         for name, rows in loads.items():
             part = self._terms[name].fixed["part"]
             made += masses.changes(name, rows, part, self._bodies[part])
