@@ -12,7 +12,14 @@ from bns.worlds.effects.parts import ALL, ANY, UNSERVOED, WIDE
 
 
 def added(unit: str, number: str, example: float, what: str = "joint") -> Parameter:
-    """What is added to a number of a part, see `Parameter`."""
+    """A parameter: what is added to a number of a part.
+
+    Args:
+        unit: of the number.
+        number: in words.
+        example: value that is felt.
+        what: the part is.
+    """
     doc = f"added to the {what}'s {number}, which stays 0 at least"
     return strength("added", unit, (-WIDE, WIDE), doc, example=example)
 
