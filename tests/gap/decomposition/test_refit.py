@@ -22,9 +22,9 @@ def noise(weight=1e4):
     )
 
 
-def load(slope=1.0):
-    """A problem whose prediction is the value of its one row; by the coarse step it is
-    so many times as large."""
+def load(slope=1.0, *, one_step=False):
+    """A problem whose prediction is the value of its one row; by the coarse step, if
+    there is one, it is so many times as large."""
     row, asked = Row("load", 0.0, 1.0, -100.0, 100.0), []
 
     def residual(values):
@@ -32,6 +32,7 @@ def load(slope=1.0):
         return (TRUE - values[0]) * SHAPE, None
 
     return asked, SimpleNamespace(
+        model=SimpleNamespace(one_step=one_step),
         rows=(row,),
         terms={"load": (0,)},
         nominal=np.zeros(1),
@@ -66,3 +67,12 @@ def test_where_the_coarse_step_leads_astray_the_fine_one_judges_each_step():
     values, _ = refit.newton(problem, begun, {"load"}, noise(100.0), turns=refit.STEPS)
     assert len(asked) > 3
     assert abs(values[0] - TRUE) < 1.0
+
+
+def test_a_model_of_one_step_is_asked_for_no_other():
+    asked, problem = load(one_step=True)
+    problem.predict = None
+    values, _ = refit.newton(
+        problem, np.array([10.0]), {"load"}, noise(), turns=refit.STEPS
+    )
+    assert values[0] == pytest.approx(TRUE, rel=1e-3)
