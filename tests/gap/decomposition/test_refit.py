@@ -70,7 +70,7 @@ def test_where_the_coarse_step_leads_astray_the_fine_one_judges_each_step():
 
 
 def test_a_model_of_one_step_is_asked_for_no_other():
-    asked, problem = load(one_step=True)
+    _, problem = load(one_step=True)
     problem.predict = None
     values, _ = refit.newton(
         problem, np.array([10.0]), {"load"}, noise(), turns=refit.STEPS
