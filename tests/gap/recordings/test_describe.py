@@ -10,6 +10,7 @@ from bns.gap.describe import describe
 from bns.gap.importers import tables
 from bns.gap.models.mjcf import cuts, matching, start
 from bns.gap.models.mjcf.model import OwnModel
+from bns.gap.models.mjcf.rehearsal import Part
 from bns.gap.recordings import load_recordings
 from tests.gap.own_robots import ARM, MOTORS, SERVOS, described
 
@@ -240,7 +241,31 @@ def test_a_word_that_one_part_alone_has_tells_which_it_is():
 def test_a_place_may_end_with_its_unit():
     column = tables.Column("marker_x_mm", np.zeros(2))
     places = {"site": ["marker"], "body": ["base"]}
-    assert matching.by_place([column], places) == {column.name: ("site", "marker", "x")}
+    found = matching.by_place([column], places)
+    assert found == {column.name: (Part("site", "marker", "x"),)}
+
+
+@pytest.mark.parametrize(
+    ("name", "part"),
+    [
+        ("trunk_yaw_deg", Part("body", "trunk", "yaw")),
+        ("heading", Part("body", "trunk", "yaw")),
+        ("pos_y", Part("body", "trunk", "y")),
+        ("theta", Part("body", "trunk", "yaw")),
+        ("flexor_length", Part("tendon", "flexor")),
+        ("cable", Part("tendon", "flexor")),
+    ],
+)
+def test_a_turn_a_place_and_a_length_are_told_by_their_names(name, part):
+    places = {"site": [], "body": ["world", "trunk"], "tendon": ["flexor"]}
+    column = tables.Column(name, np.zeros(2))
+    assert matching.by_place([column], places, "trunk") == {name: (part,)}
+
+
+@pytest.mark.parametrize("name", ["elbow_x_cmd", "x_rad", "speed"])
+def test_what_is_called_otherwise_is_of_no_place(name):
+    places = {"site": [], "body": ["world", "trunk"], "tendon": []}
+    assert not matching.by_place([tables.Column(name, np.zeros(2))], places, "trunk")
 
 
 def test_an_actuator_that_nothing_tells_is_listed(tmp_path):
