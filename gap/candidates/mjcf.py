@@ -283,10 +283,7 @@ def _of_model(
 
 def _of_joint(name: str, joint: int, model: mujoco.MjModel) -> tuple[float, float, str]:
     dof = int(model.jnt_dofadr[joint])
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    full = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, full)
+    _, full = _inertia(model)
     inertia = float(full[dof, dof])
     slide = int(model.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
     if name == "joint_stop":
@@ -313,11 +310,9 @@ def _of_tendon(
 ) -> tuple[float, float, str]:
     """Lowest and highest value, and the unit, from the mass that it feels: that of the
     joints, in the model's first pose, by its lever arms."""
-    data, step = mujoco.MjData(model), 1e-6
-    mujoco.mj_forward(model, data)
-    full, first = np.zeros((model.nv, model.nv)), data.ten_length[tendon]
-    mujoco.mj_fullM(model, data, full)
-    begun, arms = data.qpos.copy(), np.zeros(model.nv)
+    (data, full), step = _inertia(model), 1e-6
+    begun, first = data.qpos.copy(), float(data.ten_length[tendon])
+    arms = np.zeros(model.nv)
     for dof in range(model.nv):
         data.qpos[:] = begun
         mujoco.mj_integratePos(model, data.qpos, step * np.eye(model.nv)[dof], 1.0)
@@ -333,6 +328,14 @@ def _of_tendon(
         "stiffness": (model.tendon_stiffness[tendon], "N/m"),
     }[number]
     return *_about(now, MOST[number] / max(felt, 1e-9)), unit
+
+
+def _inertia(model: mujoco.MjModel) -> tuple[mujoco.MjData, np.ndarray]:
+    """A model in its first pose, and its inertia there, ``(nv, nv)``."""
+    data, full = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+    mujoco.mj_forward(model, data)
+    mujoco.mj_fullM(model, data, full)
+    return data, full
 
 
 def _about(now: float | np.ndarray, most: float) -> tuple[float, float]:

@@ -10,24 +10,21 @@ import numpy as np
 from bns.gap.decomposition import fit, levels, refit, search, simpler
 from bns.gap.decomposition.fit import Noise, Point, linearised, placed
 from bns.gap.decomposition.levels import Level
-from bns.gap.decomposition.linear import Linear, Support
+from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.noise import Memory
-from bns.gap.decomposition.problem import FAR, Problem
+from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.refit import newton
 from bns.gap.decomposition.shares import HeldOut
 from bns.gap.decomposition.singles import Single, Singles, wide
 
 TURNS = 4  # of fitting and searching
 INSTEAD = 3  # explanations one of which another may replace
-RIVALS = 2  # explanations that may replace it
-SAME = 0.98  # cosine of what two explanations change, from which they are tied
 FEW = 2  # explanations that need no other start if they leave little
 ENOUGH = 1.2  # times what all explanations leave: little more
 NEARLY = 1.5  # the same where these, all together, only describe the recording
 STRETCHED = 4.0  # deviations of slack that are no slack any more
 ROUNDS = 2  # of levels, and of what walkers scatter
 MARGIN = 1.02  # of the held-out error that an autoregression may cost
-SHARES = (1.0, 0.5, 0.2)  # of the way to where a linear model leads
 PATIENCE = 2  # points in a row that are no better than those before
 WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
 
@@ -91,7 +88,7 @@ def descend(
     support, near = frozenset(support), near if problem.model.many else None
     before = [near] if near else []
     passed: list[Point] = []
-    values = _nearer(problem, values, support, known)
+    values = refit.nearer(problem, values, support, known)
     for _ in range(TURNS):
         most = 3 if problem.model.singly else refit.STEPS
         values, rest = newton(
@@ -111,7 +108,7 @@ def descend(
         if len(tried) > PATIENCE and refit.better(problem, tried) in tried[:-PATIENCE]:
             return refit.better(problem, passed)
         support = found
-        values = _nearer(
+        values = refit.nearer(
             problem, placed(problem, linear, support, values), support, known
         )
     # the last fit was under the noise of the point before
@@ -121,22 +118,6 @@ def descend(
     )
     last = Point(values, support, rest, linear, slopes, known, at)
     return refit.better(problem, [last, *passed])
-
-
-def _nearer(
-    problem: Problem, values: np.ndarray, support: Iterable[str], known: Noise
-) -> np.ndarray:
-    """Values ``(R,)``, or shares of the way to them from the nominal model where these
-    leave less: what many explanations do is not the sum of what each does."""
-    if not problem.model.many:
-        return values
-    smooth = np.array([row.smooth and row.term in set(support) for row in problem.rows])
-    whole = np.where(smooth, values - problem.nominal, 0.0)
-    sets = [values - (1 - share) * whole for share in SHARES]
-    here, *made = problem.predict([problem.nominal, *sets], fine=False)
-    rest = np.nan_to_num(problem.gap)
-    left = [known.loss(rest - np.nan_to_num(path - here, nan=FAR)) for path in made]
-    return sets[int(np.argmin(left))]
 
 
 def decompose(tried: Singles) -> Point:
@@ -224,7 +205,7 @@ def _instead(tried: Singles, best: Point) -> Point:
     pairs = [
         (one, gone)
         for gone in sorted(support)
-        for one in _rivals(linear, gone, set(linear.free) - support)
+        for one in simpler.rivals(linear, gone, set(linear.free) - support)
     ]
     fits = {one.name: one for one in tried.among({name for name, _ in pairs})}
     for name, gone in pairs:
@@ -243,14 +224,6 @@ def _instead(tried: Singles, best: Point) -> Point:
         return best
     again = descend(problem, found.values, found.support, found.noise)
     return refit.better(problem, [best, _simplest(problem, again)])
-
-
-def _rivals(linear: Linear, name: str, others: Iterable[str]) -> list[str]:
-    """Names of the explanations that change most alike to one, but not the same: what
-    does is tied to it."""
-    sizes = sorted((linear.alike(other, name), other) for other in others)
-    near = [n for size, n in sizes if simpler.ALIKE <= size < SAME]
-    return near[-RIVALS:]
 
 
 def _renewed(problem: Problem, best: Point) -> Point:

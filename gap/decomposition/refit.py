@@ -17,6 +17,7 @@ DAMPING = (0.0, 2.0, 20.0, 200.0)  # added to the curvature, in units of the pri
 LONGEST = 4.0  # prior standard deviations of one step; of what is farther off, twice
 # as far: a load may be many times what its link plausibly departs by
 STILL = 0.02  # prior standard deviations below which a fit has converged
+SHARES = (1.0, 0.5, 0.2)  # of the way to where a linear model leads
 LOST = 1e3  # predicted by a simulation that diverged
 ROUNDING = 1e-6  # by which a fit may be worse
 REWEIGHED = 2  # times that residuals are weighed by what is left of them
@@ -107,6 +108,29 @@ def relinearised(problem: Problem, point: Point, known: Noise) -> Linear:
         left = made.rest(made.solve(point.support))
         weight = noise.weights(left, known.sd, problem.seen)
     return Linear.of(problem, design, units, whole, weight).correlated(known.lam)
+
+
+def nearer(
+    problem: Problem, values: np.ndarray, support: Iterable[str], known: Noise
+) -> np.ndarray:
+    """Values ``(R,)``, or shares of the way to them from the nominal model where these
+    leave less: what many explanations do is not the sum of what each does.
+
+    Args:
+        problem: the recording.
+        values: that a linear model leads to, ``(R,)``.
+        support: explanations that are in; rows set to a level keep it.
+        known: noise.
+    """
+    if not problem.model.many:
+        return values
+    smooth = np.array([row.smooth and row.term in set(support) for row in problem.rows])
+    whole = np.where(smooth, values - problem.nominal, 0.0)
+    sets = [values - (1 - share) * whole for share in SHARES]
+    here, *made = problem.predict([problem.nominal, *sets], fine=False)
+    rest = np.nan_to_num(problem.gap)
+    left = [known.loss(rest - np.nan_to_num(path - here, nan=LOST)) for path in made]
+    return sets[int(np.argmin(left))]
 
 
 def newton(
@@ -239,16 +263,17 @@ def _step(
     pull -= held * away / flat
     now = _height(problem, values, rest, which, known)
     low, high = problem.bounds
+    base = None if fine else problem.predict([values], fine=False, only=only)[0]
     for damping in DAMPING:
         step = np.linalg.solve(curvature + damping * np.eye(len(which)), pull)
         step *= min(1.0, 1 / ((np.abs(step) / longest).max() + 1e-30))
         there = values.copy()
         there[which] += step * problem.sd[which]
         there = np.clip(there, low, high)
-        if fine:
+        if base is None:
             left = _rest(problem, there, only)
         else:
-            base, made = problem.predict([values, there], fine=False, only=only)
+            (made,) = problem.predict([there], fine=False, only=only)
             left = rest - np.nan_to_num(made - base, nan=LOST)
         if _height(problem, there, left, which, known) <= now + ROUNDING:
             return there, left

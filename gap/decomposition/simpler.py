@@ -1,11 +1,12 @@
 """A fitted set made simpler: one explanation for several, another one in the place of
 one, and none that the others do as well."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from bns.gap.decomposition import levels, refit
 from bns.gap.decomposition.fit import Point
+from bns.gap.decomposition.linear import Linear
 from bns.gap.decomposition.problem import Problem
 
 WEAK = 0.05  # of what a set explains: so little may be left to the others
@@ -13,6 +14,8 @@ TRIED = 3  # of these, the weakest first
 SWAPPED = 30.0  # nats that another set may be worse by the linear model, to be fitted
 UNITED = 2  # levels that are fitted in place of two explanations
 SLIGHT = 0.25  # of a plausible departure: next to none
+SAME = 0.98  # cosine of what two explanations change, from which they are tied
+RIVALS = 2  # explanations that are tried in the place of another
 ALIKE = 0.4  # cosine of what two explanations change, from which one may undo the other
 
 
@@ -204,3 +207,17 @@ def _as_good(problem: Problem, other: Point, point: Point) -> bool:
     """Whether a simpler point has at least the evidence of another one."""
     least, here = refit.costs(problem, [other, point])
     return least <= here
+
+
+def rivals(linear: Linear, name: str, others: Iterable[str]) -> list[str]:
+    """Names of the explanations that change most alike to one, but not the same: what
+    does is tied to it.
+
+    Args:
+        linear: the problem made linear.
+        name: of the explanation.
+        others: that may be.
+    """
+    sizes = sorted((linear.alike(other, name), other) for other in others)
+    near = [n for size, n in sizes if ALIKE <= size < SAME]
+    return near[-RIVALS:]

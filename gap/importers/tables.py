@@ -90,10 +90,6 @@ class Table:
     def __contains__(self, name: str) -> bool:
         return name in self.names
 
-    def has(self, names: Sequence[str]) -> bool:
-        """Whether all these columns are there."""
-        return {*names} <= {*self.names}
-
 
 def reader(path: str | Path) -> Callable[[Path], Table] | None:
     """What reads a log; None if it is of no known kind."""
@@ -142,7 +138,8 @@ def turned(table: Table) -> Table:
     for column in table.columns:
         four = [column.name[:-1] + letter for letter in "xyzw"]
         stem = re.sub(QUATERNION, "", four[0][:-1])
-        if stem == four[0][:-1] or column.name != four[-1] or not table.has(four):
+        named = column.name == four[-1] and stem != four[0][:-1]
+        if not named or not all(name in table for name in four):
             continue
         values = np.stack([table[name] for name in four], axis=1)
         good = np.isfinite(values).all(axis=1) & values.any(axis=1)

@@ -88,9 +88,14 @@ class Seen:
     scatter: float
 
     @property
+    def way(self) -> str:
+        """The axis of a site or body, of `AXES` and `TURNS`; "" of what has none."""
+        return (*AXES, *TURNS)[self.axis] if self.quantity in PLACES else ""
+
+    @property
     def turning(self) -> bool:
         """Whether it is how a site or body is turned, and not where that is."""
-        return self.quantity in PLACES and self.axis >= len(AXES)
+        return self.way in TURNS
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, Windows
 from bns.gap.models.mjcf import cuts, log, masses, roughness, start
 from bns.gap.models.mjcf import effects as own_effects
-from bns.gap.models.mjcf.config import AXES, PLACES, TURNS, OwnConfig
+from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.models.mjcf.simulation import Simulation
 from bns.gap.recordings import segments, trial_conditions
 from bns.storage import files
@@ -358,7 +358,6 @@ def _carried(config: OwnConfig, free: frozenset[str]) -> list[dict[str, int]]:
     """
     found: dict[tuple[str, str], dict[str, int]] = {}
     for column, item in enumerate(config.seen):
-        axis = (*AXES, *TURNS)[item.axis]
-        if item.quantity in PLACES and item.part in free and axis in FLOOR:
-            found.setdefault((item.quantity, item.part), {})[axis] = column
+        if item.part in free and item.way in FLOOR:
+            found.setdefault((item.quantity, item.part), {})[item.way] = column
     return [*found.values()]

@@ -14,6 +14,7 @@ import numpy as np
 from bns.errors import FormatError
 from bns.gap.models.mjcf import command_steps, prepared, start, trees
 from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.models.mjcf.loads import Loads
 from bns.gap.models.mjcf.view import View
 from bns.models import mjcf as mjcf_file
 from bns.worlds.effects.base import (
@@ -33,20 +34,6 @@ EXACT = 0.2  # of the noise: predictions that differ by less are alike
 BY_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
 TRIED = 4  # trials on which steps are compared, and forces and contacts looked at
 LOOKED = 500  # moments of a trial at which these are looked at
-
-
-class Loads(NamedTuple):
-    """What the nominal motion takes.
-
-    Attributes:
-        forces: of each actuator that has a limit, over that, by name, ``(n,)``.
-        touching: names of the geoms that touch something.
-        travel: lowest and highest position of each hinge and slide, by name, ``(2,)``.
-    """
-
-    forces: Mapping[str, np.ndarray] = {}
-    touching: frozenset[str] = frozenset()
-    travel: Mapping[str, np.ndarray] = {}
 
 
 class _Group(NamedTuple):
@@ -180,30 +167,7 @@ class Simulation:
         Args:
             trials: recorded.
         """
-        model, seen, touching = self.model, [], set[int]()
-        places = []
-        for data in self._moments(trials):
-            seen.append(np.abs(data.actuator_force))
-            places.append(data.qpos.copy())
-            touching |= set(data.contact.geom.ravel().tolist())
-        went = np.array(places)
-        most = np.abs(model.actuator_forcerange).max(axis=1)
-        limited = np.flatnonzero(model.actuator_forcelimited).tolist()
-        return Loads(
-            {
-                model.actuator(number).name: np.array(seen)[:, number] / most[number]
-                for number in limited
-                if seen  # else it diverged at once
-            },
-            frozenset(model.geom(number).name for number in touching),
-            {
-                model.joint(number).name: np.array(
-                    [went[:, at].min(), went[:, at].max()]
-                )
-                for number, at in enumerate(model.jnt_qposadr)
-                if places and prepared.hinged(model, number)
-            },
-        )
+        return Loads.of(self.model, self._moments(trials))
 
     def apart(self, loads: Loads) -> None:
         """From now on what trees of the model do is simulated apart, where they can not

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from bns.gap.models.mjcf import prepared
-from bns.gap.models.mjcf.config import AXES, TURNS, OwnConfig, Seen
+from bns.gap.models.mjcf.config import OwnConfig, Seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class View:
                     states[good, column : column + 4], scalar_first=True
                 )
                 frames = turned.as_matrix().reshape(-1, 9)
-                made[good, channel] = angle(frames, TURNS[item.axis - len(AXES)])
+                made[good, channel] = angle(frames, item.way)
             elif column >= 0:
                 made[:, channel] = states[:, column]
         if placed and good.any():
@@ -73,20 +73,13 @@ class View:
     ) -> np.ndarray:
         """Readings ``(T, K)`` of channels that kinematics tell, of valid states."""
         data, seen = mujoco.MjData(model), [self.config.seen[c] for c in channels]
-        where = {
-            ("site", False): data.site_xpos,
-            ("site", True): data.site_xmat,
-            ("body", False): data.xpos,
-            ("body", True): data.xmat,
-            ("tendon", False): data.ten_length[:, None],
-        }
-        found, sizes = [], []
-        for channel, item in zip(channels, seen, strict=True):
-            row = where[item.quantity, item.turning][self.parts[channel]]
-            found.append(row if len(row) != 3 else row[item.axis : item.axis + 1])
-            sizes.append(len(found[-1]))
+        found = [
+            _found(data, item, self.parts[channel])
+            for channel, item in zip(channels, seen, strict=True)
+        ]
+        ends = np.cumsum([len(each) for each in found])
+        rows = np.empty((len(states), ends[-1]))
         tendons = any(item.quantity == "tendon" for item in seen)
-        rows = np.empty((len(states), sum(sizes)))
         for number, state in enumerate(states):
             data.qpos[:] = state[1 : 1 + model.nq]
             mujoco.mj_kinematics(model, data)
@@ -94,9 +87,9 @@ class View:
                 mujoco.mj_comPos(model, data)
                 mujoco.mj_tendon(model, data)
             rows[number] = np.concatenate(found)
-        parts = np.split(rows, np.cumsum(sizes)[:-1], axis=1)
+        parts = np.split(rows, ends[:-1], axis=1)
         made = [
-            angle(part, TURNS[item.axis - len(AXES)]) if item.turning else part[:, 0]
+            angle(part, item.way) if item.turning else part[:, 0]
             for item, part in zip(seen, parts, strict=True)
         ]
         return np.stack(made, axis=1)
@@ -108,12 +101,24 @@ class View:
                 data.qpos[self.columns[channel] - 1] = seen[channel]
 
 
+def _found(data: mujoco.MjData, item: Seen, part: int) -> np.ndarray:
+    """Where the numbers of a channel come to stand: one, or the axes of what is turned,
+    ``(9,)``."""
+    if item.quantity == "tendon":
+        return data.ten_length[part : part + 1]
+    frames = {"site": data.site_xmat, "body": data.xmat}
+    places = {"site": data.site_xpos, "body": data.xpos}
+    if item.turning:
+        return frames[item.quantity][part]
+    return places[item.quantity][part, item.axis : item.axis + 1]
+
+
 def angle(frames: np.ndarray, turn: str) -> np.ndarray:
     """Roll, pitch or yaw [rad], ``(T,)``, going on beyond half a turn.
 
     Args:
         frames: axes of what is turned, a row-major matrix each, ``(T, 9)``.
-        turn: one of `TURNS`.
+        turn: one of `config.TURNS`.
     """
     if turn == "pitch":
         made: np.ndarray = np.arcsin(np.clip(-frames[:, 6], -1.0, 1.0))

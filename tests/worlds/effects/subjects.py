@@ -136,3 +136,19 @@ def wheel_fields(model) -> dict[str, dict[str, bytes]]:
             and not key.endswith(derived)
         }
     return fields
+
+
+def built(*texts, xml=ARM, gravity=True) -> mujoco.MjModel:
+    """The arm, or another model, with effects given as text."""
+    spec = mujoco.MjSpec.from_string(xml)
+    if not gravity:
+        spec.option.gravity = [0, 0, 0]
+    return edited(spec, *texts)
+
+
+def at_rest(model, ctrl=(0.5, 0.3), seconds=4.0) -> mujoco.MjData:
+    """After servos have been told angles [rad] for a while."""
+    data = mujoco.MjData(model)
+    data.ctrl[: len(ctrl)] = ctrl[: model.nu]
+    mujoco.mj_step(model, data, nstep=round(seconds / model.opt.timestep))
+    return data

@@ -6,7 +6,7 @@ import pytest
 
 from bns.errors import BnsError, UnknownNameError
 from bns.worlds.effects import registry
-from tests.worlds.effects.subjects import ARM, edited
+from tests.worlds.effects.subjects import at_rest, built
 
 G = 9.81  # [m/s2]
 ROD = """
@@ -18,21 +18,6 @@ ROD = """
 <actuator><position name="servo" joint="pivot" kp="20" kv="2"/></actuator></mujoco>
 """
 """A thin rod of 0.6 kg and 0.4 m that hangs on one end; inertia m L^2 / 12."""
-
-
-def compiled(*texts, xml=ARM, gravity=True) -> mujoco.MjModel:
-    spec = mujoco.MjSpec.from_string(xml)
-    if not gravity:
-        spec.option.gravity = [0, 0, 0]
-    return edited(spec, *texts)
-
-
-def at_rest(model, ctrl=(0.5, 0.3), seconds=4.0) -> mujoco.MjData:
-    """After servos have been told angles [rad] for a while."""
-    data = mujoco.MjData(model)
-    data.ctrl[: len(ctrl)] = ctrl[: model.nu]
-    mujoco.mj_step(model, data, nstep=round(seconds / model.opt.timestep))
-    return data
 
 
 def moving(model, speed, seconds=1.0) -> mujoco.MjData:
@@ -48,46 +33,20 @@ def moving(model, speed, seconds=1.0) -> mujoco.MjData:
 
 class TestJoints:
     def test_a_spring_shares_the_servos_angle(self):
-        model = compiled("joint_stiffness:part=elbow,added=4", gravity=False)
+        model = built("joint_stiffness:part=elbow,added=4", gravity=False)
         assert at_rest(model).qpos == pytest.approx(
             [0.5, 0.3 * 12 / (12 + 4)], abs=1e-3
         )
 
-    def test_a_tendon_of_a_stiffness_holds_its_joint_by_its_lever_squared(self):
-        model = compiled("tendon_stiffness:part=cord,added=400", gravity=False)
-        assert at_rest(model).qpos == pytest.approx(
-            [0.5, 0.3 * 12 / (12 + 400 * 0.1**2)], abs=1e-3
-        )
-
-    def test_a_tendon_is_damped_and_rubs_as_a_joint_is_by_its_lever(self):
-        for what, joint in (
-            ("tendon_damping:part=cord,added=50", "joint_damping:part=elbow,added=0.5"),
-            (
-                "tendon_friction:part=cord,added=4",
-                "joint_friction:part=elbow,added=0.4",
-            ),
-        ):
-            one, other = (
-                at_rest(compiled(text, gravity=False), seconds=0.2)
-                for text in (what, joint)
-            )
-            assert one.qpos == pytest.approx(other.qpos, abs=1e-3)
-
-    def test_a_slack_tendon_pulls_from_its_end_on(self):
-        stiff = "tendon_stiffness:part=cord,added=1200"
-        slack = "tendon_slack:part=cord,slack=0.02"
-        held = at_rest(compiled(stiff, slack, gravity=False)).qpos[1]
-        assert 12 * (0.3 - held) == pytest.approx(120 * (0.1 * held - 0.01), abs=0.02)
-
     def test_stribeck_friction_fades_with_speed(self):
-        model = compiled("joint_stribeck:part=pivot,torque=0.5,speed=0.2", xml=ROD)
+        model = built("joint_stribeck:part=pivot,torque=0.5,speed=0.2", xml=ROD)
         for speed in (0.02, 0.1, 0.2, 0.4):
             force = moving(model, speed).actuator_force[-1]
             expected = 0.5 * (1e-3 + (1 - 1e-3) * np.exp(-((speed / 0.2) ** 2)))
             assert force == pytest.approx(-expected, rel=0.01)
 
     def test_stribeck_friction_holds_until_it_breaks_away(self):
-        model = compiled(
+        model = built(
             "joint_stribeck:part=pivot,torque=0.5,speed=0.2", xml=ROD, gravity=False
         )
         model.actuator_gainprm[0] = model.actuator_biasprm[0] = 0
@@ -99,7 +58,7 @@ class TestJoints:
             assert (data.qpos[0] > 0.1) == moves
 
     def test_a_keyframe_still_fits_a_model_with_more_joints_and_actuators(self):
-        model = compiled(
+        model = built(
             "joint_backlash:part=shoulder,play=0.1", "joint_stribeck:torque=1"
         )
         assert model.key_qpos[0] == pytest.approx([0.6, 0, 0.9])
@@ -107,17 +66,17 @@ class TestJoints:
         assert model.nu == model.key_ctrl.shape[1] > 2
 
     def test_backlash_lets_the_load_hang_on_its_stop(self):
-        model = compiled("joint_backlash:part=elbow,play=0.1")
+        model = built("joint_backlash:part=elbow,play=0.1")
         data = at_rest(model, seconds=6.0)
         shaft, play = data.joint("elbow").qpos[0], data.joint("elbow_play").qpos[0]
         assert play == pytest.approx(0.05, abs=2e-3)  # down is positive
-        plain = at_rest(compiled(), seconds=6.0)
+        plain = at_rest(built(), seconds=6.0)
         assert shaft == pytest.approx(plain.joint("elbow").qpos[0], abs=5e-3)
         assert model.joint("elbow_play").range == pytest.approx([-0.05, 0.05])
 
     def test_an_encoder_that_reads_too_much_stops_the_arm_short(self):
-        off = compiled("encoder_offset:part=elbow,added=0.1", gravity=False)
-        plain = compiled(gravity=False)
+        off = built("encoder_offset:part=elbow,added=0.1", gravity=False)
+        plain = built(gravity=False)
         there = at_rest(off, (0.5, 0.4))
         assert there.qpos == pytest.approx([0.5, 0.4], abs=1e-3)  # what it reports
         short = at_rest(plain, (0.5, 0.3))  # where it is
@@ -126,7 +85,7 @@ class TestJoints:
         )
 
     def test_end_stops_stay_on_the_robot_in_a_file_in_degrees(self):
-        off = compiled("encoder_offset:part=shoulder,added=0.1")
+        off = built("encoder_offset:part=shoulder,added=0.1")
         stops = np.deg2rad([-170, 170]) + 0.1
         assert off.joint("shoulder").range == pytest.approx(stops)
 
@@ -134,7 +93,7 @@ class TestJoints:
 class TestBodies:
     def test_a_longer_rod_is_harder_to_turn_by_the_square(self):
         plain, long = (
-            compiled(*texts, xml=ROD)
+            built(*texts, xml=ROD)
             for texts in ([], ["body_length:part=rod,factor=1.2"])
         )
         assert plain.dof_M0[0] == pytest.approx(0.6 * 0.4**2 / 3)
@@ -143,15 +102,15 @@ class TestBodies:
         assert long.body("rod").mass == plain.body("rod").mass
 
     def test_a_longer_upper_arm_carries_the_forearm_further_out(self):
-        long = compiled("body_length:part=upper_arm,factor=1.1")
+        long = built("body_length:part=upper_arm,factor=1.1")
         assert long.body("forearm").pos == pytest.approx([0.33, 0, 0])
         capsule = long.geom("upper_arm")
         assert capsule.size[1] == pytest.approx(0.165)
         assert capsule.pos == pytest.approx([0.165, 0, 0])
 
     def test_a_tilted_body_is_one_in_tilted_gravity(self):
-        tilted = compiled("body_tilt:part=rod,roll=0.3,pitch=-0.2", xml=ROD)
-        level = compiled(xml=ROD)
+        tilted = built("body_tilt:part=rod,roll=0.3,pitch=-0.2", xml=ROD)
+        level = built(xml=ROD)
         turn, gravity = np.zeros(4), np.zeros(3)
         mujoco.mju_axisAngle2Quat(
             turn, np.array([0.3, -0.2, 0]) / np.hypot(0.3, 0.2), -np.hypot(0.3, 0.2)
@@ -165,7 +124,7 @@ class TestBodies:
     @pytest.mark.parametrize("part", ["rod", "all"])
     def test_what_carries_half_of_a_weight_leaves_half_of_its_torque(self, part):
         xml = ROD.replace('name="rod"', 'name="rod" gravcomp="0.8"')
-        model = compiled(f"gravity_compensation:part={part},added=-0.3", xml=xml)
+        model = built(f"gravity_compensation:part={part},added=-0.3", xml=xml)
         data = mujoco.MjData(model)
         mujoco.mj_forward(model, data)
         held = data.qfrc_bias[0] - data.qfrc_gravcomp[0]
@@ -173,7 +132,7 @@ class TestBodies:
 
     def test_a_centre_of_mass_further_out_pulls_harder(self):
         def pull(*texts):
-            model = compiled(*texts, xml=ROD)
+            model = built(*texts, xml=ROD)
             data = mujoco.MjData(model)
             mujoco.mj_forward(model, data)
             return abs(data.qfrc_bias[0])
@@ -183,7 +142,7 @@ class TestBodies:
         assert pull("body_centre:part=rod,dy=0.05") == pytest.approx(0.6 * G * 0.2)
 
     def test_mass_pulls_and_friction_scales(self):
-        model = compiled("body_mass:part=forearm,added=0.1", "geom_friction:factor=0.5")
+        model = built("body_mass:part=forearm,added=0.1", "geom_friction:factor=0.5")
         assert model.body("forearm").mass == pytest.approx(0.5)
         assert model.geom_friction[:, 0] == pytest.approx(0.5)  # of 1
 
@@ -209,7 +168,7 @@ class TestSurfaces:
     @pytest.mark.parametrize("tyre", TYRES)
     def test_a_larger_wheel_rolls_farther_and_weighs_the_same(self, tyre):
         xml = ROLLER.format(tyre)
-        plain, large = compiled(xml=xml), compiled("geom_radius:factor=1.2", xml=xml)
+        plain, large = built(xml=xml), built("geom_radius:factor=1.2", xml=xml)
         assert large.body_mass == pytest.approx(plain.body_mass)
         for one, other in zip(large.body_inertia, plain.body_inertia, strict=True):
             assert sorted(one) == pytest.approx(sorted(other))
@@ -219,7 +178,7 @@ class TestSurfaces:
     def test_a_box_has_no_radius(self):
         xml = ROLLER.format('box" size="0.05 0.05 0.05')
         with pytest.raises(BnsError, match="not round"):
-            compiled("geom_radius:part=tyre,factor=1.2", xml=xml)
+            built("geom_radius:part=tyre,factor=1.2", xml=xml)
 
     def test_a_soft_floor_lets_sink_in(self):
         depths = []
@@ -227,7 +186,7 @@ class TestSurfaces:
             xml = ROLLER.format(f'sphere" size="0.05" solref="{solref}')
             xml = xml.replace('0.1"/>', f'0.1" solref="{solref}"/>')
             for texts in ([], ["geom_compliance:factor=2"]):
-                depths.append(-at_rest(compiled(*texts, xml=xml), (0.0,)).qpos[1])
+                depths.append(-at_rest(built(*texts, xml=xml), (0.0,)).qpos[1])
         assert depths[2:] == pytest.approx(depths[:2])
         assert 2 < depths[1] / depths[0] < 4  # the contact stiffens as it sinks in
 
@@ -235,7 +194,7 @@ class TestSurfaces:
 class TestActuators:
     def test_a_softer_servo_gives_way_more(self):
         droop = [
-            at_rest(compiled(*texts, xml=ROD), (0.0,)).qpos[0]
+            at_rest(built(*texts, xml=ROD), (0.0,)).qpos[0]
             for texts in ([], ["actuator_kp:factor=0.5"])
         ]
         for angle, kp in zip(droop, (20, 10), strict=True):
@@ -243,7 +202,7 @@ class TestActuators:
 
     def test_the_gain_on_speed_is_scaled_alone(self):
         for texts, kd in (([], 2.0), (["actuator_kd:part=servo,factor=0.5"], 1.0)):
-            model = compiled(*texts, xml=ROD)
+            model = built(*texts, xml=ROD)
             data = mujoco.MjData(model)
             data.qvel[0], data.qpos[0], data.ctrl[0] = 3.0, 0.1, 0.1
             mujoco.mj_forward(model, data)
@@ -253,7 +212,7 @@ class TestActuators:
         servo = '<velocity name="a" joint="knee" kv="9" gear="20"/>'
         gear = ["actuator_gear:part=a,factor=0.8"]
         for texts, ratio in (([], 20.0), (gear, 16.0)):
-            model = compiled(*texts, xml=LOOP.format(servo), gravity=False)
+            model = built(*texts, xml=LOOP.format(servo), gravity=False)
             data = mujoco.MjData(model)
             data.ctrl[0] = 4.0
             mujoco.mj_forward(model, data)
@@ -266,7 +225,7 @@ class TestActuators:
         xml = LOOP.format(f'<muscle joint="knee" lengthrange="-2 2" {force}/>')
         pulls = []
         for texts in ([], ["actuator_gain:factor=0.8"]):
-            model = compiled(*texts, xml=xml)
+            model = built(*texts, xml=xml)
             data = mujoco.MjData(model)
             for angle, activation in ((-0.5, 0.3), (0.0, 1.0), (1.5, 0.0)):
                 data.qpos[0], data.act[0] = angle, activation
@@ -277,7 +236,7 @@ class TestActuators:
         assert min(np.abs(pulls)) > 0.001  # all three are felt
 
     def test_a_limited_servo_pushes_no_harder(self):
-        model = compiled("actuator_torque_limit:part=shoulder_servo,factor=0.25")
+        model = built("actuator_torque_limit:part=shoulder_servo,factor=0.25")
         data = mujoco.MjData(model)
         data.ctrl[:] = 2.5
         mujoco.mj_forward(model, data)
@@ -286,22 +245,22 @@ class TestActuators:
     def test_what_an_actuator_lacks_is_said(self):
         bare = ROD.replace(' kv="2"', "")
         with pytest.raises(BnsError, match=r"'servo' has no damping gain"):
-            compiled("actuator_kd:factor=2", xml=bare)
+            built("actuator_kd:factor=2", xml=bare)
         with pytest.raises(BnsError, match="no force range"):
-            compiled("actuator_torque_limit:factor=0.5", xml=bare)
+            built("actuator_torque_limit:factor=0.5", xml=bare)
 
 
 class TestParts:
     def test_all_a_pattern_and_a_name(self):
         gains = [
-            compiled(f"actuator_gain:part={part},factor=0.5").actuator_gainprm[:, 0]
+            built(f"actuator_gain:part={part},factor=0.5").actuator_gainprm[:, 0]
             for part in ("all", "*_servo", "elbow_*", "elbow_servo")
         ]
         assert np.array(gains).tolist() == [[15, 6], [15, 6], [30, 6], [30, 6]]
 
     def test_an_unknown_one_gets_a_suggestion(self):
         with pytest.raises(UnknownNameError, match="Did you mean 'elbow'"):
-            compiled("joint_damping:part=elbwo,added=1")
+            built("joint_damping:part=elbwo,added=1")
 
     def test_former_names_are_read_and_light_sensors_keep_theirs(self):
         old = registry.parse("sensor_gain:part=elbow,factor=1.5")
@@ -339,10 +298,10 @@ def test_a_loop_in_a_computer_is_one_with_its_period(period):
                 path.append(data.qpos[0])
         return np.array(path)
 
-    real = moved(compiled(xml=LOOP.format('<motor joint="knee"/>')), loop=True)
+    real = moved(built(xml=LOOP.format('<motor joint="knee"/>')), loop=True)
     servo = LOOP.format(f'<position name="a" joint="knee" kp="{KP}" kv="{KD}"/>')
     apart = [
-        np.std(real - moved(compiled(*texts, xml=servo), loop=False))
+        np.std(real - moved(built(*texts, xml=servo), loop=False))
         for texts in ((), (f"actuator_period:part=a,period={period}",))
     ]
     assert apart[1] < 0.3 * apart[0]
@@ -353,7 +312,7 @@ def test_a_loop_in_a_computer_is_one_with_its_period(period):
 )
 def test_a_valve_that_is_slow_follows_by_its_time_constant(dynamics, begins):
     xml = LOOP.format(f'<general name="a" joint="knee" gainprm="2" {dynamics}/>')
-    model = compiled("actuator_lag:part=a,added=0.1", xml=xml)
+    model = built("actuator_lag:part=a,added=0.1", xml=xml)
     data = mujoco.MjData(model)
     data.ctrl[0] = 1.0
     constant = begins + 0.1
@@ -368,7 +327,7 @@ def test_drag_goes_with_the_number_of_the_medium(number, speed, degree):
     xml = LOOP.format("").replace("<mujoco>", f'<mujoco><option {number}="900"/>')
     drags = []
     for texts, times in (([], 1), ([], 2), ([f"fluid_{number}:factor=1.5"], 1)):
-        model = compiled(*texts, xml=xml.replace('damping="0.05"', ""), gravity=False)
+        model = built(*texts, xml=xml.replace('damping="0.05"', ""), gravity=False)
         data = mujoco.MjData(model)
         data.qvel[0] = times * speed
         mujoco.mj_forward(model, data)
@@ -380,13 +339,13 @@ def test_drag_goes_with_the_number_of_the_medium(number, speed, degree):
 def test_a_valve_that_integrates_has_no_time_constant():
     xml = LOOP.format('<general name="a" joint="knee" dyntype="integrator"/>')
     with pytest.raises(BnsError, match="'a' has dynamics without a time constant"):
-        compiled("actuator_lag:part=a,added=0.1", xml=xml)
+        built("actuator_lag:part=a,added=0.1", xml=xml)
 
 
 def test_the_period_of_a_loop_with_a_damping_ratio_is_refused():
     servo = LOOP.format('<position name="a" joint="knee" kp="25" dampratio="1"/>')
     with pytest.raises(BnsError, match="'a' has a damping ratio"):
-        compiled("actuator_period:part=a,period=0.005", xml=servo)
+        built("actuator_period:part=a,period=0.005", xml=servo)
 
 
 @pytest.mark.parametrize(
@@ -401,6 +360,6 @@ def test_a_stop_is_met_beside_those_that_the_model_has(limits, ends):
     joint = 'name="knee" axis="0 1 0"'
     xml = LOOP.format('<motor joint="knee"/>').replace(joint, f"{joint} {limits}")
     xml = xml.replace("<mujoco>", '<mujoco><compiler angle="radian"/>')
-    model = compiled("joint_stop:part=knee,high=0.3", xml=xml)
+    model = built("joint_stop:part=knee,high=0.3", xml=xml)
     assert model.jnt_limited[0]
     assert tuple(model.jnt_range[0]) == pytest.approx(ends)
