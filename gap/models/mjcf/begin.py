@@ -7,6 +7,7 @@ import numpy as np
 
 from bns.gap.models.mjcf import guesses, prepared, start
 from bns.gap.models.mjcf.channels import Work, compiled, tolds
+from bns.gap.models.mjcf.config import AXES
 from bns.gap.models.mjcf.measured import replayed
 from bns.worlds.data.units import factor
 
@@ -23,7 +24,7 @@ def hold(work: Work) -> None:
     bodies = tuple(prepared.loose(work.model))
     carried = start.free(work.model)
     if not bodies or any(
-        part.axis and part.name in carried for _, part, _ in work.seen
+        part.axis in AXES and part.name in carried for _, part, _ in work.seen
     ):
         return
     held = replace(work, model=compiled(work.path, tolds(work), bodies))

@@ -79,6 +79,25 @@ def test_a_stand_is_found_and_its_log_is_cut(tmp_path, hung, floor, why):
     )
 
 
+def test_a_stand_is_found_of_a_robot_that_logs_how_its_base_is_turned(tmp_path, hung):
+    rows = np.genfromtxt(hung[2], delimiter=",", names=True)
+    turned = np.random.default_rng(0).normal([1, 0, 0, 0], 1e-3, (len(rows), 4))
+    log, names = tmp_path / "log.csv", [*rows.dtype.names]
+    table = np.column_stack([*(rows[name] for name in names), turned])
+    head = ",".join([*names, *(f"trunk_q{letter}" for letter in "wxyz")])
+    np.savetxt(log, table, delimiter=",", header=head, comments="")
+    _, own = described(tmp_path, model(), log)
+    assert own.config.held == ("trunk",) and own.config.cut > 0
+    assert [item.way for item in own.config.seen if item.turning] == [
+        "yaw",
+        "pitch",
+        "roll",
+    ]
+    trials = own.read_log(str(log))
+    (paths,) = own.simulate(trials[:1], [()])
+    assert np.abs(paths[0][:, -3:]).max() < 1e-9
+
+
 def test_a_robot_on_the_floor_is_not_held(tmp_path):
     found, own = described(tmp_path, model(), recorded(tmp_path, stand=False))
     assert not own.config.held and "held" not in found.toml
