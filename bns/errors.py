@@ -52,6 +52,9 @@ class UnknownNameError(BnsError):
         if close:
             super().__init__(f"{said} Did you mean {close[0]!r}?{end}")
             return
+        if not self.known:
+            super().__init__(f"{said} There is none.{end}")
+            return
         said += " Available: "
         room = LONGEST - len(said) - len(end) - len(", ... (10000 in all).")
         listed, left = ", ".join(self.known), len(self.known)
