@@ -110,6 +110,8 @@ def rows(
         if item.effect == "body_mass":
             body = bodies[item.fixed["part"]]
             made += masses.rows(item, body, EXCITE[item.effect])
+        elif item.later:
+            made.append(item)
         elif item.effect == "joint_stop":
             made += _stop(item, (ends or {}).get(item.fixed["part"]))
         else:
@@ -121,6 +123,16 @@ def rows(
     if stepped:
         made.append(Row(STEP, 1.0, 0.5, -1.0, 2.0, nuisance=True, step=0.5))
     return tuple(made)
+
+
+def centre(part: str, body: Body) -> list[Row]:
+    """Candidates that a body's mass covers: where its centre of mass lies.
+
+    Args:
+        part: name of the body.
+        body: that.
+    """
+    return masses.centre(part, body, EXCITE["body_centre"])
 
 
 def grouped(candidates: Sequence[Row]) -> list[Row]:
@@ -147,6 +159,26 @@ def grouped(candidates: Sequence[Row]) -> list[Row]:
                     slack=0.0,
                     joins=tuple(item.name for item in parts),
                 )
+            )
+    return made
+
+
+def motors(candidates: Sequence[Row]) -> list[Row]:
+    """Further candidates: a motor of another strength, where both gains of its servo
+    are considered; it is each of them at once.
+
+    Args:
+        candidates: of a model.
+    """
+    known = {item.name: item for item in candidates}
+    made = []
+    for item in candidates:
+        part = item.fixed.get("part")
+        pair = tuple(f"actuator_{gain}[{part}]" for gain in ("kp", "kd"))
+        name = f"actuator_gain[{part}]"
+        if item.name == pair[0] and pair[1] in known and name not in known:
+            made.append(
+                replace(item, name=name, effect="actuator_gain", slack=0.0, joins=pair)
             )
     return made
 

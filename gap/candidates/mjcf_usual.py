@@ -60,9 +60,16 @@ TENDONS = ("tendon_damping", "tendon_friction", "tendon_stiffness")
 PUSHED = ("joint_damping", "joint_friction", "body_mass")
 """... also on what is seen and has no motor: a block that is gripped, a door"""
 FEW = 6  # joints up to which `RARER` are considered, too; commands, readings
-RARER = ("joint_backlash", "body_length", "command_dead_zone", "command_offset")
+RARER = (
+    "joint_backlash",
+    "encoder_offset",
+    "body_length",
+    "command_dead_zone",
+    "command_offset",
+)
 """the same of a model of few joints: many would cost more than they tell; a dead
-zone of the commands to all but position servos, a trim of the commands to these"""
+zone of the commands to all but position servos, a trim of the commands to these and a
+zero of their encoders"""
 TOUCHING = ("geom_radius", "geom_friction", "geom_compliance")
 """effects that nothing shows where nothing touches"""
 
@@ -140,6 +147,11 @@ def _on_actuators(
     pushing = tuple(c for n, c in zip(told, channels, strict=True) if n not in servos)
     return named | {
         "actuator_period": (ALL,) if any(item.kd for item in config.told) else (),
+        "encoder_offset": tuple(
+            model.joint(joint).name
+            for joint in (prepared.driven(model, n) for n in told if n in servos)
+            if joint >= 0
+        ),
         "command_limit": pushing,
         "command_dead_zone": pushing,
         "command_offset": tuple(c for c in channels if c not in pushing),

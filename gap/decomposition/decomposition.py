@@ -6,7 +6,16 @@ from functools import cached_property
 
 import numpy as np
 
-from bns.gap.decomposition import descent, flexible, onset, refit, rest, shares, ties
+from bns.gap.decomposition import (
+    descent,
+    flexible,
+    onset,
+    refit,
+    rest,
+    shares,
+    simpler,
+    ties,
+)
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.onset import Onset
@@ -22,6 +31,7 @@ EDGE = 0.01  # plausible departures from a bound that are at it
 WITHIN = 0.1  # of what explanations leave: all but that is within the model's slack
 SILENT = 1e-3  # weighted square of what a plausible departure changes: no evidence
 FELT = 0.02  # of the floor's variance: a gap below shows in no picture
+ALONE = 0.1  # the same of one of many features, where the others show none
 LARGE = 2.0  # variances of the floor: more than heavy tails of any camera's noise
 SCATTER = 3.0  # times what differs between repeats
 BEYOND_LATE = 25.0  # variances of the floor: five times as large as all it scatters
@@ -251,7 +261,12 @@ def _settled(
     if support != point.support:
         point = refit.refitted(problem, point, support)
         size = _Sizes.of(problem, start, point, known)
-    if point.support and size.foretells_worse(problem, start, point):
+    other = simpler.renamed(problem, point)
+    if other is not point:
+        point, size = other, _Sizes.of(problem, start, other, known)
+    most = rest.most(start.rest, known, size.inside)
+    unseen = size.before <= 0 and most < ALONE  # nothing to explain
+    if point.support and (unseen or size.foretells_worse(problem, start, point)):
         point = refit.refitted(problem, point, frozenset())
         size = _Sizes.of(problem, start, point, known)
     return problem, point, size, unconfirmed

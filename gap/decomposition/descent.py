@@ -309,9 +309,9 @@ def _simple(tried: Singles) -> list[Point]:
     Where many depart, what the tangent finds does if it is enough by itself."""
     problem, start = tried.problem, tried.start
     made: dict[Single, Point] = {}
-    if problem.model.many:
-        made = _from(tried, _leading(problem, tried.by_tangent))
-        if any(enough(problem, point, 1) for point in made.values()):
+    for one in _leading(problem, tried.by_tangent) if problem.model.many else []:
+        made |= _from(tried, [one])
+        if enough(problem, made[one], 1):
             return list(made.values())
     leading = _leading(problem, tried.fitted)
     made |= _from(tried, [one for one in leading if one not in made])

@@ -89,7 +89,7 @@ def smooth(problem: Problem, values: np.ndarray) -> list[int]:
     return [
         number
         for number, row in enumerate(problem.rows)
-        if (row.smooth or values[number] != row.nominal)
+        if row.sloped(values[number])
         and not (row.nuisance and not row.low < values[number] < row.high)
     ]
 

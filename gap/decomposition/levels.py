@@ -151,7 +151,7 @@ def _by_itself(linear: Linear, term: str) -> tuple[float, Support]:
 def _departures(row: Row, spread: Sequence[float]) -> list[float]:
     """Levels of a row, and values as many plausible departures from the nominal."""
     found = {value for value in row.levels if value != row.nominal}
-    for size in spread if row.smooth else ():
+    for size in spread if row.sloped(row.nominal) else ():
         for value in (row.nominal - size * row.sd, row.nominal + size * row.sd):
             if row.low <= value <= row.high:
                 found.add(value)

@@ -134,6 +134,10 @@ class Corrected(GapModel):
         """See `GapModel.effect`."""
         return self.model.effect(term, values)
 
+    def covered(self, term: str, values: Mapping[str, float]) -> Mapping[str, float]:
+        """See `GapModel.covered`."""
+        return self.model.covered(term, values)
+
     def motion(self, features: np.ndarray) -> np.ndarray:
         """See `GapModel.motion`."""
         return self.model.motion(features)

@@ -2,7 +2,8 @@
 which of several is the best."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -18,6 +19,7 @@ LONGEST = 4.0  # prior standard deviations of one step; of what is farther off, 
 # as far: a load may be many times what its link plausibly departs by
 STILL = 0.02  # prior standard deviations below which a fit has converged
 SHARES = (1.0, 0.5, 0.2)  # of the way to where a linear model leads
+BACK = 8  # rows of a fit of which each is tried at its nominal value
 LOST = 1e3  # predicted by a simulation that diverged
 ROUNDING = 1e-6  # by which a fit may be worse
 REWEIGHED = 2  # times that residuals are weighed by what is left of them
@@ -204,8 +206,7 @@ def _descended(
         which = [
             k
             for k in names
-            if (part.rows[k].smooth or values[k] != part.nominal[k])
-            and not part.rows[k].stepped
+            if part.rows[k].sloped(values[k]) and not part.rows[k].stepped
         ]
         if not which:
             break
@@ -213,11 +214,13 @@ def _descended(
         if slopes is None or far or any(k not in slopes for k in which):
             slopes, at = part.slopes(values, which, only=only), values
         moved = _step(part, values, rest, which, known, slopes, only, fine)
-        if moved is None:
-            if at is values:
-                break
+        if moved is None and at is not values:
             slopes = None  # were of elsewhere
             continue
+        if moved is None:
+            moved = _back(part, values, rest, which, known, only, fine)
+        if moved is None:
+            break
         change = np.abs((moved[0] - values)[which] / part.sd[which]).max()
         values, rest = moved
         if change < STILL:
@@ -263,21 +266,66 @@ def _step(
     pull -= held * away / flat
     now = _height(problem, values, rest, which, known)
     low, high = problem.bounds
-    base = None if fine else problem.predict([values], fine=False, only=only)[0]
+    tried = _Tried(problem, values, rest, only, fine)
     for damping in DAMPING:
         step = np.linalg.solve(curvature + damping * np.eye(len(which)), pull)
         step *= min(1.0, 1 / ((np.abs(step) / longest).max() + 1e-30))
         there = values.copy()
         there[which] += step * problem.sd[which]
         there = np.clip(there, low, high)
-        if base is None:
-            left = _rest(problem, there, only)
-        else:
-            (made,) = problem.predict([there], fine=False, only=only)
-            left = rest - np.nan_to_num(made - base, nan=LOST)
+        left = tried.rest(there)
         if _height(problem, there, left, which, known) <= now + ROUNDING:
             return there, left
     return None
+
+
+def _back(
+    problem: Problem,
+    values: np.ndarray,
+    rest: np.ndarray,
+    which: Sequence[int],
+    known: Noise,
+    only: list[int] | None,
+    fine: bool,
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Values with one of some rows nominal again, if that lowers the loss: where a foot
+    lands a step sooner or later slopes may lead nowhere. None if none does."""
+    away = [k for k in which if values[k] != problem.nominal[k]]
+    if not problem.model.many or not 1 < len(away) <= BACK:
+        return None
+    best, least = None, _height(problem, values, rest, which, known) - ROUNDING
+    tried = _Tried(problem, values, rest, only, fine)
+    for number in away:
+        there = values.copy()
+        there[number] = problem.nominal[number]
+        left = tried.rest(there)
+        height = _height(problem, there, left, which, known)
+        if height < least:
+            best, least = (there, left), height
+    return best
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """Residuals of values that are tried, from values and residuals that are known: at
+    the fine step, or by what changes at the coarse one."""
+
+    problem: Problem
+    values: np.ndarray
+    known: np.ndarray
+    only: list[int] | None
+    fine: bool
+
+    @cached_property
+    def _base(self) -> np.ndarray:
+        return self.problem.predict([self.values], fine=False, only=self.only)[0]
+
+    def rest(self, values: np.ndarray) -> np.ndarray:
+        """Of values of all rows ``(R,)``, ``(N, C)``."""
+        if self.fine:
+            return _rest(self.problem, values, self.only)
+        (made,) = self.problem.predict([values], fine=False, only=self.only)
+        return self.known - np.nan_to_num(made - self._base, nan=LOST)
 
 
 def _departure(

@@ -148,6 +148,17 @@ def excess(rest: np.ndarray, known: Floor, inside: np.ndarray) -> float:
     return float(_by_feature(rest, known, inside) @ count / max(count.sum(), 1))
 
 
+def most(rest: np.ndarray, known: Floor, inside: np.ndarray) -> float:
+    """The same of the feature in which it is largest: one joint of twelve.
+
+    Args:
+        rest: residuals, ``(N, C)``.
+        known: the floor.
+        inside: which residuals count, ``(N, C)``.
+    """
+    return float(_by_feature(rest, known, inside).max(initial=0.0))
+
+
 def beyond(
     rest: np.ndarray, motion: np.ndarray, known: Floor, inside: np.ndarray, share: float
 ) -> float:

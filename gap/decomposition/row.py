@@ -27,6 +27,8 @@ class Row:
         smooth: whether there is a slope at the nominal.
         stepped: whether the motion changes in steps with the value, so that only a
             search among values fits it.
+        later: whether it is looked at in the place of what covers it alone: it has no
+            slope at the nominal.
         nuisance: fitted always and never an answer.
         step: for differences; 0 = a tenth of `sd`.
         inexact: share of what it changes to which the simulation shows it at best: less
@@ -58,6 +60,7 @@ class Row:
     levels: tuple[float, ...] = ()
     smooth: bool = True
     stepped: bool = False
+    later: bool = False
     nuisance: bool = False
     step: float = 0.0
     inexact: float = 0.01
@@ -95,6 +98,10 @@ class Row:
         whole = about[self.parameter].integer
         given = {**self.fixed, self.parameter: round(value) if whole else value}
         return registry.make(self.effect, **given)
+
+    def sloped(self, value: float) -> bool:
+        """Whether it has a column at a value: a slope, or the secant from nominal."""
+        return (self.smooth and not self.later) or value != self.nominal
 
     def inward(self, value: float, step: float) -> float:
         """A step from a value: the other way, or shorter, where bounds are nearer."""

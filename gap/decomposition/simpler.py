@@ -4,7 +4,7 @@ one, and none that the others do as well."""
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from bns.gap.decomposition import levels, refit
+from bns.gap.decomposition import fit, levels, refit
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Linear
 from bns.gap.decomposition.problem import Problem
@@ -77,15 +77,55 @@ def narrowed(problem: Problem, point: Point) -> Point:
         problem: the recording.
         point: a fitted set.
     """
+    for name, covered in _covered(problem, point, later=False):
+        support = (point.support - {name}) | set(covered)
+        other = refit.refitted(problem, point, support)
+        point = other if _as_good(problem, other, point) else point
+    return point
+
+
+def renamed(problem: Problem, point: Point) -> Point:
+    """A point with as few as do of what an explanation covers in its place, of what is
+    looked at for that alone (`Row.later`): a centre of mass that lies elsewhere along
+    one axis for a load of next to no mass.
+
+    Args:
+        problem: the recording.
+        point: a fitted set.
+    """
+    for name, covered in _covered(problem, point, later=True):
+        others = (point.support - {name}) & set(point.linear.terms)
+        mine = {problem.rows[k].name: point.values[k] for k in problem.terms[name]}
+        same = problem.model.covered(name, mine)
+        where = {term: problem.terms[term][0] for term in covered}
+        order = sorted(covered, key=lambda n: -abs(same[n]) / problem.sd[where[n]])
+        for count in range(1, len(order) + 1):
+            values = fit.placed(problem, point.linear, others, point.values)
+            for term in order[:count]:
+                values[where[term]] = same[term]
+            begun, support = replace(point, values=values), {*others, *order[:count]}
+            other = refit.fitted_at(problem, begun, support)
+            if _as_good(problem, other, point):
+                point = other
+                break
+    return point
+
+
+def _covered(
+    problem: Problem, point: Point, *, later: bool
+) -> Iterator[tuple[str, list[str]]]:
+    """Explanations of a point whose first number departs next to nothing, and what they
+    cover; of what is looked at in their place alone, or of the rest."""
     for name in sorted(point.support & set(point.linear.covers)):
         first = problem.terms[name][0]
-        covered = point.linear.covers[name] & set(problem.terms)
         off = point.values[first] - problem.nominal[first]
+        covered = [
+            term
+            for term in sorted(point.linear.covers[name] & set(problem.terms))
+            if problem.rows[problem.terms[term][0]].later == later
+        ]
         if covered and abs(off) < SLIGHT * problem.sd[first]:
-            support = (point.support - {name}) | covered
-            other = refit.refitted(problem, point, support)
-            point = other if _as_good(problem, other, point) else point
-    return point
+            yield name, covered
 
 
 def pruned(problem: Problem, point: Point) -> Point:

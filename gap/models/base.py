@@ -194,6 +194,17 @@ class GapModel(ABC):
             values: of its rows.
         """
 
+    def covered(self, term: str, values: Mapping[str, float]) -> Mapping[str, float]:
+        """Values of rows that an explanation covers and that do nearly what it does;
+        empty = they are found by their slopes.
+
+        Args:
+            term: name of the explanation.
+            values: of its rows.
+        """
+        del term, values
+        return {}
+
     def parse(self, text: str) -> Effect:
         """An effect as a diagnosis with this model writes it."""
         return registry.parse(text)

@@ -13,6 +13,8 @@ from bns.worlds.data.units import factor
 
 HELD = 0.5  # of the error on the ground, less of which says that a stand holds a robot
 
+HIGH = 0.3  # [m] above where it would stand: it does not (assumed)
+
 
 def hold(work: Work) -> None:
     """Whether a stand holds the robot: there is nothing to stand on, or its joints move
@@ -77,12 +79,15 @@ def begin(work: Work) -> None:
         )
     elif pose is None and loose:
         pose = guesses.nearest(work.model, first)
-        work.start = {"recorded": True, "settle": guesses.SETTLE}
-        work.start |= {"keyframe": pose} if pose else {}
+        stands = _stands(work, pose)
+        work.start = {"recorded": True, "keyframe": pose, "settle": guesses.SETTLE}
+        for key, given in (("keyframe", pose), ("settle", stands)):
+            if not given:
+                del work.start[key]
+        how = f"settling on the floor for {guesses.SETTLE:g} s" if stands else "aloft"
         work.unsure.append(
             "start: the robot is free and trials begin in no pose of the model, so "
-            "each begins where its joints were recorded, settling on the floor for "
-            f"{guesses.SETTLE:g} s; give a keyframe for the rest"
+            f"each begins where it was recorded, {how}; give a keyframe for the rest"
         )
     elif pose is None:
         work.start = {"recorded": True}
@@ -95,6 +100,18 @@ def begin(work: Work) -> None:
         work.start |= {"settle": settle} if settle else {}
         what = f"keyframe {pose!r}" if pose else "the model's own pose"
         work.guessed.append(f"start: at rest in {what}, settling for {settle:g} s")
+
+
+def _stands(work: Work, pose: str) -> bool:
+    """Whether a free robot stands on something where trials begin: in a pose it settles
+    on the floor, as high as it was seen if that was."""
+    data = guesses.posed(work.model, pose, guesses.SETTLE)
+    for column, part, unit in work.seen:
+        if part.quantity == "body" and part.axis == "z":
+            at = np.nanmedian([column.values[rows[:1]] for rows in work.rows])
+            if abs(data.body(part.name).xpos[2] - at * factor(unit)) > HIGH:
+                return False
+    return bool(data.ncon)
 
 
 def _stood(work: Work, rows: np.ndarray) -> mujoco.MjData:

@@ -20,8 +20,9 @@ def arriving(
     rest: np.ndarray,
     config: OwnConfig,
     dt: float,
-) -> np.ndarray:
-    """Commands at each step after the effects, settling included, ``(S, K)``.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Commands at each step after the effects: those of the last `LEAD` before, and
+    those of the trial, settling included, ``(S, K)`` each.
 
     Args:
         trial: recorded.
@@ -45,7 +46,7 @@ def arriving(
     for effect in effects:
         if isinstance(effect, CommandEffect) and effect.stage == "command":
             signal = replace(signal, values=effect.apply(signal, on, rng))
-    return signal.values[extra:]
+    return signal.values[:extra], signal.values[extra:]
 
 
 def stepped(trial: Trial, dt: float) -> tuple[np.ndarray, np.ndarray]:

@@ -78,6 +78,8 @@ class Seen:
         axis: of a site or body, in the world frame: number among `AXES` and `TURNS`.
         noise: standard deviation of its measurement, in its unit.
         scatter: of what the robot itself scatters, per square root of a second.
+        floats: whether it tells, with others, the state of a free body
+            (`floating.told`).
     """
 
     channel: Channel
@@ -86,6 +88,14 @@ class Seen:
     axis: int
     noise: float
     scatter: float
+    floats: bool = False
+
+    @property
+    def state(self) -> str:
+        """What it tells of the state in which a trial begins: a joint, by its name, or
+        the way of a free body; "" = nothing."""
+        joint = self.part if self.quantity == "joint" else ""
+        return f"{self.part}.{self.way}" if self.floats else joint
 
     @property
     def way(self) -> str:

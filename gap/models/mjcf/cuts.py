@@ -104,8 +104,9 @@ def _refined(
 ) -> tuple[list[Trial], float]:
     """Trials with starts that were fitted in so many turns, fewer if they stay, and how
     far a motion was from one in proportion, in deviations of its noise."""
-    joints = [k for k, item in enumerate(config.seen) if item.quantity == "joint"]
+    joints = [k for k, item in enumerate(config.seen) if item.state]
     made, noise = list(trials), np.array([config.seen[k].noise for k in joints])
+    turning = [k for k in joints if config.seen[k].turning]
     expected: list[np.ndarray] = []
     bent = 0.0
     for _ in range(turns):
@@ -118,7 +119,9 @@ def _refined(
         expected, farthest = [], 0.0
         for number, (trial, path) in enumerate(zip(made, base, strict=True)):
             change = np.stack([way[number] - path for way in ways])
-            units = (trial.observed - path)[:, joints] / noise
+            away = trial.observed - path
+            away[:, turning] = np.angle(np.exp(1j * away[:, turning]))
+            units = away[:, joints] / noise
             size = _nearest(units, change[..., joints] / noise)
             sds = start.unsure(trial, config)
             expected.append(path + np.tensordot(size, change, axes=1))
@@ -189,8 +192,10 @@ def state(trial: Trial, row: int, config: OwnConfig) -> dict[str, list[float]]:
     near = around(trial.times, np.isfinite(trial.observed).all(axis=1), row)
     at = trial.times[near] - trial.times[row]
     for column, item in enumerate(config.seen):
-        if item.quantity == "joint":
-            found[item.part] = parabola(at, trial.observed[near, column], item.noise)
+        if item.state:
+            values = trial.observed[near, column]
+            values = np.unwrap(values) if item.turning else values
+            found[item.state] = parabola(at, values, item.noise)
     for column, item in enumerate(config.seen):
         if item.quantity == "speed":
             mean, _, sd, _ = parabola(at, trial.observed[near, column], item.noise)
@@ -279,11 +284,15 @@ def foreseen(
 
 
 def _observed(config: OwnConfig, model: mujoco.MjModel) -> bool:
-    """Whether each joint turns or slides and is seen: then a state can be told."""
+    """Whether each joint turns or slides and is seen, or carries a free body of which
+    all is seen: then a state can be told."""
     seen = {item.part for item in config.seen if item.quantity == "joint"}
+    bodies = {item.part for item in config.seen if item.floats}
     return all(
-        prepared.hinged(model, number) and model.joint(number).name in seen
-        for number in range(model.njnt)
+        model.joint(number).name in seen
+        if prepared.hinged(model, number)
+        else model.body(body).name in bodies
+        for number, body in enumerate(model.jnt_bodyid)
     )
 
 
@@ -291,9 +300,9 @@ def _lengths(
     trials: Sequence[Trial], config: OwnConfig, model: GapModel
 ) -> Iterator[float]:
     """Seconds of each trial that are foreseen; infinity = all of it."""
-    joints = [k for k, item in enumerate(config.seen) if item.quantity == "joint"]
+    joints = [k for k, item in enumerate(config.seen) if item.state]
     noise = np.array([config.seen[k].noise for k in joints])
-    names = [f"{start.NUMBERS[0]}[{config.seen[k].part}]" for k in joints]
+    names = [f"{start.NUMBERS[0]}[{config.seen[k].state}]" for k in joints]
     rng = np.random.default_rng(0)
     grown = [np.zeros(len(trial.times)) for trial in trials]
     sets = [dict.fromkeys(names, 0.0)]

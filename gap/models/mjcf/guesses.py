@@ -16,6 +16,8 @@ ANEW = 0.1  # [s] between new commands, up to which they are a curve
 SETTLE = 0.5  # [s]
 LONGEST = 5.0  # [s] of settling
 STILL = 3e-4  # [rad or m] that what rests moves at most in `SETTLE`
+CREEPING = 3e-3  # the same of what stands on feet that creep (assumed)
+HARDLY = 2.0  # times the least that it moves: hardly more
 NEAR = 0.05  # of a joint's range, by which a start may be off
 SIGMAS = 6.0  # times the noise, the same
 PAD = 0.02  # of the range of commands, by which limits are wider
@@ -98,23 +100,29 @@ def rests(
 
 
 def settling(model: mujoco.MjModel, pose: str) -> float:
-    """How long a model settles in a pose until it rests [s]: whole times of `SETTLE`,
-    one of them where it does not rest within `LONGEST`.
+    """How long a model settles in a pose until it rests [s]: whole times of `SETTLE`.
+    Feet creep: where it does not rest within `LONGEST`, until it moves hardly more than
+    it ever does; one of them, where it moves on.
 
     Args:
         model: that is recorded.
         pose: name of the keyframe; "" = the model's own.
     """
-    data = posed(model, pose, 0.0)
-    for count in range(round(LONGEST / SETTLE) + 1):
-        if _moved(model, data) < STILL:
-            return max(count, 1) * SETTLE
-    return SETTLE
+    data, moved = posed(model, pose, 0.0), []
+    for _ in range(round(LONGEST / SETTLE) + 1):
+        moved.append(_moved(model, data))
+        if moved[-1] < STILL:
+            break
+    least = min(moved)
+    if least > CREEPING:
+        return SETTLE
+    still = np.flatnonzero(np.array(moved) <= max(HARDLY * least, STILL))[0]
+    return max(int(still), 1) * SETTLE
 
 
 def nearest(model: mujoco.MjModel, first: Mapping[str, float]) -> str:
-    """The keyframe whose joints are nearest to where they were at the start of a trial;
-    "" = the model's own pose.
+    """The keyframe whose joints are nearest to where they were at the start of a trial,
+    the last of those that are as near; "" = the model's own pose.
 
     Args:
         model: that is recorded.
@@ -125,7 +133,7 @@ def nearest(model: mujoco.MjModel, first: Mapping[str, float]) -> str:
         data = posed(model, name, 0.0)
         return sum(abs(float(data.joint(j).qpos[0]) - at) for j, at in first.items())
 
-    return min(_poses(model), key=away)
+    return min(reversed(_poses(model)), key=away)
 
 
 def _poses(model: mujoco.MjModel) -> list[str]:

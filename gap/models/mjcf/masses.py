@@ -19,7 +19,6 @@ from bns.worlds.effects.base import Effect
 AXES = "xyz"
 PLAUSIBLE = 0.1  # of a body's mass (assumed)
 SLACK = 0.004  # of a body's mass: how well a model knows it, and its centre (assumed)
-LIGHT = 0.01  # of a body's mass: below, moments do not tell where an added mass sits
 FAR = 4.0  # radii of gyration from the centre: the farthest
 TAKEN = 0.5  # of its spread that a mass taken off may take along
 
@@ -72,7 +71,7 @@ def rows(item: Row, body: Body, excite: str) -> list[Row]:
     part = item.fixed["part"]
     shared: dict[str, Any] = {
         "group": item.name,
-        "covers": tuple(f"body_centre.d{axis}[{part}]" for axis in AXES),
+        "covers": tuple(_centre(part, axis) for axis in AXES),
         "excite": excite,
     }
     made = [
@@ -89,33 +88,34 @@ def rows(item: Row, body: Body, excite: str) -> list[Row]:
     return made
 
 
-def changes(
-    name: str, values: Mapping[str, float], part: str, body: Body
-) -> list[Effect]:
-    """The effects that an explanation is simulated by.
-
-    A light mass, which would sit far off for its moments, is one at the centre and a
-    shift of the centre: so its moments have a slope at no mass.
+def centre(part: str, body: Body, excite: str) -> list[Row]:
+    """The centre of mass that a mass covers, an explanation along each axis.
 
     Args:
-        name: of the explanation.
-        values: of its rows that are not nominal.
         part: name of the body.
         body: that.
+        excite: which commands make it felt.
     """
-    mass = max(values.get(name, 0.0), -0.9 * body.mass)
-    if abs(mass) > LIGHT * body.mass:
-        return [added(name, values, part, body)]
-    moments = _moments(name, values)
-    made = [effects.make("body_mass", {"part": part, "added": mass})] if mass else []
-    if moments.any():
-        away = _place(moments / (body.mass + mass))
-        made.append(effects.make("body_centre", {"part": part, **away}))
-    return made
+    size = body.gyration
+    return [
+        Row(
+            _centre(part, axis), 0.0, PLAUSIBLE * size, -FAR * size, FAR * size,
+            unit="m", slack=SLACK * size, later=True, excite=excite,
+            effect="body_centre", parameter=f"d{axis}", fixed={"part": part},
+        )
+        for axis in AXES
+        if size
+    ]  # fmt: skip
 
 
-def added(name: str, values: Mapping[str, float], part: str, body: Body) -> Effect:
-    """The mass where its moments say.
+def _centre(part: str, axis: str) -> str:
+    return f"body_centre.d{axis}[{part}]"
+
+
+def centred(
+    name: str, values: Mapping[str, float], part: str, body: Body
+) -> dict[str, float]:
+    """Values of the centre of mass that do nearly what a mass and its moments do.
 
     Args:
         name: of the explanation.
@@ -123,20 +123,71 @@ def added(name: str, values: Mapping[str, float], part: str, body: Body) -> Effe
         part: name of the body.
         body: that.
     """
+    away = _moments(name, values) / body.mass
+    return {_centre(part, axis): float(x) for axis, x in zip(AXES, away, strict=True)}
+
+
+def changes(
+    name: str, values: Mapping[str, float], part: str, body: Body
+) -> list[Effect]:
+    """The effects that an explanation is simulated by.
+
+    The mass sits where its moments say, or as far out as it may; what moments are left
+    shift the centre of mass, so that they have a slope at any mass and at none.
+
+    Args:
+        name: of the explanation.
+        values: of its rows that are not nominal.
+        part: name of the body.
+        body: that.
+    """
+    mass, away, left = _placed(name, values, body)
+    made = []
+    if mass:
+        made.append(effects.make("body_mass", _load(part, mass, away)))
+    if left.any():
+        shift = left / (body.mass + mass)
+        made.append(effects.make("body_centre", {"part": part, **_place(shift)}))
+    return made
+
+
+def added(name: str, values: Mapping[str, float], part: str, body: Body) -> Effect:
+    """The mass where its moments say, or as far out as it may.
+
+    Args:
+        name: of the explanation.
+        values: of its rows.
+        part: name of the body.
+        body: that.
+    """
+    mass, away, _ = _placed(name, values, body)
+    return effects.make("body_mass", _load(part, mass, away))
+
+
+def _placed(
+    name: str, values: Mapping[str, float], body: Body
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """The mass [kg], its place ``(3,)`` [m] from the centre of mass, and the moments
+    ``(3,)`` [kg m] that it does not have there."""
     mass = max(values.get(name, 0.0), -0.9 * body.mass)
-    size = max(abs(mass), LIGHT * body.mass) * (-1 if mass < 0 else 1)
-    away = _moments(name, values) / size
+    moments = _moments(name, values)
+    if not mass:
+        return mass, np.zeros(3), moments
     limit = FAR * body.gyration
     if mass < 0:  # what is left has a spread
         reduced = body.mass * -mass / (body.mass + mass)
         limit = min(limit, float(np.sqrt(TAKEN * body.spread / reduced)))
-    length = float(np.linalg.norm(away))
-    away = away * min(1.0, limit / max(length, 1e-12))
-    return effects.make("body_mass", {"part": part, "added": mass, **_place(away)})
+    away = moments / mass
+    away = away * min(1.0, limit / max(float(np.linalg.norm(away)), 1e-12))
+    return mass, away, moments - mass * away
 
 
 def _moments(name: str, values: Mapping[str, float]) -> np.ndarray:
     return np.array([values.get(f"{name}.m{axis}", 0.0) for axis in AXES])
+
+
+def _load(part: str, mass: float, away: np.ndarray) -> dict[str, Any]:
+    return {"part": part, "added": mass, **_place(away)}
 
 
 def _place(away: np.ndarray) -> dict[str, float]:

@@ -47,7 +47,7 @@ class OwnModel(GapModel):
     leeway = 1.0  # `bns gap describe` has limits from what one log was told
 
     def __init__(self, config: OwnConfig, *, threads: int = 2):
-        self.config, self.name = config, config.name
+        self.name = config.name
         self.channels = tuple(item.channel for item in config.seen)
         self.features = self.channels
         self.process = np.array([item.scatter for item in config.seen])
@@ -57,6 +57,7 @@ class OwnModel(GapModel):
             for item in config.told
         }
         self.physics = Simulation(config, threads=threads)
+        self.config = config = self.physics.config
         model, self.dt = self.physics.model, self.physics.dt
         self._parts = self.physics.finest
         self._touches = False
@@ -73,10 +74,12 @@ class OwnModel(GapModel):
             for column, item in enumerate(config.seen)
             if item.turning and column not in carried
         ]
-        self._tried = {item.effect for item in self.listed}
-        self._terms = {
-            item.name: item for item in (*self.listed, *mjcf_rows.grouped(self.listed))
-        }
+        further = (*mjcf_rows.grouped(self.listed), *mjcf_rows.motors(self.listed))
+        self._terms = {item.name: item for item in (*self.listed, *further)}
+        for part, body in self._bodies.items():  # masses cover these
+            centre = mjcf_rows.centre(part, body)
+            self._terms = {row.name: row for row in centre} | self._terms
+        self._tried = {item.effect for item in self._terms.values()}
 
     @classmethod
     def read(cls, path: str | Path, *, threads: int = 2) -> "OwnModel":
@@ -192,6 +195,11 @@ class OwnModel(GapModel):
             part = item.fixed["part"]
             return masses.added(term, values, part, self._bodies[part])
         return item.make(values[term])
+
+    def covered(self, term: str, values: Mapping[str, float]) -> Mapping[str, float]:
+        """See `GapModel.covered`: a load that has no mass shifts its body's centre."""
+        part = self._terms[term].fixed["part"]
+        return masses.centred(term, values, part, self._bodies[part])
 
     def _changes(self, values: Mapping[str, float]) -> tuple[Effect, ...]:
         """The effects that rows which are not nominal are simulated by."""

@@ -2,7 +2,8 @@
 
 A wheel on its rim, or a foot that lands a step sooner, moves a body by a little,
 whatever is changed and however little. A derivative by a step that changes no more than
-that is the simulation's, not the robot's, so such a row takes a larger step.
+that is the simulation's, not the robot's, so rows take a larger step: as far as a slope
+is trusted, or as far as they plausibly depart, where the motion is as linear so far.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -10,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bns.gap.decomposition import fit
 from bns.gap.decomposition.row import Row
 
 Changed = Callable[[Sequence[Mapping[str, float]]], np.ndarray]
@@ -38,9 +40,10 @@ def stepped(rows: Sequence[Row], changed: Changed) -> tuple[Row, ...]:
         rows: of a model.
         changed: simulates values of rows.
     """
+    rows = tuple(_as_far_as_trusted(row) for row in rows)
     tried = [row for row in rows if row.smooth and not row.nuisance and not row.joins]
     if not tried or len(rows) > MOST:
-        return tuple(rows)
+        return rows
     probed = tried[:: max(len(tried) // PROBED, 1)]
     tiny = _sizes(changed([_moved(row, TINY * row.difference) for row in probed]))
     large = _sizes(changed([_moved(row, row.difference) for row in probed]))
@@ -48,16 +51,21 @@ def stepped(rows: Sequence[Row], changed: Changed) -> tuple[Row, ...]:
     rough = float(np.quantile(beyond, QUANTILE))
     small = [row for row in tried if row.difference < row.sd]
     if rough < FELT or not small:
-        return tuple(rows)
+        return rows
     near = changed([_moved(row, row.difference) for row in small])
     lost = np.flatnonzero(_sizes(near) < ABOVE * rough)
     if not len(lost):
-        return tuple(rows)
+        return rows
     far = changed([_moved(small[n], small[n].sd) for n in lost])
     ratio = np.array([small[n].difference / small[n].sd for n in lost])
     alike = _sizes(near[lost] - far * ratio[:, None, None]) < ALIKE * rough
     names = {small[n].name for n in lost[alike]}
     return tuple(replace(r, step=r.sd) if r.name in names else r for r in rows)
+
+
+def _as_far_as_trusted(row: Row) -> Row:
+    plain = row.smooth and not row.nuisance and not row.step
+    return replace(row, step=fit.FAR * row.sd) if plain else row
 
 
 def _sizes(changes: np.ndarray) -> np.ndarray:

@@ -6,12 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 import mujoco
 import numpy as np
 
+from bns.gap.models.mjcf import floating
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.models.mjcf.view import View
 from bns.worlds.trial import Trial
 
 STATE = "start"
-"""condition of a trial that begins in motion: by joint its position and speed"""
+"""condition of a trial that begins in motion: by joint, and way of a free body, its
+position and speed (`Seen.state`)"""
 
 UNSURE = "start_unsure"
 """condition of such a trial: by joint the standard deviations of these"""
@@ -51,9 +53,18 @@ def place(data: mujoco.MjData, trial: Trial, view: View) -> None:
         seen = trial.observed[np.isfinite(trial.observed).all(axis=1)]
         view.place(data, seen[0])
         return
-    for joint, (position, speed) in state.items():
-        data.joint(joint).qpos[0] = position
-        data.joint(joint).qvel[0] = speed
+    bodies: dict[str, dict[str, Sequence[float]]] = {}
+    free = {item.state: item for item in view.config.seen if item.floats}
+    for name, (position, speed) in state.items():
+        if name in free:
+            found = bodies.setdefault(free[name].part, {})
+            found[free[name].way] = position, speed
+        else:
+            data.joint(name).qpos[0] = position
+            data.joint(name).qvel[0] = speed
+    for body, found in bodies.items():
+        places, speeds = ({w: x[k] for w, x in found.items()} for k in (0, 1))
+        floating.place(data, data.model.body(body).id, places, speeds)
 
 
 def unsure(trial: Trial, config: OwnConfig) -> dict[str, float]:
@@ -74,8 +85,9 @@ def unsure(trial: Trial, config: OwnConfig) -> dict[str, float]:
         }
     if not config.recorded:
         return {}
-    joints = [item for item in config.seen if item.quantity == "joint"]
-    return {f"{NUMBERS[0]}[{item.part}]": item.noise for item in joints}
+    return {
+        f"{NUMBERS[0]}[{item.state}]": item.noise for item in config.seen if item.state
+    }
 
 
 def moved(trial: Trial, off: Mapping[str, float], config: OwnConfig) -> Trial:
@@ -89,8 +101,8 @@ def moved(trial: Trial, off: Mapping[str, float], config: OwnConfig) -> Trial:
     state = trial.conditions.get(STATE)
     if not isinstance(state, dict):
         seen = trial.observed[np.isfinite(trial.observed).all(axis=1)][0]
-        joints = [k for k, item in enumerate(config.seen) if item.quantity == "joint"]
-        state = {config.seen[k].part: [float(seen[k]), 0.0] for k in joints}
+        told = [(item.state, at) for item, at in zip(config.seen, seen, strict=True)]
+        state = {name: [float(at), 0.0] for name, at in told if name}
     state = {
         joint: [
             value + off.get(f"{number}[{joint}]", 0.0)

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from bns.gap.models.mjcf import prepared
+from bns.gap.models.mjcf import floating, prepared
 from bns.gap.models.mjcf.config import OwnConfig, Seen
 
 
@@ -95,10 +95,17 @@ class View:
         return np.stack(made, axis=1)
 
     def place(self, data: mujoco.MjData, seen: np.ndarray) -> None:
-        """Set the observed joints to what was recorded, ``(C,)``."""
+        """Set the observed joints to what was recorded, ``(C,)``, and of a free body
+        that does not settle what was observed."""
+        bodies: dict[str, dict[str, float]] = {}
         for channel, item in enumerate(self.config.seen):
+            column = self.columns[channel] - 1
             if item.quantity == "joint":
-                data.qpos[self.columns[channel] - 1] = seen[channel]
+                data.qpos[column] = seen[channel]
+            elif item.quantity == "body" and column >= 0 and not self.config.settle:
+                bodies.setdefault(item.part, {})[item.way] = seen[channel]
+        for body, places in bodies.items():
+            floating.place(data, data.model.body(body).id, places)
 
 
 def _found(data: mujoco.MjData, item: Seen, part: int) -> np.ndarray:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from bns.gap.decomposition.fit import FAR
 from bns.gap.decomposition.row import Row
 from bns.gap.models.mjcf import roughness
 
@@ -30,11 +31,11 @@ def motion(*, rough, bent):
 @pytest.mark.parametrize(
     ("rough", "bent", "share"),
     [
-        (0.0, 0.0, 0.1),  # nothing to stand out of
-        (0.01, 0.0, 0.1),  # less than is felt
-        (0.1, 0.0, 0.1),  # a tenth of the departure changes eight times as much
+        (0.0, 0.0, FAR),  # nothing to stand out of
+        (0.01, 0.0, FAR),  # less than is felt
+        (0.1, 0.0, FAR),  # so far a departure changes many times as much
         (0.5, 0.0, 1.0),
-        (0.5, 99.0, 0.1),  # the larger step tells another derivative
+        (0.5, 99.0, FAR),  # the larger step tells another derivative
     ],
 )
 def test_steps_stand_out_of_the_roughness(rough, bent, share):
@@ -43,11 +44,16 @@ def test_steps_stand_out_of_the_roughness(rough, bent, share):
     assert {row.difference / row.sd for row in made} == {share}
 
 
-@pytest.mark.parametrize(
-    "rows", [ROWS * 11, (Row("band", 0.0, SD, 0.0, 1.0, smooth=False),)]
-)
-def test_many_rows_and_none_with_a_slope_stay(rows):
-    assert roughness.stepped(rows, motion(rough=0.5, bent=0.0)) == rows
+def test_of_many_rows_none_steps_farther_than_a_slope_is_trusted():
+    made = roughness.stepped(ROWS * 11, motion(rough=0.5, bent=0.0))
+    assert {row.difference / row.sd for row in made} == {FAR}
+
+
+def test_what_has_no_slope_and_what_has_a_step_of_its_own_stay():
+    band = Row("band", 0.0, SD, 0.0, 1.0, smooth=False)
+    fixed = Row("fixed", 1.0, SD, -9.0, 9.0, step=0.5)
+    still = motion(rough=0.0, bent=0.0)
+    assert roughness.stepped((band, fixed), still) == (band, fixed)
 
 
 def test_nuisances_keep_their_step():
