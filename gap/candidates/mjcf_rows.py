@@ -29,6 +29,7 @@ GROUPED = (
     "actuator_gain",
     "actuator_gear",
     "actuator_kp",
+    "actuator_lag",
     "command_lag",
 )
 """effects that may be on all parts alike: one kind of bearing, wheel, motor or supply;

@@ -256,6 +256,10 @@ def parabola(at: np.ndarray, values: np.ndarray, noise: float) -> list[float]:
 
 GROWN = 30.0  # times an error of the start, from which what follows is of no use
 SHORTEST = 0.4  # [s] of a piece
+ALOFT = (
+    0.5  # [s] of a piece of a free body aloft: what turns it too little adds up twice
+)
+# in how it is turned, and four times in where it goes (assumed)
 
 
 def foreseen(
@@ -277,6 +281,8 @@ def foreseen(
     length = np.inf
     if _observed(config, physics):
         length = min(_lengths(made, config, model), default=np.inf)
+    if np.isfinite(length) and any(item.floats for item in config.seen):
+        length = min(length, ALOFT)
     if np.isfinite(length):
         cut = replace(config, cut=max(length, SHORTEST))
         made = [one for trial in trials for one in pieces(trial, cut)]

@@ -1,4 +1,4 @@
-"""Bodies on free joints: where they are, how they are turned, and how fast both change."""
+"""Bodies on free joints: where they are, how they are turned, how fast both change."""
 
 from collections.abc import Mapping
 from dataclasses import replace
