@@ -256,10 +256,8 @@ def parabola(at: np.ndarray, values: np.ndarray, noise: float) -> list[float]:
 
 GROWN = 30.0  # times an error of the start, from which what follows is of no use
 SHORTEST = 0.4  # [s] of a piece
-ALOFT = (
-    0.5  # [s] of a piece of a free body aloft: what turns it too little adds up twice
-)
-# in how it is turned, and four times in where it goes (assumed)
+TURNED = 0.3  # [rad] by which a free body may be turned otherwise than foreseen, and
+# what that changes still adds up; beyond, pieces are of `SHORTEST`
 
 
 def foreseen(
@@ -281,12 +279,31 @@ def foreseen(
     length = np.inf
     if _observed(config, physics):
         length = min(_lengths(made, config, model), default=np.inf)
-    if np.isfinite(length) and any(item.floats for item in config.seen):
-        length = min(length, ALOFT)
     if np.isfinite(length):
         cut = replace(config, cut=max(length, SHORTEST))
         made = [one for trial in trials for one in pieces(trial, cut)]
-    return refined(made, config, model) if cut.cut else made
+    if not cut.cut:
+        return made
+    found = refined(made, config, model)
+    if cut.cut > SHORTEST and _turned(found, config, model) > TURNED:
+        cut = replace(config, cut=SHORTEST)
+        made = [one for trial in trials for one in pieces(trial, cut)]
+        found = refined(made, config, model)
+    return found
+
+
+def _turned(trials: Sequence[Trial], config: OwnConfig, model: GapModel) -> float:
+    """How far free bodies are turned otherwise than foreseen at most [rad], in the
+    median of trials."""
+    columns = [k for k, item in enumerate(config.seen) if item.floats and item.turning]
+    if not columns:
+        return 0.0
+    (paths,) = model.paths(trials, [[{}] * len(trials)])
+    apart = [
+        np.nanmax(np.abs(np.angle(np.exp(1j * (trial.observed - path)[:, columns]))))
+        for trial, path in zip(trials, paths, strict=True)
+    ]
+    return float(np.median(np.nan_to_num(apart, nan=np.pi)))
 
 
 def _observed(config: OwnConfig, model: mujoco.MjModel) -> bool:
