@@ -8,6 +8,7 @@ import numpy as np
 
 from bns.gap.decomposition import (
     descent,
+    fit,
     flexible,
     onset,
     refit,
@@ -29,8 +30,8 @@ MOST = 0.5  # share of the gap beyond which what is left is most of it
 PINNED = 0.15  # the same where an explanation ended at the edge of what is possible
 EDGE = 0.01  # plausible departures from a bound that are at it
 WITHIN = 0.1  # of what explanations leave: all but that is within the model's slack
-SILENT = 1e-3  # weighted square of what a plausible departure changes: no evidence
 FELT = 0.02  # of the floor's variance: a gap below shows in no picture
+TENTH = 0.1  # of what scatters: explanations that take less of it off take next to none
 ALONE = 0.1  # the same of one of many features, where the others show none
 LARGE = 2.0  # variances of the floor: more than heavy tails of any camera's noise
 SCATTER = 3.0  # times what differs between repeats
@@ -264,8 +265,7 @@ def _settled(
     other = simpler.renamed(problem, point)
     if other is not point:
         point, size = other, _Sizes.of(problem, start, other, known)
-    most = rest.most(start.rest, known, size.inside)
-    unseen = size.before <= 0 and most < ALONE  # nothing to explain
+    unseen = _unseen(start, point, size, known)
     if point.support and (unseen or size.foretells_worse(problem, start, point)):
         point = refit.refitted(problem, point, frozenset())
         size = _Sizes.of(problem, start, point, known)
@@ -282,7 +282,7 @@ def _steady(
     if unstable.any() and not unstable.all():
         problem = problem.without(unstable)
         start = descent.nothing(problem)
-    return replace(problem, silent=silent(problem, start)), start, known, unstable
+    return replace(problem, silent=fit.silent(problem, start)), start, known, unstable
 
 
 def _begun(problem: Problem, seed: int) -> tuple[Problem, Point, rest.Floor]:
@@ -298,29 +298,6 @@ def _begun(problem: Problem, seed: int) -> tuple[Problem, Point, rest.Floor]:
     if large or not problem.any_open:
         return exact, start, known
     return problem, descent.nothing(problem, start), known
-
-
-def silent(problem: Problem, start: Point) -> frozenset[str]:
-    """Names of rows of explanations that change next to nothing as far as they may
-    plausibly depart: of joints that no command moves, in a model of one's own. One of
-    several numbers of an explanation is none: where a load sits does nothing until
-    there is one.
-
-    Args:
-        problem: the recording.
-        start: the nominal model.
-    """
-    changed = {
-        number: float((start.linear.weight * (slope * problem.sd[number]) ** 2).sum())
-        for number, slope in start.slopes.items()
-        if problem.rows[number].smooth and problem.model.many
-    }
-    return frozenset(
-        problem.rows[number].name
-        for numbers in problem.terms.values()
-        if all(changed.get(number, 1.0) < SILENT for number in numbers)
-        for number in numbers
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -387,6 +364,16 @@ def _share(size: float, before: float, after: float) -> float:
 def _numbers(problem: Problem, windows: np.ndarray) -> tuple[int, ...]:
     """Numbers of the trials that windows ``(N,)`` are of."""
     return tuple(problem.numbers[n] for n in np.unique(problem.trial[windows]))
+
+
+def _unseen(start: Point, point: Point, size: _Sizes, known: rest.Floor) -> bool:
+    """Whether no gap shows beyond the floor in any feature, and explanations leave most
+    of what scatters once all that is not known of trials is taken out: there is nothing
+    to explain."""
+    if size.before > 0 or rest.most(start.rest, known, size.inside) > ALONE:
+        return False
+    none, some = (point.linear.squares(s) for s in ((), point.support))
+    return bool(none - some < TENTH * none)
 
 
 def _worse(problem: Problem, start: Point, point: Point, known: rest.Floor) -> bool:

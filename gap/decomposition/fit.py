@@ -17,6 +17,7 @@ MOVED = 0.5  # the same for what is not in, where many may depart
 WATCHED = 16  # explanations beside those that are in whose slopes are taken anew there
 APART = 0.25  # plausible departures from which it counts how exact a row is simulated
 MEASURED = 4  # times that noise is measured from what it leaves
+SILENT = 1e-3  # weighted square of what a plausible departure changes: no evidence
 ROUGH = 20.0  # [s] of recording for comparing these
 
 
@@ -334,3 +335,26 @@ def lasting(
 def nuisances(problem: Problem) -> set[str]:
     """Names of what is always fitted."""
     return {row.term for row in problem.rows if row.nuisance}
+
+
+def silent(problem: Problem, start: Point) -> frozenset[str]:
+    """Names of rows of explanations that change next to nothing as far as they may
+    plausibly depart: of joints that no command moves, in a model of one's own. One of
+    several numbers of an explanation is none: where a load sits does nothing until
+    there is one.
+
+    Args:
+        problem: the recording.
+        start: the nominal model.
+    """
+    changed = {
+        number: float((start.linear.weight * (slope * problem.sd[number]) ** 2).sum())
+        for number, slope in start.slopes.items()
+        if problem.rows[number].smooth and problem.model.many
+    }
+    return frozenset(
+        problem.rows[number].name
+        for numbers in problem.terms.values()
+        if all(changed.get(number, 1.0) < SILENT for number in numbers)
+        for number in numbers
+    )

@@ -9,7 +9,6 @@ import pytest
 from bns.gap.bench.wheeled_cases import commands
 from bns.gap.candidates import legged, wheeled_rows
 from bns.gap.decomposition import (
-    decomposition,
     descent,
     diagnosis,
     record,
@@ -220,7 +219,7 @@ def test_where_a_load_sits_is_never_silent(many, names):
     linear = SimpleNamespace(weight=np.ones((5, 1)))
     slopes = {n: np.full((5, 1), size) for n, size in changes.items()}
     start = SimpleNamespace(linear=linear, slopes=slopes)
-    assert decomposition.silent(problem, start) == names
+    assert fit.silent(problem, start) == names
 
 
 def test_every_row_of_a_wheeled_robot_makes_its_effect(recorded, model):

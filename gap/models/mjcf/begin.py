@@ -54,18 +54,18 @@ def begin(work: Work) -> None:
     told = np.stack([c.values for c, _, _ in work.told], axis=1)
     longest = max(work.rows, key=len)
     span = float(np.ptp(work.times[longest]))
-    first, tolerance = {}, {}
+    first, tolerance, varies = {}, {}, False
     for column, part, unit in work.seen:
         if part.quantity == "joint":
             pieces = [column.values[rows] * factor(unit) for rows in work.rows]
-            heads = [p[np.isfinite(p)][:1] for p in pieces]
-            first[part.name] = float(np.median(np.concatenate(heads)))
+            heads = np.concatenate([p[np.isfinite(p)][:1] for p in pieces])
+            first[part.name] = float(np.median(heads))
             wide = guesses.NEAR * float(
                 np.nanmax(column.values) - np.nanmin(column.values)
             )
-            tolerance[part.name] = max(
-                guesses.SIGMAS * guesses.noise(pieces), wide * factor(unit)
-            )
+            least = guesses.SIGMAS * guesses.noise(pieces)
+            tolerance[part.name] = max(least, wide * factor(unit))
+            varies |= bool(np.ptp(heads) > 2 * least)
     pose, settle = guesses.rests(work.model, first, tolerance)
     if settle and not _settled(work, longest, pose or "", settle):
         settle = 0.0
@@ -97,9 +97,14 @@ def begin(work: Work) -> None:
         )
     else:
         work.start = {"keyframe": pose} if pose else {}
-        work.start |= {"settle": settle} if settle else {}
         what = f"keyframe {pose!r}" if pose else "the model's own pose"
-        work.guessed.append(f"start: at rest in {what}, settling for {settle:g} s")
+        if varies and not settle and not loose:
+            work.start |= {"recorded": True}
+            how = f"at rest near {what}, where its joints were recorded in each trial"
+        else:
+            work.start |= {"settle": settle} if settle else {}
+            how = f"at rest in {what}, settling for {settle:g} s"
+        work.guessed.append(f"start: {how}")
 
 
 def _stands(work: Work, pose: str) -> bool:

@@ -3,11 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 
 from bns.gap.models.mjcf import start
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.worlds.effects.base import CommandEffect, ControlSignal, Effect
+from bns.worlds.effects.parts import FILTERS
 from bns.worlds.trial import Trial
 
 LEAD = 1.0  # [s] of rest before a trial, so that what is late has something before it
@@ -47,6 +49,30 @@ def arriving(
         if isinstance(effect, CommandEffect) and effect.stage == "command":
             signal = replace(signal, values=effect.apply(signal, on, rng))
     return signal.values[:extra], signal.values[extra:]
+
+
+def filtered(
+    before: np.ndarray, model: mujoco.MjModel, actuators: Sequence[int]
+) -> dict[int, float]:
+    """What a model's filters have made of commands that went before a trial, by the
+    address of each activation.
+
+    Args:
+        before: commands at the steps before, ``(S, K)``.
+        model: that is simulated.
+        actuators: number of each channel's actuator.
+    """
+    found, dt = {}, model.opt.timestep
+    ago = np.arange(len(before) - 1, 0, -1) * dt
+    for number, told in zip(actuators, before.T, strict=True):
+        if model.actuator_dyntype[number] in FILTERS:
+            if model.actuator_ctrllimited[number]:
+                told = np.clip(told, *model.actuator_ctrlrange[number])
+            lag = max(float(model.actuator_dynprm[number, 0]), dt)
+            come = 1 - np.exp(-ago / lag)
+            at = int(model.actuator_actadr[number])
+            found[at] = float(told[0] + come @ np.diff(told))
+    return found
 
 
 def stepped(trial: Trial, dt: float) -> tuple[np.ndarray, np.ndarray]:

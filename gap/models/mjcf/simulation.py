@@ -23,7 +23,6 @@ from bns.worlds.effects.base import (
     ModelEdit,
     SensorEffect,
 )
-from bns.worlds.effects.parts import FILTERS
 from bns.worlds.physics.rollout import STATE, Compiled, Job, Pool, Segment
 from bns.worlds.trial import Trial
 
@@ -309,8 +308,10 @@ class Simulation:
         before, told = command_steps.arriving(trial, effects, rest, self.config, dt)
         begin = self._start(trial, scene.model)
         if self.config.recorded or start.STATE in trial.conditions:
-            begin = begin.copy()
-            self._fill(begin, scene.model, before)
+            begin, first = begin.copy(), 1 + scene.model.nq + scene.model.nv
+            held = command_steps.filtered(before, scene.model, self.actuators)
+            for at, value in held.items():
+                begin[first + at] = value
         ctrl = np.tile(self._rest(scene.model), (len(told), 1))
         ctrl[:, self.actuators] = told
         return Job(begin, (Segment(scene, ctrl),))
@@ -343,27 +344,6 @@ class Simulation:
         data.time = 0.0
         mujoco.mj_getState(model, data, state, STATE)
         return state
-
-    def _fill(
-        self, state: np.ndarray, model: mujoco.MjModel, before: np.ndarray
-    ) -> None:
-        """Set what a model filters of commands to what these have made of it.
-
-        Args:
-            state: in which a trial begins, ``(n,)``; written to.
-            model: that is simulated.
-            before: commands at the steps before, ``(S, K)``.
-        """
-        first = 1 + model.nq + model.nv
-        for number, told in zip(self.actuators, before.T, strict=True):
-            actuator = model.actuator(number)
-            if actuator.dyntype[0] in FILTERS:
-                if actuator.ctrllimited[0]:
-                    told = np.clip(told, *actuator.ctrlrange)
-                lag = max(float(actuator.dynprm[0]), model.opt.timestep)
-                ago = np.arange(len(told) - 1, 0, -1) * model.opt.timestep
-                come = 1 - np.exp(-ago / lag)
-                state[first + int(actuator.actadr[0])] = told[0] + come @ np.diff(told)
 
     def _samples(
         self,
