@@ -291,7 +291,7 @@ def _back(
     """Values with one of some rows nominal again, if that lowers the loss: where a foot
     lands a step sooner or later slopes may lead nowhere. None if none does."""
     away = [k for k in which if values[k] != problem.nominal[k]]
-    if not problem.model.many or not 1 < len(away) <= BACK:
+    if not 1 < len(away) <= BACK or not problem.model.many:
         return None
     best, least = None, _height(problem, values, rest, which, known) - ROUNDING
     tried = _Tried(problem, values, rest, only, fine)

@@ -11,6 +11,7 @@ from bns.gap.candidates import legged, wheeled_rows
 from bns.gap.decomposition import (
     descent,
     diagnosis,
+    fit,
     record,
     refit,
     rest,
