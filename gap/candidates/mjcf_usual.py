@@ -183,9 +183,11 @@ def _by_camera(config: OwnConfig) -> tuple[str, ...]:
 
 def _long(model: mujoco.MjModel, bodies: Iterable[int]) -> list[str]:
     """Names of the bodies that turn and have a length: from their joint to the one body
-    that they carry, or to their centre of mass."""
+    that they carry, or to their centre of mass; a free body has none."""
     found = []
     for body in bodies:
+        if prepared.free_joint(model, body) >= 0:
+            continue
         carried = np.flatnonzero(model.body_parentid == body)
         end = model.body_pos[carried[0]] if len(carried) == 1 else model.body_ipos[body]
         if np.linalg.norm(end) > SHORT and model.body(body).name:

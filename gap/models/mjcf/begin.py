@@ -54,18 +54,7 @@ def begin(work: Work) -> None:
     told = np.stack([c.values for c, _, _ in work.told], axis=1)
     longest = max(work.rows, key=len)
     span = float(np.ptp(work.times[longest]))
-    first, tolerance, varies = {}, {}, False
-    for column, part, unit in work.seen:
-        if part.quantity == "joint":
-            pieces = [column.values[rows] * factor(unit) for rows in work.rows]
-            heads = np.concatenate([p[np.isfinite(p)][:1] for p in pieces])
-            first[part.name] = float(np.median(heads))
-            wide = guesses.NEAR * float(
-                np.nanmax(column.values) - np.nanmin(column.values)
-            )
-            least = guesses.SIGMAS * guesses.noise(pieces)
-            tolerance[part.name] = max(least, wide * factor(unit))
-            varies |= bool(np.ptp(heads) > 2 * least)
+    first, tolerance, varies = _heads(work)
     pose, settle = guesses.rests(work.model, first, tolerance)
     if settle and not _settled(work, longest, pose or "", settle):
         settle = 0.0
@@ -105,6 +94,26 @@ def begin(work: Work) -> None:
             work.start |= {"settle": settle} if settle else {}
             how = f"at rest in {what}, settling for {settle:g} s"
         work.guessed.append(f"start: {how}")
+
+
+def _heads(work: Work) -> tuple[dict[str, float], dict[str, float], bool]:
+    """Where each joint is at the start of trials, in their median, and by how much that
+    may be off; whether any of them differs from trial to trial by more than noise."""
+    first: dict[str, float] = {}
+    tolerance: dict[str, float] = {}
+    varies = False
+    for column, part, unit in work.seen:
+        if part.quantity == "joint":
+            pieces = [column.values[rows] * factor(unit) for rows in work.rows]
+            heads = np.concatenate([p[np.isfinite(p)][:1] for p in pieces])
+            first[part.name] = float(np.median(heads))
+            wide = guesses.NEAR * float(
+                np.nanmax(column.values) - np.nanmin(column.values)
+            )
+            least = guesses.SIGMAS * guesses.noise(pieces)
+            tolerance[part.name] = max(least, wide * factor(unit))
+            varies |= bool(np.ptp(heads) > 2 * least)
+    return first, tolerance, varies
 
 
 def _stands(work: Work, pose: str) -> bool:

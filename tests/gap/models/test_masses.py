@@ -58,6 +58,23 @@ def test_far_moments_leave_a_body_that_can_be(mass):
     assert model.body_inertia[1].min() > 0
 
 
+@pytest.mark.parametrize("mass", [-0.3, 0.001, 0.4])
+def test_moments_that_a_mass_cannot_have_shift_the_centre(mass):
+    body = Body.of(compiled(), "load")
+    made = masses.changes(NAME, {NAME: mass, f"{NAME}.mx": 0.4}, "load", body)
+    before, after = about_origin(compiled()), about_origin(compiled(*made))
+    assert [effect.name for effect in made] == ["body_mass", "body_centre"]
+    assert (after[1] - before[1])[0] == pytest.approx(0.4)
+
+
+def test_a_centre_of_mass_stands_for_a_load_without_mass():
+    axis, *_ = masses.centre("load", BODY, "motion")
+    assert axis.later and not axis.sloped(0.0) and axis.sloped(0.01)
+    values = {NAME: 0.001, f"{NAME}.mx": 0.018}
+    found = masses.centred(NAME, values, "load", BODY)
+    assert found[axis.name] == pytest.approx(0.02)
+
+
 def test_mass_and_moments_are_one_explanation_that_covers_a_shifted_centre():
     item = Row(
         name=NAME, effect="body_mass", parameter="added", unit="kg", nominal=0.0,

@@ -34,8 +34,8 @@ def motion(*, rough, bent):
         (0.0, 0.0, FAR),  # nothing to stand out of
         (0.01, 0.0, FAR),  # less than is felt
         (0.1, 0.0, FAR),  # so far a departure changes many times as much
-        (0.5, 0.0, 1.0),
-        (0.5, 99.0, FAR),  # the larger step tells another derivative
+        (1.0, 0.0, 1.0),
+        (1.0, 99.0, FAR),  # the larger step tells another derivative
     ],
 )
 def test_steps_stand_out_of_the_roughness(rough, bent, share):
@@ -45,7 +45,7 @@ def test_steps_stand_out_of_the_roughness(rough, bent, share):
 
 
 def test_of_many_rows_none_steps_farther_than_a_slope_is_trusted():
-    made = roughness.stepped(ROWS * 11, motion(rough=0.5, bent=0.0))
+    made = roughness.stepped(ROWS * 11, motion(rough=1.0, bent=0.0))
     assert {row.difference / row.sd for row in made} == {FAR}
 
 
@@ -58,5 +58,5 @@ def test_what_has_no_slope_and_what_has_a_step_of_its_own_stay():
 
 def test_nuisances_keep_their_step():
     clock = Row("clock", 0.0, SD, -1.0, 1.0, nuisance=True, step=0.001)
-    *_, kept = roughness.stepped((*ROWS, clock), motion(rough=0.5, bent=0.0))
+    *_, kept = roughness.stepped((*ROWS, clock), motion(rough=1.0, bent=0.0))
     assert kept == clock
