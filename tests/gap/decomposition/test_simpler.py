@@ -7,9 +7,10 @@ from bns.gap.bench import mjcf_cases
 from bns.gap.decomposition import descent, refit, simpler
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.singles import Singles
+from bns.gap.diagnose import diagnose
 from bns.gap.models.mjcf import effects
 from bns.gap.models.mjcf.model import OwnModel
-from tests.gap.own_robots import ARM, MOTORS
+from tests.gap.own_robots import ARM, MOTORS, SERVOS
 
 DESCRIBED = """
 name = "arm"
@@ -67,3 +68,51 @@ def test_friction_takes_the_place_of_a_damping_that_was_found_first(problem):
     assert found.support == {HIP, FRICTION}
     (friction,) = problem.terms[FRICTION]
     assert abs(found.values[friction] - 0.1) < 0.01
+
+
+SERVOED = """
+name = "arm"
+model = "robot.xml"
+commands.hip = { actuator = "hip", unit = "rad", low = -0.6, high = 0.6 }
+commands.calf = { actuator = "calf", unit = "rad", low = -0.6, high = 0.6 }
+observed.q0 = { joint = "FL_hip_joint", unit = "rad", noise = 0.001 }
+observed.q1 = { joint = "FL_calf_joint", unit = "rad", noise = 0.001 }
+[effects]
+actuator_kp = ["hip", "calf"]
+actuator_kd = ["hip", "calf"]
+body_mass = ["upper", "lower"]
+"""
+
+
+@pytest.fixture(scope="module")
+def servoed(tmp_path_factory):
+    """An arm of position servos, and what it is told."""
+    folder, made = tmp_path_factory.mktemp("servoed"), SERVOS
+    for name in ("hip", "calf"):
+        made = made.replace(f'joint="FL_{name}', f'name="{name}" joint="FL_{name}')
+    (folder / "robot.xml").write_text(ARM.replace("ACTUATORS", made))
+    (folder / "own.toml").write_text(SERVOED)
+    model = OwnModel.read(folder / "own.toml", threads=1)
+    return model, mjcf_cases.commands(model, np.random.default_rng(0), 4)
+
+
+@pytest.mark.parametrize(
+    ("planted", "values", "name", "size"),
+    [
+        ("actuator_gain", {"part": "hip", "factor": 0.8}, HIP, 0.8),
+        (
+            "body_centre",
+            {"part": "upper", "dx": 0.0, "dy": 0.03, "dz": 0.0},
+            "body_centre.dy[upper]",
+            0.03,
+        ),
+    ],
+)
+def test_a_weak_motor_and_a_shifted_centre_have_a_name_each(
+    servoed, planted, values, name, size
+):
+    model, told = servoed
+    trials = mjcf_cases.record(model, told, [effects.make(planted, values)])
+    found = diagnose(trials, model, full=False)
+    assert found.verdict.named[0] == (name,)  # a load does what a shifted centre does
+    assert found.best.magnitudes[0] == pytest.approx(size, rel=0.03)
