@@ -165,12 +165,13 @@ def grouped(candidates: Sequence[Row]) -> list[Row]:
 
 
 def motors(candidates: Sequence[Row]) -> list[Row]:
-    """Further candidates: a motor of another strength, where both gains of its servo
-    are considered; it is each of them at once.
+    """Further candidates: a motor of another strength, in the place of both gains of
+    its servo where these hold alike. In a search it stands in the place of dampings.
 
     Args:
         candidates: of a model.
     """
+    sd, _ = PLAUSIBLE["actuator_kp"]
     known = {item.name: item for item in candidates}
     made = []
     for item in candidates:
@@ -179,7 +180,17 @@ def motors(candidates: Sequence[Row]) -> list[Row]:
         name = f"actuator_gain[{part}]"
         if item.name == pair[0] and pair[1] in known and name not in known:
             made.append(
-                replace(item, name=name, effect="actuator_gain", slack=0.0, joins=pair)
+                replace(
+                    item,
+                    name=name,
+                    effect="actuator_gain",
+                    sd=sd,
+                    slack=0.0,
+                    later=True,
+                    levels=(),
+                    joins=pair,
+                    excite=EXCITE["actuator_gain"],
+                )
             )
     return made
 

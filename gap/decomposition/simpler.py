@@ -4,6 +4,8 @@ one, and none that the others do as well."""
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from bns.gap.decomposition import fit, levels, refit
 from bns.gap.decomposition.fit import Point
 from bns.gap.decomposition.linear import Linear
@@ -85,14 +87,24 @@ def narrowed(problem: Problem, point: Point) -> Point:
 
 
 def renamed(problem: Problem, point: Point) -> Point:
-    """A point with as few as do of what an explanation covers in its place, of what is
-    looked at for that alone (`Row.later`): a centre of mass that lies elsewhere along
-    one axis for a load of next to no mass.
+    """A point with what is looked at for that alone (`Row.later`) in the place of
+    others where it is as good: as few as do of what an explanation covers, a centre of
+    mass that lies elsewhere along one axis for a load of next to no mass; and one for
+    two that it joins, a weak motor for both gains of its servo.
 
     Args:
         problem: the recording.
         point: a fitted set.
     """
+    for number, parts in problem.joins.items():
+        row, whole = problem.rows[number], {problem.rows[k].term for k in parts}
+        if row.later and whole <= point.support:
+            values = point.values.copy()
+            values[number] = float(np.mean(values[list(parts)]))
+            values[list(parts)] = problem.nominal[list(parts)]
+            begun = replace(point, values=values)
+            other = refit.fitted_at(problem, begun, point.support - whole | {row.term})
+            point = other if _as_good(problem, other, point) else point
     for name, covered in _covered(problem, point, later=True):
         others = (point.support - {name}) & set(point.linear.terms)
         mine = {problem.rows[k].name: point.values[k] for k in problem.terms[name]}
