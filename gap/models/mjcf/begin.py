@@ -69,10 +69,9 @@ def begin(work: Work) -> None:
     elif pose is None and loose:
         pose = guesses.nearest(work.model, first)
         stands = _stands(work, pose)
-        work.start = {"recorded": True, "keyframe": pose, "settle": guesses.SETTLE}
-        for key, given in (("keyframe", pose), ("settle", stands)):
-            if not given:
-                del work.start[key]
+        work.start = {"recorded": True}
+        work.start |= {"keyframe": pose} if pose else {}
+        work.start |= {"settle": guesses.SETTLE} if stands else {}
         how = f"settling on the floor for {guesses.SETTLE:g} s" if stands else "aloft"
         work.unsure.append(
             "start: the robot is free and trials begin in no pose of the model, so "

@@ -87,7 +87,7 @@ class Trees:
         spans = list(zip([-1, *cuts], [*cuts, len(on)], strict=True))
         state = trial.conditions.get(start.STATE)
         state = state if isinstance(state, dict) else {}
-        joints = {joint: self.parts.get(("joint", joint), 0) for joint in state}
+        joints = {name: self._of_state(name) for name in state}
         pieces = [
             Piece(
                 columns,
@@ -100,6 +100,13 @@ class Trees:
             for tree, columns in enumerate(self.columns)
         ]
         return tuple(effects[k] for k in cuts), pieces
+
+    def _of_state(self, name: str) -> int:
+        """Number of the tree that a number of a start is of: a joint's, or a way of a
+        free body (`Seen.state`)."""
+        body, _, _ = name.rpartition(".")
+        of_body = self.parts.get(("body", body), 0)
+        return self.parts.get(("joint", name), of_body)
 
     def _tree(self, effect: Effect) -> int:
         """Number of the tree that an effect is on, -1 = all."""
