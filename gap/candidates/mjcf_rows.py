@@ -126,14 +126,18 @@ def rows(
     return tuple(made)
 
 
-def centre(part: str, body: Body) -> list[Row]:
-    """Candidates that a body's mass covers: where its centre of mass lies.
+def centres(bodies: Mapping[str, Body]) -> list[Row]:
+    """Candidates that masses of bodies cover: where their centres of mass lie.
 
     Args:
-        part: name of the body.
-        body: that.
+        bodies: whose mass may be off, by name.
     """
-    return masses.centre(part, body, EXCITE["body_centre"])
+    excite = EXCITE["body_centre"]
+    return [
+        row
+        for part, body in bodies.items()
+        for row in masses.centre(part, body, excite)
+    ]
 
 
 def grouped(candidates: Sequence[Row]) -> list[Row]:

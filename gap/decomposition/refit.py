@@ -213,12 +213,12 @@ def _descended(
         far = np.abs((values - at)[which] / part.sd[which]).max() > fit.FAR
         if slopes is None or far or any(k not in slopes for k in which):
             slopes, at = part.slopes(values, which, only=only), values
-        moved = _step(part, values, rest, which, known, slopes, only, fine)
+        here = _Here(part, values, rest, which, known, only, fine)
+        moved = _step(here, slopes)
         if moved is None and at is not values:
             slopes = None  # were of elsewhere
             continue
-        if moved is None:
-            moved = _back(part, values, rest, which, known, only, fine)
+        moved = moved or _back(here)
         if moved is None:
             break
         change = np.abs((moved[0] - values)[which] / part.sd[which]).max()
@@ -240,79 +240,26 @@ def _rest(problem: Problem, values: np.ndarray, only: list[int] | None) -> np.nd
     return np.where(problem.seen, problem.recorded - np.nan_to_num(made, nan=LOST), 0.0)
 
 
-def _step(
-    problem: Problem,
-    values: np.ndarray,
-    rest: np.ndarray,
-    chosen: Sequence[int],
-    known: Noise,
-    slopes: Mapping[int, np.ndarray],
-    only: list[int] | None,
-    fine: bool,
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """One damped step that lowers the loss; None if there is none."""
-    which = np.array(chosen)
-    weight = known.weights(rest, problem.seen).ravel()
-    design = np.stack([known.innovations(slopes[k]).ravel() for k in which], axis=-1)
-    design = design * problem.sd[which]
-    flat, away = _departure(problem, values, which)
-    free = np.array([not problem.rows[k].nuisance for k in which])
-    wider = np.where(free, np.maximum(np.abs(away), 1.0), 1.0)
-    held = (flat / wider) ** 2  # by their priors, see `tail`
-    longest = np.maximum(LONGEST, wider)
-    heavy = design * weight[:, None]
-    curvature = heavy.T @ design / known.lam + np.diag(held)
-    pull = heavy.T @ known.innovations(np.nan_to_num(rest)).ravel() / known.lam
-    pull -= held * away / flat
-    now = _height(problem, values, rest, which, known)
-    low, high = problem.bounds
-    tried = _Tried(problem, values, rest, only, fine)
-    for damping in DAMPING:
-        step = np.linalg.solve(curvature + damping * np.eye(len(which)), pull)
-        step *= min(1.0, 1 / ((np.abs(step) / longest).max() + 1e-30))
-        there = values.copy()
-        there[which] += step * problem.sd[which]
-        there = np.clip(there, low, high)
-        left = tried.rest(there)
-        if _height(problem, there, left, which, known) <= now + ROUNDING:
-            return there, left
-    return None
-
-
-def _back(
-    problem: Problem,
-    values: np.ndarray,
-    rest: np.ndarray,
-    which: Sequence[int],
-    known: Noise,
-    only: list[int] | None,
-    fine: bool,
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Values with one of some rows nominal again, if that lowers the loss: where a foot
-    lands a step sooner or later slopes may lead nowhere. None if none does."""
-    away = [k for k in which if values[k] != problem.nominal[k]]
-    if not 1 < len(away) <= BACK or not problem.model.many:
-        return None
-    best, least = None, _height(problem, values, rest, which, known) - ROUNDING
-    tried = _Tried(problem, values, rest, only, fine)
-    for number in away:
-        there = values.copy()
-        there[number] = problem.nominal[number]
-        left = tried.rest(there)
-        height = _height(problem, there, left, which, known)
-        if height < least:
-            best, least = (there, left), height
-    return best
-
-
 @dataclass(frozen=True, eq=False)
-class _Tried:
-    """Residuals of values that are tried, from values and residuals that are known: at
-    the fine step, or by what changes at the coarse one."""
+class _Here:
+    """Where a fit has come, and what is left of values that it tries from there.
+
+    Attributes:
+        problem: the recording.
+        values: of all rows, ``(R,)``.
+        rest: residuals there, ``(N, C)``.
+        which: numbers of the rows that are fitted.
+        noise: what it is weighed by.
+        only: trials that count, None = all.
+        fine: whether what is left is simulated at the fine step; else it is what is
+            left here, less what changes at the coarse one.
+    """
 
     problem: Problem
     values: np.ndarray
-    known: np.ndarray
+    rest: np.ndarray
+    which: Sequence[int]
+    noise: Noise
     only: list[int] | None
     fine: bool
 
@@ -320,12 +267,69 @@ class _Tried:
     def _base(self) -> np.ndarray:
         return self.problem.predict([self.values], fine=False, only=self.only)[0]
 
-    def rest(self, values: np.ndarray) -> np.ndarray:
-        """Of values of all rows ``(R,)``, ``(N, C)``."""
+    @cached_property
+    def height(self) -> float:
+        """See `_height`."""
+        return self._height(self.values, self.rest)
+
+    def tried(self, values: np.ndarray) -> tuple[np.ndarray, float]:
+        """What other values ``(R,)`` leave, ``(N, C)``, and their height."""
         if self.fine:
-            return _rest(self.problem, values, self.only)
-        (made,) = self.problem.predict([values], fine=False, only=self.only)
-        return self.known - np.nan_to_num(made - self._base, nan=LOST)
+            left = _rest(self.problem, values, self.only)
+        else:
+            (made,) = self.problem.predict([values], fine=False, only=self.only)
+            left = self.rest - np.nan_to_num(made - self._base, nan=LOST)
+        return left, self._height(values, left)
+
+    def _height(self, values: np.ndarray, rest: np.ndarray) -> float:
+        return _height(self.problem, values, rest, self.which, self.noise)
+
+
+def _step(
+    here: _Here, slopes: Mapping[int, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """One damped step that lowers the loss; None if there is none."""
+    problem, known, which = here.problem, here.noise, np.array(here.which)
+    weight = known.weights(here.rest, problem.seen).ravel()
+    design = np.stack([known.innovations(slopes[k]).ravel() for k in which], axis=-1)
+    design = design * problem.sd[which]
+    flat, away = _departure(problem, here.values, which)
+    free = np.array([not problem.rows[k].nuisance for k in which])
+    wider = np.where(free, np.maximum(np.abs(away), 1.0), 1.0)
+    held = (flat / wider) ** 2  # by their priors, see `tail`
+    longest = np.maximum(LONGEST, wider)
+    heavy = design * weight[:, None]
+    curvature = heavy.T @ design / known.lam + np.diag(held)
+    pull = heavy.T @ known.innovations(np.nan_to_num(here.rest)).ravel() / known.lam
+    pull -= held * away / flat
+    low, high = problem.bounds
+    for damping in DAMPING:
+        step = np.linalg.solve(curvature + damping * np.eye(len(which)), pull)
+        step *= min(1.0, 1 / ((np.abs(step) / longest).max() + 1e-30))
+        there = here.values.copy()
+        there[which] += step * problem.sd[which]
+        there = np.clip(there, low, high)
+        left, height = here.tried(there)
+        if height <= here.height + ROUNDING:
+            return there, left
+    return None
+
+
+def _back(here: _Here) -> tuple[np.ndarray, np.ndarray] | None:
+    """Values with one of some rows nominal again, if that lowers the loss: where a foot
+    lands a step sooner or later slopes may lead nowhere. None if none does."""
+    nominal, values = here.problem.nominal, here.values
+    away = [k for k in here.which if values[k] != nominal[k]]
+    if not 1 < len(away) <= BACK or not here.problem.model.many:
+        return None
+    best, least = None, here.height - ROUNDING
+    for number in away:
+        there = values.copy()
+        there[number] = nominal[number]
+        left, height = here.tried(there)
+        if height < least:
+            best, least = (there, left), height
+    return best
 
 
 def _departure(

@@ -27,8 +27,8 @@ class Row:
         smooth: whether there is a slope at the nominal.
         stepped: whether the motion changes in steps with the value, so that only a
             search among values fits it.
-        later: whether it is looked at in the place of what covers it alone: it has no
-            slope at the nominal.
+        later: whether it is looked at in the place of others alone, of what covers it
+            or of what it joins (`simpler.renamed`): it has no slope at the nominal.
         nuisance: fitted always and never an answer.
         step: for differences; 0 = a tenth of `sd`.
         inexact: share of what it changes to which the simulation shows it at best: less

@@ -34,3 +34,8 @@ def per_si(name: str) -> dict[str, float]:
         name: of the SI unit, "m", "rad", ...
     """
     return {unit: 1 / size for unit, size in FACTORS[name].items()}
+
+
+def wrapped(angles: np.ndarray) -> np.ndarray:
+    """Angles within half a turn of zero [rad]."""
+    return (np.asarray(angles) + np.pi) % (2 * np.pi) - np.pi

@@ -22,6 +22,7 @@ from bns.gap.models.base import GapModel
 from bns.gap.models.mjcf import prepared, start
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.recordings.segments import piece
+from bns.worlds.data.units import wrapped
 from bns.worlds.trial import Trial
 
 HALF = 0.03  # [s] on each side of a start, of the samples that tell its state
@@ -120,7 +121,7 @@ def _refined(
         for number, (trial, path) in enumerate(zip(made, base, strict=True)):
             change = np.stack([way[number] - path for way in ways])
             away = trial.observed - path
-            away[:, turning] = np.angle(np.exp(1j * away[:, turning]))
+            away[:, turning] = wrapped(away[:, turning])
             units = away[:, joints] / noise
             size = _nearest(units, change[..., joints] / noise)
             sds = start.unsure(trial, config)
@@ -273,23 +274,28 @@ def foreseen(
         physics: its MJCF, compiled.
         model: the nominal model.
     """
-    made, cut = list(trials), config
-    if config.cut:
-        made = [one for trial in trials for one in pieces(trial, config)]
+    made = _cut(trials, config) if config.cut else list(trials)
     length = np.inf
     if _observed(config, physics):
         length = min(_lengths(made, config, model), default=np.inf)
-    if np.isfinite(length):
-        cut = replace(config, cut=max(length, SHORTEST))
-        made = [one for trial in trials for one in pieces(trial, cut)]
-    if not cut.cut:
-        return made
-    found = refined(made, config, model)
-    if cut.cut > SHORTEST and _turned(found, config, model) > TURNED:
-        cut = replace(config, cut=SHORTEST)
-        made = [one for trial in trials for one in pieces(trial, cut)]
-        found = refined(made, config, model)
+    if np.isinf(length):
+        return refined(made, config, model) if config.cut else made
+    length = max(length, SHORTEST)
+    found = _begun_anew(trials, config, model, length)
+    if length > SHORTEST and _turned(found, config, model) > TURNED:
+        found = _begun_anew(trials, config, model, SHORTEST)
     return found
+
+
+def _cut(trials: Sequence[Trial], config: OwnConfig) -> list[Trial]:
+    return [one for trial in trials for one in pieces(trial, config)]
+
+
+def _begun_anew(
+    trials: Sequence[Trial], config: OwnConfig, model: GapModel, length: float
+) -> list[Trial]:
+    """Trials in pieces of so many seconds, with starts that are refined."""
+    return refined(_cut(trials, replace(config, cut=length)), config, model)
 
 
 def _turned(trials: Sequence[Trial], config: OwnConfig, model: GapModel) -> float:
@@ -300,7 +306,7 @@ def _turned(trials: Sequence[Trial], config: OwnConfig, model: GapModel) -> floa
         return 0.0
     (paths,) = model.paths(trials, [[{}] * len(trials)])
     apart = [
-        np.nanmax(np.abs(np.angle(np.exp(1j * (trial.observed - path)[:, columns]))))
+        np.nanmax(np.abs(wrapped((trial.observed - path)[:, columns])))
         for trial, path in zip(trials, paths, strict=True)
     ]
     return float(np.median(np.nan_to_num(apart, nan=np.pi)))

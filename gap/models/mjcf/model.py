@@ -75,10 +75,9 @@ class OwnModel(GapModel):
             if item.turning and column not in carried
         ]
         further = (*mjcf_rows.grouped(self.listed), *mjcf_rows.motors(self.listed))
-        self._terms = {item.name: item for item in (*self.listed, *further)}
-        for part, body in self._bodies.items():  # masses cover these
-            centre = mjcf_rows.centre(part, body)
-            self._terms = {row.name: row for row in centre} | self._terms
+        centres = mjcf_rows.centres(self._bodies)
+        items = (*centres, *self.listed, *further)  # a centre may be listed
+        self._terms = {item.name: item for item in items}
         self._tried = {item.effect for item in self._terms.values()}
 
     @classmethod

@@ -22,8 +22,8 @@ from bns.gap.models.odometry.motions import (
     Motions,
     changed,
     start,
-    wrapped,
 )
+from bns.worlds.data.units import wrapped
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bns.errors import BnsError
+from bns.worlds.data.units import wrapped
 from bns.worlds.trial import Trial, body_displacements
 
 NUMBERS = (
@@ -121,11 +122,6 @@ class Motions:
         steps = 1e-6 * np.eye(len(NUMBERS))
         ahead = np.stack([self.predict(values + step) for step in steps])
         return (ahead - self.predict(values)) / 1e-6
-
-
-def wrapped(angles: np.ndarray) -> np.ndarray:
-    """Angles within half a turn of zero [rad]."""
-    return (np.asarray(angles) + np.pi) % (2 * np.pi) - np.pi
 
 
 def changed(magnitudes: Mapping[str, float]) -> np.ndarray:

@@ -28,26 +28,26 @@ GAINS, HIP = "actuator_gain[all]", "actuator_gain[hip]"
 DAMPING, FRICTION = "joint_damping[FL_calf_joint]", "joint_friction[FL_calf_joint]"
 
 
-def motors():
-    """The arm's, by the name of their joint."""
-    made = MOTORS
+def model(folder, actuators, description):
+    """The arm as it is described, its actuators called as their joints."""
     for name in ("hip", "calf"):
-        made = made.replace(f'joint="FL_{name}', f'name="{name}" joint="FL_{name}')
-    return made
+        told = f'joint="FL_{name}'
+        actuators = actuators.replace(told, f'name="{name}" {told}')
+    (folder / "robot.xml").write_text(ARM.replace("ACTUATORS", actuators))
+    (folder / "own.toml").write_text(description)
+    return OwnModel.read(folder / "own.toml", threads=1)
 
 
 @pytest.fixture
 def problem(tmp_path):
     """A recording of an arm with a stronger hip motor and a calf that rubs."""
-    (tmp_path / "robot.xml").write_text(ARM.replace("ACTUATORS", motors()))
-    (tmp_path / "own.toml").write_text(DESCRIBED)
-    model = OwnModel.read(tmp_path / "own.toml", threads=1)
-    told = mjcf_cases.commands(model, np.random.default_rng(0), 3)
+    arm = model(tmp_path, MOTORS, DESCRIBED)
+    told = mjcf_cases.commands(arm, np.random.default_rng(0), 3)
     planted = [
         effects.make("actuator_gain", {"part": "hip", "factor": 1.2}),
         effects.make("joint_friction", {"part": "FL_calf_joint", "added": 0.1}),
     ]
-    return Problem.of(mjcf_cases.record(model, told, planted), model)
+    return Problem.of(mjcf_cases.record(arm, told, planted), arm)
 
 
 def test_a_gain_of_both_motors_is_one_of_one_with_nothing_to_undo_it(problem):
@@ -87,13 +87,8 @@ body_mass = ["upper", "lower"]
 @pytest.fixture(scope="module")
 def servoed(tmp_path_factory):
     """An arm of position servos, and what it is told."""
-    folder, made = tmp_path_factory.mktemp("servoed"), SERVOS
-    for name in ("hip", "calf"):
-        made = made.replace(f'joint="FL_{name}', f'name="{name}" joint="FL_{name}')
-    (folder / "robot.xml").write_text(ARM.replace("ACTUATORS", made))
-    (folder / "own.toml").write_text(SERVOED)
-    model = OwnModel.read(folder / "own.toml", threads=1)
-    return model, mjcf_cases.commands(model, np.random.default_rng(0), 4)
+    arm = model(tmp_path_factory.mktemp("servoed"), SERVOS, SERVOED)
+    return arm, mjcf_cases.commands(arm, np.random.default_rng(0), 4)
 
 
 @pytest.mark.parametrize(
@@ -111,8 +106,8 @@ def servoed(tmp_path_factory):
 def test_a_weak_motor_and_a_shifted_centre_have_a_name_each(
     servoed, planted, values, name, size
 ):
-    model, told = servoed
-    trials = mjcf_cases.record(model, told, [effects.make(planted, values)])
-    found = diagnose(trials, model, full=False)
+    arm, told = servoed
+    trials = mjcf_cases.record(arm, told, [effects.make(planted, values)])
+    found = diagnose(trials, arm, full=False)
     assert found.verdict.named[0] == (name,)  # a load does what a shifted centre does
     assert found.best.magnitudes[0] == pytest.approx(size, rel=0.03)
