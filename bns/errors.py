@@ -40,12 +40,12 @@ class UnknownNameError(BnsError):
     Args:
         kind: what was looked up, in singular ("effect", "preset", "world").
         given: the name that was given.
-        known: the names that exist.
+        known: the names that exist; what has none, such as a free joint, is called "".
         also: a sentence on what else may be given.
     """
 
     def __init__(self, kind: str, given: str, known: Iterable[str], also: str = ""):
-        self.kind, self.given, self.known = kind, given, sorted(known)
+        self.kind, self.given, self.known = kind, given, sorted(filter(None, known))
         close = get_close_matches(given, self.known, n=1, cutoff=ALIKE)
         end = f" {also}" if also else ""
         said = f"Unknown {kind} {one_line(given, 60)!r}."

@@ -4,9 +4,11 @@ import mujoco
 import numpy as np
 import pytest
 
+from bns.errors import UnknownNameError
 from bns.gap.diagnose import diagnose
 from bns.gap.models.mjcf import floating, view
 from bns.gap.models.mjcf.config import TURNS
+from bns.gap.models.mjcf.model import OwnModel
 from tests.gap.own_robots import described
 
 ROBOT = """<mujoco model="drone"><option timestep="0.002" integrator="RK4"/>
@@ -110,6 +112,14 @@ def test_what_flies_begins_aloft_and_its_log_is_cut(flown):
         for trial, made in zip(trials, path, strict=True)
     ]
     assert np.median(left) < 1.5
+
+
+def test_a_joint_without_a_name_is_not_listed(flown):
+    own = flown[1].config.model.parent / "own.toml"
+    wrong = own.with_name("wrong.toml")
+    wrong.write_text(f"{own.read_text()}\n[effects]\nencoder_offset = ['base']\n")
+    with pytest.raises(UnknownNameError, match="There is none"):
+        OwnModel.read(wrong, threads=1)
 
 
 def test_nothing_planted_is_no_gap(flown):
