@@ -21,8 +21,10 @@ TURNS = 4  # of fitting and searching
 INSTEAD = 3  # explanations one of which another may replace
 FEW = 2  # explanations that need no other start if they leave little
 ENOUGH = 1.2  # times what all explanations leave: little more
+LITTLE = 0.02  # of what all explain: the rest of a strong one's law
 NEARLY = 1.5  # the same where these, all together, only describe the recording
 STRETCHED = 4.0  # deviations of slack that are no slack any more
+BETWEEN = 2  # steps of a fit between two searches: the next one moves it again
 ROUNDS = 2  # of levels, and of what walkers scatter
 MARGIN = 1.02  # of the held-out error that an autoregression may cost
 PATIENCE = 2  # points in a row that are no better than those before
@@ -85,22 +87,22 @@ def descend(
         the point of highest evidence on the way, after `TURNS` searches at most: around
         a strong effect a linear model may lead away from it.
     """
-    support, near = frozenset(support), near if problem.model.many else None
+    singly, many = problem.model.singly, problem.model.many
+    support, near = frozenset(support), near if many else None
     before = [near] if near else []
     passed: list[Point] = []
     values = refit.nearer(problem, values, support, known)
+    between = refit.LOOKS if singly else BETWEEN if many else refit.STEPS
     for _ in range(TURNS):
-        most = 3 if problem.model.singly else refit.STEPS
-        values, rest = newton(
-            problem, values, set(support) | fit.nuisances(problem), known, turns=most
-        )
+        fitted = set(support) | fit.nuisances(problem)
+        values, rest = newton(problem, values, fitted, known, turns=between)
         values, rest = levels.zoomed(problem, values, rest, support, known)
         kept = fit.lasting(problem, near, support, values) if near else None
         linear, known, slopes = linearised(problem, values, rest, known, kept)
         at = values if kept is None or near is None else near.at
         inside = support & set(linear.terms)  # without what came back to nominal
         near = Point(values, inside, rest, linear, slopes, known, at)
-        found = search.best(linear, start=support, backward=not problem.model.singly)[1]
+        found = search.best(linear, start=support, backward=not singly)[1]
         if found == support:
             break
         passed.append(near)
@@ -112,10 +114,9 @@ def descend(
             problem, placed(problem, linear, support, values), support, known
         )
     # the last fit was under the noise of the point before
-    most = 2 if problem.model.singly else refit.STEPS
-    values, rest = newton(
-        problem, values, set(support) | fit.nuisances(problem), known, turns=most
-    )
+    fitted = set(support) | fit.nuisances(problem)
+    most = 2 if singly else refit.STEPS
+    values, rest = newton(problem, values, fitted, known, turns=most)
     last = Point(values, support, rest, linear, slopes, known, at)
     return refit.better(problem, [last, *passed])
 
@@ -273,9 +274,10 @@ def _several(tried: Singles, found: Support, best: Point) -> Point:
 def enough(problem: Problem, point: Point, few: int = FEW) -> bool:
     """Whether few explanations leave little more than all together do.
 
-    Where many depart, it does for the strongest few (what is weak beside them needs no
-    other start), and for somewhat more where all together, a hundred numbers, foretell
-    motion that was not fitted no better.
+    Where many depart, it does for the strongest few: if they close next to all of the
+    gap, since what is weak beside them needs no other start; and for somewhat more
+    where all together, a hundred numbers, foretell motion that was not fitted no
+    better.
 
     Args:
         problem: the recording.
@@ -288,6 +290,8 @@ def enough(problem: Problem, point: Point, few: int = FEW) -> bool:
     sets = itertools.combinations(support, min(few, len(support)))
     best = min(sets, key=linear.squares)
     left, whole = linear.squares(best), linear.squares(linear.free)
+    if many and left - whole < LITTLE * (linear.squares(()) - whole):
+        return True
     if left < ENOUGH * whole or not many:
         return left < ENOUGH * whole
     if left >= NEARLY * whole:
@@ -306,13 +310,16 @@ def _simple(tried: Singles) -> list[Point]:
     """Points from the best single explanation, and from it with a level on top; if it
     has many numbers, which imitate much, from the best one of few, too.
 
-    Where many depart, what the tangent finds does if it is enough by itself."""
+    Where many depart, what the tangent finds does if it is enough by itself: only then
+    it is followed before the others are tried."""
     problem, start = tried.problem, tried.start
     made: dict[Single, Point] = {}
     for one in _leading(problem, tried.by_tangent) if problem.model.many else []:
-        made |= _from(tried, [one])
-        if enough(problem, made[one], 1):
-            return list(made.values())
+        here = refit.fitted_at(problem, replace(start, values=one.values), {one.name})
+        if enough(problem, here, 1):
+            made |= _from(tried, [one])
+            if enough(problem, made[one], 1):
+                return list(made.values())
     leading = _leading(problem, tried.fitted)
     made |= _from(tried, [one for one in leading if one not in made])
     points = [made[one] for one in leading]

@@ -13,7 +13,8 @@ from bns.gap.decomposition.linear import Linear, Support
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.spread import tail
 
-STEPS = 5  # of a fit; a walker, whose contacts make steps dear, takes fewer
+STEPS = 5  # of a fit
+LOOKS = 3  # steps of a first look, and of a walker
 DAMPING = (0.0, 2.0, 20.0, 200.0)  # added to the curvature, in units of the prior
 LONGEST = 4.0  # prior standard deviations of one step; of what is farther off, twice
 # as far: a load may be many times what its link plausibly departs by
@@ -55,7 +56,8 @@ def fitted_at(
     """
     support = frozenset(support)
     fitted = set(support) | fit.nuisances(problem)
-    most = 3 if problem.model.singly else STEPS
+    first = near and problem.model.many
+    most = LOOKS if problem.model.singly or first else STEPS
     values, rest = newton(problem, point.values, fitted, point.noise, turns=most)
     values, rest = levels.zoomed(problem, values, rest, support, point.noise)
     kept = point.slopes if near else None

@@ -19,6 +19,8 @@ CLEARLY = 0.02  # of the held-out error that a further explanation has to lower
 PIECES = 4  # of a stretch, each left out by itself for the share that is closed
 SLIGHT = 0.15  # of what is left: less may as well come from that,
 TRIFLE = 1e-3  # of the gap, if it is less than this too: a thirtieth of its size
+SMALL = 0.01  # of the gap: what closes less has to be this sure,
+SURE = 8.0  # nats of evidence: a simulation by other steps may look like 7
 CANCELLED = 5e-3  # of the gap: what explanations that cancel close at most
 LEFT_OVER = 0.01  # of what they change by themselves, squared: the others undo it
 LOOKED_AT = 8  # weakest explanations among which some may cancel
@@ -301,7 +303,8 @@ def within_slack(problem: Problem, point: Point) -> Problem:
 def weighty(problem: Problem, point: Point, left: float) -> Support:
     """The set of a point without trifles: what closes, added last, hardly any of the
     gap, and less than a part of what no explanation closes: that may look like it. So
-    may the others, within what they are simulated to.
+    may the others, within what they are simulated to. Nor is in it what closes little
+    beside a single other one, and is not sure; among several it may be what they lack.
 
     Args:
         problem: the recording.
@@ -310,12 +313,16 @@ def weighty(problem: Problem, point: Point, left: float) -> Support:
     """
     linear, support = point.linear, point.support
     least = max(min(SLIGHT * left, TRIFLE), fit.inexact(problem, point.values) ** 2)
-    least *= linear.squares(()) - linear.squares(linear.free)
+    gap = linear.squares(()) - linear.squares(linear.free)
     while len(support) > 1:
-        here = _height(linear, support)
+        here, cost = _height(linear, support), linear.cost(support)
         without = {n: _height(linear, support - {n}) - here for n in sorted(support)}
         name = min(without, key=without.__getitem__)
-        if without[name] >= least:
+        small = [n for n in without if without[n] < SMALL * gap]
+        doubts = {n for n in small if linear.cost(support - {n}) < cost + SURE}
+        if len(support - doubts) == 1:
+            name = min(sorted(doubts), key=without.__getitem__)
+        elif without[name] >= least * gap:
             break
         support = support - {name}
     return support - cancelling(linear, support)

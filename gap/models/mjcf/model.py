@@ -41,7 +41,7 @@ class OwnModel(GapModel):
 
     memory = 2
     many = True
-    spread = (0.1, 0.3, 1.0)
+    spread = (0.3, 1.0, 4.0)
     whole = True
     logs = True
     leeway = 1.0  # `bns gap describe` has limits from what one log was told

@@ -333,6 +333,18 @@ def test_a_small_explanation_that_nothing_undoes_stays():
     assert shares.cancelling(linear, frozenset("ab")) == frozenset()
 
 
+@pytest.mark.parametrize(("size", "kept"), [(0.15, False), (0.3, True)])
+def test_what_closes_little_has_to_be_sure(size, kept):
+    rng = np.random.default_rng(4)
+    problem = Rows(rng)
+    linear = problem.linear(planted(rng, problem, a=5.0, b=size))
+    assert linear.cost("ab") < linear.cost("a") - 2  # evidence as such has it
+    values = np.array([5.0, size, 0.0, 0.0, 0.0, 0.0])
+    point = SimpleNamespace(linear=linear, support=frozenset("ab"), values=values)
+    found = shares.weighty(problem, point, left=0.0)
+    assert found == frozenset("ab" if kept else "a")
+
+
 def test_one_of_both_adds_nothing_to_one_of_each():
     rng = np.random.default_rng(7)
     problem = Rows(rng)
