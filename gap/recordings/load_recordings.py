@@ -35,6 +35,8 @@ RUN = "dataset"  # where the directory of a run keeps its recordings
 SMOOTH = 0.01  # [s] over which robots move smoothly, and measurements scatter
 PART = 20.0  # [s] length of the trials that long recordings are cut into
 
+_WRITTEN = "`bns gap describe ROBOT.xml LOG` writes one (docs/gap_your_robot.md)"
+
 
 def model(name: str, *, threads: int = 2) -> GapModel:
     """The nominal model called `name`.
@@ -47,6 +49,8 @@ def model(name: str, *, threads: int = 2) -> GapModel:
         BnsError: there is no such model, or it can not be diagnosed.
     """
     if name.endswith(".toml"):
+        if not Path(name).is_file():
+            raise BnsError(f"There is no description {name}: {_WRITTEN}.")
         from bns.gap.models.mjcf.model import OwnModel
 
         return OwnModel.read(name, threads=threads)
@@ -56,8 +60,8 @@ def model(name: str, *, threads: int = 2) -> GapModel:
         return UnicycleModel()
     if name.endswith(".xml"):
         raise BnsError(
-            f"{name} alone does not say what is told and seen: give a TOML file that "
-            "maps its channels (docs/gap_your_robot.md)."
+            f"{name} alone does not say what is told and seen, a TOML file does: "
+            f"{_WRITTEN}."
         )
     kind = models.robot(name).kind
     if kind == "wheeled":

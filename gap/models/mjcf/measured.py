@@ -153,7 +153,8 @@ def _chosen(
             f"{p.quantity} {p.name}" for p in near[:2]
         )
     sure = fit.score > AGREES and reason not in (*matching.UNSURE, "for it moves so")
-    if fit.correlation < -AGREES:
+    headed = best.axis in ("x", "y") and bool(_free(work.model))  # as it began
+    if fit.correlation < -AGREES and not headed:
         line += (
             "; it moves against the model: if its sign is another, give its line in "
             "[log] scale = -1"

@@ -50,7 +50,11 @@ def test_check_says_that_there_are_too_few(tmp_path, capsys):
         (["gap", "diagnose", ".", "--threads", "0"], "give a number from 1 to 1024"),
         (["gap", "edit", "x", "--remove", "a"], "Missing: --predict."),
         (["gap", "diagnose", "x", "--model", "khepera4"], "khepera"),
-        (["gap", "check", "x", "--model", "robot.xml"], "TOML file that maps"),
+        (["gap", "check", "x", "--model", "robot.xml"], "a TOML file does: `bns gap"),
+        (
+            ["gap", "check", "x", "--model", "no.toml"],
+            "There is no description no.toml",
+        ),
         (["gap", "check", "x", "--importer", "xl33"], "Did you mean 'xl330'"),
         (["gap", "plan", "nowhere"], "bns gap diagnose DATA --out nowhere"),
         (["gap", "edit", "nowhere", "--remove", "a", "--predict", "b"], "nowhere"),

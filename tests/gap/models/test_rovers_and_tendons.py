@@ -146,6 +146,11 @@ def test_the_frame_of_the_tracker_does_not_matter(cart):
     assert np.median(change) == pytest.approx(0.05, abs=2e-3)
 
 
+def test_a_robot_that_set_out_another_way_has_no_turned_sign(tmp_path):
+    found, _ = described(tmp_path, CART, driven(tmp_path, yaw=np.pi))
+    assert not any("against the model" in note for note in found.unsure)
+
+
 def test_a_heading_is_read_as_going_on_beyond_half_a_turn(cart):
     _, own, log = cart
     raw = tables.read(log)["heading"]
