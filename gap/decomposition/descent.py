@@ -2,7 +2,7 @@
 around it."""
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from bns.gap.decomposition.noise import Memory
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.refit import newton
 from bns.gap.decomposition.shares import HeldOut
-from bns.gap.decomposition.singles import Single, Singles, wide
+from bns.gap.decomposition.singles import Single, Singles, leading, wide
 
 TURNS = 4  # of fitting and searching
 INSTEAD = 3  # explanations one of which another may replace
@@ -314,24 +314,18 @@ def _simple(tried: Singles) -> list[Point]:
     it is followed before the others are tried."""
     problem, start = tried.problem, tried.start
     made: dict[Single, Point] = {}
-    for one in _leading(problem, tried.by_tangent) if problem.model.many else []:
+    for one in leading(problem.terms, tried.by_tangent) if problem.model.many else []:
         here = refit.fitted_at(problem, replace(start, values=one.values), {one.name})
         if enough(problem, here, 1):
             made |= _from(tried, [one])
             if enough(problem, made[one], 1):
                 return list(made.values())
-    leading = _leading(problem, tried.fitted)
-    made |= _from(tried, [one for one in leading if one not in made])
-    points = [made[one] for one in leading]
+    first = leading(problem.terms, tried.fitted)
+    made |= _from(tried, [one for one in first if one not in made])
+    points = [made[one] for one in first]
     if not enough(problem, points[0]):
-        points += _with_level(problem, leading[0], start)
+        points += _with_level(problem, first[0], start)
     return points
-
-
-def _leading(problem: Problem, singles: Sequence[Single]) -> list[Single]:
-    """The best of some single explanations, and the best one of few numbers."""
-    narrow = [one for one in singles if not wide(problem.terms, one.name)]
-    return [*dict.fromkeys((*singles[:1], *narrow[:1]))]
 
 
 def _from(tried: Singles, singles: Iterable[Single]) -> dict[Single, Point]:

@@ -1,7 +1,7 @@
 """Explanations by themselves, each fitted to the simulation: through a tangent at the
 nominal a strong one looks like several, or like another."""
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -105,6 +105,14 @@ class Singles:
 def wide(terms: Mapping[str, tuple[int, ...]], name: str) -> bool:
     """Whether an explanation has so many numbers that it imitates much."""
     return len(terms[name]) >= WIDE
+
+
+def leading(
+    terms: Mapping[str, tuple[int, ...]], singles: Sequence[Single]
+) -> list[Single]:
+    """The first of some single explanations, and the first one of few numbers."""
+    narrow = [one for one in singles if not wide(terms, one.name)]
+    return [*dict.fromkeys((*singles[:1], *narrow[:1]))]
 
 
 def _prior(problem: Problem, values: np.ndarray) -> float:
