@@ -24,7 +24,6 @@ ENOUGH = 1.2  # times what all explanations leave: little more
 LITTLE = 0.02  # of what all explain: the rest of a strong one's law
 NEARLY = 1.5  # the same where these, all together, only describe the recording
 STRETCHED = 4.0  # deviations of slack that are no slack any more
-BETWEEN = 2  # steps of a fit between two searches: the next one moves it again
 ROUNDS = 2  # of levels, and of what walkers scatter
 MARGIN = 1.02  # of the held-out error that an autoregression may cost
 PATIENCE = 2  # points in a row that are no better than those before
@@ -87,12 +86,12 @@ def descend(
         the point of highest evidence on the way, after `TURNS` searches at most: around
         a strong effect a linear model may lead away from it.
     """
-    singly, many = problem.model.singly, problem.model.many
-    support, near = frozenset(support), near if many else None
+    singly = problem.model.singly
+    support, near = frozenset(support), near if problem.model.many else None
     before = [near] if near else []
     passed: list[Point] = []
     values = refit.nearer(problem, values, support, known)
-    between = refit.LOOKS if singly else BETWEEN if many else refit.STEPS
+    between = refit.LOOKS if singly else refit.STEPS
     for _ in range(TURNS):
         fitted = set(support) | fit.nuisances(problem)
         values, rest = newton(problem, values, fitted, known, turns=between)
