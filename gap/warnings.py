@@ -56,7 +56,8 @@ def warnings(
         untried: effects that it does not consider, by name.
     """
     made = []
-    if untried and found.verdict.kind != "no gap":
+    searched = found.decomposition.get("unlisted", {}).get("searched")
+    if untried and found.verdict.kind != "no gap" and not searched:
         made.append(
             f"Not tried: {', '.join(untried)}; list what can be the case in [effects]."
         )

@@ -1,6 +1,6 @@
 """What is considered of a user's own model where the user does not say what."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import mujoco
 import numpy as np
@@ -116,6 +116,30 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
         else:
             made[name] = tuple(of.get(name, (ALL,)))
     return {name: parts for name, parts in made.items() if parts}
+
+
+def beside(
+    config: OwnConfig, model: mujoco.MjModel
+) -> Mapping[str, tuple[str, ...]] | None:
+    """Names of the effects that a user lists, with their parts, and what is usual
+    beside them; None where the user lists none.
+
+    Args:
+        config: the description.
+        model: the nominal model.
+    """
+    if config.effects is None:
+        return None
+    made = dict(config.effects)
+    given = {effects.current(name): name for name in made}
+    for name, parts in usual(config, model).items():
+        listed = made.get(given.get(name, name), ())
+        if name not in given:
+            made[name] = parts
+        elif listed and ALL not in (*listed, *parts):
+            more = [part for part in parts if part not in listed]
+            made[given[name]] = (*listed, *more)
+    return made
 
 
 def _sprung(model: mujoco.MjModel, tendon: str) -> bool:

@@ -63,6 +63,9 @@ class Decomposition:
             words; "" = they do not (`flexible.imitated`).
         unconfirmed: explanations that one trial alone shows, and its number; they are
             not in `point`.
+        searched: whether what the robot's description does not list was tried as well
+            (`diagnosis.widened`).
+        unlisted: the decomposition with that, where it explains what this one leaves.
     """
 
     problem: Problem
@@ -83,6 +86,8 @@ class Decomposition:
     strayed: tuple[int, ...] = ()
     goes: str = ""
     unconfirmed: Mapping[str, int] = field(default_factory=dict)
+    searched: bool = False
+    unlisted: "Decomposition | None" = None
 
     @cached_property
     def closed(self) -> float:
@@ -165,7 +170,17 @@ class Decomposition:
         if not self.point.support and self.lasting and self.recurring:
             most |= self.after - self.scatter > LARGE
         alone = bool(self.unconfirmed) and not self.point.support
-        return most or alone or self.failing or self.strained or bool(self.goes)
+        most |= bool(self.goes or self.elsewhere)
+        return most or alone or self.failing or self.strained
+
+    @property
+    def elsewhere(self) -> frozenset[str]:
+        """Explanations that the description does not list, unless they stand beside
+        those that it does."""
+        other, named = self.unlisted, self.point.support
+        if other is None or named and named <= other.point.support:
+            return frozenset()
+        return other.point.support - self.problem.terms.keys()
 
     @property
     def kind(self) -> str:

@@ -19,6 +19,8 @@ from bns.gap.decomposition.singles import Single, Singles, leading, wide
 
 TURNS = 4  # of fitting and searching
 INSTEAD = 3  # explanations one of which another may replace
+OTHERS = 3  # single explanations from which several are looked for again
+NUMEROUS = 60  # explanations of a robot too large for that: a start takes a minute
 FEW = 2  # explanations that need no other start if they leave little
 ENOUGH = 1.2  # times what all explanations leave: little more
 LITTLE = 0.02  # of what all explain: the rest of a strong one's law
@@ -267,14 +269,32 @@ def _several(tried: Singles, found: Support, best: Point) -> Point:
             points.append(_followed(problem, tried.start, found))
         if problem.model.many:
             points.append(_from_all(problem, tried.start))
+            return _from_others(tried, refit.better(problem, points))
     return refit.better(problem, points)
+
+
+def _from_others(tried: Singles, best: Point) -> Point:
+    """A point of several explanations, or a better one from single explanations that
+    leave more than the best: beside a strong one that is not the cause, several weak
+    ones describe what it does otherwise, and no exchange of one for another leads away
+    from all of them."""
+    problem, start = tried.problem, tried.start
+    if len(best.support) <= FEW or len(start.linear.free) > NUMEROUS:
+        return best
+    first = leading(problem.terms, tried.fitted)
+    for one in [one for one in tried.fitted if one not in first][:OTHERS]:
+        here = descend(problem, one.values, {one.name}, start.noise, start)
+        best = refit.better(problem, [best, here])
+        if len(best.support) <= FEW:
+            break
+    return best
 
 
 def enough(problem: Problem, point: Point, few: int = FEW) -> bool:
     """Whether few explanations leave little more than all together do.
 
-    Where many depart, it does for the strongest few: if they close next to all of the
-    gap, since what is weak beside them needs no other start; and for somewhat more
+    Where many depart, it does for the strongest few: if a single one closes next to all
+    of the gap, since what is weak beside it needs no other start; and for somewhat more
     where all together, a hundred numbers, foretell motion that was not fitted no
     better.
 
@@ -289,8 +309,10 @@ def enough(problem: Problem, point: Point, few: int = FEW) -> bool:
     sets = itertools.combinations(support, min(few, len(support)))
     best = min(sets, key=linear.squares)
     left, whole = linear.squares(best), linear.squares(linear.free)
-    if many and left - whole < LITTLE * (linear.squares(()) - whole):
-        return True
+    if many and support:
+        strong = min(linear.squares({name}) for name in support)
+        if strong - whole < LITTLE * (linear.squares(()) - whole):
+            return True
     if left < ENOUGH * whole or not many:
         return left < ENOUGH * whole
     if left >= NEARLY * whole:

@@ -4,13 +4,17 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
-from bns.gap.decomposition.decomposition import decompose
+from bns.gap.decomposition.decomposition import Decomposition, decompose
+from bns.gap.decomposition.descent import FEW, NUMEROUS
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.record import recorded
 from bns.gap.models.base import GapModel
 from bns.gap.records import Diagnosis
 from bns.progress import Tell, unheard
 from bns.worlds.trial import Trial
+
+LEAST = 0.02  # of a gap, left: less is not worth another search
+HALF = 0.5  # of what is left: what is clearly less
 
 
 def diagnose(
@@ -39,6 +43,8 @@ def diagnose(
     if rows is not None:
         problem = narrowed(problem, rows)
     made = decompose(problem, seed=seed, tell=tell)
+    if rows is None:
+        made = widened(made, seed=seed)
     seconds = {"fit": round(time.perf_counter() - began, 3)}
     return recorded(made, faults=faults, seed=seed, seconds=seconds, full=full)
 
@@ -49,3 +55,28 @@ def narrowed(problem: Problem, names: Sequence[str]) -> Problem:
         row for row in problem.rows if row.nuisance or {row.name, row.term} & set(names)
     )
     return replace(problem, rows=kept)
+
+
+def widened(made: Decomposition, *, seed: int = 0) -> Decomposition:
+    """A decomposition beside the one with what a robot's description does not list,
+    searched where what it lists leaves much that is no scatter, and kept where it
+    leaves less than half of that by no more explanations.
+
+    Args:
+        made: the decomposition by what is listed.
+        seed: of what is drawn.
+    """
+    if not (made.lasting or made.failing) or made.unexplained < LEAST:
+        return made
+    model = made.problem.model.unlisted()
+    if model is None:
+        return made
+    problem = Problem.of(made.problem.trials, model)
+    if len(problem.terms) > NUMEROUS:
+        return made
+    other = decompose(problem, seed=seed)
+    found = other.point.support
+    new = bool(found - made.problem.terms.keys()) and not other.foreign
+    few = len(found) <= max(len(made.point.support), FEW)
+    better = new and few and other.after < HALF * made.after
+    return replace(made, searched=True, unlisted=other if better else None)

@@ -1,7 +1,7 @@
 """Starts over the whole range of what has no slope at the nominal: dead bands, limits,
 lags that are long, wheels that stop."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,6 @@ from bns.gap.decomposition import search
 from bns.gap.decomposition.fit import Noise, Point
 from bns.gap.decomposition.linear import KAPPA, Linear, Support, stretches
 from bns.gap.decomposition.problem import Problem
-from bns.gap.decomposition.row import Row
 
 FELT = 4.0  # weighted square of a change below which a level is not felt
 NEAR = 15.0  # nats beyond the present cost within which levels are tried in full
@@ -18,6 +17,7 @@ MOST = 14  # levels that are tried in full on account of their cost
 KINDS = 6  # further ones, the best level of other rows
 SEARCHED = 6  # levels whose sets are searched
 EACH = 2  # levels of one row among these
+PROMISING = 6  # times as many as are wanted: those that are tried further
 AT_ONCE = 60  # levels in one batch, which bounds the memory
 PARTS = 6  # between two levels in a search for the best value
 LOOKS = 4  # of it, each nearer, the last ones where the one before gained
@@ -121,12 +121,38 @@ def screened(
     Returns:
         names and values of all rows, ``(R,)``, nuisances fitted; the best first.
     """
-    todo = [
-        (number, value)
+    rows = [
+        number
         for number, row in enumerate(problem.rows)
         if not row.nuisance and (names is None or row.term in names)
-        for value in _departures(row, problem.model.spread)
     ]
+    levels = [(n, value) for n in rows for value in problem.rows[n].levels]
+    todo = [which for which in levels if which[1] != problem.nominal[which[0]]]
+    todo = sorted({*todo, *_departures(problem, rows, problem.model.spread)})
+    best = _least(problem, point, todo, only)
+    promising = set(_first(best, most * PROMISING))
+    rows = [number for number in rows if problem.rows[number].term in promising]
+    again = _least(
+        problem, point, _departures(problem, rows, problem.model.further), only
+    )
+    for term, item in again.items():
+        best[term] = min(best[term], item, key=lambda found: found[0])
+    return [(term, best[term][1]) for term in _first(best, most)]
+
+
+def _first(best: Mapping[str, tuple[float, np.ndarray]], most: int) -> list[str]:
+    """Explanations that cost least, the best first."""
+    return sorted(best, key=lambda term: best[term][0])[:most]
+
+
+def _least(
+    problem: Problem,
+    point: Point,
+    todo: Sequence[tuple[int, float]],
+    only: list[int] | None,
+) -> dict[str, tuple[float, np.ndarray]]:
+    """What explanations cost by themselves at the best of values of their rows, and the
+    values of all rows ``(R,)``."""
     best: dict[str, tuple[float, np.ndarray]] = {}
     for at in range(0, len(todo), AT_ONCE):
         part = todo[at : at + AT_ONCE]
@@ -136,8 +162,7 @@ def screened(
             if term not in best or cost < best[term][0]:
                 values = _values(problem, point, number, value, linear, support)
                 best[term] = cost, values
-    order = sorted(best, key=lambda term: best[term][0])[:most]
-    return [(term, best[term][1]) for term in order]
+    return best
 
 
 def _by_itself(linear: Linear, term: str) -> tuple[float, Support]:
@@ -148,13 +173,17 @@ def _by_itself(linear: Linear, term: str) -> tuple[float, Support]:
     return min((linear.cost(item), item) for item in (frozenset[str](), *sets))
 
 
-def _departures(row: Row, spread: Sequence[float]) -> list[float]:
-    """Levels of a row, and values as many plausible departures from the nominal."""
-    found = {value for value in row.levels if value != row.nominal}
-    for size in spread if row.sloped(row.nominal) else ():
-        for value in (row.nominal - size * row.sd, row.nominal + size * row.sd):
-            if row.low <= value <= row.high:
-                found.add(value)
+def _departures(
+    problem: Problem, rows: Iterable[int], spread: Sequence[float]
+) -> list[tuple[int, float]]:
+    """Numbers of rows, and values as many plausible departures from the nominal."""
+    found = set()
+    for number in rows:
+        row = problem.rows[number]
+        for size in spread if row.sloped(row.nominal) else ():
+            for value in (row.nominal - size * row.sd, row.nominal + size * row.sd):
+                if row.low <= value <= row.high:
+                    found.add((number, value))
     return sorted(found)
 
 

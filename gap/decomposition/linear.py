@@ -9,14 +9,15 @@ recording, so that thousands of sets, stretches left out and moments at which a 
 sets in cost no simulation.
 """
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from bns.gap.decomposition.problem import Problem
-from bns.gap.decomposition.spread import Spread
+from bns.gap.decomposition.spread import Spread, Widened
 
 KAPPA = 3.0
 """what an explanation costs: the log odds against it; e^3 = 20, the number of
@@ -263,85 +264,66 @@ class Linear:
         for name, parts in self.joins.items():
             if name in key and parts <= key:  # the parts alone can be all that it is
                 return self.cost(key - {name}) + KAPPA
-        rows, plain = self._rows(key), self.spread(frozenset())
-        value, found = plain.evidence(rows, self.slack[rows] ** 2)
-        far = self._beyond(rows, found)
-        if edges := self._edges(key, far):
-            rows = [row for row in rows if row not in edges]
-            value, found = plain.evidence(rows, self.slack[rows] ** 2)
-            far = self._beyond(rows, found)
-        value += self.paid(key) + self._nuisances_beyond(key, rows)
-        if far and (off := self._at_bounds(key, rows, found, far)) < AT:
-            value, far = value + 0.5 * off, set()
-        if far:
-            out = {name for name in key if far & set(self.terms[name])}
+        wider = self._widened(self._rows(key))
+        value, found = wider.tailed()
+        far = self._beyond(wider.rows, found)
+        if edges := self._edges(key, set(wider.rows[far])):
+            wider = self._widened([row for row in wider.rows if row not in edges])
+            value, found = wider.tailed()
+            far = self._beyond(wider.rows, found)
+        value += self.paid(key) + self._nuisances_beyond(wider)
+        if far.any() and (off := self._at_bounds(wider, found, far)) < AT:
+            return float(value + 0.5 * off)
+        if far.any():
+            beyond = set(wider.rows[far])
+            out = {name for name in key if beyond & set(self.terms[name])}
             value = max(value, self.cost(key - out) + KAPPA * len(out))
         return float(value)
 
-    def _nuisances_beyond(self, key: Support, rows: list[int]) -> float:
+    def _widened(self, rows: Sequence[int]) -> Widened:
+        """What was recorded where some rows are in."""
+        more = 1.0 - self.slack[rows] ** 2
+        return self.spread(frozenset()).widened(rows, more)
+
+    def _nuisances_beyond(self, wider: Widened) -> float:
         """What it costs that nuisances are held to their bounds, in nats: half their
         squared deviations from there, by what the data leave open. Else a lead of the
         motion, which may be a thousandth of a second, would be a delay of a tenth.
 
         Args:
-            key: explanations that are in.
-            rows: of these, those that are not held to nominal.
+            wider: with the rows that are in.
         """
         out = np.flatnonzero(self.always)
-        every, places = [*rows, *out], len(rows) + np.arange(len(out))
-        more = np.r_[1.0 - self.slack[rows] ** 2, np.zeros(len(out))]
-        wanted = self.spread(frozenset()).changed(every, more)[1][places]
+        wanted = wider.beside(out)
         off = wanted - np.clip(wanted, self.low[out], self.high[out])
         far = np.abs(off) > 1e-6
-        if not far.any():
-            return 0.0
-        return 0.5 * self._squared(off[far], every, more, places[far])
+        return 0.5 * _squared(off[far], wider, out[far]) if far.any() else 0.0
 
-    def _at_bounds(
-        self, key: Support, rows: list[int], found: np.ndarray, far: set[int]
-    ) -> float:
+    def _at_bounds(self, wider: Widened, found: np.ndarray, far: np.ndarray) -> float:
         """Squared deviations, by what the data leave open, from where rows want to be
         to their bounds; infinite where such a bound is the nominal value.
 
         Args:
-            key: explanations that are in.
-            rows: of these.
+            wider: with the rows that are in.
             found: where they want to be, ``(n,)``.
-            far: those beyond a bound.
+            far: those beyond a bound, booleans ``(n,)``.
         """
-        at = [place for place, row in enumerate(rows) if row in far]
-        out = [rows[place] for place in at]
-        off = found[at] - np.clip(found[at], self.low[out], self.high[out])
-        if np.isclose(found[at], off).any():
+        out = wider.rows[far]
+        edge = np.clip(found[far], self.low[out], self.high[out])
+        if not edge.all():
             return np.inf
-        mine = self._rows(key)
-        places = np.array([mine.index(row) for row in out])
-        return self._squared(off, mine, 1.0 - self.slack[mine] ** 2, places)
+        return _squared(found[far] - edge, wider, out)
 
-    def _squared(
-        self, off: np.ndarray, rows: list[int], more: np.ndarray, places: np.ndarray
-    ) -> float:
-        """Squared deviations ``(n,)``, by what the data leave open.
-
-        Args:
-            off: deviations of some rows.
-            rows: that may move.
-            more: added to the variance of each of these.
-            places: of the deviations among them, ``(n,)``.
-        """
-        left_open = self.spread(frozenset()).uncertain(rows, more)
-        return float(off @ np.linalg.solve(left_open[np.ix_(places, places)], off))
-
-    def _beyond(self, rows: list[int], found: np.ndarray) -> set[int]:
-        """Rows whose most probable values lie beyond their bounds."""
-        out = (found < self.low[rows] - 1e-6) | (found > self.high[rows] + 1e-6)
-        return {row for row, beyond in zip(rows, out, strict=True) if beyond}
+    def _beyond(self, rows: np.ndarray, found: np.ndarray) -> np.ndarray:
+        """Which rows' most probable values lie beyond their bounds, ``(n,)``."""
+        low, high = self.low[rows] - 1e-6, self.high[rows] + 1e-6
+        return np.asarray((found < low) | (found > high))
 
     def _edges(self, key: Support, far: set[int]) -> set[int]:
         """Rows of a set that want to be beyond a bound that is their nominal value,
         while others of their explanation stay inside theirs."""
         edges: set[int] = set()
-        for name in key:
+        for name in key if far else ():
             mine = far & set(self.terms[name])
             if mine < set(self.terms[name]):
                 edges |= {r for r in mine if 0.0 in (self.low[r], self.high[r])}
@@ -365,10 +347,10 @@ class Linear:
     def paid(self, support: Support) -> float:
         """What a set costs: each family once, its dearest member."""
         most: dict[str, float] = {}
-        for name in sorted(support):
+        for name in support:
             family = self.family.get(name, name)
             most[family] = max(most.get(family, 0.0), self.penalty[name])
-        return sum(most.values())
+        return math.fsum(most.values())
 
     @property
     def weighed(self) -> Mapping[Support, float]:
@@ -463,6 +445,11 @@ class Linear:
             normal=normal,
             slope=slope,
         )
+
+
+def _squared(off: np.ndarray, wider: Widened, rows: np.ndarray) -> float:
+    """Squared deviations ``(m,)`` of rows, by what the data leave open of them."""
+    return float(off @ np.linalg.solve(wider.covariance(rows), off))
 
 
 def stretches(count: int, kept: Iterable[int]) -> np.ndarray:

@@ -116,6 +116,10 @@ def _rivals(made: Decomposition) -> list[tuple[float, Support]]:
 def _change(made: Decomposition, kind: str) -> str:
     if kind == "no gap":
         return "A longer or less noisy recording would show smaller effects."
+    if made.unlisted and made.elsewhere:
+        return (
+            f"List in [effects] what explains it: {', '.join(sorted(made.elsewhere))}."
+        )
     if kind == "none of the library":
         return "An effect that the library lacks; see where and when the gap sits."
     if kind != "either":
@@ -155,24 +159,32 @@ def statements(made: Decomposition) -> list[str]:
         if made.before > LARGE:
             said += [size, UNSURE if made.left < HALF else SCATTERED]
         return said
-    _, left = rest.sizes(made.point.rest, made.floor, made.inside)
+    return [size, _explained(made), _left(made) + apart]
+
+
+def _explained(made: Decomposition) -> str:
+    """What explains how much of a gap."""
     listed = [_said(made, part) for part in made.parts]
     date = ""
     if made.onset:
         date = f"{made.onset.name} sets in at trial {made.onset.trial}."
     swapped = [" with ".join(_ordered(made, s)) for s in made.tied[1:]]
-    return [
-        size,
-        words.explained(listed, made.closed, date, swapped),
-        words.left(
-            made.left,
-            made.lasting or made.failing,
-            made.recurring,
-            words.sized(left, features),
-            made.goes,
-        )
-        + apart,
-    ]
+    return words.explained(listed, made.closed, date, swapped)
+
+
+def _left(made: Decomposition) -> str:
+    """How large the rest is, or what explains it that is not listed."""
+    if made.unlisted:
+        return f"With what [effects] does not list, {_explained(made.unlisted)}"
+    _, left = rest.sizes(made.point.rest, made.floor, made.inside)
+    text = words.left(
+        made.left,
+        made.lasting or made.failing,
+        made.recurring,
+        words.sized(left, made.problem.model.features),
+        made.goes,
+    )
+    return text + (words.NOR if made.searched else "")
 
 
 def _over(problem: Problem) -> str:
@@ -363,6 +375,12 @@ def _decomposition(made: Decomposition) -> dict[str, Any]:
             for part in made.parts
         ],
         "statements": statements(made),
+        "unlisted": {
+            "searched": made.searched,
+            "names": [*_ordered(made.unlisted, made.unlisted.point.support)]
+            if made.unlisted
+            else [],
+        },
         "left": made.left,
         "recurs": made.recurs,
         "before": made.before,

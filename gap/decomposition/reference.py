@@ -180,6 +180,11 @@ class Corrected(GapModel):
         """See `GapModel.untried`."""
         return self.model.untried()
 
+    def unlisted(self) -> GapModel | None:
+        """See `GapModel.unlisted`."""
+        model = self.model.unlisted()
+        return model and Corrected(model, self.moved, self.slack)
+
     def at_rest(self, trial: Trial, predicted: np.ndarray) -> frozenset[str]:
         """See `GapModel.at_rest`."""
         return self.model.at_rest(trial, predicted)

@@ -63,11 +63,11 @@ def _weakest(linear: Linear, kept: Support) -> set[str]:
     rising, beyond = {}, {}
     for name in kept:
         rows = list(linear.terms[name])
-        now = spread.changed(rows, np.zeros(len(rows)))[1]
+        now = spread.widened(rows, np.zeros(len(rows))).values
         beyond[name] = float(
             np.maximum(linear.low[rows] - now, now - linear.high[rows]).max()
         )
-        value, _ = spread.changed(rows, linear.slack[rows] ** 2 - 1.0)
+        value = spread.widened(rows, linear.slack[rows] ** 2 - 1.0).cost
         rising[name] = value + linear.paid(kept - {name}) - paid
     order = sorted(kept, key=lambda name: (rising[name], name))[:TRIED]
     far = [name for name in kept if beyond[name] > 0]

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import lapack
 
 STRONG = 4.0  # plausible departures from which a row has a prior of its own size
 LEAST = 1e-12  # of a prior's variance: what double precision leaves
@@ -57,66 +58,104 @@ class Spread:
         cost += float(np.log(np.diag(factor)).sum() + np.log(prior[used]).sum())
         return cls(prior**2, inner, pull, cost)
 
-    def changed(
-        self, rows: Sequence[int], more: np.ndarray
-    ) -> tuple[float, np.ndarray]:
-        """The cost where the variance of some rows is another, and their most probable
-        values.
+    def widened(self, rows: Sequence[int], more: np.ndarray) -> "Widened":
+        """The same where the variance of some rows is another.
 
         Args:
             rows: numbers of the rows.
             more: added to the variance of each, ``(n,)``.
         """
-        if not len(rows):
-            return self.cost, np.zeros(0)
-        inner, pull = self.inner[np.ix_(rows, rows)], self.pull[rows]
-        wider = np.eye(len(rows)) + inner * more
-        try:
-            left = np.linalg.solve(wider, pull)
-        except np.linalg.LinAlgError:  # known better than doubles can tell from exactly
-            wider += LEAST * np.eye(len(rows))
-            left = np.linalg.solve(wider, pull)
-        cost = self.cost + 0.5 * np.linalg.slogdet(wider)[1]
-        cost -= 0.5 * float((more * pull) @ left)
-        return cost, (self.variance[rows] + more) * left
+        return Widened.of(self, np.array(rows, dtype=int), more)
 
-    def evidence(
-        self, rows: Sequence[int], known: np.ndarray
-    ) -> tuple[float, np.ndarray]:
-        """Minus the log evidence with some rows in, and their most probable values,
-        ``(n,)``; with priors as `tail` has them.
+
+@dataclass(frozen=True, eq=False)
+class Widened:
+    """A spread where the variance of some rows is another: one factorisation of a small
+    matrix, since thousands are asked for.
+
+    Attributes:
+        spread: before.
+        rows: numbers of the rows, ``(n,)``.
+        more: added to the variance of each, ``(n,)``.
+        left: what is left of their pulls, ``(n,)``.
+        cost: see `Spread`.
+    """
+
+    spread: Spread
+    rows: np.ndarray
+    more: np.ndarray
+    left: np.ndarray
+    cost: float
+    _factors: tuple[np.ndarray, np.ndarray]
+
+    @classmethod
+    def of(cls, spread: Spread, rows: np.ndarray, more: np.ndarray) -> "Widened":
+        """See `Spread.widened`."""
+        if not len(rows):
+            return cls(spread, rows, more, more, spread.cost, (more, more))
+        pull = spread.pull[rows]
+        wider = spread.inner[rows[:, None], rows] * more
+        wider.flat[:: len(rows) + 1] += 1.0
+        factors, order, left, singular = lapack.dgesv(wider, pull)
+        if singular:  # known better than doubles can tell from exactly
+            wider.flat[:: len(rows) + 1] += LEAST
+            factors, order, left, _ = lapack.dgesv(wider, pull)
+        cost = spread.cost + 0.5 * float(np.log(np.abs(factors.diagonal())).sum())
+        cost -= 0.5 * float((more * pull) @ left)
+        return cls(spread, rows, more, left, cost, (factors, order))
+
+    @property
+    def values(self) -> np.ndarray:
+        """Most probable values of the rows, ``(n,)``, in units of their priors."""
+        return np.asarray((self.spread.variance[self.rows] + self.more) * self.left)
+
+    def beside(self, others: np.ndarray) -> np.ndarray:
+        """Most probable values of rows whose variance stays, ``(m,)``, in units of
+        their priors.
+
+        Args:
+            others: their numbers, ``(m,)``.
+        """
+        spread = self.spread
+        taken = spread.inner[others[:, None], self.rows] @ (self.more * self.left)
+        return np.asarray(spread.variance[others] * (spread.pull[others] - taken))
+
+    def covariance(self, numbers: np.ndarray) -> np.ndarray:
+        """Posterior covariance of any rows, ``(m, m)``, in units of their priors.
+
+        Args:
+            numbers: of the rows, ``(m,)``.
+        """
+        inner = self.spread.inner
+        variance = self.spread.variance.copy()
+        variance[self.rows] += self.more
+        seen = inner[numbers[:, None], numbers]
+        if len(self.rows):
+            across = inner[self.rows[:, None], numbers]
+            solved, _ = lapack.dgetrs(*self._factors, across)
+            seen = seen - across.T @ (self.more[:, None] * solved)
+        mine = variance[numbers]
+        return np.asarray(np.diag(mine) - mine[:, None] * seen * mine)
+
+    def tailed(self) -> tuple[float, np.ndarray]:
+        """Minus the log evidence, and the most probable values of the rows, ``(n,)``,
+        where these have, each, a prior as wide as its unit; with priors as `tail` has
+        them.
 
         A normal prior holds back what is far off and not told well by the data, though
         it may be of any size: a load many times as heavy as its link plausibly departs
         by, of which one motion tells. Such rows have a prior of their own departure.
-
-        Args:
-            rows: numbers of the rows.
-            known: variance that each has anyway, ``(n,)``.
         """
-        value, found = self.changed(rows, 1.0 - known)
-        value += tail(found)
+        found = self.values
+        value = self.cost + tail(found)
         far = np.abs(found) > STRONG
         if far.any():
             scale = np.where(far, found**2, 1.0)
-            other, wider = self.changed(rows, scale - known)
-            other += tail(wider[~far])
+            wider = Widened.of(self.spread, self.rows, self.more + scale - 1.0)
+            other = wider.cost + tail(wider.values[~far])
             if other < value:
-                return other, wider
+                return other, wider.values
         return value, found
-
-    def uncertain(self, rows: Sequence[int], more: np.ndarray) -> np.ndarray:
-        """Posterior covariance of some rows where the variance of these is another,
-        ``(n, n)``, in units of their priors.
-
-        Args:
-            rows: numbers of the rows.
-            more: added to the variance of each, ``(n,)``.
-        """
-        inner, variance = self.inner[np.ix_(rows, rows)], self.variance[rows] + more
-        seen = np.linalg.solve(np.eye(len(rows)) + inner * more, inner)
-        made: np.ndarray = np.diag(variance) - variance[:, None] * seen * variance
-        return made
 
 
 def tail(values: np.ndarray) -> float:

@@ -77,6 +77,7 @@ class GapModel(ABC):
             are more rows than a tangent at the nominal can tell apart.
         spread: plausible departures at which each row is tried by itself, beside its
             levels.
+        further: the same, for those alone that say most at these.
     """
 
     name: str
@@ -98,6 +99,7 @@ class GapModel(ABC):
     one_step: bool = False
     singly: bool = False
     spread: tuple[float, ...] = ()
+    further: tuple[float, ...] = ()
     odds: float = 3.0
 
     def grid(self, trial: Trial) -> float:
@@ -331,3 +333,8 @@ class GapModel(ABC):
     def untried(self) -> tuple[str, ...]:
         """Effects that act on such a robot and are not among its rows, by name."""
         return ()
+
+    def unlisted(self) -> "GapModel | None":
+        """The same model with all effects that are usual of such a robot, where its
+        description lists some; None if it lists none, or nothing is missing."""
+        return None

@@ -1,12 +1,13 @@
 """Any MJCF model, with a TOML file that maps its channels, as a nominal model."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from bns.gap.candidates import mjcf, mjcf_rows
+from bns.gap.candidates import mjcf, mjcf_rows, mjcf_usual
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, Windows
 from bns.gap.models.mjcf import cuts, log, masses, roughness, start
@@ -41,7 +42,8 @@ class OwnModel(GapModel):
 
     memory = 2
     many = True
-    spread = (0.3, 1.0, 4.0)
+    spread = (1.0,)
+    further = (0.3, 4.0)
     whole = True
     logs = True
     leeway = 1.0  # `bns gap describe` has limits from what one log was told
@@ -56,6 +58,7 @@ class OwnModel(GapModel):
             item.channel.name: (item.low, item.high, item.channel.unit)
             for item in config.told
         }
+        self._given = config, threads
         self.physics = Simulation(config, threads=threads)
         self.config = config = self.physics.config
         model, self.dt = self.physics.model, self.physics.dt
@@ -184,6 +187,14 @@ class OwnModel(GapModel):
         """See `GapModel.untried`."""
         tried = self._tried
         return tuple(name for name in sorted(own_effects.CLASSES) if name not in tried)
+
+    def unlisted(self) -> "OwnModel | None":
+        """See `GapModel.unlisted`."""
+        wider = mjcf_usual.beside(self.config, self.physics.model)
+        if wider == self.config.effects:
+            return None
+        given, threads = self._given
+        return OwnModel(replace(given, effects=wider), threads=threads)
 
     def effect(self, term: str, values: Mapping[str, float]) -> Effect | None:
         """The effect of an explanation; None for the shift in time and the step."""

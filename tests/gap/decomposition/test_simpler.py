@@ -70,6 +70,15 @@ def test_friction_takes_the_place_of_a_damping_that_was_found_first(problem):
     assert abs(found.values[friction] - 0.1) < 0.01
 
 
+def test_several_that_describe_a_wrong_start_give_way_to_a_single_one_with_another(
+    problem,
+):
+    start = descent.nothing(problem)
+    several = refit.fitted_at(problem, start, {GAINS, DAMPING, FRICTION})
+    found = descent._from_others(Singles(problem, start), several)
+    assert found.support == {HIP, FRICTION}
+
+
 SERVOED = """
 name = "arm"
 model = "robot.xml"
