@@ -170,15 +170,15 @@ class Decomposition:
         if not self.point.support and self.lasting and self.recurring:
             most |= self.after - self.scatter > LARGE
         alone = bool(self.unconfirmed) and not self.point.support
-        most |= bool(self.goes or self.elsewhere)
-        return most or alone or self.failing or self.strained
+        other = bool(self.goes or self.elsewhere)
+        return most or alone or self.failing or self.strained or other
 
     @property
     def elsewhere(self) -> frozenset[str]:
         """Explanations that the description does not list, unless they stand beside
         those that it does."""
         other, named = self.unlisted, self.point.support
-        if other is None or named and named <= other.point.support:
+        if other is None or (named and named <= other.point.support):
             return frozenset()
         return other.point.support - self.problem.terms.keys()
 

@@ -304,7 +304,8 @@ def weighty(problem: Problem, point: Point, left: float) -> Support:
     """The set of a point without trifles: what closes, added last, hardly any of the
     gap, and less than a part of what no explanation closes: that may look like it. So
     may the others, within what they are simulated to. Nor is in it what closes little
-    beside a single other one, and is not sure; among several it may be what they lack.
+    beside a single other one, and is not sure, or less than is left; among several it
+    may be what they lack.
 
     Args:
         problem: the recording.
@@ -319,7 +320,11 @@ def weighty(problem: Problem, point: Point, left: float) -> Support:
         without = {n: _height(linear, support - {n}) - here for n in sorted(support)}
         name = min(without, key=without.__getitem__)
         small = [n for n in without if without[n] < SMALL * gap]
-        doubts = {n for n in small if linear.cost(support - {n}) < cost + SURE}
+        doubts = {
+            n
+            for n in small
+            if without[n] < left * gap or linear.cost(support - {n}) < cost + SURE
+        }
         if len(support - doubts) == 1:
             name = min(sorted(doubts), key=without.__getitem__)
         elif without[name] >= least * gap:

@@ -189,12 +189,14 @@ class OwnModel(GapModel):
         return tuple(name for name in sorted(own_effects.CLASSES) if name not in tried)
 
     def unlisted(self) -> "OwnModel | None":
-        """See `GapModel.unlisted`."""
+        """See `GapModel.unlisted`: for what explains much by itself."""
         wider = mjcf_usual.beside(self.config, self.physics.model)
         if wider == self.config.effects:
             return None
         given, threads = self._given
-        return OwnModel(replace(given, effects=wider), threads=threads)
+        made = OwnModel(replace(given, effects=wider), threads=threads)
+        made.singly = True
+        return made
 
     def effect(self, term: str, values: Mapping[str, float]) -> Effect | None:
         """The effect of an explanation; None for the shift in time and the step."""

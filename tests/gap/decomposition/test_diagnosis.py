@@ -43,7 +43,7 @@ def test_a_cause_that_is_not_listed_is_named_beside_the_verdict(tmp_path):
     assert found.verdict.kind == "none of the library"
     assert found.verdict.change == f"List in [effects] what explains it: {RUBS}."
     assert found.decomposition["unlisted"]["names"] == [RUBS]
-    assert f"[effects] does not list, {RUBS} = 0.1" in found.verdict.sentence
+    assert f"[effects] does not list, {RUBS} = 0.0999" in found.verdict.sentence
 
 
 def test_what_listed_effects_imitate_is_told_with_those_that_are_right(tmp_path):

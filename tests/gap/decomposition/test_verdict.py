@@ -58,7 +58,9 @@ def test_what_recurs_of_an_unexplained_gap_is_of_no_library(
         after=53.0,
         scatter=scatter,
         unexplained=(53.0 - scatter) / 53.0,
-        **dict.fromkeys(("unconfirmed", "failing", "strained", "goes"), ""),
+        **dict.fromkeys(
+            ("unconfirmed", "failing", "strained", "goes", "elsewhere"), ""
+        ),
     )
     assert Decomposition.foreign.fget(made) is foreign
 
