@@ -20,7 +20,7 @@ from bns.gap.decomposition.singles import Single, Singles, leading, wide
 TURNS = 4  # of fitting and searching
 INSTEAD = 3  # explanations one of which another may replace
 OTHERS = 3  # single explanations from which several are looked for again
-NUMEROUS = 60  # explanations of a robot too large for that: a start takes a minute
+NUMEROUS = 60  # explanations of a robot of which one start takes a minute
 FEW = 2  # explanations that need no other start if they leave little
 ENOUGH = 1.2  # times what all explanations leave: little more
 LITTLE = 0.02  # of what all explain: the rest of a strong one's law
@@ -169,7 +169,8 @@ def beside(problem: Problem, point: Point) -> tuple[Problem, Point]:
         problem: the recording.
         point: what was found beside the nominal model.
     """
-    for _ in range(ROUNDS if point.support else 0):
+    rounds = 1 if len(problem.terms) > NUMEROUS else ROUNDS
+    for _ in range(rounds if point.support else 0):
         trials, support = problem.trials, point.support
         model, begun = problem.model.beside(trials, problem.known(point.values))
         same = all(one is other for one, other in zip(begun, trials, strict=True))

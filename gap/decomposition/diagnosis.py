@@ -4,7 +4,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
-from bns.gap.decomposition.decomposition import Decomposition, decompose
+from bns.gap.decomposition.decomposition import LARGE, Decomposition, decompose
 from bns.gap.decomposition.descent import FEW, NUMEROUS
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.record import recorded
@@ -13,7 +13,7 @@ from bns.gap.records import Diagnosis
 from bns.progress import Tell, unheard
 from bns.worlds.trial import Trial
 
-LEAST = 0.02  # of a gap, left: less is not worth another search
+LEAST = 0.005  # of a gap, left: less is not worth another search
 HALF = 0.5  # of what is left: what is clearly less
 
 
@@ -59,14 +59,15 @@ def narrowed(problem: Problem, names: Sequence[str]) -> Problem:
 
 def widened(made: Decomposition, *, seed: int = 0) -> Decomposition:
     """A decomposition beside the one with what a robot's description does not list,
-    searched where what it lists leaves much that is no scatter, and kept where it
-    leaves less than half of that by no more explanations.
+    searched where what it lists leaves much, and not what repeats scatter, and kept
+    where it leaves less than half of that: by no more explanations, or by one further.
 
     Args:
         made: the decomposition by what is listed.
         seed: of what is drawn.
     """
-    if not (made.lasting or made.failing) or made.unexplained < LEAST:
+    much = made.lasting or made.failing or made.after > LARGE
+    if not much or made.unexplained < LEAST:
         return made
     model = made.problem.model.unlisted()
     if model is None:
@@ -75,8 +76,8 @@ def widened(made: Decomposition, *, seed: int = 0) -> Decomposition:
     if len(problem.terms) > NUMEROUS:
         return made
     other = decompose(problem, seed=seed)
-    found = other.point.support
+    named, found = made.point.support, other.point.support
     new = bool(found - made.problem.terms.keys()) and not other.foreign
-    few = len(found) <= max(len(made.point.support), FEW)
-    better = new and few and other.after < HALF * made.after
+    most = len(named) + (named <= found) if named else FEW
+    better = new and len(found) <= most and other.after < HALF * made.after
     return replace(made, searched=True, unlisted=other if better else None)
