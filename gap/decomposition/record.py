@@ -12,6 +12,7 @@ from bns.gap.decomposition import rest, search, shares, words
 from bns.gap.decomposition.decomposition import LARGE, Decomposition
 from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.problem import Problem
+from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.shares import Part, Sized
 from bns.gap.records import Diagnosis, Fit, Verdict
 from bns.gap.where import horizons, localised
@@ -20,6 +21,10 @@ from bns.gap.where.compared import Compared
 SINGLES = 8  # explanations whose share alone is reported
 HALF = 0.5  # of a gap: what is left where most is within the model's own doubts
 SCATTERED = "That does not recur: the robot or its measurement scatters it."
+INEXACT = (
+    f"It recurs, but is within {100 * Row.inexact:g} % of the motion, to which a "
+    "simulation is taken to be exact."
+)
 UNSURE = (
     "The nominal model is unsure by as much, of its timing first: a shift of some "
     "milliseconds, gains by thousandths."
@@ -116,11 +121,10 @@ def _rivals(made: Decomposition) -> list[tuple[float, Support]]:
 def _change(made: Decomposition, kind: str) -> str:
     if kind == "no gap":
         return "A longer or less noisy recording would show smaller effects."
-    if made.unlisted and made.elsewhere:
-        return (
-            f"List in [effects] what explains it: {', '.join(sorted(made.elsewhere))}."
-        )
     if kind == "none of the library":
+        listed = ", ".join(sorted(made.elsewhere))
+        if listed:
+            return f"List in [effects] what explains it: {listed}."
         return "An effect that the library lacks; see where and when the gap sits."
     if kind != "either":
         return ""
@@ -157,7 +161,8 @@ def statements(made: Decomposition) -> list[str]:
     if made.kind == "no gap":
         said = ["No gap beyond what the recording scatters by itself." + apart]
         if made.before > LARGE:
-            said += [size, UNSURE if made.left < HALF else SCATTERED]
+            why = INEXACT if made.recurring else SCATTERED
+            said += [size, UNSURE if made.left < HALF else why]
         return said
     return [size, _explained(made), _left(made) + apart]
 

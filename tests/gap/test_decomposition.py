@@ -281,8 +281,8 @@ def said(model, rows, *parts, **about):
         "parts": parts,
         **{"kind": "effect", "tied": (), "goes": "", "onset": None},
         **{"before": 50.0, "closed": 0.9, "left": 0.0, "unconfirmed": {}},
-        **dict.fromkeys(("lasting", "failing", "recurring"), False),
-        **dict.fromkeys(("unstable", "strayed"), ()),
+        **dict.fromkeys(("lasting", "failing", "recurring", "searched"), False),
+        **dict.fromkeys(("unstable", "strayed", "unlisted"), ()),
     }
     return record.statements(SimpleNamespace(**{**known, **about}))
 
@@ -315,11 +315,17 @@ def test_directions_and_places_are_told(recorded, model, name, values, text):
 
 
 @pytest.mark.parametrize(
-    ("before", "left", "why"),
-    [(5.0, 1.0, "does not recur"), (5.0, 0.1, "is unsure by as much"), (1.0, 1.0, "")],
+    ("before", "left", "recurs", "why"),
+    [
+        (5.0, 1.0, False, "does not recur"),
+        (5.0, 1.0, True, "recurs, but is within 1 % of the motion"),
+        (5.0, 0.1, True, "is unsure by as much"),
+        (1.0, 1.0, False, ""),
+    ],
 )
-def test_a_gap_that_is_none_has_its_size_and_why(model, before, left, why):
-    first, *more = said(model, (), kind="no gap", before=before, left=left)
+def test_a_gap_that_is_none_has_its_size_and_why(model, before, left, recurs, why):
+    about = {"before": before, "left": left, "recurring": recurs}
+    first, *more = said(model, (), kind="no gap", **about)
     assert first.startswith("No gap beyond what the recording scatters")
     size = "10 mm forward, 10 mm left, 10 mrad turn over 0.5 s"
     assert (size in "".join(more)) == bool(why)
@@ -345,6 +351,7 @@ def test_what_holds_for_the_fitted_motion_alone_is_no_answer(before, closed, kin
         goes="",
         unconfirmed={},
         strained=False,
+        elsewhere=frozenset(),
     )
     made.failing = Decomposition.failing.fget(made)
     made.foreign = Decomposition.foreign.fget(made)
