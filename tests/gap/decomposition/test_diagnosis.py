@@ -6,6 +6,7 @@ from bns.gap.bench import mjcf_cases
 from bns.gap.diagnose import diagnose
 from bns.gap.models.mjcf import effects
 from bns.gap.models.mjcf.model import OwnModel
+from bns.viz.gap import report
 from tests.gap.own_robots import ARM, MOTORS
 
 DESCRIBED = """
@@ -44,6 +45,7 @@ def test_a_cause_that_is_not_listed_is_named_beside_the_verdict(tmp_path):
     assert found.verdict.change == f"List in [effects] what explains it: {RUBS}."
     assert found.decomposition["unlisted"]["names"] == [RUBS]
     assert f"[effects] does not list, {RUBS} = 0.0999" in found.verdict.sentence
+    assert report.title(found) == f"Not listed in [effects]: {RUBS}"
 
 
 def test_what_listed_effects_imitate_is_told_with_those_that_are_right(tmp_path):
