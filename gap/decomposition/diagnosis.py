@@ -44,7 +44,7 @@ def diagnose(
         problem = narrowed(problem, rows)
     made = decompose(problem, seed=seed, tell=tell)
     if rows is None:
-        made = widened(made, seed=seed)
+        made = widened(made, seed=seed, tell=tell)
     seconds = {"fit": round(time.perf_counter() - began, 3)}
     return recorded(made, faults=faults, seed=seed, seconds=seconds, full=full)
 
@@ -57,7 +57,9 @@ def narrowed(problem: Problem, names: Sequence[str]) -> Problem:
     return replace(problem, rows=kept)
 
 
-def widened(made: Decomposition, *, seed: int = 0) -> Decomposition:
+def widened(
+    made: Decomposition, *, seed: int = 0, tell: Tell = unheard
+) -> Decomposition:
     """A decomposition beside the one with what a robot's description does not list,
     searched where what it lists leaves much, and not what repeats scatter, and kept
     where it leaves less than half of that: by no more explanations, or by one further.
@@ -65,6 +67,7 @@ def widened(made: Decomposition, *, seed: int = 0) -> Decomposition:
     Args:
         made: the decomposition by what is listed.
         seed: of what is drawn.
+        tell: is told when that search begins.
     """
     much = made.lasting or made.failing or made.after > LARGE
     if not much or made.unexplained < LEAST:
@@ -75,6 +78,7 @@ def widened(made: Decomposition, *, seed: int = 0) -> Decomposition:
     problem = Problem.of(made.problem.trials, model)
     if len(problem.terms) > NUMEROUS:
         return made
+    tell("what [effects] does not list")
     other = decompose(problem, seed=seed)
     named, found = made.point.support, other.point.support
     new = bool(found - made.problem.terms.keys()) and not other.foreign
