@@ -56,7 +56,7 @@ def warnings(
         untried: effects that it does not consider, by name.
     """
     made = []
-    searched = found.decomposition.get("unlisted", {}).get("searched")
+    searched = "unlisted" in found.decomposition
     if untried and found.verdict.kind != "no gap" and not searched:
         made.append(
             f"Not tried: {', '.join(untried)}; list what can be the case in [effects]."

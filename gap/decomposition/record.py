@@ -363,9 +363,12 @@ def _closed(made: Decomposition) -> dict[str, Any]:
 
 
 def _decomposition(made: Decomposition) -> dict[str, Any]:
-    """The parts with their shares, and the three statements."""
+    """The parts with their shares, and the three statements; what is named by effects
+    that the description does not list, if these were searched."""
     rows = {row.name: row for row in made.problem.rows}
-    return {
+    other = made.unlisted
+    names = [*_ordered(other, other.point.support)] if other else []
+    return ({"unlisted": names} if made.searched else {}) | {
         "parts": [
             {
                 "name": part.name,
@@ -380,12 +383,6 @@ def _decomposition(made: Decomposition) -> dict[str, Any]:
             for part in made.parts
         ],
         "statements": statements(made),
-        "unlisted": {
-            "searched": made.searched,
-            "names": [*_ordered(made.unlisted, made.unlisted.point.support)]
-            if made.unlisted
-            else [],
-        },
         "left": made.left,
         "recurs": made.recurs,
         "before": made.before,

@@ -38,3 +38,36 @@ def described(folder, mjcf, log, **loop) -> tuple[Description, OwnModel]:
     found = describe(folder / "robot.xml", log, out=own, **loop)
     found.write(own)
     return found, OwnModel.read(own, threads=1)
+
+
+def arm(folder, actuators, description) -> OwnModel:
+    """The arm as it is described, its actuators called as their joints.
+
+    Args:
+        folder: where its MJCF and its description are written.
+        actuators: `MOTORS` or `SERVOS`.
+        description: text of the latter.
+    """
+    for name in ("hip", "calf"):
+        told = f'joint="FL_{name}'
+        actuators = actuators.replace(told, f'name="{name}" {told}')
+    (folder / "robot.xml").write_text(ARM.replace("ACTUATORS", actuators))
+    (folder / "own.toml").write_text(description)
+    return OwnModel.read(folder / "own.toml", threads=1)
+
+
+def of_motors(effects: str) -> str:
+    """A description of the arm with motors.
+
+    Args:
+        effects: what it lists.
+    """
+    return f"""
+name = "arm"
+model = "robot.xml"
+commands.hip = {{ actuator = "hip", unit = "N m", low = -2.0, high = 2.0 }}
+commands.calf = {{ actuator = "calf", unit = "N m", low = -0.5, high = 0.5 }}
+observed.q0 = {{ joint = "FL_hip_joint", unit = "rad", noise = 0.002 }}
+observed.q1 = {{ joint = "FL_calf_joint", unit = "rad", noise = 0.002 }}
+[effects]
+{effects}"""

@@ -149,7 +149,7 @@ def title(found: Diagnosis) -> str:
     """The verdict in a few words."""
     verdict = found.verdict
     named = " + ".join(verdict.named[0]) if verdict.named else ""
-    unlisted = " + ".join(found.decomposition.get("unlisted", {}).get("names", ()))
+    unlisted = " + ".join(found.decomposition.get("unlisted", ()))
     if unlisted and verdict.kind == "none of the library":
         return f"Not listed in [effects]: {unlisted}"
     return {

@@ -9,17 +9,9 @@ from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.singles import Singles
 from bns.gap.diagnose import diagnose
 from bns.gap.models.mjcf import effects
-from bns.gap.models.mjcf.model import OwnModel
-from tests.gap.own_robots import ARM, MOTORS, SERVOS
+from tests.gap.own_robots import MOTORS, SERVOS, arm, of_motors
 
-DESCRIBED = """
-name = "arm"
-model = "robot.xml"
-commands.hip = { actuator = "hip", unit = "N m", low = -2.0, high = 2.0 }
-commands.calf = { actuator = "calf", unit = "N m", low = -0.5, high = 0.5 }
-observed.q0 = { joint = "FL_hip_joint", unit = "rad", noise = 0.002 }
-observed.q1 = { joint = "FL_calf_joint", unit = "rad", noise = 0.002 }
-[effects]
+EFFECTS = """
 actuator_gain = ["hip", "calf"]
 joint_damping = ["FL_calf_joint"]
 joint_friction = ["FL_calf_joint"]
@@ -28,26 +20,16 @@ GAINS, HIP = "actuator_gain[all]", "actuator_gain[hip]"
 DAMPING, FRICTION = "joint_damping[FL_calf_joint]", "joint_friction[FL_calf_joint]"
 
 
-def model(folder, actuators, description):
-    """The arm as it is described, its actuators called as their joints."""
-    for name in ("hip", "calf"):
-        told = f'joint="FL_{name}'
-        actuators = actuators.replace(told, f'name="{name}" {told}')
-    (folder / "robot.xml").write_text(ARM.replace("ACTUATORS", actuators))
-    (folder / "own.toml").write_text(description)
-    return OwnModel.read(folder / "own.toml", threads=1)
-
-
 @pytest.fixture
 def problem(tmp_path):
     """A recording of an arm with a stronger hip motor and a calf that rubs."""
-    arm = model(tmp_path, MOTORS, DESCRIBED)
-    told = mjcf_cases.commands(arm, np.random.default_rng(0), 3)
+    robot = arm(tmp_path, MOTORS, of_motors(EFFECTS))
+    told = mjcf_cases.commands(robot, np.random.default_rng(0), 3)
     planted = [
         effects.make("actuator_gain", {"part": "hip", "factor": 1.2}),
         effects.make("joint_friction", {"part": "FL_calf_joint", "added": 0.1}),
     ]
-    return Problem.of(mjcf_cases.record(arm, told, planted), arm)
+    return Problem.of(mjcf_cases.record(robot, told, planted), robot)
 
 
 def test_a_gain_of_both_motors_is_one_of_one_with_nothing_to_undo_it(problem):
@@ -96,8 +78,8 @@ body_mass = ["upper", "lower"]
 @pytest.fixture(scope="module")
 def servoed(tmp_path_factory):
     """An arm of position servos, and what it is told."""
-    arm = model(tmp_path_factory.mktemp("servoed"), SERVOS, SERVOED)
-    return arm, mjcf_cases.commands(arm, np.random.default_rng(0), 4)
+    robot = arm(tmp_path_factory.mktemp("servoed"), SERVOS, SERVOED)
+    return robot, mjcf_cases.commands(robot, np.random.default_rng(0), 4)
 
 
 @pytest.mark.parametrize(
@@ -115,8 +97,8 @@ def servoed(tmp_path_factory):
 def test_a_weak_motor_and_a_shifted_centre_have_a_name_each(
     servoed, planted, values, name, size
 ):
-    arm, told = servoed
-    trials = mjcf_cases.record(arm, told, [effects.make(planted, values)])
-    found = diagnose(trials, arm, full=False)
+    robot, told = servoed
+    trials = mjcf_cases.record(robot, told, [effects.make(planted, values)])
+    found = diagnose(trials, robot, full=False)
     assert found.verdict.named[0] == (name,)  # a load does what a shifted centre does
     assert found.best.magnitudes[0] == pytest.approx(size, rel=0.03)
