@@ -64,12 +64,12 @@ RARER = (
     "joint_backlash",
     "encoder_offset",
     "body_length",
-    "command_dead_zone",
-    "command_offset",
 )
-"""the same of a model of few joints: many would cost more than they tell; a dead
-zone of the commands to all but position servos, a trim of the commands to these and a
-zero of their encoders"""
+"""the same of a model of few joints: many would cost more than they tell; the zero of
+an encoder of position servos"""
+OF_COMMANDS = ("command_dead_zone", "command_offset")
+"""the same of a model of few joints or few commands, as a car has on many joints: a
+dead zone of the commands to all but position servos, a trim of the commands to these"""
 TOUCHING = ("geom_radius", "geom_friction", "geom_compliance")
 """effects that nothing shows where nothing touches"""
 
@@ -108,7 +108,9 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
         **_surfaces(model, joints=(*moved, *pushed)),
     }
     made: dict[str, tuple[str, ...]] = {}
-    for name in (*USUAL, *(RARER if len(moved) <= FEW else ())):
+    rarer = RARER if len(moved) <= FEW else ()
+    trims = OF_COMMANDS if min(len(moved), len(told)) <= FEW else ()
+    for name in (*USUAL, *rarer, *trims):
         kind = effects.OWNERS.get(name)
         if kind in ("joint", "body") and name not in of:
             parts = _parts(model, kind, moved)

@@ -380,8 +380,11 @@ def test_a_verdict_on_a_gap_names_what_was_not_tried(arm, kind):
     assert {"joint_backlash", "body_tilt"} < set(untried)
     assert Corrected(arm, {}, {}).untried() == untried
     found = SimpleNamespace(
-        verdict=SimpleNamespace(kind=kind), change={}, fits=(), signatures={}
+        verdict=SimpleNamespace(kind=kind),
+        **{"change": {}, "fits": (), "signatures": {}, "decomposition": {}},
     )
     text = " ".join(warnings.warnings(found, (), untried))
     assert (f"Not tried: {', '.join(untried)}" in text) == (kind != "no gap")
     assert "Not tried" not in " ".join(warnings.warnings(found, ()))
+    found.decomposition["unlisted"] = []  # were tried, after all
+    assert "Not tried" not in " ".join(warnings.warnings(found, (), untried))
