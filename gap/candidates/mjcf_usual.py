@@ -1,6 +1,6 @@
 """What is considered of a user's own model where the user does not say what."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -48,13 +48,13 @@ USUAL = (
 `actuator_kp` and `actuator_kd` of position servos, `actuator_gear` of servos of speed,
 `actuator_lag` of those whose control the model filters, `actuator_period` of all whose
 gains the description gives, a limit of force of these and of servos of speed,
-`actuator_gain` and `command_limit` of all but position servos, `command_fade` where
-there are none of these, the tilt of what is bolted to the world, `gravity_compensation`
-and a fluid's numbers where the model has some; `joint_stop` of joints that are seen;
-`command_lag` of each command where there are few, and of all; `reading_delay` of each
-reading where there are few, else of places, by a camera, beside joints, by encoders;
-the radius of wheels and feet, and grip and softness of all that touch, where they touch
-something"""
+`actuator_gain` and `command_limit` of all but position servos, `command_fade` of these
+(of all at once where there are no others, else of each of few), the tilt of what is
+bolted to the world, `gravity_compensation` and a fluid's numbers where the model has
+some; `joint_stop` of joints that are seen; `command_lag` of each command where there are
+few, and of all; `reading_delay` of each reading where there are few, else of places, by a
+camera, beside joints, by encoders; the radius of wheels and feet, and grip and softness
+of all that touch, where they touch something"""
 TENDONS = ("tendon_damping", "tendon_friction", "tendon_stiffness")
 """on every tendon; `tendon_slack` where it has a spring"""
 PUSHED = ("joint_damping", "joint_friction", "body_mass")
@@ -181,8 +181,15 @@ def _on_actuators(
         "command_limit": pushing,
         "command_dead_zone": pushing,
         "command_offset": tuple(c for c in channels if c not in pushing),
-        "command_fade": (ALL,) if len(pushing) == len(channels) else (),
+        "command_fade": _fading(pushing, channels),
     }
+
+
+def _fading(pushing: tuple[str, ...], channels: Sequence[str]) -> tuple[str, ...]:
+    """Commands that a battery may fade, of those that no position servo holds."""
+    if len(pushing) == len(channels):
+        return (ALL,)
+    return pushing if len(pushing) <= FEW else ()
 
 
 def _parts(model: mujoco.MjModel, kind: str, joints: Iterable[int]) -> tuple[str, ...]:

@@ -252,3 +252,27 @@ def test_a_quaternion_is_read_as_roll_pitch_and_yaw(tmp_path):
     table = tables.read(log)
     for at, turn in enumerate(("yaw", "pitch", "roll")):
         np.testing.assert_allclose(table[f"base_{turn}"], angles[:, at], atol=1e-9)
+
+
+def test_few_commands_may_be_trimmed_or_fade_whatever_they_move(tmp_path):
+    links = "".join(
+        f'<body pos="0 0 0.1"><joint name="j{n}"/><geom size="0.01"/>' for n in range(7)
+    )
+    (tmp_path / "robot.xml").write_text(
+        f"""<mujoco><worldbody><body><joint name="wheel"/><geom size="0.05"/></body>
+        {links}{"</body>" * 7}</worldbody><tendon><fixed name="rack">
+        {"".join(f'<joint joint="j{n}" coef="1"/>' for n in range(7))}</fixed></tendon>
+        <actuator><position name="steer" tendon="rack" kp="1"/>
+        <velocity name="throttle" joint="wheel" kv="1"/></actuator></mujoco>"""
+    )
+    (tmp_path / "own.toml").write_text(
+        """name = "car"
+        model = "robot.xml"
+        commands.steer = { actuator = "steer", unit = "rad", low = -1.0, high = 1.0 }
+        commands.throttle = { actuator = "throttle", unit = "rad/s", low = 0, high = 9 }
+        observed.q = { joint = "wheel", unit = "rad", noise = 0.01 }"""
+    )
+    names = {row.name for row in OwnModel.read(tmp_path / "own.toml").listed}
+    fading = {"command_fade[throttle]", "command_dead_zone[throttle]"}
+    assert {"command_offset[steer]"} | fading <= names
+    assert not any(name.startswith("joint_backlash") for name in names)
