@@ -52,9 +52,9 @@ gains the description gives, a limit of force of these and of servos of speed,
 (of all at once where there are no others, else of each of few), the tilt of what is
 bolted to the world, `gravity_compensation` and a fluid's numbers where the model has
 some; `joint_stop` of joints that are seen; `command_lag` of each command where there
-are few, and of all; `reading_delay` of each reading where there are few, else of places,
-by a camera, beside joints, by encoders; the radius of wheels and feet, and grip and
-softness of all that touch, where they touch something"""
+are few, and of all; `reading_delay` of each reading where there are few, else of
+places, by a camera, beside joints, by encoders; the radius of wheels and feet, and grip
+and softness of all that touch, where they touch something"""
 TENDONS = ("tendon_damping", "tendon_friction", "tendon_stiffness")
 """on every tendon; `tendon_slack` where it has a spring"""
 PUSHED = ("joint_damping", "joint_friction", "body_mass")
