@@ -135,12 +135,12 @@ def beside(
     made = dict(config.effects)
     given = {effects.current(name): name for name in made}
     for name, parts in usual(config, model).items():
-        listed = made.get(given.get(name, name), ())
-        if name not in given:
+        name = given.get(name, name)
+        listed = made.get(name)
+        if listed is None:
             made[name] = parts
         elif listed and ALL not in (*listed, *parts):
-            more = [part for part in parts if part not in listed]
-            made[given[name]] = (*listed, *more)
+            made[name] = tuple(dict.fromkeys((*listed, *parts)))
     return made
 
 

@@ -126,15 +126,17 @@ def screened(
         for number, row in enumerate(problem.rows)
         if not row.nuisance and (names is None or row.term in names)
     ]
-    levels = [(n, value) for n in rows for value in problem.rows[n].levels]
-    todo = [which for which in levels if which[1] != problem.nominal[which[0]]]
-    todo = sorted({*todo, *_departures(problem, rows, problem.model.spread)})
+    todo = _departures(problem, rows, problem.model.spread) | {
+        (number, value)
+        for number in rows
+        for value in problem.rows[number].levels
+        if value != problem.nominal[number]
+    }
     best = _least(problem, point, todo, only)
     promising = set(_first(best, most * PROMISING))
     rows = [number for number in rows if problem.rows[number].term in promising]
-    again = _least(
-        problem, point, _departures(problem, rows, problem.model.further), only
-    )
+    todo = _departures(problem, rows, problem.model.further)
+    again = _least(problem, point, todo, only)
     for term, item in again.items():
         best[term] = min(best[term], item, key=lambda found: found[0])
     return [(term, best[term][1]) for term in _first(best, most)]
@@ -148,14 +150,15 @@ def _first(best: Mapping[str, tuple[float, np.ndarray]], most: int) -> list[str]
 def _least(
     problem: Problem,
     point: Point,
-    todo: Sequence[tuple[int, float]],
+    todo: Collection[tuple[int, float]],
     only: list[int] | None,
 ) -> dict[str, tuple[float, np.ndarray]]:
     """What explanations cost by themselves at the best of values of their rows, and the
     values of all rows ``(R,)``."""
     best: dict[str, tuple[float, np.ndarray]] = {}
-    for at in range(0, len(todo), AT_ONCE):
-        part = todo[at : at + AT_ONCE]
+    order = sorted(todo)
+    for at in range(0, len(order), AT_ONCE):
+        part = order[at : at + AT_ONCE]
         for _, (number, value), linear in _scored(problem, point, part, only):
             term = problem.rows[number].term
             cost, support = _by_itself(linear, term)
@@ -175,7 +178,7 @@ def _by_itself(linear: Linear, term: str) -> tuple[float, Support]:
 
 def _departures(
     problem: Problem, rows: Iterable[int], spread: Sequence[float]
-) -> list[tuple[int, float]]:
+) -> set[tuple[int, float]]:
     """Numbers of rows, and values as many plausible departures from the nominal."""
     found = set()
     for number in rows:
@@ -184,7 +187,7 @@ def _departures(
             for value in (row.nominal - size * row.sd, row.nominal + size * row.sd):
                 if row.low <= value <= row.high:
                     found.add((number, value))
-    return sorted(found)
+    return found
 
 
 def _level(
