@@ -70,7 +70,7 @@ def widened(
         tell: is told when that search begins.
     """
     much = made.lasting or made.failing or made.after > LARGE
-    if not much or made.unexplained < LEAST:
+    if not much or made.unexplained < LEAST or made.kind == "no gap":
         return made
     model = made.problem.model.unlisted()
     if model is None:

@@ -1,8 +1,11 @@
 """What a description does not list, where that explains what its effects leave."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from bns.gap.bench import mjcf_cases
+from bns.gap.decomposition.diagnosis import widened
 from bns.gap.diagnose import diagnose
 from bns.gap.models.mjcf import effects
 from bns.viz.gap import report
@@ -44,3 +47,10 @@ def test_nothing_further_is_searched_where_the_listed_effects_explain_all(tmp_pa
     found = diagnosis(tmp_path, GAIN)
     assert found.verdict.named == (("actuator_gain[hip]",),)
     assert "unlisted" not in found.decomposition
+
+
+def test_nothing_further_is_searched_where_there_is_no_gap():
+    made = SimpleNamespace(
+        kind="no gap", lasting=False, failing=False, after=5.0, unexplained=0.9
+    )
+    assert widened(made) is made  # within what a simulation is exact to
