@@ -18,7 +18,7 @@ SAME = (
     "They do the same whatever is commanded: observe another quantity, or measure one "
     "of them."
 )
-NOR = " As few usual effects that [effects] does not list leave no less than half of it."
+NOR = " As few usual effects that [effects] does not list leave over half of it."
 KINDS = 4  # of motion that a further recording is asked for
 LISTED = 4  # alternatives, or channels, in a sentence
 
