@@ -183,6 +183,12 @@ class Decomposition:
         return other.point.support - self.problem.terms.keys()
 
     @property
+    def told(self) -> "Decomposition":
+        """The one whose explanations, shares and figures are told: with what the
+        description does not list, where that is what most of the gap comes from."""
+        return self.unlisted if self.unlisted and self.elsewhere else self
+
+    @property
     def kind(self) -> str:
         """Kind of the verdict, one of `records.KINDS`."""
         if self.foreign:

@@ -15,6 +15,7 @@ from bns.worlds.trial import Trial
 
 LEAST = 0.005  # of a gap, left: less is not worth another search
 HALF = 0.5  # of what is left: what is clearly less
+SMALL = 0.01  # of the gap: an explanation that closes less does not count
 
 
 def diagnose(
@@ -62,7 +63,8 @@ def widened(
 ) -> Decomposition:
     """A decomposition beside the one with what a robot's description does not list,
     searched where what it lists leaves much, and not what repeats scatter, and kept
-    where it leaves less than half of that: by no more explanations, or by one further.
+    where it leaves less than half of that: by no more explanations, or by one further,
+    of which those do not count that close a trifle.
 
     Args:
         made: the decomposition by what is listed.
@@ -80,8 +82,15 @@ def widened(
         return made
     tell("what [effects] does not list")
     other = decompose(problem, seed=seed)
-    named, found = made.point.support, other.point.support
-    new = bool(found - made.problem.terms.keys()) and not other.foreign
-    most = len(named) + (named <= found) if named else FEW
-    better = new and len(found) <= most and other.after < HALF * made.after
+    better = explains_more(made, other)
     return replace(made, searched=True, unlisted=other if better else None)
+
+
+def explains_more(made: Decomposition, other: Decomposition) -> bool:
+    """Whether a decomposition with what is not listed is to be told, see `widened`."""
+    named, found = made.point.support, other.point.support
+    if other.foreign or found <= made.problem.terms.keys():
+        return False
+    most = len(named) + (named <= found) if named else FEW
+    count = sum(part.last >= SMALL for part in other.parts)
+    return count <= most and other.after < HALF * made.after

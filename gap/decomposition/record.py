@@ -48,12 +48,12 @@ def recorded(
         seconds: by stage; "where" is added if `full`.
         full: with localisation and the plain gap.
     """
-    problem, model = made.problem, made.problem.model
+    problem, model, told = made.problem, made.problem.model, made.told
     where: dict[str, Any] = {}
-    closed = _closed(made)
+    closed = _closed(told)
     if full:
         began = time.perf_counter()
-        where, plain = _where(made, seed=seed)
+        where, plain = _where(told, seed=seed)
         seconds = {**seconds, "where": round(time.perf_counter() - began, 3)}
         closed["plain"] = plain
     if made.onset:
@@ -69,9 +69,9 @@ def recorded(
         trials=len(problem.trials),
         faults=tuple(faults),
         verdict=_verdict(made),
-        fits=_fits(made),
+        fits=_fits(told),
         where=where,
-        signatures=_signatures(made),
+        signatures=_signatures(told),
         floor={
             "source": "the recording",
             "repeats": len(rest.repeats(problem)),
@@ -93,7 +93,7 @@ def recorded(
 def _verdict(made: Decomposition) -> Verdict:
     kind = made.kind
     named: tuple[tuple[str, ...], ...] = ()
-    sets = tuple(_ordered(made, support) for support in made.tied)
+    sets = tuple(_ordered(made.told, support) for support in made.told.tied)
     if kind in ("effect", "together"):
         named = sets[:1]
     elif kind == "either":
@@ -364,34 +364,41 @@ def _closed(made: Decomposition) -> dict[str, Any]:
 
 def _decomposition(made: Decomposition) -> dict[str, Any]:
     """The parts with their shares, and the three statements; what is named by effects
-    that the description does not list, if these were searched."""
-    rows = {row.name: row for row in made.problem.rows}
-    other = made.unlisted
+    that the description does not list, if these were searched; numbers of the trials
+    that do not count."""
+    other, told = made.unlisted, made.told
+    rows = {row.name: row for row in told.problem.rows}
     names = [*_ordered(other, other.point.support)] if other else []
-    return ({"unlisted": names} if made.searched else {}) | {
-        "parts": [
-            {
-                "name": part.name,
-                "values": part.values,
-                "low": part.low,
-                "high": part.high,
-                "units": {n: rows[n].unit for n in part.values},
-                "last": part.last,
-                "alone": part.alone,
-                "sure": part.sure,
-            }
-            for part in made.parts
-        ],
-        "statements": statements(made),
-        "left": made.left,
-        "recurs": made.recurs,
-        "before": made.before,
-        "after": made.after,
-        "correlated": made.point.noise.lam,
-        "onset": None
-        if made.onset is None
-        else {"name": made.onset.name, "trial": made.onset.trial},
-    }
+    apart = sorted({*told.unstable, *told.strayed})
+    further: dict[str, Any] = {"unlisted": names} if made.searched else {}
+    return (
+        further
+        | ({"left_out": apart} if apart else {})
+        | {
+            "parts": [
+                {
+                    "name": part.name,
+                    "values": part.values,
+                    "low": part.low,
+                    "high": part.high,
+                    "units": {n: rows[n].unit for n in part.values},
+                    "last": part.last,
+                    "alone": part.alone,
+                    "sure": part.sure,
+                }
+                for part in told.parts
+            ],
+            "statements": statements(made),
+            "left": told.left,
+            "recurs": told.recurs,
+            "before": told.before,
+            "after": told.after,
+            "correlated": told.point.noise.lam,
+            "onset": None
+            if made.onset is None
+            else {"name": made.onset.name, "trial": made.onset.trial},
+        }
+    )
 
 
 def _where(made: Decomposition, *, seed: int) -> tuple[dict[str, Any], dict[str, Any]]:

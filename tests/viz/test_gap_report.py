@@ -101,6 +101,14 @@ def test_the_recording_shows_three_robots(home):
     } <= paths
 
 
+def test_the_trial_that_is_drawn_is_the_worst_of_those_that_count(home):
+    found, trials = store.load(home / "out"), dataset.read(home / "data").trials
+    robot = load_recordings.model(found.model)
+    first = view(found, trials, robot).shown
+    told = {**found.decomposition, "left_out": [first]}
+    assert view(replace(found, decomposition=told), trials, robot).shown != first
+
+
 def test_enlarged_robots_stand_where_they_were(home):
     found, trials = store.load(home / "out"), dataset.read(home / "data").trials
     seen = view(found, trials, load_recordings.model(found.model))

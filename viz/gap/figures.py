@@ -11,7 +11,7 @@ import numpy as np
 
 from bns.gap import store
 from bns.gap.models.base import GapModel
-from bns.gap.recordings import check
+from bns.gap.recordings import check, trial_conditions
 from bns.gap.records import Diagnosis, Residuals
 from bns.gap.where.compared import Compared, terms
 from bns.gap.where.horizons import residuals
@@ -35,7 +35,7 @@ class View:
         effects: of the corrected model; empty where nothing explains the gap.
         nominal, corrected: predicted samples of each trial, ``(T, n_channels)``.
         left: features of recorded minus corrected motion of each trial, ``(W, C)``.
-        shown: number of the trial that is drawn: the one with the largest gap.
+        shown: which trial is drawn: of those that count, the one with the largest gap.
         after: residuals of the corrected model by horizon.
     """
 
@@ -93,7 +93,13 @@ def view(found: Diagnosis, trials: Sequence[Trial], model: GapModel) -> View:
             problem.recorded, usable, corrected, problem.windows, strict=True
         )
     )
-    losses = [terms(gap).mean() for gap in problem.gap]
+    apart = found.decomposition.get("left_out", ())
+    losses = [
+        -1.0 if number in apart else terms(gap).mean()
+        for number, gap in zip(
+            trial_conditions.numbers(usable), problem.gap, strict=True
+        )
+    ]
     return View(
         problem,
         effects,
