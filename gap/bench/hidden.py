@@ -8,8 +8,8 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.gap.decomposition import levels
+from bns.gap.decomposition.evidence.linear import KAPPA
 from bns.gap.decomposition.fit import Point
-from bns.gap.decomposition.linear import KAPPA
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.refit import newton
 from bns.gap.decomposition.row import Row

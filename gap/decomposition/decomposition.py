@@ -15,10 +15,11 @@ from bns.gap.decomposition import (
     rest,
     shares,
     simpler,
+    starts,
     ties,
 )
+from bns.gap.decomposition.evidence.linear import Support
 from bns.gap.decomposition.fit import Point
-from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.onset import Onset
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
@@ -213,7 +214,7 @@ def decompose(
     problem, start, known, unstable = _steady(problem, seed)
     tell("explanations")
     tried = Singles(problem, start)
-    problem, point = descent.beside(problem, descent.decompose(tried))
+    problem, point = descent.beside(problem, starts.explained(tried))
     found = onset.dated(problem, start, point)
     late = None
     if found:

@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from bns.gap.decomposition.decomposition import LARGE, Decomposition, decompose
-from bns.gap.decomposition.descent import FEW, NUMEROUS
+from bns.gap.decomposition.descent import NUMEROUS
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.record import recorded
+from bns.gap.decomposition.starts import FEW
 from bns.gap.models.base import GapModel
 from bns.gap.records import Diagnosis
 from bns.progress import Tell, unheard

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bns.gap.decomposition import noise
-from bns.gap.decomposition.latent import Latent
-from bns.gap.decomposition.linear import Linear, Support
-from bns.gap.decomposition.noise import Memory
+from bns.gap.decomposition.evidence import noise
+from bns.gap.decomposition.evidence.latent import Latent
+from bns.gap.decomposition.evidence.linear import Linear, Support
+from bns.gap.decomposition.evidence.noise import Memory
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bns.gap.decomposition import search
+from bns.gap.decomposition.evidence import search
+from bns.gap.decomposition.evidence.linear import KAPPA, Linear, Support, stretches
 from bns.gap.decomposition.fit import Noise, Point
-from bns.gap.decomposition.linear import KAPPA, Linear, Support, stretches
 from bns.gap.decomposition.problem import Problem
 
 FELT = 4.0  # weighted square of a change below which a level is not felt

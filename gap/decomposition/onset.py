@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bns.gap.decomposition import descent, refit, search
+from bns.gap.decomposition import descent, refit
+from bns.gap.decomposition.evidence import search
+from bns.gap.decomposition.evidence.linear import KAPPA, Linear, Support
 from bns.gap.decomposition.fit import Point, placed
-from bns.gap.decomposition.linear import KAPPA, Linear, Support
 from bns.gap.decomposition.problem import Problem
 
 WORTH = 3.0  # nats that a date has to bring, with each trial left out as well

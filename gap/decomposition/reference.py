@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from bns.gap.decomposition import descent, fit, shares
+from bns.gap.decomposition import descent, fit, shares, starts
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.singles import Singles
@@ -43,7 +43,7 @@ class Corrected(GapModel):
         """From checked recordings in which nothing was changed."""
         problem = Problem.of(trials, model)
         tried = Singles(problem, descent.nothing(problem))
-        problem, point = descent.beside(problem, descent.decompose(tried))
+        problem, point = descent.beside(problem, starts.explained(tried))
         support = shares.guarded(problem, point)
         values = fit.placed(problem, point.linear, support, point.values)
         linear = point.linear

@@ -7,11 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from bns.gap.decomposition import fit, levels, noise
+from bns.gap.decomposition import fit, levels
+from bns.gap.decomposition.evidence import noise
+from bns.gap.decomposition.evidence.linear import Linear, Support
+from bns.gap.decomposition.evidence.spread import tail
 from bns.gap.decomposition.fit import Noise, Point, linearised, placed
-from bns.gap.decomposition.linear import Linear, Support
 from bns.gap.decomposition.problem import Problem
-from bns.gap.decomposition.spread import tail
 
 STEPS = 5  # of a fit
 LOOKS = 3  # steps of a first look, and of a walker

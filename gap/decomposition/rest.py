@@ -7,7 +7,7 @@ import numpy as np
 from scipy import stats
 
 from bns import seeding
-from bns.gap.decomposition.latent import Latent
+from bns.gap.decomposition.evidence.latent import Latent
 from bns.gap.decomposition.problem import Problem
 from bns.gap.recordings import trial_conditions
 

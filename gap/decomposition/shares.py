@@ -6,9 +6,10 @@ from itertools import combinations
 
 import numpy as np
 
-from bns.gap.decomposition import fit, search
+from bns.gap.decomposition import fit
+from bns.gap.decomposition.evidence import search
+from bns.gap.decomposition.evidence.linear import KAPPA, Linear, Support
 from bns.gap.decomposition.fit import Point
-from bns.gap.decomposition.linear import KAPPA, Linear, Support
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.rest import by_trial
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from bns.gap.decomposition import fit, levels, refit
+from bns.gap.decomposition.evidence.linear import Linear
 from bns.gap.decomposition.fit import Point
-from bns.gap.decomposition.linear import Linear
 from bns.gap.decomposition.problem import Problem
 
 WEAK = 0.05  # of what a set explains: so little may be left to the others

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from bns.gap.decomposition import descent, levels, refit
+from bns.gap.decomposition import levels, refit, starts
+from bns.gap.decomposition.evidence.linear import Support
 from bns.gap.decomposition.fit import Point
-from bns.gap.decomposition.linear import Support
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.singles import Singles
 
@@ -46,7 +46,7 @@ def _refitted(
     bent = problem.model.singly or problem.model.many
     if len(point.support) > 1 or problem.onset or not bent:
         return []
-    clear = problem.model.many and descent.enough(problem, point, 1)
+    clear = problem.model.many and starts.enough(problem, point, 1)
     fitted = tried.by_tangent if clear else tried.fitted
     most = min((one.height for one in fitted), default=0.0) + 2 * (TIED + MARGIN)
     near = [one for one in fitted if one.height < most]

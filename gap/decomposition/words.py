@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from bns.gap.decomposition.linear import Support
+from bns.gap.decomposition.evidence.linear import Support
 from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.shares import Part
 from bns.worlds.effects.parts import ALL

@@ -17,6 +17,7 @@ from bns.gap.decomposition import (
     rest,
     shares,
     simpler,
+    statements,
 )
 from bns.gap.decomposition.decomposition import Decomposition
 from bns.gap.decomposition.problem import Problem
@@ -284,7 +285,7 @@ def said(model, rows, *parts, **about):
         **dict.fromkeys(("lasting", "failing", "recurring", "searched"), False),
         **dict.fromkeys(("unstable", "strayed", "unlisted"), ()),
     }
-    return record.statements(SimpleNamespace(**{**known, **about}))
+    return statements.of(SimpleNamespace(**{**known, **about}))
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.gap.decomposition.latent import Latent
+from bns.gap.decomposition.evidence.latent import Latent
 
 TRIALS, LENGTH, SD = 3, 20, np.array([0.5, 2.0])
 REST = np.zeros((TRIALS * LENGTH, 2))

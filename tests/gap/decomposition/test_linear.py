@@ -9,12 +9,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.gap.decomposition import refit, search, shares
+from bns.gap.decomposition import refit, shares
+from bns.gap.decomposition.evidence import search
+from bns.gap.decomposition.evidence.latent import Latent
+from bns.gap.decomposition.evidence.linear import KAPPA, Linear
+from bns.gap.decomposition.evidence.noise import (
+    Memory,
+    correlated,
+    inflation,
+    scale,
+    weights,
+)
+from bns.gap.decomposition.evidence.spread import Spread, tail
 from bns.gap.decomposition.fit import Noise, Point
-from bns.gap.decomposition.latent import Latent
-from bns.gap.decomposition.linear import KAPPA, Linear
-from bns.gap.decomposition.noise import Memory, correlated, inflation, scale, weights
-from bns.gap.decomposition.spread import Spread, tail
 from tests.sources import ROOT
 
 NAMES = ("a", "b", "c", "d", "e", "f")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bns.gap.bench import mjcf_cases
-from bns.gap.decomposition import descent, refit, simpler
+from bns.gap.decomposition import descent, refit, simpler, starts
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.singles import Singles
 from bns.gap.diagnose import diagnose
@@ -46,7 +46,7 @@ def test_friction_takes_the_place_of_a_damping_that_was_found_first(problem):
     start = descent.nothing(problem)
     wrong = refit.fitted_at(problem, start, {HIP, DAMPING})
     assert wrong.support == {HIP, DAMPING}
-    found = descent._instead(Singles(problem, start), wrong)
+    found = starts._instead(Singles(problem, start), wrong)
     assert found.support == {HIP, FRICTION}
     (friction,) = problem.terms[FRICTION]
     assert abs(found.values[friction] - 0.1) < 0.01
@@ -57,7 +57,7 @@ def test_several_that_describe_a_wrong_start_give_way_to_a_single_one_with_anoth
 ):
     start = descent.nothing(problem)
     several = refit.fitted_at(problem, start, {GAINS, DAMPING, FRICTION})
-    found = descent._from_others(Singles(problem, start), several)
+    found = starts._from_others(Singles(problem, start), several)
     assert found.support == {HIP, FRICTION}
 
 

@@ -12,7 +12,7 @@ from bns.errors import BnsError
 from bns.gap import warnings
 from bns.gap.bench import mjcf_cases
 from bns.gap.candidates import mjcf, mjcf_usual
-from bns.gap.decomposition import descent, diagnosis, record, refit, simpler
+from bns.gap.decomposition import descent, diagnosis, refit, simpler, statements
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.reference import Corrected
 from bns.gap.decomposition.shares import Part
@@ -367,9 +367,9 @@ def test_a_mass_on_a_link_is_told_with_its_place(arm):
     part = Part(KEPT[1], values, values, values, last=1.0, alone=1.0, sure=1.0)
     told = "body_mass[forearm] = 0.2 kg [0.2, 0.2], dx 0.05 m"
     alone = SimpleNamespace(problem=problem, parts=[part])
-    assert record._said(alone, part) == told
+    assert statements._said(alone, part) == told
     two = SimpleNamespace(problem=problem, parts=[part, part])
-    assert record._said(two, part) == f"{told} (100 % when added last)"
+    assert statements._said(two, part) == f"{told} (100 % when added last)"
 
 
 @pytest.mark.parametrize("kind", ["effect", "none of the library", "no gap"])

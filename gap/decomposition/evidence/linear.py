@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from bns.gap.decomposition.evidence.spread import Spread, Widened
 from bns.gap.decomposition.problem import Problem
-from bns.gap.decomposition.spread import Spread, Widened
 
 KAPPA = 3.0
 """what an explanation costs: the log odds against it; e^3 = 20, the number of

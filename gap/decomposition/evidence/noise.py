@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from bns.gap.decomposition.linear import Linear
+from bns.gap.decomposition.evidence.linear import Linear
 
 NORMAL = 1.4826  # standard deviation over the median of |x| of a normal
 CLIP = 3.5  # robust deviations beyond which squares are cut

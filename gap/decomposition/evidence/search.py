@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from bns.gap.decomposition.linear import Linear, Support
+from bns.gap.decomposition.evidence.linear import Linear, Support
 
 FEW = 12  # explanations of which each is dropped by way of trial on the way backward
 TRIED = 3  # of more: those that look weakest

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bns.gap.decomposition import noise
+from bns.gap.decomposition.evidence import noise
 from bns.gap.decomposition.problem import Problem
 
 FELT = 0.1  # deviations of a residual's noise: less is not felt
