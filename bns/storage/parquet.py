@@ -109,13 +109,21 @@ def foreign(
                     f"{_listed(names)}."
                 )
             table = file.read(list(wanted), use_threads=False)
-            return {name: _plain(table.column(name), name, path) for name in wanted}
+            return {name: plain(table.column(name), name, path) for name in wanted}
     except (*reading.UNREADABLE, pyarrow.ArrowException) as error:
         raise unreadable(error, path) from error
 
 
-def _plain(column: Any, name: str, path: Path | str) -> Any:
+def plain(column: Any, name: str, path: Path | str) -> Any:
     """A column of numbers, or of lists of equally many, as doubles.
+
+    Args:
+        column: of a `pyarrow.Table`, N rows.
+        name: of it, for messages.
+        path: of the file, for messages.
+
+    Returns:
+        ``(N,)``, or ``(N, K)`` of lists; missing numbers are NaN.
 
     Raises:
         FormatError: lists of different lengths, or none at all.

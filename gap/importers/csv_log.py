@@ -8,17 +8,16 @@ import codecs
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from bns.errors import FormatError
 from bns.gap.importers.tables import Column, Table
+from bns.gap.importers.tables import seconds as seconds_of
 from bns.storage import reading, tables
 
 PACKED = ".gz"
 WIDE = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
-TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
 def read(path: Path) -> Table:
@@ -92,7 +91,8 @@ def _columns(data: bytes, path: Path) -> dict[str, np.ndarray]:
     table, names = tables.parsed(data, path, *_separators(data))
     tables.once(names, names, path)
     columns = dict(zip(names, table.columns, strict=True))
-    seconds = _seconds({n: c for n, c in columns.items() if types.is_timestamp(c.type)})
+    moments = {n: c for n, c in columns.items() if types.is_timestamp(c.type)}
+    seconds = seconds_of(moments)
     found = {}
     for name, column in columns.items():
         column = column.cast("int8") if types.is_boolean(column.type) else column
@@ -103,22 +103,6 @@ def _columns(data: bytes, path: Path) -> dict[str, np.ndarray]:
         elif tables.is_number(column.type):
             found[name] = tables.doubles(column, name, path)
     return found
-
-
-def _seconds(moments: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """Columns of moments as seconds since the first of all of them."""
-    whole = {name: column.cast("int64") for name, column in moments.items()}
-    ticks = {name: TICKS[column.type.unit] for name, column in moments.items()}
-    filled = {n: c.drop_null().to_numpy() for n, c in whole.items() if len(c)}
-    firsts = {n: int(values.min()) for n, values in filled.items() if len(values)}
-    zero = min((first * ticks[n] for n, first in firsts.items()), default=0.0)
-    made = {}
-    for name, column in whole.items():
-        first = firsts.get(name, 0)  # whole numbers keep the fractions of a second
-        later = (column.fill_null(first).to_numpy() - first) * ticks[name]
-        values = later + (first * ticks[name] - zero)
-        made[name] = np.where(column.is_null().to_numpy(), np.nan, values)
-    return made
 
 
 def _check_text(cells: Sequence[str | None], name: str, path: Path) -> None:

@@ -8,14 +8,12 @@ ARRAYS = (
 )
 FRAME = "import pandas as p; p.{load}.to_csv('{out}', index=False)"
 LINES = {
-    ".npz": (ARRAYS, "import numpy as n; d = n.load('{path}')"),
     ".h5": (ARRAYS, "import h5py; d = h5py.File('{path}')"),
     ".hdf5": (ARRAYS, "import h5py; d = h5py.File('{path}')"),
     ".mat": (
         ARRAYS,
         "from scipy.io import loadmat; d = loadmat('{path}', squeeze_me=1)",
     ),
-    ".parquet": (FRAME, "read_parquet('{path}')"),
     ".xlsx": (FRAME, "read_excel('{path}')"),
     ".json": (FRAME, "read_json('{path}')"),
     ".pkl": (FRAME, "read_pickle('{path}')"),
@@ -24,14 +22,17 @@ LINES = {
 
 BAGS = (".bag", ".db3")
 KNOWN = (
-    "give a CSV table (.csv, .tsv, .csv.gz), a PACE file (.pt), an MCAP log (.mcap) or "
-    "the directory of a rosbag2 with some, or the directory of a SAGE motion "
-    "(control.csv, state_motor.csv) or of a LeRobotDataset (meta/info.json)"
+    "give a table (.csv, .tsv, .csv.gz, .parquet, .npz) or a directory of some, one a "
+    "trial, a PACE file (.pt), an MCAP log (.mcap) or the directory of a rosbag2 with "
+    "some, or the directory of a SAGE motion (control.csv, state_motor.csv) or of a "
+    "LeRobotDataset (meta/info.json)"
 )
 MOTION = ("control.csv", "state_motor.csv")
 BESIDE = ("joint_list.txt", "event.csv")
 PARTS = ("data", "meta", "videos")
 FRAMES = (".parquet", ".json", ".jsonl", ".mp4")
+TABLES = (".csv", ".tsv", ".csv.gz", ".parquet", ".npz")
+OURS = ("dataset.json", "run.json", "campaign.json")
 DEEPEST = 4  # directories of a dataset in one another
 
 
@@ -72,6 +73,20 @@ def whole(path: Path) -> tuple[Path, str] | None:
             if place.relative_to(home).parts[0] in PARTS and is_lerobot(home):
                 return home, "a LeRobotDataset"
     return None
+
+
+def tables_in(path: Path) -> list[Path]:
+    """The tables in a directory, those of the kind that most are; of a dataset, a run
+    or a campaign of this project none: what lies there is no log."""
+    inside = [p for p in path.iterdir() if p.is_file() and not p.name.startswith(".")]
+    if any(item.name in OURS for item in inside):
+        return []
+    kinds: dict[str, list[Path]] = {end: [] for end in TABLES}
+    for item in inside:
+        for end in TABLES:
+            if item.name.lower().endswith(end):
+                kinds[end].append(item)
+    return max(kinds.values(), key=len)
 
 
 def is_lerobot(path: Path) -> bool:

@@ -1,14 +1,16 @@
 """Logs as people have them, each read into one table: stamps and columns of numbers.
 
-CSV, PACE (`.pt`), SAGE, LeRobotDataset and MCAP. What a format says of its columns
-(told or seen, which joint, which quantity) is kept; units are left as they are.
+CSV, Parquet, NPZ, directories of these, PACE (`.pt`), SAGE, LeRobotDataset and MCAP.
+What a format says of its columns (told or seen, which joint, which quantity) is kept;
+units are left as they are.
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -29,7 +31,9 @@ QUATERNION = r"(?i)(q|quat|quaternion|orientation|rot|rotation)[._]?$"
 SAME = 1e-6  # [s] moments that are nearer are one
 
 ENDS = ([".csv"], [".tsv"], [".txt"])
+ARRAYS = (".parquet", ".pq", ".npz")
 PACKED = ".gz"
+TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 SORT = (
     "Sort the rows by time, or number recordings that follow one another in a column "
     f"{TRIAL!r}."
@@ -103,8 +107,12 @@ def reader(path: str | Path) -> Callable[[Path], Table] | None:
             name = "sage"
         elif any(path.glob("*.mcap")):
             name = "ros2_mcap"
+        elif other_files.tables_in(path):
+            name = "directory_log"
     elif suffixes[-1:] in ([".pt"], [".pth"]):
         name = "pace"
+    elif path.suffix.lower() in ARRAYS:
+        name = "array_log"
     elif suffixes[-1:] == [".mcap"]:
         name = "ros2_mcap"
     elif [end for end in suffixes if end != PACKED][-1:] in ENDS:
@@ -260,6 +268,29 @@ def checked(table: Table, path: Path) -> Table:
                 "the most that is read."
             )
     return table
+
+
+def seconds(moments: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Columns of moments as seconds since the first of all of them.
+
+    Args:
+        moments: name -> column of Arrow's timestamps, T rows.
+
+    Returns:
+        name -> seconds, ``(T,)``, NaN in cells that are empty.
+    """
+    whole = {name: column.cast("int64") for name, column in moments.items()}
+    ticks = {name: TICKS[column.type.unit] for name, column in moments.items()}
+    filled = {n: c.drop_null().to_numpy() for n, c in whole.items() if len(c)}
+    firsts = {n: int(values.min()) for n, values in filled.items() if len(values)}
+    zero = min((first * ticks[n] for n, first in firsts.items()), default=0.0)
+    made = {}
+    for name, column in whole.items():
+        first = firsts.get(name, 0)  # whole numbers keep the fractions of a second
+        later = (column.fill_null(first).to_numpy() - first) * ticks[name]
+        values = later + (first * ticks[name] - zero)
+        made[name] = np.where(column.is_null().to_numpy(), np.nan, values)
+    return made
 
 
 def named(names: Sequence[str], count: int) -> list[str]:

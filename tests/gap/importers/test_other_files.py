@@ -19,10 +19,8 @@ def said(path):
         ("a.db3", "rosbags-convert --src {path} --dst a_mcap --dst-storage mcap"),
         ("a.bag", "rosbags-convert --src {path} --dst a_mcap --dst-storage mcap"),
         ("a.mcap.zstd", "`zstd -d {path}`, then give {home}/a.mcap."),
-        ("a.npz", "n.load('a.npz')"),
         ("a.h5", "h5py.File('a.h5')"),
         ("a.mat", "loadmat('a.mat'"),
-        ("a.parquet", "p.read_parquet('a.parquet').to_csv('a.csv', index=False)"),
         ("a.xlsx", "p.read_excel('a.xlsx').to_csv('a.csv', index=False)"),
     ],
 )
