@@ -30,6 +30,7 @@ GROUPED = (
     "actuator_gear",
     "actuator_kp",
     "actuator_lag",
+    "command_delay",
     "command_lag",
 )
 """effects that may be on all parts alike: one kind of bearing, wheel, motor or supply;

@@ -51,10 +51,9 @@ gains the description gives, a limit of force of these and of servos of speed,
 `actuator_gain` and `command_limit` of all but position servos, `command_fade` of these
 (of all at once where there are no others, else of each of few), the tilt of what is
 bolted to the world, `gravity_compensation` and a fluid's numbers where the model has
-some; `joint_stop` of joints that are seen; `command_lag` of each command where there
-are few, and of all; `reading_delay` of each reading where there are few, else of
-places, by a camera, beside joints, by encoders; the radius of wheels and feet, and grip
-and softness of all that touch, where they touch something"""
+some; `joint_stop` of joints that are seen; `reading_delay` of each reading where there
+are few, else of places, by a camera, beside joints, by encoders; the radius of wheels
+and feet, and grip and softness of all that touch, where they touch something"""
 TENDONS = ("tendon_damping", "tendon_friction", "tendon_stiffness")
 """on every tendon; `tendon_slack` where it has a spring"""
 PUSHED = ("joint_damping", "joint_friction", "body_mass")
@@ -70,6 +69,8 @@ an encoder of position servos"""
 OF_COMMANDS = ("command_dead_zone", "command_offset")
 """the same of a model of few joints or few commands, as a car has on many joints: a
 dead zone of the commands to all but position servos, a trim of the commands to these"""
+LATE = ("command_delay", "command_lag")
+"""of each command where there are few, and of all"""
 TOUCHING = ("geom_radius", "geom_friction", "geom_compliance")
 """effects that nothing shows where nothing touches"""
 
@@ -94,7 +95,7 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
     of = {
         **_on_actuators(config, model),
         "joint_stop": [item.part for item in config.seen if item.quantity == "joint"],
-        "command_lag": channels if 1 < len(channels) <= FEW else (ALL,),
+        **dict.fromkeys(LATE, channels if 1 < len(channels) <= FEW else (ALL,)),
         "reading_delay": seen if 1 < len(seen) <= FEW else _by_camera(config),
         "reading_gain": seen,
         "reading_offset": seen,

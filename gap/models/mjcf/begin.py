@@ -58,6 +58,8 @@ def begin(work: Work) -> None:
     pose, settle = guesses.rests(work.model, first, tolerance)
     if settle and not _settled(work, longest, pose or "", settle):
         settle = 0.0
+    elif pose is not None and not settle and not varies:
+        settle = guesses.returning(work.model, pose, _elsewhere(work, pose))
     loose = bool(start.free(work.model))
     if span > guesses.LONG and guesses.curved(told[longest], span) and not loose:
         work.start = {"recorded": True, "cut": guesses.CUT}
@@ -113,6 +115,22 @@ def _heads(work: Work) -> tuple[dict[str, float], dict[str, float], bool]:
             tolerance[part.name] = max(least, wide * factor(unit))
             varies |= bool(np.ptp(heads) > 2 * least)
     return first, tolerance, varies
+
+
+def _elsewhere(work: Work, pose: str) -> dict[str, float]:
+    """Joints that were not first seen where a pose has them, by more than the noise of
+    all trials together, and where they were: what is to be found took them there."""
+    data, found = guesses.posed(work.model, pose, 0.0), {}
+    for column, part, unit in work.seen:
+        if part.quantity != "joint":
+            continue
+        pieces = [column.values[rows] * factor(unit) for rows in work.rows]
+        seen = [piece[np.isfinite(piece)] for piece in pieces]
+        at = float(np.mean([piece[0] for piece in seen if len(piece)]))
+        error = guesses.noise(pieces) / np.sqrt(len(pieces))
+        if abs(at - data.joint(part.name).qpos[0]) > guesses.SIGMAS * error:
+            found[part.name] = at
+    return found
 
 
 def _stands(work: Work, pose: str) -> bool:

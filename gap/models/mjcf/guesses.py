@@ -17,6 +17,7 @@ SETTLE = 0.5  # [s]
 LONGEST = 5.0  # [s] of settling
 STILL = 3e-4  # [rad or m] that what rests moves at most in `SETTLE`
 CREEPING = 3e-3  # the same of what stands on feet that creep (assumed)
+BACK = 0.05  # of how far a joint was away: it is back
 HARDLY = 2.0  # times the least that it moves: hardly more
 NEAR = 0.05  # of a joint's range, by which a start may be off
 SIGMAS = 6.0  # times the noise, the same
@@ -118,6 +119,34 @@ def settling(model: mujoco.MjModel, pose: str) -> float:
         return SETTLE
     still = np.flatnonzero(np.array(moved) <= max(HARDLY * least, STILL))[0]
     return max(int(still), 1) * SETTLE
+
+
+def returning(model: mujoco.MjModel, pose: str, begun: Mapping[str, float]) -> float:
+    """How long a model takes to come back to a pose [s], whole times of `SETTLE`: what
+    does rests elsewhere once something pulls at it. 0 = it does not within `LONGEST`.
+
+    Args:
+        model: that is recorded; rests in the pose.
+        pose: name of the keyframe; "" = the model's own.
+        begun: joints that are elsewhere, and where; none = 0.
+    """
+    data = posed(model, pose, 0.0)
+    goal = {joint: float(data.joint(joint).qpos[0]) for joint in begun}
+    for joint, at in begun.items():
+        data.joint(joint).qpos[0] = at
+    steps = round(SETTLE / model.opt.timestep)
+    for count in range(round(LONGEST / SETTLE) if begun else 0):
+        most = 0.0  # it may swing through
+        for _ in range(steps):
+            mujoco.mj_step(model, data)
+            off = (
+                (data.joint(joint).qpos[0] - goal[joint]) / (at - goal[joint])
+                for joint, at in begun.items()
+            )
+            most = max(most, *(abs(float(share)) for share in off))
+        if most < BACK:
+            return max(count, 1) * SETTLE
+    return 0.0
 
 
 def nearest(model: mujoco.MjModel, first: Mapping[str, float]) -> str:

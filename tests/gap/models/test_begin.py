@@ -54,6 +54,50 @@ def test_trials_that_begin_in_various_places_begin_where_recorded(tmp_path, away
     assert "start: at rest" in " ".join(found.guessed)
 
 
+def hung(tilt, servo):
+    """A pendulum that is turned by a motor, or held by a servo, on a tilted base."""
+    drive = '<position name="motor" joint="swing" kp="4" kv="0.4"/>' if servo else ""
+    text = PENDULUM.replace(
+        '<motor name="motor" joint="swing" ctrlrange="-2 2"/>', drive
+    )
+    return (text if servo else PENDULUM).replace(
+        "<worldbody>", f'<option gravity="{9.81 * tilt} 0 -9.81"/><worldbody>'
+    )
+
+
+@pytest.mark.parametrize(
+    ("servo", "tilt", "settle"),
+    [(True, 0.0, 0.0), (True, 0.1, 0.5), (False, 0.01, 0.0)],
+)
+def test_what_rested_elsewhere_than_its_model_had_come_to_rest(
+    tmp_path, servo, tilt, rested
+):
+    model = mujoco.MjModel.from_xml_string(hung(tilt, servo))
+    rng, rows = np.random.default_rng(1), []
+    for trial in range(4):
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, 20_000)
+        for number in range(200):
+            data.ctrl[0] = [0.0, -0.3, 0.2, 0.3][number // 50]
+            rows.append([trial, number * 0.01, data.ctrl[0], data.qpos[0]])
+            rows[-1][-1] += rng.normal(0, 1e-3)
+            mujoco.mj_step(model, data, 2)
+    log = tmp_path / "log.csv"
+    head = "trial,time,motor_cmd,swing"
+    np.savetxt(log, rows, delimiter=",", header=head, comments="")
+    _, own = described(tmp_path, hung(0.0, servo), log)
+    assert bool(own.config.settle) == rested  # what swings on had not
+
+
+def test_what_stays_where_it_is_put_does_not_come_back():
+    slide = SLIDE.format(name="free", damping=50.0, stiffness=0.0)
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option gravity="0 0 0"/><worldbody>{slide}</worldbody></mujoco>'
+    )
+    assert guesses.returning(model, "", {"free": 0.01}) == 0.0
+    assert guesses.returning(model, "", {}) == 0.0
+
+
 def test_filters_begin_with_what_was_told_before():
     model = mujoco.MjModel.from_xml_string(
         PENDULUM.replace(
