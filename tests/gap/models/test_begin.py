@@ -66,8 +66,8 @@ def hung(tilt, servo):
 
 
 @pytest.mark.parametrize(
-    ("servo", "tilt", "settle"),
-    [(True, 0.0, 0.0), (True, 0.1, 0.5), (False, 0.01, 0.0)],
+    ("servo", "tilt", "rested"),
+    [(True, 0.0, False), (True, 0.05, True), (False, 0.01, False)],
 )
 def test_what_rested_elsewhere_than_its_model_had_come_to_rest(
     tmp_path, servo, tilt, rested
