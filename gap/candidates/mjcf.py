@@ -31,6 +31,7 @@ SLOWEST = 0.03  # [s] period of a loop
 FASTEST = 0.1  # of a clock, which may be as slow
 FADED = 0.2  # lost with each trial at most
 LEAST = 0.002  # of a limit in the model, which may be far beyond the robot's
+MOUNT = 0.2  # [m] that a marker is off its place at most; that of the effect
 TILT = 0.5  # [rad] largest tilt of a body
 FREE = ((-np.pi, np.pi), (-1.0, 1.0))  # [rad], [m] of a joint without stops
 MOST = {
@@ -52,6 +53,7 @@ RANGES = {
     "geom_compliance": (0.2, 10.0, "1"),
     "geom_radius": (0.7, 1.4, "1"),
     "gravity_compensation": (-1.0, 1.0, "1"),
+    "marker_mount": (-MOUNT, MOUNT, "m"),
     "tendon_slack": (0.0, SLACK, "m"),
     "log_clock": (-FASTEST, FASTEST, "1"),
 }
@@ -80,6 +82,7 @@ EXCITE = {
     "reading_gain": "large excursions",
     "reading_offset": "any command",
     "reading_delay": "fast motion",
+    "marker_mount": "turns on the spot",
     "joint_stribeck": "slow motion and reversals of that joint",
     "joint_stop": "motion to where a stop may be",
     "joint_backlash": "reversals of that joint under changing load",
@@ -153,6 +156,8 @@ def _candidates(
 ) -> Iterable[Row]:
     """One for each strength that the effect has."""
     strengths = [item for item in effects.CLASSES[name].parameters if item.scales]
+    if name == "marker_mount":  # turned: an offset of the yaw that is read
+        strengths = [about for about in strengths if about.unit == "m"]
     for about in strengths:
         stem = name if len(strengths) == 1 else f"{name}.{about.name}"
         low, high, unit = _range(name, part, config, model)
@@ -204,8 +209,11 @@ def _range(
 ) -> tuple[float, float, str]:
     """Lowest and highest value, and the unit."""
     kind = effects.OWNERS.get(name)
-    if kind:
+    if kind and kind != "place":
         return _of_model(name, kind, part, model)
+    if kind == "place":
+        config.tracked(part)
+        return RANGES[name]
     if name in ("command_delay", "reading_delay", "command_lag"):
         _channel(part, config)
         return 0.0, LATE[-1], "s"

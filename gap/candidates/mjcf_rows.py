@@ -77,6 +77,7 @@ PLAUSIBLE = {
     "fluid_viscosity": (0.3, 0.03),
     "gravity_compensation": (0.1, 0.003),
     "log_clock": (0.01, 0.003),
+    "marker_mount": (0.01, 2e-4),
 }
 SHARE = 0.02  # slack of a number over its plausible departure
 

@@ -42,6 +42,7 @@ USUAL = (
     "geom_compliance",
     "fluid_density",
     "fluid_viscosity",
+    "marker_mount",
     "log_clock",
 )
 """considered where the user does not say which, on what the commands move:
@@ -53,7 +54,8 @@ gains the description gives, a limit of force of these and of servos of speed,
 bolted to the world, `gravity_compensation` and a fluid's numbers where the model has
 some; `joint_stop` of joints that are seen; `reading_delay` of each reading where there
 are few, else of places, by a camera, beside joints, by encoders; the radius of wheels
-and feet, and grip and softness of all that touch, where they touch something"""
+and feet, and grip and softness of all that touch, where they touch something; where the
+marker sits of what is followed by x, y and yaw"""
 TENDONS = ("tendon_damping", "tendon_friction", "tendon_stiffness")
 """on every tendon; `tendon_slack` where it has a spring"""
 PUSHED = ("joint_damping", "joint_friction", "body_mass")
@@ -102,6 +104,7 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
         **dict.fromkeys(TENDONS, tendons),
         "tendon_slack": [n for n in tendons if _sprung(model, n)],
         "body_tilt": _bolted(model, owned),
+        "marker_mount": tuple(config.followed),
         "fluid_density": (ALL,) if model.opt.density else (),
         "fluid_viscosity": (ALL,) if model.opt.viscosity else (),
         "gravity_compensation": (ALL,) if model.body_gravcomp.any() else (),

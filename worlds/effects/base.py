@@ -80,12 +80,14 @@ class PoseSignal:
         poses: planar poses in the world frame, shape ``(T, 3)``; NaN = lost.
         fine_times: the physics grid [s], shape ``(S + 1,)``, for delays.
         fine_poses: true poses on it, shape ``(S + 1, 3)``.
+        place: name of what is tracked.
     """
 
     times: np.ndarray
     poses: np.ndarray
     fine_times: np.ndarray
     fine_poses: np.ndarray
+    place: str = "robot"
 
 
 class Effect(ABC):

@@ -36,8 +36,9 @@ class Part(Choice):
     """A choice among the names of a model that is known later.
 
     Attributes:
-        kind: "joint", "body", "actuator", "tendon", "geom" or "channel"; "model" = of
-            the whole of it, which is `ALL`.
+        kind: "joint", "body", "actuator", "tendon", "geom" or "channel"; "place" = a
+            body or site that a tracker follows; "model" = of the whole of it, which is
+            `ALL`.
     """
 
     kind: str = "channel"

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.random import Generator
 
+from bns.worlds.effects import parts
 from bns.worlds.effects.base import (
     Parameter,
     PoseSignal,
@@ -73,7 +74,8 @@ class MarkerMount(TrackingEffect):
 
     name = "marker_mount"
     source = "rigid-body kinematics; a marker glued askew"
-    robots = ("wheeled", "legged")
+    robots = parts.ANY
+    choices = parts.part("place")
     parameters = (
         _off("dx", "m", 0.2, "ahead of the robot's centre", 0.01),
         _off("dy", "m", 0.2, "to the left of the robot's centre", -0.005),
@@ -81,6 +83,7 @@ class MarkerMount(TrackingEffect):
     )
 
     def _change(self, signal: PoseSignal, active: np.ndarray, rng: Generator) -> None:
+        parts.among([signal.place], self["part"], "tracked place")
         x, y, yaw = signal.poses[active].T
         cos, sin = np.cos(yaw), np.sin(yaw)
         dx, dy = self["dx"], self["dy"]

@@ -14,6 +14,7 @@ from bns.storage import reading
 from bns.storage.reading import BEYOND
 from bns.worlds.data.importing import Source, read_map
 from bns.worlds.data.units import FACTORS, si_unit
+from bns.worlds.effects import parts
 from bns.worlds.trial import Channel
 
 KEYS = (
@@ -28,6 +29,7 @@ KEYS = (
     "bounds",
     "log",
 )
+FLOOR = ("x", "y", "yaw")  # axes of what goes over a floor
 START = ("keyframe", "recorded", "settle", "cut")
 LOOP = ("kp", "kd", "torque")
 """of a position loop that the MJCF file lacks"""
@@ -140,6 +142,32 @@ class OwnConfig:
     effects: Mapping[str, tuple[str, ...]] | None = None
     bounds: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     log: Mapping[str, Source] = field(default_factory=dict)
+
+    @property
+    def followed(self) -> Mapping[str, list[int]]:
+        """Columns of x, y and yaw of each site and body of which all are observed."""
+        found: dict[str, dict[str, int]] = {}
+        for column, item in enumerate(self.seen):
+            if item.way in FLOOR:
+                found.setdefault(item.part, {})[item.way] = column
+        return {
+            part: [columns[way] for way in FLOOR]
+            for part, columns in found.items()
+            if len(columns) == len(FLOOR)
+        }
+
+    def tracked(self, part: str) -> dict[str, list[int]]:
+        """Columns of x, y and yaw of each place that an effect is on, by name.
+
+        Args:
+            part: name of a site or body, a pattern, or "all".
+
+        Raises:
+            UnknownNameError: x, y and yaw of it are not observed.
+        """
+        names = [*self.followed]
+        on = [names[n] for n in parts.among(names, part, "tracked place")]
+        return {name: self.followed[name] for name in on}
 
     @classmethod
     def read(cls, path: str | Path) -> "OwnConfig":

@@ -12,7 +12,7 @@ from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, Windows
 from bns.gap.models.mjcf import cuts, log, masses, roughness, start
 from bns.gap.models.mjcf import effects as own_effects
-from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.models.mjcf.config import FLOOR, OwnConfig
 from bns.gap.models.mjcf.simulation import Simulation
 from bns.gap.recordings import segments, trial_conditions
 from bns.storage import files
@@ -20,7 +20,6 @@ from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Trial
 
 LEAST = 0.3  # of the noise that is told: the smallest that is believed
-FLOOR = ("x", "y", "yaw")  # axes of what goes over a floor
 SHORT, SHARE = 5.0, 0.01  # of the noise, of a joint's travel: sooner by more is stopped
 STRIDE = 0.5  # [s] over which those of a free body are compared
 

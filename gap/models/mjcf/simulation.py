@@ -21,7 +21,9 @@ from bns.worlds.effects.base import (
     CommandEffect,
     Effect,
     ModelEdit,
+    PoseSignal,
     SensorEffect,
+    TrackingEffect,
 )
 from bns.worlds.physics.rollout import STATE, Compiled, Job, Pool, Segment
 from bns.worlds.trial import Trial
@@ -359,6 +361,11 @@ class Simulation:
         for effect in effects:
             if isinstance(effect, SensorEffect):
                 read = effect.apply(times, read, names, on, rng)
+            elif isinstance(effect, TrackingEffect):
+                read = read.copy()
+                for place, at in self.config.tracked(str(effect["part"])).items():
+                    signal = PoseSignal(times, read[:, at], times, read[:, at], place)
+                    read[:, at] = effect.apply(signal, on, rng)[1]
         at = trial.times - trial.times[trial.boundaries[0]] + ahead
         return np.stack([np.interp(at, times, column) for column in read.T], axis=1)
 
@@ -379,7 +386,7 @@ def _every(dt: float) -> int:
 def _on_readings(effect: Effect) -> bool:
     """Whether an effect changes what is read and not how the robot moves."""
     moves = isinstance(effect, CommandEffect | ModelEdit)
-    return isinstance(effect, SensorEffect) and not moves
+    return isinstance(effect, SensorEffect | TrackingEffect) and not moves
 
 
 def _key(trial: Trial, effects: Sequence[Effect]) -> tuple:

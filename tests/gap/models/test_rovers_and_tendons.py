@@ -46,7 +46,7 @@ RATE = 50  # [Hz]
 NOISE = np.array([1e-3, 1e-3, 5e-3, 5e-3, 5e-3])
 
 
-def driven(folder, *, gear=1.0, fade=0.0, yaw=0.0, seconds=3.0, trials=4):
+def driven(folder, *, gear=1.0, fade=0.0, yaw=0.0, ahead=0.0, seconds=3.0, trials=4):
     """A log of a cart that turns on the spot and drives off, in a frame of its own."""
     robot = mujoco.MjModel.from_xml_string(CART)
     robot.actuator_gear[0, 0] *= gear
@@ -59,7 +59,8 @@ def driven(folder, *, gear=1.0, fade=0.0, yaw=0.0, seconds=3.0, trials=4):
             now = told[min(step * 6 // round(seconds * RATE), 5)]
             frame = Rotation.from_quat(data.qpos[3:7], scalar_first=True)
             (turned, _, _) = frame.as_euler("ZYX")
-            place = np.exp(1j * yaw) * complex(*data.qpos[:2]) + (3 - 2j)
+            place = complex(*data.qpos[:2]) + ahead * np.exp(1j * turned)
+            place = np.exp(1j * yaw) * place + (3 - 2j)
             heading = (turned + yaw + np.pi) % (2 * np.pi) - np.pi
             seen = [place.real, place.imag, heading, *data.qpos[7:9]]
             rows.append([trial, step / RATE, *now, *rng.normal(seen, NOISE)])
@@ -188,6 +189,25 @@ def test_a_planted_gear_is_named_with_its_value(tmp_path):
     found = diagnose(own.read_log(str(log)), own, rows=TRIED, full=False)
     assert found.verdict.named == (("actuator_gear[left_wheel]",),)
     assert found.best.magnitudes[0] == pytest.approx(1.1, abs=0.02)
+
+
+def test_a_marker_that_sits_ahead_is_named_with_its_place(tmp_path):
+    log = driven(tmp_path, ahead=0.04, yaw=1.0)
+    _, own = described(tmp_path, CART, log)
+    found = diagnose(own.read_log(str(log)), own, full=False)
+    assert found.verdict.named == (("marker_mount.dx[chassis]",),)
+    assert found.best.magnitudes[0] == pytest.approx(0.04, abs=2e-3)
+
+
+def test_a_marker_is_looked_for_where_a_place_and_its_heading_are_seen(cart):
+    _, own, log = cart
+    assert own.config.followed == {"chassis": [0, 1, 2]}
+    assert own.config.tracked("all") == {"chassis": [0, 1, 2]}
+    with pytest.raises(UnknownNameError, match="tracked place"):
+        own.config.tracked("mast")
+    names = {row.name for row in own.rows(own.read_log(str(log)))}
+    assert {f"marker_mount.{way}[chassis]" for way in ("dx", "dy")} <= names
+    assert "marker_mount.yaw[chassis]" not in names  # an offset of the heading
 
 
 def test_a_battery_that_fades_over_trials_is_named_with_its_value(tmp_path):
