@@ -86,6 +86,7 @@ EXCITE = {
     "joint_stribeck": "slow motion and reversals of that joint",
     "joint_stop": "motion to where a stop may be",
     "joint_backlash": "reversals of that joint under changing load",
+    "output_backlash": "reversals of that joint under changing load",
     "encoder_offset": "motion against gravity, or between stops",
     "body_centre": "motion against gravity, or sudden changes of speed",
     "body_length": "large excursions",
@@ -110,7 +111,7 @@ _DELAYS = {
 """alike where every command and every reading is late"""
 WHOLE = ("actuator_period", "gravity_compensation")
 """effects on actuators and bodies that may be on all of them"""
-UNSIGNED = ("joint_backlash", "joint_stop")
+UNSIGNED = ("joint_backlash", "output_backlash", "joint_stop")
 """effects on joints that are no number added to the model's"""
 
 
@@ -297,7 +298,7 @@ def _of_joint(name: str, joint: int, model: mujoco.MjModel) -> tuple[float, floa
     if name == "joint_stop":
         low, high = model.jnt_range[joint] if model.jnt_limited[joint] else FREE[slide]
         return float(low), float(high), "m" if slide else "rad"
-    if name in ("encoder_offset", "joint_backlash"):
+    if name in ("encoder_offset", "joint_backlash", "output_backlash"):
         low = -PLAY if name == "encoder_offset" else 0.0
         return low, PLAY, "m" if slide else "rad"
     number = name.removeprefix("joint_")

@@ -63,14 +63,16 @@ PUSHED = ("joint_damping", "joint_friction", "body_mass")
 FEW = 6  # joints up to which `RARER` are considered, too; commands, readings
 RARER = (
     "joint_backlash",
+    "output_backlash",
     "encoder_offset",
     "body_length",
 )
 """the same of a model of few joints: many would cost more than they tell; the zero of
-an encoder of position servos"""
-OF_COMMANDS = ("command_dead_zone", "command_offset")
+an encoder of position servos, play before the encoders of joints that motors turn"""
+OF_COMMANDS = ("command_dead_zone", "command_offset", "command_gain")
 """the same of a model of few joints or few commands, as a car has on many joints: a
-dead zone of the commands to all but position servos, a trim of the commands to these"""
+dead zone of the commands to all but position servos, a trim of the commands to these, a
+scale of those to servos of speed"""
 LATE = ("command_delay", "command_lag")
 """of each command where there are few, and of all"""
 TOUCHING = ("geom_radius", "geom_friction", "geom_compliance")
@@ -175,18 +177,25 @@ def _on_actuators(
     }
     channels = [item.channel.name for item in config.told]
     pushing = tuple(c for n, c in zip(told, channels, strict=True) if n not in servos)
+    paced = looped - servos
     return named | {
         "actuator_period": (ALL,) if any(item.kd for item in config.told) else (),
-        "encoder_offset": tuple(
-            model.joint(joint).name
-            for joint in (prepared.driven(model, n) for n in told if n in servos)
-            if joint >= 0
-        ),
+        "encoder_offset": _turned(model, (n for n in told if n in servos)),
+        "output_backlash": _turned(model, (n for n in told if n not in looped)),
         "command_limit": pushing,
         "command_dead_zone": pushing,
+        "command_gain": tuple(
+            c for n, c in zip(told, channels, strict=True) if n in paced
+        ),
         "command_offset": tuple(c for c in channels if c not in pushing),
         "command_fade": _fading(pushing, channels),
     }
+
+
+def _turned(model: mujoco.MjModel, actuators: Iterable[int]) -> tuple[str, ...]:
+    """Names of the joints that some actuators drive."""
+    joints = (prepared.driven(model, actuator) for actuator in actuators)
+    return tuple(model.joint(joint).name for joint in joints if joint >= 0)
 
 
 def _fading(pushing: tuple[str, ...], channels: Sequence[str]) -> tuple[str, ...]:

@@ -130,6 +130,26 @@ class JointBacklash(BodyEffect):
             parts.loosen(spec, joint, self["play"])
 
 
+class OutputBacklash(BodyEffect):
+    """Play between a joint's drive and what it moves, with the encoder behind it.
+
+    What drives the joint is on the motor's side of the play, what reads it on the other
+    (an absolute encoder at the output). A position servo of the model still goes by
+    its motor's side.
+    """
+
+    name = "output_backlash"
+    source = "backlash as a joint of its own with stops; bounds assumed"
+    robots = ("own",)
+    choices = parts.part("joint")
+    resizes = True
+    parameter = strength("play", "rad or m", (0.0, 1.0), "full play", example=0.1)
+
+    def _write(self, spec: Any) -> None:
+        for joint in parts.joints(spec, self["part"]):
+            parts.loosen(spec, joint, self["play"], called=parts.SEEN_PLAY)
+
+
 NARROW = 1e-6  # [rad or m] or degrees; MuJoCo refuses a joint without any way to go
 
 

@@ -27,6 +27,9 @@ UNSERVOED = ("wheeled", "own")
 """... on numbers that the servo law sets in walking robots; there it has the effect"""
 
 SLIDE, HINGE = 2, 3  # mjtJoint
+PLAY, SEEN_PLAY = "_play", "_seen_play"
+"""how the names of joints go on that are play behind others; where their encoders are
+behind it, too, they read both's sum"""
 FILTERS = (2, 3)  # mjtDyn: a first-order filter, and an exactly integrated one
 ROUND_GEOMS = (2, 3, 4, 5)  # mjtGeom: sphere, capsule, ellipsoid, cylinder
 
@@ -179,7 +182,12 @@ def stick(spec: Any, held: Sequence[Any], torque: float, speed: float) -> None:
 
 
 def loosen(
-    spec: Any, joint: Any, play: float, soft: tuple[float, float] | None = None
+    spec: Any,
+    joint: Any,
+    play: float,
+    soft: tuple[float, float] | None = None,
+    *,
+    called: str = PLAY,
 ) -> None:
     """Put play behind a joint, as a joint of its own with stops; more if it has some.
 
@@ -190,9 +198,10 @@ def loosen(
         soft: inertia and damping in the play, so that it can be computed; by default a
             thousandth of the inertia that the joint moves, as much damping as stops
             that within ten milliseconds, and stops as hard as the step allows.
+        called: how the name of the joint of its own goes on after that of the joint.
     """
     half = in_file(spec, joint, play / 2)
-    name = f"{joint.name}_play"
+    name = f"{joint.name}{called}"
     wide = spec.joint(name)
     if wide is not None:
         wide.range = [wide.range[0] - half, wide.range[1] + half]

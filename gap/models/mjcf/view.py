@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from bns.gap.models.mjcf import floating, prepared
 from bns.gap.models.mjcf.config import OwnConfig, Seen
+from bns.worlds.effects.parts import SEEN_PLAY
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,11 +21,13 @@ class View:
         columns: per channel the column of the full physics state, -1 = kinematics; of
             how a free body is turned the first of its quaternion's.
         parts: per channel the number of the site, body or tendon, -1 = it has a column.
+        beyond: per channel the column of a play that its encoder is behind, -1 = none.
     """
 
     config: OwnConfig
     columns: tuple[int, ...]
     parts: tuple[int, ...]
+    beyond: tuple[int, ...]
 
     @classmethod
     def of(cls, config: OwnConfig, model: mujoco.MjModel) -> "View":
@@ -33,20 +36,22 @@ class View:
         Raises:
             UnknownNameError: a joint, site, body or tendon that the model lacks.
         """
-        columns, parts = [], []
+        columns, parts, beyond = [], [], []
         for item in config.seen:
             kind = "joint" if item.quantity == "speed" else item.quantity
             number = prepared.number(model, kind, item.part)
-            at = -1
-            if item.quantity == "joint":
-                at = 1 + int(model.jnt_qposadr[number])
-            elif item.quantity == "speed":
-                at = 1 + model.nq + int(model.jnt_dofadr[number])
+            at = further = -1
+            if kind == "joint":
+                at = _jointed(model, item, number)
+                name = model.joint(number).name + SEEN_PLAY
+                play = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+                further = _jointed(model, item, play) if play >= 0 else -1
             elif item.quantity == "body":
                 at = _floating(model, number, item)
             columns.append(at)
             parts.append(-1 if at >= 0 else number)
-        return cls(config, tuple(columns), tuple(parts))
+            beyond.append(further)
+        return cls(config, tuple(columns), tuple(parts), tuple(beyond))
 
     def read(self, model: mujoco.MjModel, states: np.ndarray) -> np.ndarray:
         """Readings ``(T, C)`` from full physics states ``(T, n)``, one after the other:
@@ -64,6 +69,8 @@ class View:
                 made[good, channel] = angle(frames, item.way)
             elif column >= 0:
                 made[:, channel] = states[:, column]
+                if self.beyond[channel] >= 0:
+                    made[:, channel] += states[:, self.beyond[channel]]
         if placed and good.any():
             made[np.ix_(good, placed)] = self._placed(model, states[good], placed)
         return made
@@ -106,6 +113,13 @@ class View:
                 bodies.setdefault(item.part, {})[item.way] = seen[channel]
         for body, places in bodies.items():
             floating.place(data, data.model.body(body).id, places)
+
+
+def _jointed(model: mujoco.MjModel, item: Seen, joint: int) -> int:
+    """Column of the full physics state that holds where a joint is, or how fast."""
+    if item.quantity == "speed":
+        return 1 + model.nq + int(model.jnt_dofadr[joint])
+    return 1 + int(model.jnt_qposadr[joint])
 
 
 def _found(data: mujoco.MjData, item: Seen, part: int) -> np.ndarray:

@@ -250,6 +250,20 @@ def test_play_behind_a_joint_is_found(arm, told):
     assert found.best.magnitudes[0] == pytest.approx(0.08, rel=0.1)
 
 
+def test_an_encoder_behind_the_play_reads_it_too(arm, told):
+    trials = mjcf_cases.record(arm, told[:1], [])
+    before, behind = (
+        arm.simulate(trials, [(arm.parse(f"{name}:part=elbow,play=0.08"),)])[0][0]
+        for name in ("joint_backlash", "output_backlash")
+    )
+    names = [item.channel.name for item in arm.config.seen]
+    elbow = names.index("elbow")
+    others = np.arange(len(names)) != elbow
+    np.testing.assert_array_equal(before[:, others], behind[:, others])
+    apart = (behind - before)[:, elbow]
+    assert 0.035 < np.median(np.abs(apart)) < 0.045  # half of it, either way
+
+
 def test_play_of_one_joint_is_not_read_as_that_of_another(arm, told):
     trials = mjcf_cases.record(arm, told[:1], [])
     effects = [

@@ -74,6 +74,10 @@ class TestJoints:
         assert shaft == pytest.approx(plain.joint("elbow").qpos[0], abs=5e-3)
         assert model.joint("elbow_play").range == pytest.approx([-0.05, 0.05])
 
+    def test_play_before_an_encoder_is_told_by_its_name(self):
+        model = built("output_backlash:part=elbow,play=0.1")
+        assert model.joint("elbow_seen_play").range == pytest.approx([-0.05, 0.05])
+
     def test_an_encoder_that_reads_too_much_stops_the_arm_short(self):
         off = built("encoder_offset:part=elbow,added=0.1", gravity=False)
         plain = built(gravity=False)
