@@ -31,7 +31,6 @@ SLOWEST = 0.03  # [s] period of a loop
 FASTEST = 0.1  # of a clock, which may be as slow
 FADED = 0.2  # lost with each trial at most
 LEAST = 0.002  # of a limit in the model, which may be far beyond the robot's
-MOUNT = 0.2  # [m] that a marker is off its place at most; that of the effect
 TILT = 0.5  # [rad] largest tilt of a body
 FREE = ((-np.pi, np.pi), (-1.0, 1.0))  # [rad], [m] of a joint without stops
 MOST = {
@@ -53,7 +52,6 @@ RANGES = {
     "geom_compliance": (0.2, 10.0, "1"),
     "geom_radius": (0.7, 1.4, "1"),
     "gravity_compensation": (-1.0, 1.0, "1"),
-    "marker_mount": (-MOUNT, MOUNT, "m"),
     "tendon_slack": (0.0, SLACK, "m"),
     "log_clock": (-FASTEST, FASTEST, "1"),
 }
@@ -210,11 +208,12 @@ def _range(
 ) -> tuple[float, float, str]:
     """Lowest and highest value, and the unit."""
     kind = effects.OWNERS.get(name)
-    if kind and kind != "place":
-        return _of_model(name, kind, part, model)
     if kind == "place":
         config.tracked(part)
-        return RANGES[name]
+        about = effects.CLASSES[name].parameters[0]
+        return about.low, about.high, about.unit
+    if kind:
+        return _of_model(name, kind, part, model)
     if name in ("command_delay", "reading_delay", "command_lag"):
         _channel(part, config)
         return 0.0, LATE[-1], "s"

@@ -163,9 +163,10 @@ def _on_actuators(
     affine = model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE
     servos = {n for n in told if affine[n] and model.actuator_biasprm[n][1]}
     looped = servos | {n for n in told if affine[n] and model.actuator_biasprm[n][2]}
+    others, paced = set(told) - servos, looped - servos
     on = {
-        "actuator_gain": set(told) - servos,
-        "actuator_gear": looped - servos,
+        "actuator_gain": others,
+        "actuator_gear": paced,
         "actuator_kp": servos,
         "actuator_kd": {n for n in servos if model.actuator_biasprm[n][2]},
         "actuator_lag": {n for n in told if model.actuator_dyntype[n] in FILTERS},
@@ -176,18 +177,19 @@ def _on_actuators(
         for name, which in on.items()
     }
     channels = [item.channel.name for item in config.told]
-    pushing = tuple(c for n, c in zip(told, channels, strict=True) if n not in servos)
-    paced = looped - servos
+
+    def to(which: set[int]) -> tuple[str, ...]:
+        return tuple(c for n, c in zip(told, channels, strict=True) if n in which)
+
+    pushing = to(others)
     return named | {
         "actuator_period": (ALL,) if any(item.kd for item in config.told) else (),
         "encoder_offset": _turned(model, (n for n in told if n in servos)),
         "output_backlash": _turned(model, (n for n in told if n not in looped)),
         "command_limit": pushing,
         "command_dead_zone": pushing,
-        "command_gain": tuple(
-            c for n, c in zip(told, channels, strict=True) if n in paced
-        ),
-        "command_offset": tuple(c for c in channels if c not in pushing),
+        "command_gain": to(paced),
+        "command_offset": to(servos),
         "command_fade": _fading(pushing, channels),
     }
 

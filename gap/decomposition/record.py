@@ -175,9 +175,8 @@ def shown_effect(
     Returns:
         text; magnitude, interval and unit as `statements.magnitude` gives them.
     """
-    return str(problem.model.effect(name, part.values)), *statements.magnitude(
-        problem, part
-    )
+    size = statements.magnitude(problem, part)
+    return str(problem.model.effect(name, part.values)), *size
 
 
 def _signatures(made: Decomposition) -> dict[str, Any]:
@@ -239,39 +238,38 @@ def _decomposition(made: Decomposition) -> dict[str, Any]:
     """The parts with their shares, and the three statements; what is named by effects
     that the description does not list, if these were searched; numbers of the trials
     that do not count."""
-    other, told = made.unlisted, made.told
+    told, other = made.told, made.unlisted
     rows = {row.name: row for row in told.problem.rows}
-    names = [*statements.ordered(other, other.point.support)] if other else []
-    apart = sorted({*told.unstable, *told.strayed})
-    further: dict[str, Any] = {"unlisted": names} if made.searched else {}
-    return (
-        further
-        | ({"left_out": apart} if apart else {})
-        | {
-            "parts": [
-                {
-                    "name": part.name,
-                    "values": part.values,
-                    "low": part.low,
-                    "high": part.high,
-                    "units": {n: rows[n].unit for n in part.values},
-                    "last": part.last,
-                    "alone": part.alone,
-                    "sure": part.sure,
-                }
-                for part in told.parts
-            ],
-            "statements": statements.of(made),
-            "left": told.left,
-            "recurs": told.recurs,
-            "before": told.before,
-            "after": told.after,
-            "correlated": told.point.noise.lam,
-            "onset": None
-            if made.onset is None
-            else {"name": made.onset.name, "trial": made.onset.trial},
-        }
-    )
+    further: dict[str, Any] = {}
+    if made.searched:
+        names = statements.ordered(other, other.point.support) if other else ()
+        further["unlisted"] = [*names]
+    if apart := sorted({*told.unstable, *told.strayed}):
+        further["left_out"] = apart
+    return further | {
+        "parts": [
+            {
+                "name": part.name,
+                "values": part.values,
+                "low": part.low,
+                "high": part.high,
+                "units": {n: rows[n].unit for n in part.values},
+                "last": part.last,
+                "alone": part.alone,
+                "sure": part.sure,
+            }
+            for part in told.parts
+        ],
+        "statements": statements.of(made),
+        "left": told.left,
+        "recurs": told.recurs,
+        "before": told.before,
+        "after": told.after,
+        "correlated": told.point.noise.lam,
+        "onset": None
+        if made.onset is None
+        else {"name": made.onset.name, "trial": made.onset.trial},
+    }
 
 
 def _where(made: Decomposition, *, seed: int) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 from bns.errors import FormatError
-from bns.gap.importers import tables
-from bns.gap.importers.tables import Column, Table
+from bns.gap.importers.tables import Column, Table, moments
 from bns.storage import arrays, parquet, reading
 from bns.storage.tables import is_number
 
@@ -66,7 +65,6 @@ def _columns(name: str, values: np.ndarray) -> Iterator[Column]:
 def _frame(path: Path) -> Mapping[str, Any]:
     """Columns of a Parquet file; moments are seconds."""
     import pyarrow
-    from pyarrow import types
 
     try:
         with reading.regular(path, most=reading.DATA) as source:
@@ -74,8 +72,7 @@ def _frame(path: Path) -> Mapping[str, Any]:
             table = file.read(use_threads=False)
             names = [name for name in table.column_names if name != INDEX]
             whole = {name: table.column(name) for name in names}
-            moments = {n: c for n, c in whole.items() if types.is_timestamp(c.type)}
-            seconds = tables.seconds(moments)
+            seconds = moments(whole)
             return {
                 name: seconds[name] if name in seconds else _numbers(column, name, path)
                 for name, column in whole.items()

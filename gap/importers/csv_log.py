@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from bns.errors import FormatError
-from bns.gap.importers.tables import Column, Table
-from bns.gap.importers.tables import seconds as seconds_of
+from bns.gap.importers.tables import Column, Table, moments
 from bns.storage import reading, tables
 
 PACKED = ".gz"
@@ -91,8 +90,7 @@ def _columns(data: bytes, path: Path) -> dict[str, np.ndarray]:
     table, names = tables.parsed(data, path, *_separators(data))
     tables.once(names, names, path)
     columns = dict(zip(names, table.columns, strict=True))
-    moments = {n: c for n, c in columns.items() if types.is_timestamp(c.type)}
-    seconds = seconds_of(moments)
+    seconds = moments(columns)
     found = {}
     for name, column in columns.items():
         column = column.cast("int8") if types.is_boolean(column.type) else column

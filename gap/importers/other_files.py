@@ -31,7 +31,8 @@ MOTION = ("control.csv", "state_motor.csv")
 BESIDE = ("joint_list.txt", "event.csv")
 PARTS = ("data", "meta", "videos")
 FRAMES = (".parquet", ".json", ".jsonl", ".mp4")
-TABLES = (".csv", ".tsv", ".csv.gz", ".parquet", ".npz")
+COLUMNAR = (".parquet", ".pq", ".npz")
+TABLES = (".csv", ".tsv", ".csv.gz", *COLUMNAR)
 OURS = ("dataset.json", "run.json", "campaign.json")
 DEEPEST = 4  # directories of a dataset in one another
 

@@ -31,7 +31,6 @@ QUATERNION = r"(?i)(q|quat|quaternion|orientation|rot|rotation)[._]?$"
 SAME = 1e-6  # [s] moments that are nearer are one
 
 ENDS = ([".csv"], [".tsv"], [".txt"])
-ARRAYS = (".parquet", ".pq", ".npz")
 PACKED = ".gz"
 TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 SORT = (
@@ -111,7 +110,7 @@ def reader(path: str | Path) -> Callable[[Path], Table] | None:
             name = "directory_log"
     elif suffixes[-1:] in ([".pt"], [".pth"]):
         name = "pace"
-    elif path.suffix.lower() in ARRAYS:
+    elif path.suffix.lower() in other_files.COLUMNAR:
         name = "array_log"
     elif suffixes[-1:] == [".mcap"]:
         name = "ros2_mcap"
@@ -270,15 +269,18 @@ def checked(table: Table, path: Path) -> Table:
     return table
 
 
-def seconds(moments: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """Columns of moments as seconds since the first of all of them.
+def moments(columns: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """Those of some columns that are moments, as seconds since the first of all.
 
     Args:
-        moments: name -> column of Arrow's timestamps, T rows.
+        columns: name -> column of Arrow, T rows.
 
     Returns:
         name -> seconds, ``(T,)``, NaN in cells that are empty.
     """
+    from pyarrow import types
+
+    moments = {n: c for n, c in columns.items() if types.is_timestamp(c.type)}
     whole = {name: column.cast("int64") for name, column in moments.items()}
     ticks = {name: TICKS[column.type.unit] for name, column in moments.items()}
     filled = {n: c.drop_null().to_numpy() for n, c in whole.items() if len(c)}

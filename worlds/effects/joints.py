@@ -116,9 +116,13 @@ class JointBacklash(BodyEffect):
     """Play between a joint's drive and what it moves.
 
     What drives and reads the joint is on the motor's side of the play.
+
+    Attributes:
+        called: how the name of the play goes on after that of the joint.
     """
 
     name = "joint_backlash"
+    called: ClassVar[str] = parts.PLAY
     source = "backlash as a joint of its own with stops; bounds assumed"
     robots = ("own",)
     choices = parts.part("joint")
@@ -127,10 +131,10 @@ class JointBacklash(BodyEffect):
 
     def _write(self, spec: Any) -> None:
         for joint in parts.joints(spec, self["part"]):
-            parts.loosen(spec, joint, self["play"])
+            parts.loosen(spec, joint, self["play"], called=self.called)
 
 
-class OutputBacklash(BodyEffect):
+class OutputBacklash(JointBacklash):
     """Play between a joint's drive and what it moves, with the encoder behind it.
 
     What drives the joint is on the motor's side of the play, what reads it on the other
@@ -139,15 +143,7 @@ class OutputBacklash(BodyEffect):
     """
 
     name = "output_backlash"
-    source = "backlash as a joint of its own with stops; bounds assumed"
-    robots = ("own",)
-    choices = parts.part("joint")
-    resizes = True
-    parameter = strength("play", "rad or m", (0.0, 1.0), "full play", example=0.1)
-
-    def _write(self, spec: Any) -> None:
-        for joint in parts.joints(spec, self["part"]):
-            parts.loosen(spec, joint, self["play"], called=parts.SEEN_PLAY)
+    called = parts.SEEN_PLAY
 
 
 NARROW = 1e-6  # [rad or m] or degrees; MuJoCo refuses a joint without any way to go

@@ -1,6 +1,8 @@
 """How the trials of a log begin: on a stand or free, at rest in a pose or not."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -54,12 +56,16 @@ def begin(work: Work) -> None:
     told = np.stack([c.values for c, _, _ in work.told], axis=1)
     longest = max(work.rows, key=len)
     span = float(np.ptp(work.times[longest]))
-    first, tolerance, varies = _heads(work)
+    heads = _heads(work)
+    first = {joint: float(np.median(head.at)) for joint, head in heads.items()}
+    tolerance = {joint: head.tolerance for joint, head in heads.items()}
+    varies = any(head.varies for head in heads.values())
     pose, settle = guesses.rests(work.model, first, tolerance)
     if settle and not _settled(work, longest, pose or "", settle):
         settle = 0.0
     elif pose is not None and not settle and not varies:
-        settle = guesses.returning(work.model, pose, _elsewhere(work, pose))
+        beside = _beside(work.model, pose, heads)
+        settle = guesses.returning(work.model, pose, beside)
     loose = bool(start.free(work.model))
     if span > guesses.LONG and guesses.curved(told[longest], span) and not loose:
         work.start = {"recorded": True, "cut": guesses.CUT}
@@ -97,40 +103,58 @@ def begin(work: Work) -> None:
         work.guessed.append(f"start: {how}")
 
 
-def _heads(work: Work) -> tuple[dict[str, float], dict[str, float], bool]:
-    """Where each joint is at the start of trials, in their median, and by how much that
-    may be off; whether any of them differs from trial to trial by more than noise."""
-    first: dict[str, float] = {}
-    tolerance: dict[str, float] = {}
-    varies = False
+class _Head(NamedTuple):
+    """Where a joint is at the start of trials.
+
+    Attributes:
+        at: in each trial, ``(n,)``.
+        noise: standard deviation of its measurement.
+        span: of all that it did.
+    """
+
+    at: np.ndarray
+    noise: float
+    span: float
+
+    @property
+    def varies(self) -> bool:
+        """Whether it differs from trial to trial by more than noise."""
+        return bool(np.ptp(self.at) > 2 * guesses.SIGMAS * self.noise)
+
+    @property
+    def tolerance(self) -> float:
+        """By how much their median may be off a pose."""
+        return max(guesses.SIGMAS * self.noise, guesses.NEAR * self.span)
+
+    def beside(self, place: float) -> bool:
+        """Whether it is not at a place, by more than the noise of all trials."""
+        error = self.noise / np.sqrt(len(self.at))
+        return bool(abs(self.at.mean() - place) > guesses.SIGMAS * error)
+
+
+def _heads(work: Work) -> dict[str, _Head]:
+    """Where each joint is at the start of trials."""
+    found = {}
     for column, part, unit in work.seen:
         if part.quantity == "joint":
             pieces = [column.values[rows] * factor(unit) for rows in work.rows]
-            heads = np.concatenate([p[np.isfinite(p)][:1] for p in pieces])
-            first[part.name] = float(np.median(heads))
-            wide = guesses.NEAR * float(
-                np.nanmax(column.values) - np.nanmin(column.values)
-            )
-            least = guesses.SIGMAS * guesses.noise(pieces)
-            tolerance[part.name] = max(least, wide * factor(unit))
-            varies |= bool(np.ptp(heads) > 2 * least)
-    return first, tolerance, varies
-
-
-def _elsewhere(work: Work, pose: str) -> dict[str, float]:
-    """Joints that were not first seen where a pose has them, by more than the noise of
-    all trials together, and where they were: what is to be found took them there."""
-    data, found = guesses.posed(work.model, pose, 0.0), {}
-    for column, part, unit in work.seen:
-        if part.quantity != "joint":
-            continue
-        pieces = [column.values[rows] * factor(unit) for rows in work.rows]
-        seen = [piece[np.isfinite(piece)] for piece in pieces]
-        at = float(np.mean([piece[0] for piece in seen if len(piece)]))
-        error = guesses.noise(pieces) / np.sqrt(len(pieces))
-        if abs(at - data.joint(part.name).qpos[0]) > guesses.SIGMAS * error:
-            found[part.name] = at
+            at = np.concatenate([p[np.isfinite(p)][:1] for p in pieces])
+            span = float(np.nanmax(column.values) - np.nanmin(column.values))
+            found[part.name] = _Head(at, guesses.noise(pieces), span * factor(unit))
     return found
+
+
+def _beside(
+    model: mujoco.MjModel, pose: str, heads: Mapping[str, _Head]
+) -> dict[str, float]:
+    """Joints that are not where a pose has them, and where: what is to be found
+    took them there."""
+    data = guesses.posed(model, pose, 0.0)
+    return {
+        joint: float(head.at.mean())
+        for joint, head in heads.items()
+        if head.beside(float(data.joint(joint).qpos[0]))
+    }
 
 
 def _stands(work: Work, pose: str) -> bool:

@@ -144,15 +144,20 @@ class OwnConfig:
     log: Mapping[str, Source] = field(default_factory=dict)
 
     @property
-    def followed(self) -> Mapping[str, list[int]]:
-        """Columns of x, y and yaw of each site and body of which all are observed."""
-        found: dict[str, dict[str, int]] = {}
+    def over_floor(self) -> Mapping[tuple[str, str], Mapping[str, int]]:
+        """Columns by axis, those of `FLOOR`, of each site and body by kind and name."""
+        found: dict[tuple[str, str], dict[str, int]] = {}
         for column, item in enumerate(self.seen):
             if item.way in FLOOR:
-                found.setdefault(item.part, {})[item.way] = column
+                found.setdefault((item.quantity, item.part), {})[item.way] = column
+        return found
+
+    @property
+    def followed(self) -> Mapping[str, list[int]]:
+        """Columns of x, y and yaw of each site and body of which all are observed."""
         return {
             part: [columns[way] for way in FLOOR]
-            for part, columns in found.items()
+            for (_, part), columns in self.over_floor.items()
             if len(columns) == len(FLOOR)
         }
 
@@ -165,9 +170,11 @@ class OwnConfig:
         Raises:
             UnknownNameError: x, y and yaw of it are not observed.
         """
-        names = [*self.followed]
-        on = [names[n] for n in parts.among(names, part, "tracked place")]
-        return {name: self.followed[name] for name in on}
+        followed = self.followed
+        names = [*followed]
+        kind = "tracked place (a body or site whose x, y and yaw are observed)"
+        on = (names[n] for n in parts.among(names, part, kind))
+        return {name: followed[name] for name in on}
 
     @classmethod
     def read(cls, path: str | Path) -> "OwnConfig":

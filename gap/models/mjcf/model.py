@@ -69,7 +69,9 @@ class OwnModel(GapModel):
             for item in self.listed
             if item.effect == "body_mass"
         }
-        self._carried = _carried(config, start.free(self.physics.model))
+        free = start.free(self.physics.model)
+        over = config.over_floor.items()
+        self._carried = [columns for (_, part), columns in over if part in free]
         carried = {column for part in self._carried for column in part.values()}
         self._turning = [
             column
@@ -366,17 +368,3 @@ class OwnModel(GapModel):
         spec.compile()
         files.write_text(path, spec.to_xml())
         return [str(effect) for effect in made if effect.stage != "body"]
-
-
-def _carried(config: OwnConfig, free: frozenset[str]) -> list[dict[str, int]]:
-    """Columns of each body and site on a free joint that goes over the floor, by axis.
-
-    Args:
-        config: the description.
-        free: names of what a free joint carries.
-    """
-    found: dict[tuple[str, str], dict[str, int]] = {}
-    for column, item in enumerate(config.seen):
-        if item.part in free and item.way in FLOOR:
-            found.setdefault((item.quantity, item.part), {})[item.way] = column
-    return [*found.values()]
