@@ -14,7 +14,7 @@ import numpy as np
 from bns.errors import BnsError, UnknownNameError
 from bns.gap.candidates.mjcf_usual import usual
 from bns.gap.decomposition.row import Row
-from bns.gap.models.mjcf import effects
+from bns.gap.models.mjcf import effects, ties
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.worlds.effects.parts import ALL, FILTERS, WIDE
 
@@ -53,6 +53,8 @@ RANGES = {
     "geom_radius": (0.7, 1.4, "1"),
     "gravity_compensation": (-1.0, 1.0, "1"),
     "tendon_slack": (0.0, SLACK, "m"),
+    "tendon_arm": (0.5, 2.0, "1"),
+    "coupling_ratio": (0.5, 2.0, "1"),
     "log_clock": (-FASTEST, FASTEST, "1"),
 }
 """of effects on parts of the model that have the same on all of them"""
@@ -66,6 +68,8 @@ EXCITE = {
     "tendon_friction": "slow motion and reversals of that tendon",
     "tendon_stiffness": "large excursions of that tendon",
     "tendon_slack": "reversals of that tendon",
+    "tendon_arm": "large excursions of that joint",
+    "coupling_ratio": "large excursions of that joint",
     "actuator_gain": "large commands",
     "geom_friction": "sliding",
     "geom_radius": "rolling, or steps",
@@ -355,6 +359,8 @@ def _about(now: float | np.ndarray, most: float) -> tuple[float, float]:
 def _names(model: mujoco.MjModel, kind: str) -> list[str]:
     if kind == "model":
         return [ALL]
+    if kind == "arm":
+        return ties.arms(model)
     count = {
         "joint": model.njnt,
         "body": model.nbody,

@@ -50,10 +50,10 @@ EIGHTH = 0.125  # of the largest value: the plausible one
 OFFSET = 0.0625  # of the span of an offset
 
 # plausible departure and slack of what has no scale of its own (assumed): a gain of a
-# motor is known to 10 %, of a sensor, a gear and a tyre to 3 %, a delay to 40 ms, a
-# battery to 1 % a trial; loops run at 1 kHz, or at some 200 Hz; what balances a weight
-# is known as a motor is, and drag no better. A clock is known to 1 %; its slack is that
-# of gains, which make a robot as much faster or slower
+# motor is known to 10 %, of a sensor, a gear, a lever arm and a tyre to 3 %, a delay to
+# 40 ms, a battery to 1 % a trial; loops run at 1 kHz, or at some 200 Hz; what balances
+# a weight is known as a motor is, and drag no better. A clock is known to 1 %; its
+# slack is that of gains, which make a robot as much faster or slower
 PLAUSIBLE = {
     "actuator_gain": (0.1, 0.003),
     "actuator_kp": (0.05, 0.003),
@@ -72,6 +72,8 @@ PLAUSIBLE = {
     "reading_delay": (0.04, 8e-4),
     "body_length": (0.03, 0.001),
     "body_tilt": (0.03, 0.001),
+    "tendon_arm": (0.03, 0.001),
+    "coupling_ratio": (0.03, 0.001),
     "encoder_offset": (0.01, 0.0),
     "fluid_density": (0.1, 0.01),
     "fluid_viscosity": (0.3, 0.03),

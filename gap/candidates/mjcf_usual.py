@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import mujoco
 import numpy as np
 
-from bns.gap.models.mjcf import effects, prepared
+from bns.gap.models.mjcf import effects, prepared, ties
 from bns.gap.models.mjcf.config import PLACES, OwnConfig, Seen
 from bns.worlds.effects.parts import ALL, FILTERS, ROUND_GEOMS
 
@@ -20,6 +20,8 @@ USUAL = (
     "tendon_friction",
     "tendon_stiffness",
     "tendon_slack",
+    "tendon_arm",
+    "coupling_ratio",
     "body_mass",
     "body_tilt",
     "gravity_compensation",
@@ -57,7 +59,8 @@ are few, else of places, by a camera, beside joints, by encoders; the radius of 
 and feet, and grip and softness of all that touch, where they touch something; where the
 marker sits of what is followed by x, y and yaw"""
 TENDONS = ("tendon_damping", "tendon_friction", "tendon_stiffness")
-"""on every tendon; `tendon_slack` where it has a spring"""
+"""on every tendon; `tendon_slack` where it has a spring, `tendon_arm` about each joint
+of one that pulls several"""
 PUSHED = ("joint_damping", "joint_friction", "body_mass")
 """... also on what is seen and has no motor: a block that is gripped, a door"""
 FEW = 6  # joints up to which `RARER` are considered, too; commands, readings
@@ -105,6 +108,8 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
         "reading_offset": seen,
         **dict.fromkeys(TENDONS, tendons),
         "tendon_slack": [n for n in tendons if _sprung(model, n)],
+        "tendon_arm": ties.arms(model, fewest=2),
+        "coupling_ratio": ties.followers(model),
         "body_tilt": _bolted(model, owned),
         "marker_mount": tuple(config.followed),
         "fluid_density": (ALL,) if model.opt.density else (),
@@ -255,7 +260,7 @@ def _moved(model: mujoco.MjModel, told: Iterable[int]) -> list[int]:
 def _on(model: mujoco.MjModel, bodies: Iterable[int]) -> list[int]:
     """Joints of the trees of some bodies, and of what is tied to them."""
     roots = {int(model.body_rootid[body]) for body in bodies} - {0}
-    roots = prepared.tied(model, roots)
+    roots = ties.tied(model, roots)
     return [
         joint
         for joint, body in enumerate(model.jnt_bodyid)
@@ -270,7 +275,7 @@ def _owner(model: mujoco.MjModel, item: Seen) -> int:
     if item.quantity == "site":
         return int(model.site(item.part).bodyid[0])
     if item.quantity == "tendon":
-        return max(prepared.by_tendon(model)[model.tendon(item.part).id], default=0)
+        return max(ties.by_tendon(model)[model.tendon(item.part).id], default=0)
     return int(model.joint(item.part).bodyid[0])
 
 

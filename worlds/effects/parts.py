@@ -27,6 +27,8 @@ UNSERVOED = ("wheeled", "own")
 """... on numbers that the servo law sets in walking robots; there it has the effect"""
 
 SLIDE, HINGE = 2, 3  # mjtJoint
+JOINT_WRAP = 1  # mjtWrap
+COUPLED = 2  # mjtEq: of joints
 PLAY, SEEN_PLAY = "_play", "_seen_play"
 """how the names of joints go on that are play behind others; where their encoders are
 behind it, too, they read both's sum"""
@@ -39,9 +41,9 @@ class Part(Choice):
     """A choice among the names of a model that is known later.
 
     Attributes:
-        kind: "joint", "body", "actuator", "tendon", "geom" or "channel"; "place" = a
-            body or site that a tracker follows; "model" = of the whole of it, which is
-            `ALL`.
+        kind: "joint", "body", "actuator", "tendon", "geom" or "channel"; "arm" = of a
+            fixed tendon about a joint, ``TENDON/JOINT``; "place" = a body or site that
+            a tracker follows; "model" = of the whole of it, which is `ALL`.
     """
 
     kind: str = "channel"
@@ -114,6 +116,33 @@ def actuators(spec: Any, which: str) -> list[Any]:
 def tendons(spec: Any, which: str) -> list[Any]:
     """Tendons of an `MjSpec` that a part stands for."""
     return _of(list(spec.tendons), which, "tendon of the model")
+
+
+def fixed(tendon: Any) -> bool:
+    """Whether a tendon of an `MjSpec` pulls joints by lever arms of its own."""
+    return bool(len(tendon.path)) and int(tendon.path[0].type) == JOINT_WRAP
+
+
+def arms(spec: Any, which: str) -> list[tuple[str, str]]:
+    """Names of the fixed tendons of an `MjSpec`, each with one of its joints, that a
+    part ``TENDON/JOINT`` stands for."""
+    some = [
+        (tendon.name, wrap.target.name)
+        for tendon in spec.tendons
+        if fixed(tendon)
+        for wrap in tendon.path
+    ]
+    found = among(["/".join(pair) for pair in some], which, "lever arm of the model")
+    return [some[at] for at in found]
+
+
+def couplings(spec: Any, which: str) -> list[Any]:
+    """Equalities of two joints in an `MjSpec` whose first one a part stands for."""
+    some = [
+        item for item in spec.equalities if int(item.type) == COUPLED and item.name2
+    ]
+    names = [item.name1 for item in some]
+    return [some[at] for at in among(names, which, "joint that follows another one")]
 
 
 def geoms(spec: Any, which: str) -> list[Any]:

@@ -11,7 +11,7 @@ from scipy import optimize
 from bns.errors import BnsError, FormatError
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column, Table
-from bns.gap.models.mjcf import guesses, matching, prepared, rehearsal
+from bns.gap.models.mjcf import guesses, matching, prepared, rehearsal, ties
 from bns.gap.models.mjcf.config import OwnConfig, Told
 from bns.gap.models.mjcf.rehearsal import Part
 from bns.worlds.data.units import factor, per_si, si_unit
@@ -258,12 +258,7 @@ def _wound(model: mujoco.MjModel, actuator: int) -> list[str]:
     """Joints of the fixed tendon that an actuator pulls; none for other actuators."""
     if int(model.actuator_trntype[actuator]) != int(mujoco.mjtTrn.mjTRN_TENDON):
         return []
-    tendon = int(model.actuator_trnid[actuator][0])
-    first, count = int(model.tendon_adr[tendon]), int(model.tendon_num[tendon])
-    wraps = range(first, first + count)
-    if any(int(model.wrap_type[w]) != int(mujoco.mjtWrap.mjWRAP_JOINT) for w in wraps):
-        return []
-    return [model.joint(int(model.wrap_objid[w])).name for w in wraps]
+    return ties.wound(model, int(model.actuator_trnid[actuator][0]))
 
 
 def _widest(model: mujoco.MjModel, number: int, joint: str) -> float:

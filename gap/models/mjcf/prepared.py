@@ -6,7 +6,7 @@ out from its geoms each time anew.
 """
 
 import warnings
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 import mujoco
 import numpy as np
@@ -47,58 +47,6 @@ def driven(model: mujoco.MjModel, actuator: int) -> int:
     kinds = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
     on_joint = int(model.actuator_trntype[actuator]) in map(int, kinds)
     return int(model.actuator_trnid[actuator, 0]) if on_joint else -1
-
-
-def tied(model: mujoco.MjModel, roots: Collection[int]) -> set[int]:
-    """Bodies on the world whose trees are tied to some by equalities or tendons, and
-    these.
-
-    Args:
-        model: that is recorded.
-        roots: numbers of bodies on the world, see `MjModel.body_rootid`.
-    """
-    groups = [*_by_equality(model), *by_tendon(model)]
-    sets = [
-        {int(model.body_rootid[body]) for body in bodies} - {0} for bodies in groups
-    ]
-    found, count = set(roots), 0
-    while len(found) > count:
-        count = len(found)
-        for group in sets:
-            found |= group if group & found else set()
-    return found
-
-
-def _by_equality(model: mujoco.MjModel) -> Iterable[list[int]]:
-    """Numbers of the bodies that each equality ties."""
-    for number, kind in enumerate(model.eq_type):
-        if kind == mujoco.mjtEq.mjEQ_JOINT:
-            owner = model.jnt_bodyid
-        elif model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_SITE:
-            owner = model.site_bodyid
-        elif model.eq_objtype[number] == mujoco.mjtObj.mjOBJ_BODY:
-            owner = np.arange(model.nbody)
-        else:  # of tendons, which tie by themselves
-            continue
-        ends = (model.eq_obj1id[number], model.eq_obj2id[number])
-        yield [int(owner[end]) for end in ends if end >= 0]
-
-
-def by_tendon(model: mujoco.MjModel) -> list[list[int]]:
-    """Numbers of the bodies that each tendon runs over."""
-    owners = {
-        mujoco.mjtWrap.mjWRAP_JOINT: model.jnt_bodyid,
-        mujoco.mjtWrap.mjWRAP_SITE: model.site_bodyid,
-    }
-    found = []
-    for first, count in zip(model.tendon_adr, model.tendon_num, strict=True):
-        bodies = []
-        for place in range(first, first + count):
-            owner = owners.get(mujoco.mjtWrap(int(model.wrap_type[place])))
-            if owner is not None:
-                bodies.append(int(owner[model.wrap_objid[place]]))
-        found.append(bodies)
-    return found
 
 
 def hinged(model: mujoco.MjModel, joint: int) -> bool:

@@ -163,15 +163,17 @@ PARTS = {
     "actuator": "elbow_servo",
     "geom": "forearm",
     "tendon": "cord",
+    "arm": "cord/elbow",
     "model": "all",
 }
 CORD = """<tendon><fixed name="cord" stiffness="200"><joint joint="elbow" coef="0.1"/>
-  </fixed></tendon></mujoco>"""
+  </fixed></tendon><equality><joint joint1="elbow" joint2="shoulder"
+  polycoef="0 0.5 0 0 0" solref="0.5 1"/></equality></mujoco>"""
 
 
 @pytest.fixture(scope="module")
 def corded(arm, tmp_path_factory):
-    """The arm with a tendon."""
+    """The arm with a tendon, and an elbow that is softly coupled to the shoulder."""
     path = tmp_path_factory.mktemp("corded") / "arm.xml"
     path.write_text(arm.config.model.read_text().replace("</mujoco>", CORD))
     return OwnModel(replace(arm.config, model=path), threads=1)

@@ -8,7 +8,7 @@ import pytest
 
 from bns.gap.candidates import mjcf
 from bns.gap.diagnose import diagnose
-from bns.gap.models.mjcf import prepared, start
+from bns.gap.models.mjcf import start, ties
 from bns.gap.models.mjcf.model import OwnModel
 from bns.gap.records import Diagnosis, Fit, Verdict
 from bns.gap.warnings import warnings
@@ -167,7 +167,7 @@ def test_what_is_tied_to_a_driven_part_moves_with_it(tie):
     model = mujoco.MjModel.from_xml_string(FOURBAR.format(tie=TIES[tie]))
     crank, rocker = model.body("crank").id, model.body("rocker").id
     wanted = {crank} if tie == "none" else {crank, rocker}
-    assert prepared.tied(model, {crank}) == wanted
+    assert ties.tied(model, {crank}) == wanted
 
 
 PUSHER = """name = "pusher"
