@@ -1,6 +1,6 @@
 """How the trials of a log begin: on a stand or free, at rest in a pose or not."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -67,6 +67,7 @@ def begin(work: Work) -> None:
         beside = _beside(work.model, pose, heads)
         settle = guesses.returning(work.model, pose, beside)
     loose = bool(start.free(work.model))
+    put = varies and pose is not None and _put(work, pose, settle, heads)
     if span > guesses.LONG and guesses.curved(told[longest], span) and not loose:
         work.start = {"recorded": True, "cut": guesses.CUT}
         work.start |= {"keyframe": pose} if pose else {}
@@ -94,7 +95,7 @@ def begin(work: Work) -> None:
     else:
         work.start = {"keyframe": pose} if pose else {}
         what = f"keyframe {pose!r}" if pose else "the model's own pose"
-        if varies and not settle and not loose:
+        if put or (varies and not settle and not loose):
             work.start |= {"recorded": True}
             how = f"at rest near {what}, where its joints were recorded in each trial"
         else:
@@ -199,8 +200,30 @@ def _settled(work: Work, rows: np.ndarray, pose: str, settle: float) -> bool:
     return errors[0] <= errors[1]
 
 
-def _missed(work: Work, rows: np.ndarray, data: mujoco.MjData) -> float:
-    """Squared error of the model from a state on, of the columns' variances, summed."""
+def _put(work: Work, pose: str, settle: float, heads: Mapping[str, "_Head"]) -> bool:
+    """Whether joints begin where someone has put them, each time elsewhere, not where
+    the robot came to rest: by which of the two predicts their first samples better, in
+    all trials."""
+    errors = np.zeros(2)
+    begun = [joint for joint, head in heads.items() if len(head.at) == len(work.rows)]
+    for number, rows in enumerate(work.rows):
+        rows = rows[work.times[rows] <= work.times[rows[0]] + guesses.SETTLE]
+        rested = guesses.posed(work.model, pose, settle)
+        found = guesses.posed(work.model, pose, 0.0)
+        for joint in begun:
+            found.joint(joint).qpos[0] = heads[joint].at[number]
+        errors += [_missed(work, rows, data, begun) for data in (rested, found)]
+    return bool(errors[1] < errors[0])
+
+
+def _missed(
+    work: Work,
+    rows: np.ndarray,
+    data: mujoco.MjData,
+    joints: Collection[str] | None = None,
+) -> float:
+    """Squared error of the model from a state on, of the columns' variances, summed:
+    of all columns, or of those of some joints."""
     made = replayed(work, rows, data)
     return sum(
         float(
@@ -209,4 +232,5 @@ def _missed(work: Work, rows: np.ndarray, data: mujoco.MjData) -> float:
         )
         for column, part, unit in work.seen
         if part in made
+        and (joints is None or (part.quantity == "joint" and part.name in joints))
     )
