@@ -135,7 +135,8 @@ def _observed() -> Schema:
     scatter = "of what the robot scatters itself, per square root of a second"
     known = {
         **parts,
-        "axis": {"enum": list(config.AXES)} | _said("of a site or body"),
+        "axis": {"enum": [*config.AXES, *config.TURNS]}
+        | _said("of a site, body or gyro"),
         "unit": TEXT,
         "noise": POSITIVE | _said("standard deviation of its measurement"),
         "scatter": LEAST | _said(scatter),

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import mujoco
 import numpy as np
 
-from bns.gap.models.mjcf import effects, prepared, ties
+from bns.gap.models.mjcf import effects, prepared, ties, view
 from bns.gap.models.mjcf.config import PLACES, OwnConfig, Seen
 from bns.worlds.effects.parts import ALL, FILTERS, ROUND_GEOMS
 
@@ -274,6 +274,8 @@ def _owner(model: mujoco.MjModel, item: Seen) -> int:
         return int(model.body(item.part).id)
     if item.quantity == "site":
         return int(model.site(item.part).bodyid[0])
+    if item.quantity == "gyro":
+        return int(model.site_bodyid[view.gyro(model, model.sensor(item.part).id)])
     if item.quantity == "tendon":
         return max(ties.by_tendon(model)[model.tendon(item.part).id], default=0)
     return int(model.joint(item.part).bodyid[0])

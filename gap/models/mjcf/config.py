@@ -35,9 +35,9 @@ LOOP = ("kp", "kd", "torque")
 """of a position loop that the MJCF file lacks"""
 
 PLACES = ("site", "body")
-QUANTITIES = ("joint", "speed", *PLACES, "tendon")
+QUANTITIES = ("joint", "speed", *PLACES, "tendon", "gyro")
 """what an observed channel can be: position or speed of a joint, place of a site or
-body, or how that is turned, length of a tendon"""
+body, or how that is turned, length of a tendon, rate that a gyro of the model reads"""
 AXES = ("x", "y", "z")
 TURNS = ("roll", "pitch", "yaw")
 """how a site or body is turned in the world: by yaw, pitch and roll, in this order,
@@ -76,8 +76,9 @@ class Seen:
     Attributes:
         channel: name and unit.
         quantity: one of `QUANTITIES`.
-        part: name of the joint, site, body or tendon.
-        axis: of a site or body, in the world frame: number among `AXES` and `TURNS`.
+        part: name of the joint, site, body, tendon or gyro.
+        axis: of a site or body, in the world frame: number among `AXES` and `TURNS`; of
+            a gyro its own, among `AXES`.
         noise: standard deviation of its measurement, in its unit.
         scatter: of what the robot itself scatters, per square root of a second.
         floats: whether it tells, with others, the state of a free body
@@ -305,7 +306,7 @@ def _seen(name: str, table: Any, path: Path) -> Seen:
             "and a positive noise (standard deviation of its measurement)."
         )
     axis = str(table.get("axis", "x"))
-    axes = (*AXES, *TURNS)
+    axes = AXES if what[0] == "gyro" else (*AXES, *TURNS)
     if axis not in axes:
         raise UnknownNameError(f"axis of [observed.{name}]", axis, axes)
     channel = _channel(name, table["unit"], path)
@@ -313,6 +314,10 @@ def _seen(name: str, table: Any, path: Path) -> Seen:
         raise FormatError(
             f"{path}: [observed.{name}] is in {channel.unit!r}; joints and places are "
             f"in {', '.join(UNITS)}."
+        )
+    if what[0] == "gyro" and channel.unit != "rad/s":
+        raise FormatError(
+            f"{path}: [observed.{name}] is in {channel.unit!r}; a gyro reads rad/s."
         )
     made = Seen(
         channel,

@@ -9,7 +9,7 @@ import numpy as np
 from bns.errors import BnsError
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column
-from bns.gap.models.mjcf import matching, prepared, rehearsal
+from bns.gap.models.mjcf import inertial, matching, prepared, rehearsal, view
 from bns.gap.models.mjcf.channels import Work, joint_of, joints
 from bns.gap.models.mjcf.config import AXES, PLACES, TURNS
 from bns.gap.models.mjcf.rehearsal import Fit, Part
@@ -35,6 +35,7 @@ def observed(work: Work, seen: list[Column]) -> None:
         listed = ", ".join(c.name for c in turned)
         work.guessed.append(f"left out, for angles are compared: {listed}")
     model = work.model
+    spun, seen = _inertial(work, seen)
     driven = [joint_of(model, model.actuator(a).id) for _, a, _ in work.told]
     driven = [joint for joint in joints(model) if joint in driven]
     found: dict[str, Part] = {}
@@ -61,7 +62,29 @@ def observed(work: Work, seen: list[Column]) -> None:
             hits, reasons = matching.match(left, free)
             found |= {name: Part(kind, part) for name, part in hits.items()}
             why |= reasons
+    named |= spun
+    seen += [column for column in work.table.columns if column.name in spun]
     _rehearsed(work, seen, found, why, named)
+
+
+def _inertial(
+    work: Work, seen: list[Column]
+) -> tuple[dict[str, tuple[Part, ...]], list[Column]]:
+    """Columns of gyros of the model, and the others without those of an inertial unit,
+    which are no joints."""
+    every = inertial.rates(seen, view.gyros(work.model))
+    left = inertial.accelerations(seen)
+    if left:
+        listed = ", ".join(left)
+        work.guessed.append(f"left out, for no acceleration is compared: {listed}")
+    spun = {name: parts for name, parts in every.items() if parts}
+    if lost := [name for name in every if name not in spun]:
+        work.unsure.append(
+            f"left out: {', '.join(lost)}, of a gyro that the model does not have: "
+            "give it one (<gyro site=...>, with a name)"
+        )
+    dropped = {*every, *left}
+    return spun, [column for column in seen if column.name not in dropped]
 
 
 def _rehearsed(
@@ -140,7 +163,9 @@ def _chosen(
         alike = matching.core(best.name) in matching.core(column.name)
         reason = "by its name" if alike else matching.ONLY
     found[column.name] = best
-    axis = f" along {best.axis}" if best.axis in AXES else f" {best.axis}".rstrip()
+    spun = best.quantity == rehearsal.GYRO
+    along = ("about" if spun else "along") if best.axis in AXES else ""
+    axis = " ".join(["", *filter(None, (along, best.axis))]).rstrip()
     line = f"{column.name}: {best.quantity} {best.name!r}{axis} in {unit}, {reason}"
     work.seen.append((column, best, unit))
     near = [
@@ -153,7 +178,7 @@ def _chosen(
             f"{p.quantity} {p.name}" for p in near[:2]
         )
     sure = fit.score > AGREES and reason not in (*matching.UNSURE, "for it moves so")
-    headed = best.axis in ("x", "y") and bool(_free(work.model))  # as it began
+    headed = not spun and best.axis in ("x", "y") and bool(_free(work.model))
     if fit.correlation < -AGREES and not headed:
         line += (
             "; it moves against the model: if its sign is another, give its line in "

@@ -323,7 +323,7 @@ def number(model: mujoco.MjModel, kind: str, name: str) -> int:
 
     Args:
         model: compiled.
-        kind: "joint", "site", "body", "tendon", "actuator" or "key".
+        kind: "joint", "site", "body", "tendon", "actuator", "sensor" or "key".
         name: of the part.
 
     Raises:
@@ -338,6 +338,7 @@ def number(model: mujoco.MjModel, kind: str, name: str) -> int:
             "body": model.nbody,
             "tendon": model.ntendon,
             "actuator": model.nu,
+            "sensor": model.nsensor,
             "key": model.nkey,
         }[kind]
         known = [getattr(model, kind)(at).name for at in range(count)]

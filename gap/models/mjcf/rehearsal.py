@@ -11,15 +11,26 @@ from bns.gap.models.mjcf.config import AXES, TURNS
 from bns.worlds.data.units import per_si
 
 JOINT, SITE, BODY, SPEED, TENDON = "joint", "site", "body", "speed", "tendon"
-STATE = ("qpos", "qvel", "ten_length", "site_xpos", "site_xmat", "xpos", "xmat")
-"""what `mujoco.MjData` calls the motion of joints, tendons, sites and bodies"""
+GYRO = "gyro"
+STATE = (
+    "qpos",
+    "qvel",
+    "ten_length",
+    "site_xpos",
+    "site_xmat",
+    "xpos",
+    "xmat",
+    "sensordata",
+)
+"""what `mujoco.MjData` calls the motion of joints, tendons, sites and bodies, and what
+sensors read"""
 OWN = 0.03  # by which a joint is preferred to a place that moves alike
 STILL = 1e-6  # [m or rad] less is no motion
 
 
 class Part(NamedTuple):
     """What a column may be of: a joint's position or speed, a place along an axis or
-    how it is turned there, the length of a tendon."""
+    how it is turned there, the length of a tendon, what a gyro reads about an axis."""
 
     quantity: str
     name: str
@@ -85,6 +96,10 @@ def _by_part(
     for number in range(model.ntendon):
         if name := model.tendon(number).name:
             found[Part(TENDON, name)] = state["ten_length"][:, number]
+    for name in view.gyros(model):
+        first = int(model.sensor(name).adr[0])
+        for axis, letter in enumerate(AXES):
+            found[Part(GYRO, name, letter)] = state["sensordata"][:, first + axis]
     for kind, count, places, frames in (
         (SITE, model.nsite, state["site_xpos"], state["site_xmat"]),
         (BODY, model.nbody, state["xpos"], state["xmat"]),
@@ -103,11 +118,11 @@ def _by_part(
 
 def factors(model: mujoco.MjModel, part: Part) -> Mapping[str, float]:
     """What a part may be measured in, and how much of it makes one SI unit."""
-    turning = part.axis in TURNS
+    turning = part.axis in TURNS or part.quantity == GYRO
     if part.quantity in (JOINT, SPEED):
         turning = turns(model, part.name)
     name = "rad" if turning else "m"
-    return per_si(f"{name}/s" if part.quantity == SPEED else name)
+    return per_si(f"{name}/s" if part.quantity in (SPEED, GYRO) else name)
 
 
 def turns(model: mujoco.MjModel, joint: str) -> bool:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import mujoco
 
 from bns.gap.models.mjcf import effects as own_effects
-from bns.gap.models.mjcf import prepared, start
+from bns.gap.models.mjcf import prepared, start, view
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Trial
@@ -116,7 +116,8 @@ class Trees:
 
 
 def _parts(model: mujoco.MjModel) -> dict[tuple[str, str], int]:
-    """Number of the tree of each joint, body, site, geom and actuator; -1 = none."""
+    """Number of the tree of each joint, body, site, gyro, geom and actuator; -1 =
+    none."""
     made: dict[tuple[str, str], int] = {}
     for kind, bodies in (
         ("body", range(model.nbody)),
@@ -126,6 +127,9 @@ def _parts(model: mujoco.MjModel) -> dict[tuple[str, str], int]:
     ):
         for number, body in enumerate(bodies):
             made[kind, getattr(model, kind)(number).name] = int(model.body_treeid[body])
+    for name in view.gyros(model):
+        site = view.gyro(model, model.sensor(name).id)
+        made["gyro", name] = int(model.body_treeid[model.site_bodyid[site]])
     for number in range(model.nu):
         joint = prepared.driven(model, number)
         body = model.jnt_bodyid[joint] if joint >= 0 else 0

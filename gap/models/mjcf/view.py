@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from bns.errors import UnknownNameError
 from bns.gap.models.mjcf import floating, prepared
 from bns.gap.models.mjcf.config import OwnConfig, Seen
 from bns.worlds.effects.parts import SEEN_PLAY
@@ -20,7 +21,8 @@ class View:
         config: the description.
         columns: per channel the column of the full physics state, -1 = kinematics; of
             how a free body is turned the first of its quaternion's.
-        parts: per channel the number of the site, body or tendon, -1 = it has a column.
+        parts: per channel the number of the site, body or tendon, of a gyro of its
+            site, -1 = it has a column.
         beyond: per channel the column of a play that its encoder is behind, -1 = none.
     """
 
@@ -34,12 +36,16 @@ class View:
         """Find the channels in a model.
 
         Raises:
-            UnknownNameError: a joint, site, body or tendon that the model lacks.
+            UnknownNameError: a joint, site, body, tendon or gyro that the model lacks.
         """
         columns, parts, beyond = [], [], []
         for item in config.seen:
-            kind = "joint" if item.quantity == "speed" else item.quantity
+            kind = {"speed": "joint", "gyro": "sensor"}.get(
+                item.quantity, item.quantity
+            )
             number = prepared.number(model, kind, item.part)
+            if kind == "sensor":
+                number = gyro(model, number)
             at = further = -1
             if kind == "joint":
                 at = _jointed(model, item, number)
@@ -80,8 +86,11 @@ class View:
     ) -> np.ndarray:
         """Readings ``(T, K)`` of channels that kinematics tell, of valid states."""
         data, seen = mujoco.MjData(model), [self.config.seen[c] for c in channels]
+        spun = {self.parts[c]: np.zeros(6) for c in channels if self._spins(c)}
         found = [
-            _found(data, item, self.parts[channel])
+            spun[self.parts[channel]][item.axis : item.axis + 1]
+            if self._spins(channel)
+            else _found(data, item, self.parts[channel])
             for channel, item in zip(channels, seen, strict=True)
         ]
         ends = np.cumsum([len(each) for each in found])
@@ -93,6 +102,12 @@ class View:
             if tendons:
                 mujoco.mj_comPos(model, data)
                 mujoco.mj_tendon(model, data)
+            if spun:
+                data.qvel[:] = state[1 + model.nq : 1 + model.nq + model.nv]
+                mujoco.mj_comPos(model, data)
+                mujoco.mj_comVel(model, data)
+            for site, speeds in spun.items():
+                mujoco.mj_objectVelocity(model, data, _SITE, site, speeds, 1)
             rows[number] = np.concatenate(found)
         parts = np.split(rows, ends[:-1], axis=1)
         made = [
@@ -100,6 +115,9 @@ class View:
             for item, part in zip(seen, parts, strict=True)
         ]
         return np.stack(made, axis=1)
+
+    def _spins(self, channel: int) -> bool:
+        return self.config.seen[channel].quantity == "gyro"
 
     def place(self, data: mujoco.MjData, seen: np.ndarray) -> None:
         """Set the observed joints to what was recorded, ``(C,)``, and of a free body
@@ -113,6 +131,27 @@ class View:
                 bodies.setdefault(item.part, {})[item.way] = seen[channel]
         for body, places in bodies.items():
             floating.place(data, data.model.body(body).id, places)
+
+
+_SITE = mujoco.mjtObj.mjOBJ_SITE
+
+
+def gyro(model: mujoco.MjModel, sensor: int) -> int:
+    """Number of the site of a gyro.
+
+    Raises:
+        UnknownNameError: the sensor is no gyro.
+    """
+    if model.sensor_type[sensor] != mujoco.mjtSensor.mjSENS_GYRO:
+        raise UnknownNameError("gyro", model.sensor(sensor).name, gyros(model))
+    return int(model.sensor_objid[sensor])
+
+
+def gyros(model: mujoco.MjModel) -> list[str]:
+    """Names of the gyros of a model."""
+    found = np.flatnonzero(model.sensor_type == mujoco.mjtSensor.mjSENS_GYRO)
+    names = (model.sensor(int(number)).name for number in found)
+    return [name for name in names if name]
 
 
 def _jointed(model: mujoco.MjModel, item: Seen, joint: int) -> int:
