@@ -9,7 +9,7 @@ import numpy as np
 from bns.errors import BnsError
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column
-from bns.gap.models.mjcf import inertial, matching, prepared, rehearsal, view
+from bns.gap.models.mjcf import inertial, matching, prepared, rehearsal, ties, view
 from bns.gap.models.mjcf.channels import Work, joint_of, joints
 from bns.gap.models.mjcf.config import AXES, PLACES, TURNS
 from bns.gap.models.mjcf.rehearsal import Fit, Part
@@ -18,6 +18,7 @@ from bns.worlds.data.units import factor
 REHEARSED = 5.0  # [s] of a trial that the nominal model moves along
 AGREES = 0.5  # score from which on a column moves as the model says
 SHARES = 60.0  # of 100, that joints of a dataset in shares of their range come to
+SAME = "whose position that place is"
 ALIKE = 0.1  # two parts whose scores are nearer cannot be told apart
 
 
@@ -51,6 +52,7 @@ def observed(work: Work, seen: list[Column]) -> None:
     jointed = {name for name, how in hits.items() if how not in matching.UNSURE}
     placed = [c for c in others if c.name not in jointed]
     named = matching.by_place(placed, places, _free(model))
+    named = {column: _slid(model, parts) for column, parts in named.items()}
     for kind, group in (("speed", speeds), ("joint", others)):
         rest = [c for c in group if c.name not in named or c.name in joints(model)]
         # a flywheel is seen by its speed alone: what turns otherwise is another joint
@@ -65,6 +67,14 @@ def observed(work: Work, seen: list[Column]) -> None:
     named |= spun
     seen += [column for column in work.table.columns if column.name in spun]
     _rehearsed(work, seen, found, why, named)
+
+
+def _slid(model: mujoco.MjModel, parts: tuple[Part, ...]) -> tuple[Part, ...]:
+    """Parts with the joint in the place of a body where that is the same."""
+    of = ties.slides(model)
+    joint = of.get((parts[0].name, parts[0].axis), "")
+    alone = len(parts) == 1 and parts[0].quantity == rehearsal.BODY
+    return (Part(rehearsal.JOINT, joint),) if joint and alone else parts
 
 
 def _inertial(
@@ -162,6 +172,7 @@ def _chosen(
     if named and column.name not in why:
         alike = matching.core(best.name) in matching.core(column.name)
         reason = "by its name" if alike else matching.ONLY
+        reason = SAME if best.quantity == rehearsal.JOINT else reason
     found[column.name] = best
     spun = best.quantity == rehearsal.GYRO
     along = ("about" if spun else "along") if best.axis in AXES else ""

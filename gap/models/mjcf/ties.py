@@ -1,9 +1,11 @@
-"""What ties the joints of a model to each other: tendons and equalities."""
+"""What ties joints to each other, tendons and equalities, and places to joints."""
 
 from collections.abc import Collection, Iterable
 
 import mujoco
 import numpy as np
+
+from bns.gap.models.mjcf.config import AXES
 
 
 def tied(model: mujoco.MjModel, roots: Collection[int]) -> set[int]:
@@ -80,6 +82,27 @@ def arms(model: mujoco.MjModel, fewest: int = 1) -> list[str]:
         if name and len(joints) >= fewest:
             found += [f"{name}/{joint}" for joint in joints if joint]
     return found
+
+
+def slides(model: mujoco.MjModel) -> dict[tuple[str, str], str]:
+    """Slides that put a body on the world where its place says: by body and axis the
+    joint whose position that place is, as of a swimmer in a plane."""
+    found = {}
+    for body in np.flatnonzero(model.body_parentid == 0)[1:]:
+        first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
+        held = range(first, first + count)
+        turned = not np.allclose(model.body_quat[body], [1.0, 0.0, 0.0, 0.0])
+        if turned or any(np.any(model.jnt_pos[joint]) for joint in held):
+            continue
+        for joint in held:
+            if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_SLIDE:
+                break  # what comes behind it turns with it
+            way = int(np.argmax(model.jnt_axis[joint]))
+            straight = np.isclose(model.jnt_axis[joint, way], 1.0)
+            if straight and not model.body_pos[body, way]:
+                name = model.joint(joint).name
+                found[model.body(int(body)).name, AXES[way]] = name
+    return {place: joint for place, joint in found.items() if all(place) and joint}
 
 
 def followers(model: mujoco.MjModel) -> list[str]:
