@@ -1,5 +1,6 @@
 """Numbers of a model of the user's own that may be off, and how far they may be."""
 
+import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -10,6 +11,7 @@ from bns.gap.candidates.mjcf import EXCITE
 from bns.gap.candidates.mjcf_usual import TOUCHING
 from bns.gap.decomposition.row import Row
 from bns.gap.models.mjcf import masses
+from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.models.mjcf.masses import Body
 from bns.gap.recordings import trial_conditions
 from bns.worlds.effects.parts import ALL
@@ -169,6 +171,34 @@ def grouped(candidates: Sequence[Row]) -> list[Row]:
                     joins=tuple(item.name for item in parts),
                 )
             )
+    return made
+
+
+def gyros(candidates: Sequence[Row], config: OwnConfig) -> list[Row]:
+    """Further candidates: a gyro whose axes all read alike more, or less, where the
+    names of its channels begin alike.
+
+    Args:
+        candidates: of the model.
+        config: the description.
+    """
+    axes: dict[str, list[str]] = {}
+    for item in config.seen:
+        if item.quantity == "gyro":
+            axes.setdefault(item.part, []).append(item.channel.name)
+    known = {item.name: item for item in candidates}
+    every = [item.channel.name for item in config.seen]
+    made = []
+    for names in axes.values():
+        stem = os.path.commonprefix(names)
+        alike = [name for name in every if name.startswith(stem)]
+        parts = [known.get(f"reading_gain[{name}]") for name in names]
+        of = [item for item in parts if item is not None]
+        if stem and alike == names and len(names) > 1 and len(of) == len(names):
+            joins = tuple(item.name for item in of)
+            fixed = {"part": f"{stem}*"}
+            name = f"reading_gain[{stem}*]"
+            made.append(replace(of[0], name=name, fixed=fixed, slack=0.0, joins=joins))
     return made
 
 

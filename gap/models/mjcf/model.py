@@ -78,7 +78,11 @@ class OwnModel(GapModel):
             for column, item in enumerate(config.seen)
             if item.turning and column not in carried
         ]
-        further = (*mjcf_rows.grouped(self.listed), *mjcf_rows.motors(self.listed))
+        further = (
+            *mjcf_rows.grouped(self.listed),
+            *mjcf_rows.motors(self.listed),
+            *mjcf_rows.gyros(self.listed, config),
+        )
         centres = mjcf_rows.centres(self._bodies)
         items = (*centres, *self.listed, *further)  # a centre may be listed
         self._terms = {item.name: item for item in items}

@@ -340,8 +340,13 @@ class Simulation:
         if self.config.keyframe:
             key = prepared.number(model, "key", self.config.keyframe)
             mujoco.mj_resetDataKeyframe(model, data, key)
-        if self.config.recorded or start.STATE in trial.conditions:
+        known = start.STATE in trial.conditions
+        if self.config.recorded or known:
             start.place(data, trial, self._view(model))
+        if self.config.recorded and not known and not self.config.settle:
+            data.ctrl[:] = self._rest(model)
+            placed = {item.state for item in self.config.seen}
+            start.relax(data, placed | (_joints(model) - _joints(self.model)))
         state = np.empty(mujoco.mj_stateSize(model, STATE))
         data.time = 0.0
         mujoco.mj_getState(model, data, state, STATE)
@@ -376,6 +381,10 @@ def _edit(made: mujoco.MjSpec, effects: Sequence[Effect]) -> None:
         wanted = effect.stage == "body" and not effect.is_nominal
         if wanted and isinstance(effect, ModelEdit):
             effect.edit(made)
+
+
+def _joints(model: mujoco.MjModel) -> set[str]:
+    return {model.joint(joint).name for joint in range(model.njnt)}
 
 
 def _every(dt: float) -> int:

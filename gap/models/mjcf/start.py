@@ -1,12 +1,12 @@
 """Where a recorded trial of a user's own model begins: the state of the joints, and
 what was told before."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import mujoco
 import numpy as np
 
-from bns.gap.models.mjcf import floating
+from bns.gap.models.mjcf import floating, prepared
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.models.mjcf.view import View
 from bns.worlds.trial import Trial
@@ -25,6 +25,8 @@ BEFORE, STEP = "told_before", "told_before_step"
 """conditions: commands before it, a row each, and the time between two [s]"""
 
 STOOD = 0.3  # [s] over which a robot that nothing holds has left its first samples
+HANGING = 5.0  # [s] after which what hangs is left where it is
+BRAKED, RESTS = 0.97, 1e-6  # of its speed with each step; [rad/s or m/s] rest
 CLEARLY = 0.25  # of the squared error, less of which says what held it
 
 
@@ -65,6 +67,35 @@ def place(data: mujoco.MjData, trial: Trial, view: View) -> None:
     for body, found in bodies.items():
         places, speeds = ({w: x[k] for w, x in found.items()} for k in (0, 1))
         floating.place(data, data.model.body(body).id, places, speeds)
+
+
+def relax(data: mujoco.MjData, seen: Collection[str]) -> None:
+    """Let joints that nobody observed come to rest where the others hold them, as a
+    mast hangs on a cart that is put somewhere: nothing of what floats, nor what was
+    observed, moves.
+
+    Args:
+        data: of the simulation, its controls set; written to.
+        seen: names of the joints that were observed.
+    """
+    model = data.model
+    hanging = [
+        joint
+        for joint in range(model.njnt)
+        if prepared.hinged(model, joint) and model.joint(joint).name not in seen
+    ]
+    if not hanging:
+        return
+    begun, act = data.qpos.copy(), data.act.copy()
+    places, speeds = model.jnt_qposadr[hanging], model.jnt_dofadr[hanging]
+    for _ in range(round(HANGING / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+        slower, begun[places] = BRAKED * data.qvel[speeds], data.qpos[places]
+        data.qpos[:], data.qvel[:], data.act[:] = begun, 0.0, act
+        data.qvel[speeds] = slower
+        if np.abs(slower).max() < RESTS:
+            break
+    data.qvel[:] = 0.0
 
 
 def unsure(trial: Trial, config: OwnConfig) -> dict[str, float]:
