@@ -1,6 +1,5 @@
 """Numbers of a model of the user's own that may be off, and how far they may be."""
 
-import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -176,7 +175,7 @@ def grouped(candidates: Sequence[Row]) -> list[Row]:
 
 def gyros(candidates: Sequence[Row], config: OwnConfig) -> list[Row]:
     """Further candidates: a gyro whose axes all read alike more, or less, where the
-    names of its channels begin alike.
+    names of its channels differ in their last letter alone.
 
     Args:
         candidates: of the model.
@@ -190,7 +189,7 @@ def gyros(candidates: Sequence[Row], config: OwnConfig) -> list[Row]:
     every = [item.channel.name for item in config.seen]
     made = []
     for names in axes.values():
-        stem = os.path.commonprefix(names)
+        stem = names[0][:-1]  # of "gyro_x"
         alike = [name for name in every if name.startswith(stem)]
         parts = [known.get(f"reading_gain[{name}]") for name in names]
         of = [item for item in parts if item is not None]
