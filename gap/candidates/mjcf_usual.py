@@ -190,7 +190,7 @@ def _on_actuators(
     return named | {
         "actuator_period": (ALL,) if any(item.kd for item in config.told) else (),
         "encoder_offset": _turned(model, (n for n in told if n in servos)),
-        "output_backlash": _turned(model, (n for n in told if n not in looped)),
+        "output_backlash": _turned(model, (n for n in told if n not in servos)),
         "command_limit": pushing,
         "command_dead_zone": pushing,
         "command_gain": to(paced),

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from bns.gap.models.mjcf import command_steps, guesses
+from bns.gap.models.mjcf import command_steps, guesses, ties
 from tests.gap.own_robots import described
 
 SLIDE = """<body><joint name="{name}" type="slide" axis="0 0 1" damping="{damping}"
@@ -108,3 +108,72 @@ def test_filters_begin_with_what_was_told_before():
     before = np.where(np.arange(200) < 180, 0.0, 5.0)[:, None]  # 2 is the most
     (found,) = command_steps.filtered(before, model, [0]).values()
     assert found == pytest.approx(2 * (1 - np.exp(-20 * 0.005 / 0.1)))
+
+
+PENDULUMS = """<mujoco><option timestep="0.002"/><worldbody><body name="cart">
+  <joint name="rail" type="slide" axis="1 0 0" damping="4"/>
+  <geom size="0.05" mass="1" contype="0" conaffinity="0"/>
+  <body name="mast" pos="0 0 0.05"><joint name="bend" axis="0 1 0" stiffness="6"
+    damping="0.02" springref="8"/>
+  <geom name="rod" type="capsule" fromto="0 0 0 0 0 0.4" size="0.01" mass="0.4"
+    contype="0" conaffinity="0"/></body></body></worldbody>
+  <actuator><velocity name="drive" joint="rail" kv="30"/></actuator></mujoco>"""
+
+
+def put(path, seen=("rail",), count=4, away=0.03):
+    """A log of the cart, put elsewhere before each trial; its mast had come to rest."""
+    model = mujoco.MjModel.from_xml_string(PENDULUMS)
+    rng, rows = np.random.default_rng(1), []
+    for trial in range(count):
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, 20_000)
+        data.qpos[0] = away * (-1) ** trial
+        data.qvel[:] = 0.0
+        for number in range(200):
+            data.ctrl[0] = [0.0, -0.3, 0.2, 0.3][number // 50]
+            at = rng.normal([data.joint(name).qpos[0] for name in seen], 1e-3)
+            rows.append([trial, number * 0.01, data.ctrl[0], *at])
+            mujoco.mj_step(model, data, 5)
+    head = ",".join(("trial", "time", "drive_cmd", *seen))
+    np.savetxt(path, rows, delimiter=",", header=head, comments="")
+    return path
+
+
+def test_a_robot_that_settles_begins_where_it_was_put(tmp_path):
+    log = put(tmp_path / "log.csv", ("rail", "bend"))
+    found, own = described(tmp_path, PENDULUMS, log)
+    assert own.config.recorded and not own.config.settle
+    assert "where its joints were recorded in each trial" in " ".join(found.guessed)
+
+
+def test_joints_that_nobody_saw_hang_where_the_others_were_put(tmp_path):
+    _, own = described(tmp_path, PENDULUMS, put(tmp_path / "log.csv"))
+    (trial, *_) = own.read_log(str(tmp_path / "log.csv"))
+    begun = own.physics.stood(trial, 0.0, None)
+    assert begun[0] == pytest.approx(trial.observed[0, 0])
+    state = own.physics._begun_in(trial, own.physics.model)
+    angle = state[2]
+    weight = 0.4 * 9.81 * 0.2 * np.sin(angle)  # leans on its spring
+    assert 6.0 * (angle - np.deg2rad(8)) == pytest.approx(weight, abs=1e-4)
+
+
+SWIMMER = """<mujoco><option timestep="0.005" viscosity="0.5" gravity="0 0 0"/>
+  <worldbody><body name="head"><joint name="slide_x" type="slide" axis="1 0 0"/>
+  <joint name="slide_y" type="slide" axis="0 1 0"/><joint name="turn" axis="0 0 1"/>
+  <geom type="capsule" fromto="0 0 0 -0.2 0 0" size="0.02" mass="0.2"/>
+  <body name="tail" pos="-0.2 0 0"><joint name="bend" axis="0 0 1" damping="0.01"/>
+  <geom type="capsule" fromto="0 0 0 -0.2 0 0" size="0.02" mass="0.2"/></body></body>
+  </worldbody><actuator><motor name="muscle" joint="bend"/></actuator></mujoco>"""
+
+
+def test_a_place_that_is_a_slide_is_seen_as_that():
+    model = mujoco.MjModel.from_xml_string(SWIMMER)
+    assert ties.slides(model) == {("head", "x"): "slide_x", ("head", "y"): "slide_y"}
+    for old, new in (
+        ('name="head"', 'name="head" pos="0.1 0 0"'),  # another zero
+        ('axis="1 0 0"', 'axis="-1 0 0"'),  # the other way
+        ('axis="0 0 1"/>\n', 'axis="0 0 1" pos="0.1 0 0"/>\n'),  # turns it aside
+    ):
+        assert old in SWIMMER
+        other = mujoco.MjModel.from_xml_string(SWIMMER.replace(old, new, 1))
+        assert ("head", "x") not in ties.slides(other)
