@@ -30,6 +30,7 @@ from bns.worlds.trial import Trial
 
 KEPT, MODELS = 20_000, 300  # simulated trials and compiled models kept in memory
 READ = 2**28  # bytes of what sensors would read that are kept
+STARTS = 10_000  # that are kept
 FINE = 0.005  # [s] between kept states; the step if that is longer
 FINEST, CUT = 0.0025, 4  # [s] longer steps are cut, shorter ones in so many parts
 EXACT = 0.2  # of the noise: predictions that differ by less are alike
@@ -308,7 +309,7 @@ class Simulation:
         rest = self._rest(self.model)[self.actuators]
         dt = self.dt / parts
         before, told = command_steps.arriving(trial, effects, rest, self.config, dt)
-        begin = self._start(trial, scene.model)
+        begin = self._start(trial, scene.model, effects)
         if self.config.recorded or start.STATE in trial.conditions:
             begin, first = begin.copy(), 1 + scene.model.nq + scene.model.nv
             held = command_steps.filtered(before, scene.model, self.actuators)
@@ -324,14 +325,31 @@ class Simulation:
             return np.array(model.key_ctrl[key])
         return np.zeros(model.nu)
 
-    def _start(self, trial: Trial, model: mujoco.MjModel) -> np.ndarray:
-        """The state that a trial begins in, kept: effects do not change it, but for
-        those with a joint or a friction's bristles more, which begin at zero."""
+    @cached_property
+    def _hanging(self) -> list[str]:
+        """Joints that nobody observed, of a robot whose others begin where they were
+        recorded: they hang there."""
+        if not self.config.recorded or self.config.settle:
+            return []
+        seen = {item.state for item in self.config.seen}
+        return [self.model.joint(n).name for n in start.hanging(self.model, seen)]
+
+    def _start(
+        self, trial: Trial, model: mujoco.MjModel, effects: Sequence[Effect]
+    ) -> np.ndarray:
+        """The state that a trial begins in, kept: effects change where joints hang, and
+        those with a joint or a friction's bristles more begin at zero there."""
         sizes = [mujoco.mj_stateSize(some, STATE) for some in (model, self.model)]
-        model = self.model if sizes[0] == sizes[1] else model
         state = str(trial.conditions.get(start.STATE))
-        key = (model.names, sizes[0], trial.observed[:1].tobytes(), state)
+        edits: tuple[str, ...] = ()
+        if self._hanging:
+            edits = tuple(str(item) for item in effects if isinstance(item, ModelEdit))
+        elif sizes[0] == sizes[1]:
+            model = self.model
+        key = (model.names, sizes[0], trial.observed[:1].tobytes(), state, *edits)
         if key not in self._starts:
+            if len(self._starts) > STARTS:
+                self._starts.clear()
             self._starts[key] = self._begun_in(trial, model)
         return self._starts[key]
 
@@ -343,10 +361,9 @@ class Simulation:
         known = start.STATE in trial.conditions
         if self.config.recorded or known:
             start.place(data, trial, self._view(model))
-        if self.config.recorded and not known and not self.config.settle:
+        if not known and (joints := self._hanging):
             data.ctrl[:] = self._rest(model)
-            placed = {item.state for item in self.config.seen}
-            start.relax(data, placed | (_joints(model) - _joints(self.model)))
+            start.relax(data, [model.joint(joint).id for joint in joints])
         state = np.empty(mujoco.mj_stateSize(model, STATE))
         data.time = 0.0
         mujoco.mj_getState(model, data, state, STATE)
@@ -381,10 +398,6 @@ def _edit(made: mujoco.MjSpec, effects: Sequence[Effect]) -> None:
         wanted = effect.stage == "body" and not effect.is_nominal
         if wanted and isinstance(effect, ModelEdit):
             effect.edit(made)
-
-
-def _joints(model: mujoco.MjModel) -> set[str]:
-    return {model.joint(joint).name for joint in range(model.njnt)}
 
 
 def _every(dt: float) -> int:

@@ -2,6 +2,7 @@
 what was told before."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from copy import copy
 
 import mujoco
 import numpy as np
@@ -27,6 +28,7 @@ BEFORE, STEP = "told_before", "told_before_step"
 STOOD = 0.3  # [s] over which a robot that nothing holds has left its first samples
 HANGING = 5.0  # [s] after which what hangs is left where it is
 BRAKED, RESTS = 0.97, 1e-6  # of its speed with each step; [rad/s or m/s] rest
+HELD = 1e9  # [kg m2 or kg] of inertia: does not move
 CLEARLY = 0.25  # of the squared error, less of which says what held it
 
 
@@ -69,25 +71,34 @@ def place(data: mujoco.MjData, trial: Trial, view: View) -> None:
         floating.place(data, data.model.body(body).id, places, speeds)
 
 
-def relax(data: mujoco.MjData, seen: Collection[str]) -> None:
-    """Let joints that nobody observed come to rest where the others hold them, as a
-    mast hangs on a cart that is put somewhere: nothing of what floats, nor what was
-    observed, moves.
+def hanging(model: mujoco.MjModel, seen: Collection[str]) -> list[int]:
+    """Numbers of the hinges and slides that nobody observed.
 
     Args:
-        data: of the simulation, its controls set; written to.
+        model: of the robot.
         seen: names of the joints that were observed.
     """
-    model = data.model
-    hanging = [
+    return [
         joint
         for joint in range(model.njnt)
         if prepared.hinged(model, joint) and model.joint(joint).name not in seen
     ]
-    if not hanging:
-        return
+
+
+def relax(data: mujoco.MjData, joints: Sequence[int]) -> None:
+    """Let joints come to rest where all others are held, as a mast hangs on a cart that
+    someone has put somewhere.
+
+    Args:
+        data: of the simulation, its controls set; written to.
+        joints: numbers of those that hang.
+    """
+    model = copy(data.model)
+    places, speeds = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+    held = np.ones(model.nv, bool)
+    held[speeds] = False
+    model.dof_armature.reshape(model.nv, -1)[held] = HELD
     begun, act = data.qpos.copy(), data.act.copy()
-    places, speeds = model.jnt_qposadr[hanging], model.jnt_dofadr[hanging]
     for _ in range(round(HANGING / model.opt.timestep)):
         mujoco.mj_step(model, data)
         slower, begun[places] = BRAKED * data.qvel[speeds], data.qpos[places]
