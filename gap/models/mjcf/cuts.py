@@ -124,7 +124,7 @@ def _refined(
             away[:, turning] = wrapped(away[:, turning])
             units = away[:, joints] / noise
             size = _nearest(units, change[..., joints] / noise)
-            sds = start.unsure(trial, config)
+            sds = start.unsure(trial, config, {})
             expected.append(path + np.tensordot(size, change, axes=1))
             found = zip(names, size, strict=True)
             off = {n: float(z) * sds[n] for n, z in found if n in sds}

@@ -272,8 +272,8 @@ class OwnModel(GapModel):
             yield np.nan_to_num(one - other)
 
     def begun(self, trial: Trial) -> Mapping[str, float]:
-        """See `GapModel.begun`: joints that began where they were recorded."""
-        return start.unsure(trial, self.config)
+        """See `GapModel.begun`: joints that began where they were recorded, or hung."""
+        return start.unsure(trial, self.config, self.physics.hung(trial))
 
     def joint_windows(self, trial: Trial) -> Windows:
         """Windows between samples that were seen."""

@@ -327,12 +327,21 @@ class Simulation:
 
     @cached_property
     def _hanging(self) -> list[str]:
-        """Joints that nobody observed, of a robot whose others begin where they were
-        recorded: they hang there."""
-        if not self.config.recorded or self.config.settle:
-            return []
-        seen = {item.state for item in self.config.seen}
-        return [self.model.joint(n).name for n in start.hanging(self.model, seen)]
+        return start.hanging(self.model, self.config)
+
+    def hung(self, trial: Trial) -> dict[str, float]:
+        """How far each joint hangs from the model's pose where a trial begins at rest,
+        of those that nobody observed [rad or m]."""
+        if not self._hanging or start.STATE in trial.conditions:
+            return {}
+        begun = self._start(trial, self.model, ())
+        pose = mujoco.MjData(self.model)
+        if self.config.keyframe:
+            key = prepared.number(self.model, "key", self.config.keyframe)
+            mujoco.mj_resetDataKeyframe(self.model, pose, key)
+        at = [self.model.joint(name).qposadr[0] for name in self._hanging]
+        far = np.abs(begun[1:][at] - pose.qpos[at])
+        return dict(zip(self._hanging, far.tolist(), strict=True))
 
     def _start(
         self, trial: Trial, model: mujoco.MjModel, effects: Sequence[Effect]
@@ -358,12 +367,16 @@ class Simulation:
         if self.config.keyframe:
             key = prepared.number(model, "key", self.config.keyframe)
             mujoco.mj_resetDataKeyframe(model, data, key)
-        known = start.STATE in trial.conditions
-        if self.config.recorded or known:
+        if self.config.recorded or start.STATE in trial.conditions:
             start.place(data, trial, self._view(model))
-        if not known and (joints := self._hanging):
+        if self._hanging and start.UNSURE not in trial.conditions:
             data.ctrl[:] = self._rest(model)
-            start.relax(data, [model.joint(joint).id for joint in joints])
+            if model is not self.model:  # near where it hangs by the nominal model
+                begun = self._start(trial, self.model, ())
+                for name in self._hanging:
+                    at = self.model.joint(name).qposadr[0]
+                    data.joint(name).qpos[0] = begun[1 + at]
+            start.relax(data, self._hanging, trial)
         state = np.empty(mujoco.mj_stateSize(model, STATE))
         data.time = 0.0
         mujoco.mj_getState(model, data, state, STATE)

@@ -1,8 +1,9 @@
 """Where a recorded trial of a user's own model begins: the state of the joints, and
 what was told before."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -14,7 +15,7 @@ from bns.worlds.trial import Trial
 
 STATE = "start"
 """condition of a trial that begins in motion: by joint, and way of a free body, its
-position and speed (`Seen.state`)"""
+position and speed (`Seen.state`); of a joint that hangs how far it is from there"""
 
 UNSURE = "start_unsure"
 """condition of such a trial: by joint the standard deviations of these"""
@@ -27,7 +28,8 @@ BEFORE, STEP = "told_before", "told_before_step"
 
 STOOD = 0.3  # [s] over which a robot that nothing holds has left its first samples
 HANGING = 5.0  # [s] after which what hangs is left where it is
-BRAKED, RESTS = 0.97, 1e-6  # of its speed with each step; [rad/s or m/s] rest
+RESTS = 1e-4  # [rad/s or m/s, rad or m] at most: it does
+LIMP = 0.3  # of how far a joint hangs, by which it may hang elsewhere (assumed)
 HELD = 1e9  # [kg m2 or kg] of inertia: does not move
 CLEARLY = 0.25  # of the squared error, less of which says what held it
 
@@ -59,63 +61,75 @@ def place(data: mujoco.MjData, trial: Trial, view: View) -> None:
         return
     bodies: dict[str, dict[str, Sequence[float]]] = {}
     free = {item.state: item for item in view.config.seen if item.floats}
-    for name, (position, speed) in state.items():
+    for name, (position, *speed) in state.items():
         if name in free:
             found = bodies.setdefault(free[name].part, {})
-            found[free[name].way] = position, speed
-        else:
+            found[free[name].way] = position, *speed
+        elif speed:
             data.joint(name).qpos[0] = position
-            data.joint(name).qvel[0] = speed
+            data.joint(name).qvel[0] = speed[0]
     for body, found in bodies.items():
         places, speeds = ({w: x[k] for w, x in found.items()} for k in (0, 1))
         floating.place(data, data.model.body(body).id, places, speeds)
 
 
-def hanging(model: mujoco.MjModel, seen: Collection[str]) -> list[int]:
-    """Numbers of the hinges and slides that nobody observed.
+def hanging(model: mujoco.MjModel, config: OwnConfig) -> list[str]:
+    """Names of the hinges and slides that nobody observed, of a robot whose others
+    begin where they were recorded: they hang there.
 
     Args:
         model: of the robot.
-        seen: names of the joints that were observed.
+        config: the description.
     """
-    return [
-        joint
-        for joint in range(model.njnt)
-        if prepared.hinged(model, joint) and model.joint(joint).name not in seen
-    ]
+    if not config.recorded or config.settle:
+        return []
+    seen = {item.state for item in config.seen}
+    joints = filter(partial(prepared.hinged, model), range(model.njnt))
+    return [name for joint in joints if (name := model.joint(joint).name) not in seen]
 
 
-def relax(data: mujoco.MjData, joints: Sequence[int]) -> None:
+def relax(data: mujoco.MjData, joints: Sequence[str], trial: Trial) -> None:
     """Let joints come to rest where all others are held, as a mast hangs on a cart that
-    someone has put somewhere.
+    someone has put somewhere; then move them by what the trial's conditions say.
 
     Args:
         data: of the simulation, its controls set; written to.
-        joints: numbers of those that hang.
+        joints: names of those that hang.
+        trial: recorded trial.
     """
     model = copy(data.model)
-    places, speeds = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+    numbers = [model.joint(joint).id for joint in joints]
+    places, speeds = model.jnt_qposadr[numbers], model.jnt_dofadr[numbers]
     held = np.ones(model.nv, bool)
     held[speeds] = False
     model.dof_armature.reshape(model.nv, -1)[held] = HELD
-    begun, act = data.qpos.copy(), data.act.copy()
+    begun, act, fastest = data.qpos.copy(), data.act.copy(), 0.0
     for _ in range(round(HANGING / model.opt.timestep)):
         mujoco.mj_step(model, data)
-        slower, begun[places] = BRAKED * data.qvel[speeds], data.qpos[places]
+        moving, begun[places] = data.qvel[speeds].copy(), data.qpos[places]
         data.qpos[:], data.qvel[:], data.act[:] = begun, 0.0, act
-        data.qvel[speeds] = slower
-        if np.abs(slower).max() < RESTS:
+        if (speed := float(np.linalg.norm(moving))) > fastest:
+            fastest, data.qvel[speeds] = speed, moving
+        elif fastest < RESTS:
             break
+        else:  # it passes where it would rest
+            fastest = 0.0
     data.qvel[:] = 0.0
+    state = trial.conditions.get(STATE)
+    if isinstance(state, dict):
+        data.qpos[places] += [state.get(joint, [0.0])[0] for joint in joints]
 
 
-def unsure(trial: Trial, config: OwnConfig) -> dict[str, float]:
+def unsure(
+    trial: Trial, config: OwnConfig, hanging: Mapping[str, float]
+) -> dict[str, float]:
     """Standard deviations of the numbers of a trial's start that come from data, by
     name: "start_speed[elbow]".
 
     Args:
         trial: recorded trial.
         config: of the robot; its joints begin where they were seen if it says so.
+        hanging: joints that hang, and how far they do.
     """
     found = trial.conditions.get(UNSURE)
     if isinstance(found, dict):
@@ -127,9 +141,9 @@ def unsure(trial: Trial, config: OwnConfig) -> dict[str, float]:
         }
     if not config.recorded:
         return {}
-    return {
-        f"{NUMBERS[0]}[{item.state}]": item.noise for item in config.seen if item.state
-    }
+    sds = {item.state: item.noise for item in config.seen if item.state}
+    sds |= {joint: LIMP * far for joint, far in hanging.items() if far > RESTS}
+    return {f"{NUMBERS[0]}[{joint}]": sd for joint, sd in sds.items()}
 
 
 def moved(trial: Trial, off: Mapping[str, float], config: OwnConfig) -> Trial:
@@ -145,14 +159,21 @@ def moved(trial: Trial, off: Mapping[str, float], config: OwnConfig) -> Trial:
         seen = trial.observed[np.isfinite(trial.observed).all(axis=1)][0]
         told = [(item.state, at) for item, at in zip(config.seen, seen, strict=True)]
         state = {name: [float(at), 0.0] for name, at in told if name}
+    hangs = {_inside(name): [0.0] for name in off}
+    state = {**hangs, **state}
     state = {
         joint: [
             value + off.get(f"{number}[{joint}]", 0.0)
-            for number, value in zip(NUMBERS, values, strict=True)
+            for number, value in zip(NUMBERS, values, strict=False)
         ]
         for joint, values in state.items()
     }
     return trial.replace(conditions={**trial.conditions, STATE: state})
+
+
+def _inside(name: str) -> str:
+    """The joint, or way of a free body, of a number of a start."""
+    return name.partition("[")[2].removesuffix("]")
 
 
 def before(
