@@ -174,10 +174,7 @@ def _chosen(
         reason = "by its name" if alike else matching.ONLY
         reason = SAME if best.quantity == rehearsal.JOINT else reason
     found[column.name] = best
-    spun = best.quantity == rehearsal.GYRO
-    along = ("about" if spun else "along") if best.axis in AXES else ""
-    axis = " ".join(["", *filter(None, (along, best.axis))]).rstrip()
-    line = f"{column.name}: {best.quantity} {best.name!r}{axis} in {unit}, {reason}"
+    line = f"{column.name}: {_said(best)} in {unit}, {reason}"
     work.seen.append((column, best, unit))
     near = [
         part
@@ -189,7 +186,8 @@ def _chosen(
             f"{p.quantity} {p.name}" for p in near[:2]
         )
     sure = fit.score > AGREES and reason not in (*matching.UNSURE, "for it moves so")
-    headed = not spun and best.axis in ("x", "y") and bool(_free(work.model))
+    placed = best.quantity in PLACES and best.axis in ("x", "y")
+    headed = placed and bool(_free(work.model))  # it heads elsewhere than it began
     if fit.correlation < -AGREES and not headed:
         line += (
             "; it moves against the model: if its sign is another, give its line in "
@@ -199,6 +197,13 @@ def _chosen(
     elif fit.score <= AGREES:
         line += "; it hardly moves as the model does"
     (work.guessed if sure else work.unsure).append(line)
+
+
+def _said(part: Part) -> str:
+    """A part in words: "site 'toe' along z", "body 'base' yaw"."""
+    axes = ["about" if part.quantity == rehearsal.GYRO else "along"]
+    how = (axes if part.axis in AXES else []) + [part.axis]
+    return " ".join([part.quantity, repr(part.name), *filter(None, how)])
 
 
 def _shares(work: Work) -> list[str]:
