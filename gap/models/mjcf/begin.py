@@ -7,9 +7,10 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from bns.gap.importers.tables import Column
 from bns.gap.models.mjcf import guesses, prepared, start
 from bns.gap.models.mjcf.channels import Work, compiled, tolds
-from bns.gap.models.mjcf.config import AXES
+from bns.gap.models.mjcf.config import AXES, TURNS
 from bns.gap.models.mjcf.measured import replayed
 from bns.worlds.data.units import factor
 
@@ -28,7 +29,9 @@ def hold(work: Work) -> None:
     bodies = tuple(prepared.loose(work.model))
     carried = start.free(work.model)
     if not bodies or any(
-        part.axis in AXES and part.name in carried for _, part, _ in work.seen
+        part.name in carried
+        and (part.axis in AXES or (part.axis in TURNS and _turned(work, column)))
+        for column, part, _ in work.seen
     ):
         return
     held = replace(work, model=compiled(work.path, tolds(work), bodies))
@@ -45,6 +48,13 @@ def hold(work: Work) -> None:
         f"held: a stand holds {' and '.join(map(repr, bodies))} off the ground, for "
         f"{why}; delete `held` if none does"
     )
+
+
+def _turned(work: Work, column: Column) -> bool:
+    """Whether something turned while it was recorded, which no stand lets it."""
+    pieces = [column.values[rows] for rows in work.rows]
+    span = max(float(np.nanmax(piece) - np.nanmin(piece)) for piece in pieces)
+    return span > 2 * guesses.SIGMAS * guesses.noise(pieces)
 
 
 def begin(work: Work) -> None:

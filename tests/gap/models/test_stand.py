@@ -197,3 +197,15 @@ def test_a_damped_hip_is_named(hung):
     found = diagnose(own.read_log(str(hung[2])), own, rows=TRIED, full=False)
     assert found.verdict.named == (("joint_damping[rh_hip]",),)
     assert found.best.magnitudes[0] == pytest.approx(0.3, abs=0.05)
+
+
+@pytest.mark.parametrize(("turning", "held"), [(0.0, True), (0.1, False)])
+def test_a_base_that_turns_is_held_by_no_stand(tmp_path, turning, held):
+    log = recorded(tmp_path, stand=True)
+    head, *rows = log.read_text().splitlines()
+    turned = np.random.default_rng(1).normal(0, 1e-3, len(rows))
+    turned += turning * np.sin(np.arange(len(rows)) / 50)
+    lines = [f"{row},{at:.6f}" for row, at in zip(rows, turned, strict=True)]
+    log.write_text("\n".join([f"{head},trunk_pitch", *lines]))
+    _, own = described(tmp_path, model(), log)
+    assert bool(own.config.held) == held
