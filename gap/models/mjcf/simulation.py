@@ -30,7 +30,6 @@ from bns.worlds.trial import Trial
 
 KEPT, MODELS = 20_000, 300  # simulated trials and compiled models kept in memory
 READ = 2**28  # bytes of what sensors would read that are kept
-STARTS = 10_000  # that are kept
 FINE = 0.005  # [s] between kept states; the step if that is longer
 FINEST, CUT = 0.0025, 4  # [s] longer steps are cut, shorter ones in so many parts
 EXACT = 0.2  # of the noise: predictions that differ by less are alike
@@ -74,6 +73,7 @@ class Simulation:
         self._motions: OrderedDict[tuple, np.ndarray] = OrderedDict()
         self._trees = trees.Trees.one(config)
         self._starts: dict[tuple, np.ndarray] = {}
+        self._hung: dict[bytes, dict[str, tuple[float, float]]] = {}
         model = self.model
         self.config = config = floating.told(config, model)
         self.dt = float(model.opt.timestep)
@@ -309,7 +309,7 @@ class Simulation:
         rest = self._rest(self.model)[self.actuators]
         dt = self.dt / parts
         before, told = command_steps.arriving(trial, effects, rest, self.config, dt)
-        begin = self._start(trial, scene.model, effects)
+        begin = self._start(trial, scene.model)
         if self.config.recorded or start.STATE in trial.conditions:
             begin, first = begin.copy(), 1 + scene.model.nq + scene.model.nv
             held = command_steps.filtered(before, scene.model, self.actuators)
@@ -325,58 +325,50 @@ class Simulation:
             return np.array(model.key_ctrl[key])
         return np.zeros(model.nu)
 
-    @cached_property
-    def _hanging(self) -> list[str]:
-        return start.hanging(self.model, self.config)
-
-    def hung(self, trial: Trial) -> dict[str, float]:
-        """How far each joint hangs from the model's pose where a trial begins at rest,
-        of those that nobody observed [rad or m]."""
-        if not self._hanging or start.STATE in trial.conditions:
+    def hung(self, trial: Trial) -> dict[str, tuple[float, float]]:
+        """Where joints hang that nobody observed [rad or m], as a trial begins at rest
+        by the nominal model, and in the model's pose."""
+        names = start.hanging(self.model, self.config)
+        if not names or start.UNSURE in trial.conditions:
             return {}
-        begun = self._start(trial, self.model, ())
-        pose = mujoco.MjData(self.model)
-        if self.config.keyframe:
-            key = prepared.number(self.model, "key", self.config.keyframe)
-            mujoco.mj_resetDataKeyframe(self.model, pose, key)
-        at = [self.model.joint(name).qposadr[0] for name in self._hanging]
-        far = np.abs(begun[1:][at] - pose.qpos[at])
-        return dict(zip(self._hanging, far.tolist(), strict=True))
+        key = trial.observed[:1].tobytes()
+        if key not in self._hung:
+            data = self._posed(self.model)
+            pose = [float(data.joint(name).qpos[0]) for name in names]
+            recorded = {k: v for k, v in trial.conditions.items() if k != start.STATE}
+            put = trial.replace(conditions=recorded)
+            start.place(data, put, self._view(self.model))
+            data.ctrl[:] = self._rest(self.model)
+            rest = start.relaxed(data, names)
+            self._hung[key] = dict(
+                zip(names, zip(rest, pose, strict=True), strict=True)
+            )
+        return self._hung[key]
 
-    def _start(
-        self, trial: Trial, model: mujoco.MjModel, effects: Sequence[Effect]
-    ) -> np.ndarray:
-        """The state that a trial begins in, kept: effects change where joints hang, and
-        those with a joint or a friction's bristles more begin at zero there."""
-        sizes = [mujoco.mj_stateSize(some, STATE) for some in (model, self.model)]
-        state = str(trial.conditions.get(start.STATE))
-        edits: tuple[str, ...] = ()
-        if self._hanging:
-            edits = tuple(str(item) for item in effects if isinstance(item, ModelEdit))
-        elif sizes[0] == sizes[1]:
-            model = self.model
-        key = (model.names, sizes[0], trial.observed[:1].tobytes(), state, *edits)
-        if key not in self._starts:
-            if len(self._starts) > STARTS:
-                self._starts.clear()
-            self._starts[key] = self._begun_in(trial, model)
-        return self._starts[key]
-
-    def _begun_in(self, trial: Trial, model: mujoco.MjModel) -> np.ndarray:
+    def _posed(self, model: mujoco.MjModel) -> mujoco.MjData:
         data = mujoco.MjData(model)
         if self.config.keyframe:
             key = prepared.number(model, "key", self.config.keyframe)
             mujoco.mj_resetDataKeyframe(model, data, key)
+        return data
+
+    def _start(self, trial: Trial, model: mujoco.MjModel) -> np.ndarray:
+        """The state that a trial begins in, kept: effects do not change it, but for
+        those with a joint or a friction's bristles more, which begin at zero."""
+        sizes = [mujoco.mj_stateSize(some, STATE) for some in (model, self.model)]
+        model = self.model if sizes[0] == sizes[1] else model
+        state = str(trial.conditions.get(start.STATE))
+        key = (model.names, sizes[0], trial.observed[:1].tobytes(), state)
+        if key not in self._starts:
+            self._starts[key] = self._begun_in(trial, model)
+        return self._starts[key]
+
+    def _begun_in(self, trial: Trial, model: mujoco.MjModel) -> np.ndarray:
+        data = self._posed(model)
         if self.config.recorded or start.STATE in trial.conditions:
             start.place(data, trial, self._view(model))
-        if self._hanging and start.UNSURE not in trial.conditions:
-            data.ctrl[:] = self._rest(model)
-            if model is not self.model:  # near where it hangs by the nominal model
-                begun = self._start(trial, self.model, ())
-                for name in self._hanging:
-                    at = self.model.joint(name).qposadr[0]
-                    data.joint(name).qpos[0] = begun[1 + at]
-            start.relax(data, self._hanging, trial)
+        for joint, (rest, _) in self.hung(trial).items():
+            data.joint(joint).qpos[0] = rest + start.off(trial, joint)
         state = np.empty(mujoco.mj_stateSize(model, STATE))
         data.time = 0.0
         mujoco.mj_getState(model, data, state, STATE)

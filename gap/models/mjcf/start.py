@@ -88,14 +88,13 @@ def hanging(model: mujoco.MjModel, config: OwnConfig) -> list[str]:
     return [name for joint in joints if (name := model.joint(joint).name) not in seen]
 
 
-def relax(data: mujoco.MjData, joints: Sequence[str], trial: Trial) -> None:
-    """Let joints come to rest where all others are held, as a mast hangs on a cart that
-    someone has put somewhere; then move them by what the trial's conditions say.
+def relaxed(data: mujoco.MjData, joints: Sequence[str]) -> list[float]:
+    """Where joints come to rest where all others are held, as a mast hangs on a cart
+    that someone has put somewhere: at the turns of their swing.
 
     Args:
         data: of the simulation, its controls set; written to.
         joints: names of those that hang.
-        trial: recorded trial.
     """
     model = copy(data.model)
     numbers = [model.joint(joint).id for joint in joints]
@@ -114,14 +113,17 @@ def relax(data: mujoco.MjData, joints: Sequence[str], trial: Trial) -> None:
             break
         else:  # it passes where it would rest
             fastest = 0.0
-    data.qvel[:] = 0.0
+    return [float(at) for at in begun[places]]
+
+
+def off(trial: Trial, joint: str) -> float:
+    """How far a joint is from where it hangs when a trial begins, by its conditions."""
     state = trial.conditions.get(STATE)
-    if isinstance(state, dict):
-        data.qpos[places] += [state.get(joint, [0.0])[0] for joint in joints]
+    return float(state.get(joint, [0.0])[0]) if isinstance(state, dict) else 0.0
 
 
 def unsure(
-    trial: Trial, config: OwnConfig, hanging: Mapping[str, float]
+    trial: Trial, config: OwnConfig, hung: Mapping[str, tuple[float, float]]
 ) -> dict[str, float]:
     """Standard deviations of the numbers of a trial's start that come from data, by
     name: "start_speed[elbow]".
@@ -129,7 +131,7 @@ def unsure(
     Args:
         trial: recorded trial.
         config: of the robot; its joints begin where they were seen if it says so.
-        hanging: joints that hang, and how far they do.
+        hung: where joints hang, and where they are in the model's pose.
     """
     found = trial.conditions.get(UNSURE)
     if isinstance(found, dict):
@@ -142,7 +144,8 @@ def unsure(
     if not config.recorded:
         return {}
     sds = {item.state: item.noise for item in config.seen if item.state}
-    sds |= {joint: LIMP * far for joint, far in hanging.items() if far > RESTS}
+    far = {joint: abs(rest - pose) for joint, (rest, pose) in hung.items()}
+    sds |= {joint: LIMP * away for joint, away in far.items() if away > RESTS}
     return {f"{NUMBERS[0]}[{joint}]": sd for joint, sd in sds.items()}
 
 
