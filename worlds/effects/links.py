@@ -11,6 +11,8 @@ from bns.worlds.effects import parts
 from bns.worlds.effects.base import BodyEffect, Parameter, factor, place, strength
 from bns.worlds.effects.parts import ANY, WIDE, Inertial
 
+CONNECT = 0  # mjtEq
+
 
 def _shift(axis: str, *, scales: bool = True) -> Parameter:
     return strength(
@@ -127,7 +129,8 @@ class BodyLength(BodyEffect):
 
     Its length runs from its joint to the body that it carries, or to its centre of
     mass where it carries none or several. Mass stays; the centre of mass, the inertia,
-    and all that sits on the body move as the stretch says.
+    and all that sits on the body move as the stretch says, as does where it closes a
+    loop.
     """
 
     name = "body_length"
@@ -138,6 +141,7 @@ class BodyLength(BodyEffect):
 
     def _write(self, spec: Any) -> None:
         for body in parts.bodies(spec, self["part"]):
+            _pin(spec, body)
             inertial = Inertial.of(spec, body)
             along = _along(body, inertial)
             stretch = np.eye(3) + (self["factor"] - 1) * np.outer(along, along)
@@ -150,6 +154,29 @@ class BodyLength(BodyEffect):
             inertia = np.trace(spread) * np.eye(3) - spread
             centre = stretch @ inertial.centre
             replace(inertial, centre=centre, inertia=inertia).write(body)
+
+
+def _pin(spec: Any, body: Any) -> None:
+    """Connect the loops that a body closes by sites: of two bodies that are connected
+    at an anchor MuJoCo finds the second one's from the first one's, so it would move
+    along with a body that is longer."""
+    loops = [
+        (number, item)
+        for number, item in enumerate(spec.equalities)
+        if int(item.type) == CONNECT
+        and item.objtype == mujoco.mjtObj.mjOBJ_BODY
+        and body.name in (item.name1, item.name2)
+    ]
+    if not loops:
+        return
+    data = spec.copy().compile().eq_data
+    for number, item in loops:
+        names = [f"loop{number}_end{end}" for end in range(2)]
+        for end, name in enumerate(names):
+            owner = spec.body((item.name1, item.name2)[end] or "world")
+            owner.add_site(name=name, pos=data[number, 3 * end : 3 * end + 3])
+        item.objtype = mujoco.mjtObj.mjOBJ_SITE
+        item.name1, item.name2 = names
 
 
 def _along(body: Any, inertial: Inertial) -> np.ndarray:

@@ -94,6 +94,16 @@ class TestJoints:
         assert off.joint("shoulder").range == pytest.approx(stops)
 
 
+LOOP = """<mujoco><default><geom type="capsule" size="0.01" contype="0"/></default>
+  <worldbody><body name="left" pos="-0.1 0 0"><joint axis="0 1 0"/>
+    <geom fromto="0 0 0 0 0 -0.3"/><body name="bar" pos="0 0 -0.3">
+    <joint axis="0 1 0"/><geom fromto="0 0 0 0.2 0 0"/></body></body>
+  <body name="right" pos="0.1 0 0"><joint axis="0 1 0"/>
+    <geom fromto="0 0 0 0 0 -0.3"/></body></worldbody>
+  <equality><connect name="loop" body1="bar" body2="right" anchor="0.2 0 0"/></equality>
+  </mujoco>"""
+
+
 class TestBodies:
     def test_a_longer_rod_is_harder_to_turn_by_the_square(self):
         plain, long = (
@@ -111,6 +121,13 @@ class TestBodies:
         capsule = long.geom("upper_arm")
         assert capsule.size[1] == pytest.approx(0.165)
         assert capsule.pos == pytest.approx([0.165, 0, 0])
+
+    def test_a_longer_link_of_a_loop_opens_it_at_its_own_end(self):
+        long = built("body_length:part=bar,factor=1.2", xml=LOOP)
+        ends = [long.site(f"loop0_end{end}").pos for end in range(2)]
+        assert ends[0] == pytest.approx([0.24, 0, 0])
+        assert ends[1] == pytest.approx([0, 0, -0.3])
+        assert long.neq == 1
 
     def test_a_tilted_body_is_one_in_tilted_gravity(self):
         tilted = built("body_tilt:part=rod,roll=0.3,pitch=-0.2", xml=ROD)
