@@ -94,7 +94,7 @@ class TestJoints:
         assert off.joint("shoulder").range == pytest.approx(stops)
 
 
-LOOP = """<mujoco><default><geom type="capsule" size="0.01" contype="0"/></default>
+LINKAGE = """<mujoco><default><geom type="capsule" size="0.01" contype="0"/></default>
   <worldbody><body name="left" pos="-0.1 0 0"><joint axis="0 1 0"/>
     <geom fromto="0 0 0 0 0 -0.3"/><body name="bar" pos="0 0 -0.3">
     <joint axis="0 1 0"/><geom fromto="0 0 0 0.2 0 0"/></body></body>
@@ -123,7 +123,7 @@ class TestBodies:
         assert capsule.pos == pytest.approx([0.165, 0, 0])
 
     def test_a_longer_link_of_a_loop_opens_it_at_its_own_end(self):
-        long = built("body_length:part=bar,factor=1.2", xml=LOOP)
+        long = built("body_length:part=bar,factor=1.2", xml=LINKAGE)
         ends = [long.site(f"loop0_end{end}").pos for end in range(2)]
         assert ends[0] == pytest.approx([0.24, 0, 0])
         assert ends[1] == pytest.approx([0, 0, -0.3])
