@@ -83,7 +83,7 @@ def hanging(model: mujoco.MjModel, config: OwnConfig) -> list[str]:
     """
     if not config.recorded or config.settle:
         return []
-    seen = {item.state for item in config.seen}
+    seen = {item.part for item in config.seen if item.quantity in ("joint", "speed")}
     joints = filter(partial(prepared.hinged, model), range(model.njnt))
     return [name for joint in joints if (name := model.joint(joint).name) not in seen]
 

@@ -55,9 +55,7 @@ def test_a_joint_seen_by_its_speed_alone_begins_with_it(spun):
     assert len(trials) > 3
     fast = [abs(trial.conditions[start.STATE]["spin"][1]) for trial in trials]
     assert max(fast) > 20  # rad/s
-    assert all(
-        "start_position[spin]" not in start.unsure(t, own.config) for t in trials
-    )
+    assert all("start_position[spin]" not in own.begun(trial) for trial in trials)
     (made,) = own.simulate(trials, [()])
     noise = np.array([item.noise for item in own.config.seen])
     for trial, path in zip(trials, made, strict=True):
