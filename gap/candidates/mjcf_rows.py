@@ -154,23 +154,26 @@ def grouped(candidates: Sequence[Row]) -> list[Row]:
         if len({item.unit for item in parts}) > 1:
             continue
         if len(parts) > 1 and all(item.fixed["part"] != ALL for item in parts):
-            low = max(item.low for item in parts)
-            high = max(item.high for item in parts)
-            grid = tuple(value for value in parts[0].levels if low <= value <= high)
-            made.append(
-                replace(
-                    parts[0],
-                    name=f"{name}[{ALL}]",
-                    low=low,
-                    high=high,
-                    sd=max(item.sd for item in parts),
-                    levels=grid or (high,),
-                    fixed={"part": ALL},
-                    slack=0.0,
-                    joins=tuple(item.name for item in parts),
-                )
-            )
+            made.append(_alike(parts, ALL))
     return made
+
+
+def _alike(parts: Sequence[Row], which: str) -> Row:
+    """One candidate for an effect on parts that a name or pattern stands for."""
+    low = max(item.low for item in parts)
+    high = max(item.high for item in parts)
+    grid = tuple(value for value in parts[0].levels if low <= value <= high)
+    return replace(
+        parts[0],
+        name=f"{parts[0].effect}[{which}]",
+        low=low,
+        high=high,
+        sd=max(item.sd for item in parts),
+        levels=grid or (high,),
+        fixed={"part": which},
+        slack=0.0,
+        joins=tuple(item.name for item in parts),
+    )
 
 
 def gyros(candidates: Sequence[Row], config: OwnConfig) -> list[Row]:
@@ -181,23 +184,19 @@ def gyros(candidates: Sequence[Row], config: OwnConfig) -> list[Row]:
         candidates: of the model.
         config: the description.
     """
+    every = [item.channel.name for item in config.seen]
     axes: dict[str, list[str]] = {}
     for item in config.seen:
         if item.quantity == "gyro":
             axes.setdefault(item.part, []).append(item.channel.name)
-    known = {item.name: item for item in candidates}
-    every = [item.channel.name for item in config.seen]
     made = []
     for names in axes.values():
         stem = names[0][:-1]  # of "gyro_x"
         alike = [name for name in every if name.startswith(stem)]
-        parts = [known.get(f"reading_gain[{name}]") for name in names]
-        of = [item for item in parts if item is not None]
-        if stem and alike == names and len(names) > 1 and len(of) == len(names):
-            joins = tuple(item.name for item in of)
-            fixed = {"part": f"{stem}*"}
-            name = f"reading_gain[{stem}*]"
-            made.append(replace(of[0], name=name, fixed=fixed, slack=0.0, joins=joins))
+        gains = [f"reading_gain[{name}]" for name in names]
+        parts = [item for item in candidates if item.name in gains]
+        if stem and alike == names and len(parts) == len(names) > 1:
+            made.append(_alike(parts, f"{stem}*"))
     return made
 
 

@@ -275,7 +275,7 @@ def _owner(model: mujoco.MjModel, item: Seen) -> int:
     if item.quantity == "site":
         return int(model.site(item.part).bodyid[0])
     if item.quantity == "gyro":
-        return int(model.site_bodyid[view.gyro(model, model.sensor(item.part).id)])
+        return int(model.site_bodyid[view.gyro(model, item.part)])
     if item.quantity == "tendon":
         return max(ties.by_tendon(model)[model.tendon(item.part).id], default=0)
     return int(model.joint(item.part).bodyid[0])

@@ -68,16 +68,8 @@ def begin(work: Work) -> None:
     span = float(np.ptp(work.times[longest]))
     heads = _heads(work)
     first = {joint: float(np.median(head.at)) for joint, head in heads.items()}
-    tolerance = {joint: head.tolerance for joint, head in heads.items()}
-    varies = any(head.varies for head in heads.values())
-    pose, settle = guesses.rests(work.model, first, tolerance)
-    if settle and not _settled(work, longest, pose or "", settle):
-        settle = 0.0
-    elif pose is not None and not settle and not varies:
-        beside = _beside(work.model, pose, heads)
-        settle = guesses.returning(work.model, pose, beside)
+    pose, settle = _rest(work, longest, heads, first)
     loose = bool(start.free(work.model))
-    put = varies and pose is not None and _put(work, pose, settle, heads)
     if span > guesses.LONG and guesses.curved(told[longest], span) and not loose:
         work.start = {"recorded": True, "cut": guesses.CUT}
         work.start |= {"keyframe": pose} if pose else {}
@@ -105,13 +97,41 @@ def begin(work: Work) -> None:
     else:
         work.start = {"keyframe": pose} if pose else {}
         what = f"keyframe {pose!r}" if pose else "the model's own pose"
-        if put or (varies and not settle and not loose):
+        if any(head.varies for head in heads.values()) and (
+            not (settle or loose) or _put(work, pose, settle, heads)
+        ):
             work.start |= {"recorded": True}
             how = f"at rest near {what}, where its joints were recorded in each trial"
         else:
             work.start |= {"settle": settle} if settle else {}
             how = f"at rest in {what}, settling for {settle:g} s"
         work.guessed.append(f"start: {how}")
+
+
+def _rest(
+    work: Work,
+    longest: np.ndarray,
+    heads: Mapping[str, "_Head"],
+    first: Mapping[str, float],
+) -> tuple[str | None, float]:
+    """The pose in which trials begin, as `guesses.rests` finds it, and how long the
+    robot settles there [s].
+
+    Args:
+        work: what is known of the log.
+        longest: rows of the longest trial.
+        heads: where each joint is at the start of trials.
+        first: their medians.
+    """
+    tolerance = {joint: head.tolerance for joint, head in heads.items()}
+    pose, settle = guesses.rests(work.model, first, tolerance)
+    if settle and not _settled(work, longest, pose or "", settle):
+        return pose, 0.0
+    varies = any(head.varies for head in heads.values())
+    if pose is not None and not settle and not varies:
+        beside = _beside(work.model, pose, heads)
+        return pose, guesses.returning(work.model, pose, beside)
+    return pose, settle
 
 
 class _Head(NamedTuple):
@@ -160,7 +180,7 @@ def _beside(
 ) -> dict[str, float]:
     """Joints that are not where a pose has them, and where: what is to be found
     took them there."""
-    data = guesses.posed(model, pose, 0.0)
+    data = prepared.posed(model, pose, 0.0)
     return {
         joint: float(head.at.mean())
         for joint, head in heads.items()
@@ -171,7 +191,7 @@ def _beside(
 def _stands(work: Work, pose: str) -> bool:
     """Whether a free robot stands on something where trials begin: in a pose it settles
     on the floor, as high as it was seen if that was."""
-    data = guesses.posed(work.model, pose, guesses.SETTLE)
+    data = prepared.posed(work.model, pose, guesses.SETTLE)
     for column, part, unit in work.seen:
         if part.quantity == "body" and part.axis == "z":
             at = np.nanmedian([column.values[rows[:1]] for rows in work.rows])
@@ -187,7 +207,7 @@ def _stood(work: Work, rows: np.ndarray) -> mujoco.MjData:
         seen = column.values[rows][np.isfinite(column.values[rows])]
         if part.quantity == "joint" and len(seen):
             first[part.name] = float(seen[0]) * factor(unit)
-    data = guesses.posed(work.model, guesses.nearest(work.model, first), 0.0)
+    data = prepared.posed(work.model, guesses.nearest(work.model, first), 0.0)
     for joint, at in first.items():
         data.joint(joint).qpos[0] = at
     for column, actuator, unit in work.told:
@@ -204,7 +224,7 @@ def _settled(work: Work, rows: np.ndarray, pose: str, settle: float) -> bool:
     as one that was let go: by which of the two predicts its first samples better."""
     rows = rows[work.times[rows] <= work.times[rows[0]] + guesses.SETTLE]
     errors = [
-        _missed(work, rows, guesses.posed(work.model, pose, lasting))
+        _missed(work, rows, prepared.posed(work.model, pose, lasting))
         for lasting in (settle, 0.0)
     ]
     return errors[0] <= errors[1]
@@ -218,8 +238,8 @@ def _put(work: Work, pose: str, settle: float, heads: Mapping[str, "_Head"]) -> 
     begun = [joint for joint, head in heads.items() if len(head.at) == len(work.rows)]
     for number, rows in enumerate(work.rows):
         rows = rows[work.times[rows] <= work.times[rows[0]] + guesses.SETTLE]
-        rested = guesses.posed(work.model, pose, settle)
-        found = guesses.posed(work.model, pose, 0.0)
+        rested = prepared.posed(work.model, pose, settle)
+        found = prepared.posed(work.model, pose, 0.0)
         for joint in begun:
             found.joint(joint).qpos[0] = heads[joint].at[number]
         errors += [_missed(work, rows, data, begun) for data in (rested, found)]

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from bns.gap.decomposition.rest import NORMAL, THIRD
+from bns.gap.models.mjcf import prepared
 from bns.worlds.data.units import FACTORS
 
 RATES = (4.0, 5000.0)  # [Hz] of logs
@@ -88,7 +89,7 @@ def rests(
     for settled in (False, True):
         for name in reversed(_poses(model)):  # keyframes before the model's own pose
             lasting = settling(model, name) if settled else 0.0
-            data = posed(model, name, lasting)
+            data = prepared.posed(model, name, lasting)
             off = [
                 abs(float(data.joint(joint).qpos[0]) - at) <= tolerance[joint]
                 for joint, at in first.items()
@@ -109,7 +110,7 @@ def settling(model: mujoco.MjModel, pose: str) -> float:
         model: that is recorded.
         pose: name of the keyframe; "" = the model's own.
     """
-    data, moved = posed(model, pose, 0.0), []
+    data, moved = prepared.posed(model, pose, 0.0), []
     for _ in range(round(LONGEST / SETTLE) + 1):
         moved.append(_moved(model, data))
         if moved[-1] < STILL:
@@ -130,7 +131,7 @@ def returning(model: mujoco.MjModel, pose: str, begun: Mapping[str, float]) -> f
         pose: name of the keyframe; "" = the model's own.
         begun: joints that are elsewhere, and where; none = 0.
     """
-    data = posed(model, pose, 0.0)
+    data = prepared.posed(model, pose, 0.0)
     goal = {joint: float(data.joint(joint).qpos[0]) for joint in begun}
     for joint, at in begun.items():
         data.joint(joint).qpos[0] = at
@@ -159,7 +160,7 @@ def nearest(model: mujoco.MjModel, first: Mapping[str, float]) -> str:
     """
 
     def away(name: str) -> float:
-        data = posed(model, name, 0.0)
+        data = prepared.posed(model, name, 0.0)
         return sum(abs(float(data.joint(j).qpos[0]) - at) for j, at in first.items())
 
     return min(reversed(_poses(model)), key=away)
@@ -168,23 +169,6 @@ def nearest(model: mujoco.MjModel, first: Mapping[str, float]) -> str:
 def _poses(model: mujoco.MjModel) -> list[str]:
     """Names of the keyframes, after "" for the model's own pose."""
     return ["", *(model.key(k).name for k in range(model.nkey) if model.key(k).name)]
-
-
-def posed(model: mujoco.MjModel, pose: str, settle: float) -> mujoco.MjData:
-    """A model that has settled in a pose.
-
-    Args:
-        model: that is recorded.
-        pose: name of the keyframe; "" = the model's own.
-        settle: for how long [s].
-    """
-    data = mujoco.MjData(model)
-    if pose:
-        mujoco.mj_resetDataKeyframe(model, data, model.key(pose).id)
-    for _ in range(round(settle / model.opt.timestep)):
-        mujoco.mj_step(model, data)
-    data.time = 0.0
-    return data
 
 
 def _moved(model: mujoco.MjModel, data: mujoco.MjData) -> float:

@@ -36,7 +36,7 @@ def observed(work: Work, seen: list[Column]) -> None:
         listed = ", ".join(c.name for c in turned)
         work.guessed.append(f"left out, for angles are compared: {listed}")
     model = work.model
-    spun, seen = _inertial(work, seen)
+    seen, spun = _inertial(work, seen)
     driven = [joint_of(model, model.actuator(a).id) for _, a, _ in work.told]
     driven = [joint for joint in joints(model) if joint in driven]
     found: dict[str, Part] = {}
@@ -46,13 +46,18 @@ def observed(work: Work, seen: list[Column]) -> None:
         kind: [getattr(model, kind)(n).name for n in range(count)]
         for kind, count in counts.items()
     }
-    speeds = [c for c in seen if matching.quantity(c) == tables.SPEED]
-    others = [c for c in seen if c not in speeds]
+    rest = [c for c in seen if c.name not in spun]
+    speeds = [c for c in rest if matching.quantity(c) == tables.SPEED]
+    others = [c for c in rest if c not in speeds]
     _, hits = matching.match(others, joints(model))
     jointed = {name for name, how in hits.items() if how not in matching.UNSURE}
     placed = [c for c in others if c.name not in jointed]
     named = matching.by_place(placed, places, _free(model))
-    named = {column: _slid(model, parts) for column, parts in named.items()}
+    slides: dict[tuple[Part, ...], tuple[Part, ...]] = {
+        (Part(rehearsal.BODY, *place),): (Part(rehearsal.JOINT, joint),)
+        for place, joint in ties.slides(model).items()
+    }
+    named = {column: slides.get(parts, parts) for column, parts in named.items()} | spun
     for kind, group in (("speed", speeds), ("joint", others)):
         rest = [c for c in group if c.name not in named or c.name in joints(model)]
         # a flywheel is seen by its speed alone: what turns otherwise is another joint
@@ -64,37 +69,27 @@ def observed(work: Work, seen: list[Column]) -> None:
             hits, reasons = matching.match(left, free)
             found |= {name: Part(kind, part) for name, part in hits.items()}
             why |= reasons
-    named |= spun
-    seen += [column for column in work.table.columns if column.name in spun]
     _rehearsed(work, seen, found, why, named)
-
-
-def _slid(model: mujoco.MjModel, parts: tuple[Part, ...]) -> tuple[Part, ...]:
-    """Parts with the joint in the place of a body where that is the same."""
-    of = ties.slides(model)
-    joint = of.get((parts[0].name, parts[0].axis), "")
-    alone = len(parts) == 1 and parts[0].quantity == rehearsal.BODY
-    return (Part(rehearsal.JOINT, joint),) if joint and alone else parts
 
 
 def _inertial(
     work: Work, seen: list[Column]
-) -> tuple[dict[str, tuple[Part, ...]], list[Column]]:
-    """Columns of gyros of the model, and the others without those of an inertial unit,
-    which are no joints."""
+) -> tuple[list[Column], dict[str, tuple[Part, ...]]]:
+    """Columns without those of an inertial unit that nothing is compared with, and
+    which gyro of the model some of them are of."""
     every = inertial.rates(seen, view.gyros(work.model))
     left = inertial.accelerations(seen)
     if left:
         listed = ", ".join(left)
         work.guessed.append(f"left out, for no acceleration is compared: {listed}")
     spun = {name: parts for name, parts in every.items() if parts}
-    if lost := [name for name in every if name not in spun]:
+    lost = [name for name in every if name not in spun]
+    if lost:
         work.unsure.append(
             f"left out: {', '.join(lost)}, of a gyro that the model does not have: "
             "give it one (<gyro site=...>, with a name)"
         )
-    dropped = {*every, *left}
-    return spun, [column for column in seen if column.name not in dropped]
+    return [column for column in seen if column.name not in (*left, *lost)], spun
 
 
 def _rehearsed(

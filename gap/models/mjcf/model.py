@@ -273,7 +273,7 @@ class OwnModel(GapModel):
 
     def begun(self, trial: Trial) -> Mapping[str, float]:
         """See `GapModel.begun`: joints that began where they were recorded, or hung."""
-        return start.unsure(trial, self.config, self.physics.hung(trial))
+        return start.unsure(trial, self.config, self.physics.starts.hung(trial))
 
     def joint_windows(self, trial: Trial) -> Windows:
         """Windows between samples that were seen."""

@@ -318,12 +318,29 @@ def _alike(model: mujoco.MjModel, whole: mujoco.MjModel) -> bool:
     )
 
 
+def posed(model: mujoco.MjModel, pose: str, settle: float) -> mujoco.MjData:
+    """A model that has settled in a pose.
+
+    Args:
+        model: that is recorded.
+        pose: name of the keyframe; "" = the model's own.
+        settle: for how long [s].
+    """
+    data = mujoco.MjData(model)
+    if pose:
+        mujoco.mj_resetDataKeyframe(model, data, number(model, "key", pose))
+    for _ in range(round(settle / model.opt.timestep)):
+        mujoco.mj_step(model, data)
+    data.time = 0.0
+    return data
+
+
 def number(model: mujoco.MjModel, kind: str, name: str) -> int:
     """The number of a part of a model.
 
     Args:
         model: compiled.
-        kind: "joint", "site", "body", "tendon", "actuator", "sensor" or "key".
+        kind: "joint", "site", "body", "tendon", "actuator" or "key".
         name: of the part.
 
     Raises:
@@ -338,7 +355,6 @@ def number(model: mujoco.MjModel, kind: str, name: str) -> int:
             "body": model.nbody,
             "tendon": model.ntendon,
             "actuator": model.nu,
-            "sensor": model.nsensor,
             "key": model.nkey,
         }[kind]
         known = [getattr(model, kind)(at).name for at in range(count)]

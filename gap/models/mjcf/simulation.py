@@ -72,8 +72,6 @@ class Simulation:
         self._kept: OrderedDict[tuple, np.ndarray] = OrderedDict()
         self._motions: OrderedDict[tuple, np.ndarray] = OrderedDict()
         self._trees = trees.Trees.one(config)
-        self._starts: dict[tuple, np.ndarray] = {}
-        self._hung: dict[bytes, dict[str, tuple[float, float]]] = {}
         model = self.model
         self.config = config = floating.told(config, model)
         self.dt = float(model.opt.timestep)
@@ -86,6 +84,7 @@ class Simulation:
                 model, "key", config.keyframe
             )  # there, before anything runs
         self._views = {model.names: View.of(config, model)}
+        self.starts = start.Starts(config, model, self._view)
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -292,9 +291,9 @@ class Simulation:
             told: commands ``(K,)``; None = the control at rest.
         """
         data = mujoco.MjData(self.model)
-        state = self._begun_in(trial, self.model)
+        state = self.starts.begun(trial, self.model)
         mujoco.mj_setState(self.model, data, state, STATE)
-        data.ctrl[:] = self._rest(self.model)
+        data.ctrl[:] = self.starts.rest(self.model)
         if told is not None:
             data.ctrl[self.actuators] = told
         mujoco.mj_step(self.model, data, nstep=round(lasting / self.dt))
@@ -306,73 +305,18 @@ class Simulation:
 
     def _job(self, trial: Trial, effects: Sequence[Effect], parts: int) -> Job:
         scene = self.compiled(effects, parts)
-        rest = self._rest(self.model)[self.actuators]
+        rest = self.starts.rest(self.model)[self.actuators]
         dt = self.dt / parts
         before, told = command_steps.arriving(trial, effects, rest, self.config, dt)
-        begin = self._start(trial, scene.model)
+        begin = self.starts.state(trial, scene.model)
         if self.config.recorded or start.STATE in trial.conditions:
             begin, first = begin.copy(), 1 + scene.model.nq + scene.model.nv
             held = command_steps.filtered(before, scene.model, self.actuators)
             for at, value in held.items():
                 begin[first + at] = value
-        ctrl = np.tile(self._rest(scene.model), (len(told), 1))
+        ctrl = np.tile(self.starts.rest(scene.model), (len(told), 1))
         ctrl[:, self.actuators] = told
         return Job(begin, (Segment(scene, ctrl),))
-
-    def _rest(self, model: mujoco.MjModel) -> np.ndarray:
-        if self.config.keyframe:
-            key = prepared.number(model, "key", self.config.keyframe)
-            return np.array(model.key_ctrl[key])
-        return np.zeros(model.nu)
-
-    def hung(self, trial: Trial) -> dict[str, tuple[float, float]]:
-        """Where joints hang that nobody observed [rad or m], as a trial begins at rest
-        by the nominal model, and in the model's pose."""
-        names = start.hanging(self.model, self.config)
-        if not names or start.UNSURE in trial.conditions:
-            return {}
-        key = trial.observed[:1].tobytes()
-        if key not in self._hung:
-            data = self._posed(self.model)
-            pose = [float(data.joint(name).qpos[0]) for name in names]
-            recorded = {k: v for k, v in trial.conditions.items() if k != start.STATE}
-            put = trial.replace(conditions=recorded)
-            start.place(data, put, self._view(self.model))
-            data.ctrl[:] = self._rest(self.model)
-            rest = start.relaxed(data, names)
-            self._hung[key] = dict(
-                zip(names, zip(rest, pose, strict=True), strict=True)
-            )
-        return self._hung[key]
-
-    def _posed(self, model: mujoco.MjModel) -> mujoco.MjData:
-        data = mujoco.MjData(model)
-        if self.config.keyframe:
-            key = prepared.number(model, "key", self.config.keyframe)
-            mujoco.mj_resetDataKeyframe(model, data, key)
-        return data
-
-    def _start(self, trial: Trial, model: mujoco.MjModel) -> np.ndarray:
-        """The state that a trial begins in, kept: effects do not change it, but for
-        those with a joint or a friction's bristles more, which begin at zero."""
-        sizes = [mujoco.mj_stateSize(some, STATE) for some in (model, self.model)]
-        model = self.model if sizes[0] == sizes[1] else model
-        state = str(trial.conditions.get(start.STATE))
-        key = (model.names, sizes[0], trial.observed[:1].tobytes(), state)
-        if key not in self._starts:
-            self._starts[key] = self._begun_in(trial, model)
-        return self._starts[key]
-
-    def _begun_in(self, trial: Trial, model: mujoco.MjModel) -> np.ndarray:
-        data = self._posed(model)
-        if self.config.recorded or start.STATE in trial.conditions:
-            start.place(data, trial, self._view(model))
-        for joint, (rest, _) in self.hung(trial).items():
-            data.joint(joint).qpos[0] = rest + start.off(trial, joint)
-        state = np.empty(mujoco.mj_stateSize(model, STATE))
-        data.time = 0.0
-        mujoco.mj_getState(model, data, state, STATE)
-        return state
 
     def _samples(
         self,

@@ -11,6 +11,7 @@ import numpy as np
 from bns.gap.models.mjcf import floating, prepared
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.gap.models.mjcf.view import View
+from bns.worlds.physics.rollout import STATE as FULL
 from bns.worlds.trial import Trial
 
 STATE = "start"
@@ -73,21 +74,6 @@ def place(data: mujoco.MjData, trial: Trial, view: View) -> None:
         floating.place(data, data.model.body(body).id, places, speeds)
 
 
-def hanging(model: mujoco.MjModel, config: OwnConfig) -> list[str]:
-    """Names of the hinges and slides that nobody observed, of a robot whose others
-    begin where they were recorded: they hang there.
-
-    Args:
-        model: of the robot.
-        config: the description.
-    """
-    if not config.recorded or config.settle:
-        return []
-    seen = {item.part for item in config.seen if item.quantity in ("joint", "speed")}
-    joints = filter(partial(prepared.hinged, model), range(model.njnt))
-    return [name for joint in joints if (name := model.joint(joint).name) not in seen]
-
-
 def relaxed(data: mujoco.MjData, joints: Sequence[str]) -> list[float]:
     """Where joints come to rest where all others are held, as a mast hangs on a cart
     that someone has put somewhere: at the turns of their swing.
@@ -116,10 +102,94 @@ def relaxed(data: mujoco.MjData, joints: Sequence[str]) -> list[float]:
     return [float(at) for at in begun[places]]
 
 
-def off(trial: Trial, joint: str) -> float:
+def _off(trial: Trial, joint: str) -> float:
     """How far a joint is from where it hangs when a trial begins, by its conditions."""
     state = trial.conditions.get(STATE)
     return float(state.get(joint, [0.0])[0]) if isinstance(state, dict) else 0.0
+
+
+class Starts:
+    """The states in which trials begin, and the control that holds a robot before.
+
+    Args:
+        config: the description.
+        model: the nominal model; has its keyframe.
+        view: where the observed channels are in a model.
+    """
+
+    def __init__(
+        self,
+        config: OwnConfig,
+        model: mujoco.MjModel,
+        view: Callable[[mujoco.MjModel], View],
+    ):
+        self.config, self.model, self._view = config, model, view
+        self._states: dict[tuple, np.ndarray] = {}
+        self._hung: dict[bytes, dict[str, tuple[float, float]]] = {}
+
+    def rest(self, model: mujoco.MjModel) -> np.ndarray:
+        """The control that holds a robot at rest, ``(nu,)``."""
+        if self.config.keyframe:
+            key = prepared.number(model, "key", self.config.keyframe)
+            return np.array(model.key_ctrl[key])
+        return np.zeros(model.nu)
+
+    def state(self, trial: Trial, model: mujoco.MjModel) -> np.ndarray:
+        """The full physics state that a trial begins in, kept: effects do not change
+        it, but for those with a joint or a friction's bristles more, which begin at
+        zero."""
+        sizes = [mujoco.mj_stateSize(some, FULL) for some in (model, self.model)]
+        model = self.model if sizes[0] == sizes[1] else model
+        state = str(trial.conditions.get(STATE))
+        key = (model.names, sizes[0], trial.observed[:1].tobytes(), state)
+        if key not in self._states:
+            self._states[key] = self.begun(trial, model)
+        return self._states[key]
+
+    def begun(self, trial: Trial, model: mujoco.MjModel) -> np.ndarray:
+        """The same, worked out for a model."""
+        data = prepared.posed(model, self.config.keyframe, 0.0)
+        if self.config.recorded or STATE in trial.conditions:
+            place(data, trial, self._view(model))
+        for joint, (rest, _) in self.hung(trial).items():
+            data.joint(joint).qpos[0] = rest + _off(trial, joint)
+        state = np.empty(mujoco.mj_stateSize(model, FULL))
+        data.time = 0.0
+        mujoco.mj_getState(model, data, state, FULL)
+        return state
+
+    def hung(self, trial: Trial) -> dict[str, tuple[float, float]]:
+        """Where joints hang that nobody observed [rad or m], as a trial begins at rest
+        by the nominal model, and in the model's pose."""
+        names = _hanging(self.model, self.config)
+        if not names or UNSURE in trial.conditions:
+            return {}
+        key = trial.observed[:1].tobytes()
+        if key not in self._hung:
+            data = prepared.posed(self.model, self.config.keyframe, 0.0)
+            pose = [float(data.joint(name).qpos[0]) for name in names]
+            recorded = {k: v for k, v in trial.conditions.items() if k != STATE}
+            place(data, trial.replace(conditions=recorded), self._view(self.model))
+            data.ctrl[:] = self.rest(self.model)
+            rest = relaxed(data, names)
+            found = zip(rest, pose, strict=True)
+            self._hung[key] = dict(zip(names, found, strict=True))
+        return self._hung[key]
+
+
+def _hanging(model: mujoco.MjModel, config: OwnConfig) -> list[str]:
+    """Names of the hinges and slides that nobody observed, of a robot whose others
+    begin where they were recorded: they hang there.
+
+    Args:
+        model: of the robot.
+        config: the description.
+    """
+    if not config.recorded or config.settle:
+        return []
+    seen = {item.part for item in config.seen if item.quantity in ("joint", "speed")}
+    joints = filter(partial(prepared.hinged, model), range(model.njnt))
+    return [name for joint in joints if (name := model.joint(joint).name) not in seen]
 
 
 def unsure(

@@ -128,8 +128,8 @@ def _parts(model: mujoco.MjModel) -> dict[tuple[str, str], int]:
         for number, body in enumerate(bodies):
             made[kind, getattr(model, kind)(number).name] = int(model.body_treeid[body])
     for name in view.gyros(model):
-        site = view.gyro(model, model.sensor(name).id)
-        made["gyro", name] = int(model.body_treeid[model.site_bodyid[site]])
+        body = model.site_bodyid[view.gyro(model, name)]
+        made["gyro", name] = int(model.body_treeid[body])
     for number in range(model.nu):
         joint = prepared.driven(model, number)
         body = model.jnt_bodyid[joint] if joint >= 0 else 0

@@ -40,12 +40,11 @@ class View:
         """
         columns, parts, beyond = [], [], []
         for item in config.seen:
-            kind = {"speed": "joint", "gyro": "sensor"}.get(
-                item.quantity, item.quantity
-            )
-            number = prepared.number(model, kind, item.part)
-            if kind == "sensor":
-                number = gyro(model, number)
+            kind = "joint" if item.quantity == "speed" else item.quantity
+            if kind == "gyro":
+                number = gyro(model, item.part)
+            else:
+                number = prepared.number(model, kind, item.part)
             at = further = -1
             if kind == "joint":
                 at = _jointed(model, item, number)
@@ -136,15 +135,16 @@ class View:
 _SITE = mujoco.mjtObj.mjOBJ_SITE
 
 
-def gyro(model: mujoco.MjModel, sensor: int) -> int:
+def gyro(model: mujoco.MjModel, name: str) -> int:
     """Number of the site of a gyro.
 
     Raises:
-        UnknownNameError: the sensor is no gyro.
+        UnknownNameError: no gyro of the model is called so.
     """
-    if model.sensor_type[sensor] != mujoco.mjtSensor.mjSENS_GYRO:
-        raise UnknownNameError("gyro", model.sensor(sensor).name, gyros(model))
-    return int(model.sensor_objid[sensor])
+    known = gyros(model)
+    if name not in known:
+        raise UnknownNameError("gyro", name, known)
+    return int(model.sensor(name).objid[0])
 
 
 def gyros(model: mujoco.MjModel) -> list[str]:

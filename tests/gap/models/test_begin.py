@@ -151,7 +151,7 @@ def test_joints_that_nobody_saw_hang_where_the_others_were_put(tmp_path):
     (trial, *_) = own.read_log(str(tmp_path / "log.csv"))
     begun = own.physics.stood(trial, 0.0, None)
     assert begun[0] == pytest.approx(trial.observed[0, 0])
-    state = own.physics._begun_in(trial, own.physics.model)
+    state = own.physics.starts.begun(trial, own.physics.model)
     angle = state[2]
     weight = 0.4 * 9.81 * 0.2 * np.sin(angle)  # leans on its spring
     assert 6.0 * (angle - np.deg2rad(8)) == pytest.approx(weight, abs=1e-4)
