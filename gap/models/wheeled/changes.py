@@ -10,7 +10,8 @@ from bns import models
 from bns.gap.candidates.wheeled_rows import LEAD, PLANES, STICKS, parameter, term
 from bns.worlds.effects import registry
 from bns.worlds.effects.base import CommandEffect, Effect, ModelEdit
-from bns.worlds.effects.parts import Inertial, base
+from bns.worlds.effects.mass import Inertial
+from bns.worlds.effects.parts import base
 
 TRACKING = ("marker_mount", "tracker_latency", "tracker_scale", "clock_drift", LEAD)
 LATENCY = "command_latency"  # comes before all others, at any fraction of a step

@@ -50,7 +50,18 @@ SAMPLES = 31
 FILES = {  # in which the effects of a stage stand
     "command": ("command", "channels", "legs", "servo"),
     "actuator": ("wheels", "servo"),
-    "body": ("joints", "tendons", "links", "wheels", "legs", "servo", "clock", "fluid"),
+    "body": (
+        "joints",
+        "actuators",
+        "tendons",
+        "links",
+        "surfaces",
+        "wheels",
+        "legs",
+        "servo",
+        "clock",
+        "fluid",
+    ),
     "sensor": ("sensors", "channels", "light", "servo"),
     "tracking": ("tracking",),
 }
