@@ -359,8 +359,10 @@ def _about(now: float | np.ndarray, most: float) -> tuple[float, float]:
 def _names(model: mujoco.MjModel, kind: str) -> list[str]:
     if kind == "model":
         return [ALL]
-    if kind == "arm":
+    if kind == "lever arm":
         return ties.arms(model)
+    if kind == "follower":
+        return ties.followers(model)
     count = {
         "joint": model.njnt,
         "body": model.nbody,

@@ -41,9 +41,10 @@ class Part(Choice):
     """A choice among the names of a model that is known later.
 
     Attributes:
-        kind: "joint", "body", "actuator", "tendon", "geom" or "channel"; "arm" = of a
-            fixed tendon about a joint, ``TENDON/JOINT``; "place" = a body or site that
-            a tracker follows; "model" = of the whole of it, which is `ALL`.
+        kind: "joint", "body", "actuator", "tendon", "geom" or "channel"; "lever arm" =
+            of a fixed tendon about a joint, ``TENDON/JOINT``; "follower" = a joint that
+            follows another one by an equality; "place" = a body or site that a tracker
+            follows; "model" = of the whole of it, which is `ALL`.
     """
 
     kind: str = "channel"

@@ -68,7 +68,7 @@ class TendonArm(BodyEffect):
     """
 
     name = "tendon_arm"
-    choices = parts.part("arm")
+    choices = parts.part("lever arm")
     source = "MuJoCo's fixed tendons (coef); bounds assumed"
     robots = ("own",)
     parameter = factor((0.1, 10.0), "lever arm over the model's", example=1.1)
@@ -117,7 +117,7 @@ class CouplingRatio(BodyEffect):
     """
 
     name = "coupling_ratio"
-    choices = parts.part("joint")
+    choices = parts.part("follower")
     source = "MuJoCo's equality of joints (polycoef); bounds assumed"
     robots = ("own",)
     parameter = factor((0.1, 10.0), "ratio over the model's", example=1.1)

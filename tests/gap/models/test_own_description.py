@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bns.errors import BnsError, FormatError
+from bns.errors import BnsError, FormatError, UnknownNameError
 from bns.gap.bench import mjcf_cases
 from bns.gap.candidates import mjcf
 from bns.gap.models.mjcf.config import OwnConfig
@@ -193,3 +193,12 @@ def test_commands_between_steps_of_the_model_begin_when_they_were_told(arm, tmp_
     (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
     (trial,) = load_recordings.trials([str(tmp_path / "log.csv")], arm)
     np.testing.assert_allclose(trial.commands.durations, step)
+
+
+@pytest.mark.parametrize(
+    ("effect", "part"), [("tendon_arm", "cord/elbow"), ("coupling_ratio", "elbow")]
+)
+def test_effects_on_parts_that_the_model_lacks_are_refused_at_once(effect, part):
+    config = replace(OwnConfig.read(ARM), effects={effect: (part,)}, bounds={})
+    with pytest.raises(UnknownNameError, match=part):
+        OwnModel(config, threads=1)

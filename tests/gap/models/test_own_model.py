@@ -163,7 +163,8 @@ PARTS = {
     "actuator": "elbow_servo",
     "geom": "forearm",
     "tendon": "cord",
-    "arm": "cord/elbow",
+    "lever arm": "cord/elbow",
+    "follower": "elbow",
     "model": "all",
 }
 CORD = """<tendon><fixed name="cord" stiffness="200"><joint joint="elbow" coef="0.1"/>
