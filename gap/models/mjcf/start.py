@@ -135,9 +135,9 @@ class Starts:
         return np.zeros(model.nu)
 
     def state(self, trial: Trial, model: mujoco.MjModel) -> np.ndarray:
-        """The full physics state that a trial begins in, kept: effects do not change
-        it, but for those with a joint or a friction's bristles more, which begin at
-        zero."""
+        """The full physics state ``(n,)`` that a trial begins in, kept: effects do not
+        change it, but for those with a joint or a friction's bristles more, which begin
+        at zero."""
         sizes = [mujoco.mj_stateSize(some, FULL) for some in (model, self.model)]
         model = self.model if sizes[0] == sizes[1] else model
         state = str(trial.conditions.get(STATE))
@@ -147,7 +147,7 @@ class Starts:
         return self._states[key]
 
     def begun(self, trial: Trial, model: mujoco.MjModel) -> np.ndarray:
-        """The same, worked out for a model."""
+        """The same, ``(n,)``, worked out for a model."""
         data = prepared.posed(model, self.config.keyframe, 0.0)
         if self.config.recorded or STATE in trial.conditions:
             place(data, trial, self._view(model))
