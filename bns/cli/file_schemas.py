@@ -128,20 +128,20 @@ def _commanded() -> Schema:
 
 
 def _observed() -> Schema:
-    from bns.gap.models.mjcf import config
+    from bns.gap.models.mjcf import described
 
-    parts = {name: TEXT | _said(f"name of the {name}") for name in config.QUANTITIES}
+    parts = {name: TEXT | _said(f"name of the {name}") for name in described.QUANTITIES}
     parts["speed"] = TEXT | _said("name of the joint whose speed it is")
     scatter = "of what the robot scatters itself, per square root of a second"
     known = {
         **parts,
-        "axis": {"enum": [*config.AXES, *config.TURNS]}
+        "axis": {"enum": [*described.AXES, *described.TURNS]}
         | _said("of a site, body or gyro"),
         "unit": TEXT,
         "noise": POSITIVE | _said("standard deviation of its measurement"),
         "scatter": LEAST | _said(scatter),
     }
-    one = {"oneOf": [{"required": [name]} for name in config.QUANTITIES]}
+    one = {"oneOf": [{"required": [name]} for name in described.QUANTITIES]}
     return _object(known, ["unit", "noise"]) | one
 
 

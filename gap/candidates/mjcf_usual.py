@@ -6,7 +6,8 @@ import mujoco
 import numpy as np
 
 from bns.gap.models.mjcf import effects, prepared, ties, view
-from bns.gap.models.mjcf.config import PLACES, OwnConfig, Seen
+from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.models.mjcf.described import PLACES, Seen
 from bns.worlds.effects.parts import ALL, FILTERS, ROUND_GEOMS
 
 SHORT = 1e-6  # [m] no length

@@ -10,7 +10,7 @@ import numpy as np
 from bns.gap.importers.tables import Column
 from bns.gap.models.mjcf import guesses, prepared, start
 from bns.gap.models.mjcf.channels import Work, compiled, tolds
-from bns.gap.models.mjcf.config import AXES, TURNS
+from bns.gap.models.mjcf.described import AXES, TURNS
 from bns.gap.models.mjcf.measured import replayed
 from bns.worlds.data.units import factor
 

@@ -12,7 +12,8 @@ from bns.errors import BnsError, FormatError
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column, Table
 from bns.gap.models.mjcf import guesses, matching, prepared, rehearsal, ties
-from bns.gap.models.mjcf.config import OwnConfig, Told
+from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.models.mjcf.described import Told
 from bns.gap.models.mjcf.rehearsal import Part
 from bns.worlds.data.units import factor, per_si, si_unit
 from bns.worlds.trial import Channel

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from bns.gap.models.mjcf import prepared
-from bns.gap.models.mjcf.config import AXES, TURNS, OwnConfig
+from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.models.mjcf.described import AXES, TURNS
 
 ORDER = "ZYX"  # yaw, pitch and roll, each about the axes that the one before has turned
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from bns.gap.importers.tables import Column
 from bns.gap.models.mjcf import matching
-from bns.gap.models.mjcf.config import AXES
+from bns.gap.models.mjcf.described import AXES
 from bns.gap.models.mjcf.rehearsal import GYRO, Part
 
 GYROS = frozenset(("gyro", "gyros", "gyr", "gyroscope"))

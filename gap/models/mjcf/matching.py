@@ -7,7 +7,7 @@ import numpy as np
 
 from bns.gap.importers import tables
 from bns.gap.importers.tables import Column
-from bns.gap.models.mjcf.config import AXES
+from bns.gap.models.mjcf.described import AXES
 from bns.gap.models.mjcf.rehearsal import Part
 from bns.worlds.data.units import FACTORS, RATES
 
@@ -62,7 +62,7 @@ TURNED = {
     "theta": "yaw",
     "psi": "yaw",
 }
-"""words for how a body is turned, as `config.TURNS` calls it"""
+"""words for how a body is turned, as `described.TURNS` calls it"""
 WHOLE = POSITION | _set("pose place robot base body mocap odom tracker camera")
 """words for a free robot as a whole"""
 ONLY = "for the model has one alone"

@@ -11,7 +11,7 @@ from bns.gap.importers import tables
 from bns.gap.importers.tables import Column
 from bns.gap.models.mjcf import inertial, matching, prepared, rehearsal, ties, view
 from bns.gap.models.mjcf.channels import Work, joint_of, joints
-from bns.gap.models.mjcf.config import AXES, PLACES, TURNS
+from bns.gap.models.mjcf.described import AXES, PLACES, TURNS
 from bns.gap.models.mjcf.rehearsal import Fit, Part
 from bns.worlds.data.units import factor
 

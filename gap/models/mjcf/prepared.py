@@ -12,7 +12,8 @@ import mujoco
 import numpy as np
 
 from bns.errors import BnsError, UnknownNameError
-from bns.gap.models.mjcf.config import OwnConfig, Told
+from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.models.mjcf.described import Told
 from bns.models import mjcf as mjcf_file
 
 

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from bns.gap.models.mjcf import prepared, view
-from bns.gap.models.mjcf.config import AXES, TURNS
+from bns.gap.models.mjcf.described import AXES, TURNS
 from bns.worlds.data.units import per_si
 
 JOINT, SITE, BODY, SPEED, TENDON = "joint", "site", "body", "speed", "tendon"

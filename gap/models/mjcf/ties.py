@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterable
 import mujoco
 import numpy as np
 
-from bns.gap.models.mjcf.config import AXES
+from bns.gap.models.mjcf.described import AXES
 
 
 def tied(model: mujoco.MjModel, roots: Collection[int]) -> set[int]:

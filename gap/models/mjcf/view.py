@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from bns.errors import UnknownNameError
 from bns.gap.models.mjcf import floating, prepared
-from bns.gap.models.mjcf.config import OwnConfig, Seen
+from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.models.mjcf.described import Seen
 from bns.worlds.effects.parts import SEEN_PLAY
 
 
@@ -178,7 +179,7 @@ def angle(frames: np.ndarray, turn: str) -> np.ndarray:
 
     Args:
         frames: axes of what is turned, a row-major matrix each, ``(T, 9)``.
-        turn: one of `config.TURNS`.
+        turn: one of `described.TURNS`.
     """
     if turn == "pitch":
         made: np.ndarray = np.arcsin(np.clip(-frames[:, 6], -1.0, 1.0))

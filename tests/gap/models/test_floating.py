@@ -7,7 +7,7 @@ import pytest
 from bns.errors import UnknownNameError
 from bns.gap.diagnose import diagnose
 from bns.gap.models.mjcf import floating, view
-from bns.gap.models.mjcf.config import TURNS
+from bns.gap.models.mjcf.described import TURNS
 from bns.gap.models.mjcf.model import OwnModel
 from tests.gap.own_robots import described
 

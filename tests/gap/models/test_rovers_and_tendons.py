@@ -9,7 +9,8 @@ from bns.errors import FormatError, UnknownNameError
 from bns.gap.diagnose import diagnose
 from bns.gap.importers import tables
 from bns.gap.models.mjcf import view
-from bns.gap.models.mjcf.config import TURNS, OwnConfig
+from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.models.mjcf.described import TURNS
 from bns.gap.models.mjcf.model import OwnModel
 from bns.worlds.physics.rollout import STATE
 from tests.gap.own_robots import described
