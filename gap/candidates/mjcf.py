@@ -18,7 +18,7 @@ from bns.gap.models.mjcf import effects, ties
 from bns.gap.models.mjcf.config import OwnConfig
 from bns.worlds.effects.parts import ALL, FILTERS, WIDE
 
-DEAD = ("command_dead_band", "command_dead_zone")  # sizes, from 0
+DEAD = ("command_dead_band", "command_dead_zone", "command_play")  # sizes, from 0
 RATIOS = (0.4, 0.6, 0.8, 0.9, 1.1, 1.25, 1.6, 2.5)
 SHARES = (0.02, 0.05, 0.12, 0.3, 1.0)  # of the largest value, beyond the nominal
 LOWER = (0.9, 0.5, 0.2)  # of the nominal value, taken off
@@ -81,6 +81,7 @@ EXCITE = {
     "command_offset": "any command",
     "command_dead_band": "small commands",
     "command_dead_zone": "small commands",
+    "command_play": "commands that turn back",
     "reading_gain": "large excursions",
     "reading_offset": "any command",
     "reading_delay": "fast motion",

@@ -83,6 +83,7 @@ PLAUSIBLE = {
     "marker_mount": (0.01, 2e-4),
 }
 SHARE = 0.02  # slack of a number over its plausible departure
+SIZES = ("command_dead_zone", "command_play")  # of which everything has a little
 
 
 def rows(
@@ -328,7 +329,7 @@ def _plausible(item: Row) -> tuple[float, float]:
     if not sd:
         offset = item.effect.endswith("_offset")
         sd = (OFFSET if offset else EIGHTH) * (item.high - item.low)
-        slack = SHARE * sd if offset or item.effect == "command_dead_zone" else 0.0
+        slack = SHARE * sd if offset or item.effect in SIZES else 0.0
     return sd, 0.0 if item.joins else slack
 
 

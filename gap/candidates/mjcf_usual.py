@@ -73,10 +73,10 @@ RARER = (
 )
 """the same of a model of few joints: many would cost more than they tell; the zero of
 an encoder of position servos, play before the encoders of joints that motors turn"""
-OF_COMMANDS = ("command_dead_zone", "command_offset", "command_gain")
+OF_COMMANDS = ("command_dead_zone", "command_offset", "command_play", "command_gain")
 """the same of a model of few joints or few commands, as a car has on many joints: a
-dead zone of the commands to all but position servos, a trim of the commands to these, a
-scale of those to servos of speed"""
+dead zone of the commands to all but position servos, a trim of the commands to these
+and play in them, a scale of those to servos of speed"""
 LATE = ("command_delay", "command_lag")
 """of each command where there are few, and of all"""
 TOUCHING = ("geom_radius", "geom_friction", "geom_compliance")
@@ -195,7 +195,7 @@ def _on_actuators(
         "command_limit": pushing,
         "command_dead_zone": pushing,
         "command_gain": to(paced),
-        "command_offset": to(servos),
+        **dict.fromkeys(("command_offset", "command_play"), to(servos)),
         "command_fade": _fading(pushing, channels),
     }
 

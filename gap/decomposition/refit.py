@@ -267,10 +267,6 @@ class _Here:
     fine: bool
 
     @cached_property
-    def _base(self) -> np.ndarray:
-        return self.problem.predict([self.values], fine=False, only=self.only)[0]
-
-    @cached_property
     def height(self) -> float:
         """See `_height`."""
         return self._height(self.values, self.rest)
@@ -280,8 +276,9 @@ class _Here:
         if self.fine:
             left = _rest(self.problem, values, self.only)
         else:
-            (made,) = self.problem.predict([values], fine=False, only=self.only)
-            left = self.rest - np.nan_to_num(made - self._base, nan=LOST)
+            pair = [self.values, values]
+            here, there = self.problem.predict(pair, fine=False, only=self.only)
+            left = self.rest - np.nan_to_num(there - here, nan=LOST)
         return left, self._height(values, left)
 
     def _height(self, values: np.ndarray, rest: np.ndarray) -> float:

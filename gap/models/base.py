@@ -161,7 +161,8 @@ class GapModel(ABC):
             trials: N recorded trials.
             sets: E sets; of each, by trial, the values of the rows that are not
                 nominal.
-            fine: at the fine step; False = at the coarse one, which is for differences.
+            fine: at the fine step; False = at the coarse one, which is for differences
+                from the first set.
 
         Returns:
             Per set, per trial ``(T, n_channels)``; NaN from where it diverged.

@@ -143,6 +143,29 @@ class CommandDeadBand(_Command):
         return np.where(np.abs(told) < self["size"], 0.0, told)
 
 
+class CommandPlay(_Command):
+    """Play between what is told and what arrives: a horn, a rod, a cable in its sheath.
+
+    What arrives stays until the command has gone through the play, and then follows it
+    at half of that behind (the play operator; Brokate and Sprekels 1996, section 2.2).
+    """
+
+    name = "command_play"
+    parameter = _number(
+        "width", "unit of the command", 0.0, "of the play, from stop to stop", 0.05
+    )
+
+    def change(self, told: np.ndarray, dt: float) -> np.ndarray:
+        """The signal behind the play, in whose middle it begins, ``(S,)``."""
+        del dt
+        half = self["width"] / 2
+        made, now = np.empty_like(told), told[0]
+        for at, goal in enumerate(told):
+            now = min(max(now, goal - half), goal + half)
+            made[at] = now
+        return made
+
+
 class CommandLimit(_Command):
     """A command is cut to a limit: a speed or torque limit of its drive."""
 

@@ -1,5 +1,6 @@
 """Any MJCF model, with a TOML file that maps its channels, as a nominal model."""
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -21,6 +22,8 @@ from bns.worlds.trial import Trial
 
 LEAST = 0.3  # of the noise that is told: the smallest that is believed
 SHORT, SHARE = 5.0, 0.01  # of the noise, of a joint's travel: sooner by more is stopped
+FEW = 2  # trials on which longer steps of time are compared with the model's
+SOME = 0.25  # of the rows: as many may need the model's step beside longer ones
 STRIDE = 0.5  # [s] over which those of a free body are compared
 
 
@@ -62,6 +65,8 @@ class OwnModel(GapModel):
         self.config = config = self.physics.config
         model, self.dt = self.physics.model, self.physics.dt
         self._parts = self.physics.finest
+        self._pace: float = 1
+        self._fast = frozenset[str]()
         self._touches = False
         self.listed = mjcf.candidates(config, model)
         self._bodies = {
@@ -168,12 +173,27 @@ class OwnModel(GapModel):
         return found
 
     def stepped(self, trials: Sequence[Trial], rows: Sequence[Row]) -> tuple[Row, ...]:
-        """See `GapModel.stepped`: a simulation is rough where something touches."""
-        if not self._touches:
-            return tuple(rows)
-        return roughness.stepped(
-            rows, partial(self._changed, self.physics.some(trials))
-        )
+        """See `GapModel.stepped`: a simulation is rough where something touches.
+
+        From then on coarse paths have the longest step of time by which nearly all rows
+        change the same; the model's own is for those that change otherwise.
+        """
+        self._pace, self._fast = 1, frozenset()
+        if self._touches:
+            some = self.physics.some(trials)
+            rows = roughness.stepped(rows, partial(self._changed, some))
+        rows, paces = tuple(rows), self.physics.paces
+        looked = partial(self._changed, trials[:: max(len(trials) // FEW, 1)][:FEW])
+        if paces:
+            own = roughness.derivatives(rows, looked)
+        for self._pace in paces:
+            off = roughness.apart(own, roughness.derivatives(rows, looked))
+            if off.mean() <= SOME:
+                names = (row.name for row in itertools.compress(rows, off))
+                self._fast = frozenset(names)
+                return rows
+        self._pace = 1
+        return rows
 
     def _changed(
         self, trials: Sequence[Trial], sets: Sequence[Mapping[str, float]]
@@ -242,8 +262,30 @@ class OwnModel(GapModel):
         *,
         fine: bool = True,
     ) -> list[list[np.ndarray]]:
-        """See `GapModel.paths`; the coarse step is that of the model. What finer steps
-        change is that of the nominal motion."""
+        """See `GapModel.paths`; the coarse step is that of the model or longer, see
+        `stepped`. What finer steps change is that of the nominal motion."""
+        if fine or self._pace == 1:
+            return self._paths(trials, sets, self._parts if fine else 1)
+        fast = [any(values.keys() & self._fast for values in row) for row in sets]
+        if fast[0]:
+            return self._paths(trials, sets, 1)
+        slow = itertools.compress(sets, np.logical_not(fast))
+        made = self._paths(trials, [*slow], self._pace)
+        if any(fast):
+            moved = [sets[0], *itertools.compress(sets, fast)]
+            base, *others = self._paths(trials, moved, 1)
+            for at, paths in zip(np.flatnonzero(fast), others, strict=True):
+                parts = zip(made[0], paths, base, strict=True)
+                made.insert(int(at), [here + (b - a) for here, b, a in parts])
+        return made
+
+    def _paths(
+        self,
+        trials: Sequence[Trial],
+        sets: Sequence[Sequence[Mapping[str, float]]],
+        parts: float,
+    ) -> list[list[np.ndarray]]:
+        """See `paths`; each step of the model cut into so many parts."""
         pairs, leads, shares = [], [], []
         for row in sets:
             for trial, values in zip(trials, row, strict=True):
@@ -252,7 +294,7 @@ class OwnModel(GapModel):
                 pairs.append((begun, self._changes(values)))
                 leads.append(values.get(mjcf_rows.LEAD, 0.0))
                 shares.append(values.get(mjcf_rows.STEP, 1.0) - 1.0)
-        moved = self.physics.predicted(pairs, self._parts if fine else 1, leads)
+        moved = self.physics.predicted(pairs, parts, leads)
         if any(shares):
             changes = [*self._by_steps(trials)] * len(sets)
             moved = [

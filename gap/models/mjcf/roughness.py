@@ -1,4 +1,5 @@
-"""Steps of derivatives that stand out of what a simulation with contacts does itself.
+"""Steps of derivatives: of rows, that what they change stands out of what a simulation
+with contacts does itself, and of time, as long as they change no derivative.
 
 A wheel on its rim, or a foot that lands a step sooner, moves a body by a little,
 whatever is changed and however little. A derivative by a step that changes no more than
@@ -29,6 +30,8 @@ QUANTILE = 0.75  # of theirs: it is of the motion, not of the row; some change n
 FELT = 0.05  # of the noise: a roughness below is none
 ABOVE = 5.0  # times the roughness that a step has to change
 ALIKE = 3.0  # times it, by which steps that tell the same derivative may differ
+CLOSE = 0.05  # of what a row changes: by as much a longer step of time may be off
+SLIGHT = 0.1  # of the noise, by a plausible departure: the same
 
 
 def stepped(rows: Sequence[Row], changed: Changed) -> tuple[Row, ...]:
@@ -76,3 +79,38 @@ def _sizes(changes: np.ndarray) -> np.ndarray:
 def _moved(row: Row, step: float) -> dict[str, float]:
     """The value a step away from the nominal one, by the row's name."""
     return {row.name: row.nominal + row.inward(row.nominal, step)}
+
+
+def derivatives(rows: Sequence[Row], changed: Changed) -> np.ndarray:
+    """What a plausible departure of each row changes, in proportion to what its step
+    does, or a level in the middle where it has no slope, ``(E, N, C)``.
+
+    Args:
+        rows: of a model.
+        changed: simulates values of rows.
+    """
+    steps = [row.inward(row.nominal, row.difference) for row in rows]
+    middle = [row.levels[len(row.levels) // 2] if row.levels else 0.0 for row in rows]
+    smooth = [row.smooth or not row.levels for row in rows]
+    sets = [
+        {row.name: row.nominal + step if even else level}
+        for row, step, level, even in zip(rows, steps, middle, smooth, strict=True)
+    ]
+    scale = [
+        row.sd / abs(step) if even and step else 1.0
+        for row, step, even in zip(rows, steps, smooth, strict=True)
+    ]
+    made: np.ndarray = changed(sets) * np.array(scale)[:, None, None]
+    return made
+
+
+def apart(near: np.ndarray, far: np.ndarray) -> np.ndarray:
+    """Which rows, ``(E,)``, a longer step of time changes what they do.
+
+    Args:
+        near: by the shorter step, see `derivatives`, ``(E, N, C)``.
+        far: by the longer one; NaN where a simulation diverged.
+    """
+    lost = (np.isfinite(near) & ~np.isfinite(far)).any(axis=(1, 2))
+    found: np.ndarray = lost | (_sizes(far - near) > CLOSE * _sizes(near) + SLIGHT)
+    return found

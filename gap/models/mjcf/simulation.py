@@ -1,5 +1,6 @@
 """The physics of a description: trials run under effects, and what was run is kept."""
 
+import itertools
 import math
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
@@ -32,6 +33,7 @@ KEPT, MODELS = 20_000, 300  # simulated trials and compiled models kept in memor
 READ = 2**28  # bytes of what sensors would read that are kept
 FINE = 0.005  # [s] between kept states; the step if that is longer
 FINEST, CUT = 0.0025, 4  # [s] longer steps are cut, shorter ones in so many parts
+PACES = (1 / 8, 1 / 4, 1 / 2)  # of a step into parts: so many steps in one
 EXACT = 0.2  # of the noise: predictions that differ by less are alike
 BY_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
 TRIED = 4  # trials on which steps are compared, and forces and contacts looked at
@@ -59,6 +61,7 @@ class Simulation:
         dt: step of the model [s].
         actuators: number of each command channel's actuator.
         finest: into how many parts a step is cut at most.
+        paces: parts, below 1, of steps that are longer than the model's, up to `FINE`.
 
     Raises:
         FormatError: the MJCF file is missing or MuJoCo refuses it.
@@ -76,6 +79,8 @@ class Simulation:
         self.config = config = floating.told(config, model)
         self.dt = float(model.opt.timestep)
         self.finest = max(math.ceil(self.dt / FINEST - 1e-9), CUT)
+        longer = (FINE / self.dt >= 1 / each - 1e-9 for each in PACES)
+        self.paces = tuple(itertools.compress(PACES, longer))
         self.actuators = [
             prepared.number(model, "actuator", t.actuator) for t in config.told
         ]
@@ -124,12 +129,12 @@ class Simulation:
         """The model without what only draws it."""
         return prepared.lean(self.spec(()))
 
-    def compiled(self, effects: Sequence[Effect], parts: int = 1) -> Compiled:
+    def compiled(self, effects: Sequence[Effect], parts: float = 1) -> Compiled:
         """The compiled model with the effects on its parts.
 
         Args:
             effects: of any stage.
-            parts: into how many its step is cut.
+            parts: into how many its step is cut; 1/2 = two in one.
         """
         body = tuple(str(e) for e in effects if e.stage == "body" and not e.is_nominal)
         key = (parts, *body)
@@ -203,14 +208,14 @@ class Simulation:
     def predicted(
         self,
         pairs: Sequence[tuple[Trial, Sequence[Effect]]],
-        parts: int = 1,
+        parts: float = 1,
         ahead: Sequence[float] | None = None,
     ) -> list[np.ndarray]:
         """Predicted samples of trials, each under effects of its own.
 
         Args:
             pairs: trials with their effects.
-            parts: into how many a step is cut.
+            parts: into how many a step is cut; 1/2 = two in one.
             ahead: seconds by which each motion is ahead of the trial's clock.
         """
         leads = [0.0] * len(pairs) if ahead is None else ahead
@@ -242,7 +247,7 @@ class Simulation:
         return [self._put_together(pieces, found) for pieces in asked]
 
     def _moved(
-        self, pairs: Sequence[tuple[Trial, Sequence[Effect]]], parts: int
+        self, pairs: Sequence[tuple[Trial, Sequence[Effect]]], parts: float
     ) -> list[np.ndarray]:
         """What sensors without an effect would read of each trial, ``(T, C)``, every
         `FINE`. Effects on readings move nothing: one motion serves all of them.
@@ -303,7 +308,7 @@ class Simulation:
     def _lead(self, dt: float) -> int:
         return round(self.config.settle / dt)
 
-    def _job(self, trial: Trial, effects: Sequence[Effect], parts: int) -> Job:
+    def _job(self, trial: Trial, effects: Sequence[Effect], parts: float) -> Job:
         scene = self.compiled(effects, parts)
         rest = self.starts.rest(self.model)[self.actuators]
         dt = self.dt / parts

@@ -60,3 +60,14 @@ def test_nuisances_keep_their_step():
     clock = Row("clock", 0.0, SD, -1.0, 1.0, nuisance=True, step=0.001)
     *_, kept = roughness.stepped((*ROWS, clock), motion(rough=1.0, bent=0.0))
     assert kept == clock
+
+
+def test_a_longer_step_of_time_is_seen_where_it_changes_what_rows_do():
+    band = Row("band", 0.0, SD, 0.0, 1.0, smooth=False, levels=(0.2, 0.6, 0.8))
+    rows = (*ROWS[:3], band)
+    near = roughness.derivatives(rows, motion(rough=0.0, bent=0.0))
+    whole = [SLOPE * SD] * 3 + [SLOPE * (0.6 - 1.0)]  # a departure; a level as it is
+    assert near[:, 0, 0] == pytest.approx(whole)
+    far = near * np.array([1.04, 1.0, 1.2, 0.9])[:, None, None]
+    far[1, 7] = np.nan  # diverged
+    assert roughness.apart(near, far).tolist() == [False, True, True, False]

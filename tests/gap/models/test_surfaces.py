@@ -78,3 +78,29 @@ def test_a_larger_wheel_is_found(roller):
     found = diagnose(trials, model, full=False)
     assert found.verdict.named == (("geom_radius[tyre]",),)
     assert found.best.magnitudes[0] == pytest.approx(1.03, abs=0.003)
+
+
+def test_slopes_are_taken_by_a_longer_step_where_that_changes_none(roller):
+    effects = {
+        name: ("axle",)
+        for name in ("joint_damping", "joint_friction", "joint_backlash")
+    }
+    model = OwnModel(replace(roller.config, effects=effects), threads=1)
+    told = mjcf_cases.commands(model, np.random.default_rng(0), 2)
+    trials = mjcf_cases.record(model, told, [], seed=1)
+    moved = [{}, {"joint_damping[axle]": 0.02}, {"joint_backlash[axle]": 0.05}]
+    sets = [[values] * len(trials) for values in moved]
+    own = np.array(model.paths(trials, sets, fine=False))
+    model.stepped(trials, model.rows(trials))
+    parts, predicted = set(), model.physics.predicted
+
+    def counted(pairs, cut=1, ahead=None):
+        parts.add(cut)
+        return predicted(pairs, cut, ahead)
+
+    model.physics.predicted = counted
+    longer = np.array(model.paths(trials, sets, fine=False))
+    assert parts == {0.5, 1}  # play in a joint is stiff, and keeps the model's step
+    change = own[1:] - own[:1]
+    assert longer[1:] - longer[:1] == pytest.approx(change, abs=2e-3)
+    assert longer[2] - longer[0] == pytest.approx(change[1], abs=1e-12)

@@ -32,6 +32,16 @@ def test_a_rate_limit_takes_its_time():
     assert made[58] == pytest.approx(0.98) and made[59] == 1.0
 
 
+def test_play_is_gone_through_where_a_command_turns_back():
+    effect = registry.make("command_play", width=0.2)
+    told = np.array([0.0, 0.05, 0.5, 0.45, 0.25, 0.45])
+    made = effect.change(told, 0.01)
+    assert made == pytest.approx([0.0, 0.0, 0.4, 0.4, 0.35, 0.35])
+    assert registry.make("command_play", width=0.0).change(told, 0.01) == pytest.approx(
+        told
+    )
+
+
 def test_a_dead_zone_takes_its_size_off_and_a_dead_band_does_not():
     signal = np.array([-0.3, -0.1, 0.05, 0.3])
     zone = registry.make("command_dead_zone", size=0.1).change(signal, 0.01)
