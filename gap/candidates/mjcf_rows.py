@@ -82,6 +82,10 @@ PLAUSIBLE = {
     "log_clock": (0.01, 0.003),
     "marker_mount": (0.01, 2e-4),
 }
+SLIPPERY = (
+    0.15,
+    0.4,
+)  # of a grip: of what rolls no slope tells that it slides with less
 SHARE = 0.02  # slack of a number over its plausible departure
 SIZES = ("command_dead_zone", "command_play")  # of which everything has a little
 
@@ -282,14 +286,14 @@ def _of(
     if item.effect == "command_fade" and len(trials) < FADING:
         return
     sd, slack = _plausible(item)
-    late = item.effect in LATE
+    late, sliding = item.effect in LATE, item.effect == "geom_friction"
     step = LATER if late else sd if item.effect in TOUCHING else 0.0
     yield row(
         item.name,
         item.nominal,
         sd,
         slack=item.slack or slack,
-        levels=(0.15, 0.3) if late else (),
+        levels=(0.15, 0.3) if late else SLIPPERY if sliding else (),
         step=step,  # of a small one contacts show their chatter
         per_trial=item.effect == "command_fade",
     )

@@ -57,8 +57,9 @@ gains the description gives, a limit of force of these and of servos of speed,
 bolted to the world, `gravity_compensation` and a fluid's numbers where the model has
 some; `joint_stop` of joints that are seen; `reading_delay` of each reading where there
 are few, else of places, by a camera, beside joints, by encoders; the radius of wheels
-and feet, and grip and softness of all that touch, where they touch something; where the
-marker sits of what is followed by x, y and yaw"""
+and feet, and grip and softness of all that touch, where they touch something, the grip
+of each wheel or foot where there are few; where the marker sits of what is followed by
+x, y and yaw"""
 TENDONS = ("tendon_damping", "tendon_friction", "tendon_stiffness")
 """on every tendon; `tendon_slack` where it has a spring, `tendon_arm` about each joint
 of one that pulls several"""
@@ -297,9 +298,10 @@ def _surfaces(
         model.geom(n).name for n in able if int(model.geom_type[n]) in ROUND_GEOMS
     ]
     every = (ALL,) if able else ()
+    few = tuple(name for name in round_ if name)
     return {
-        "geom_radius": tuple(name for name in round_ if name),
-        "geom_friction": every,
+        "geom_radius": few,
+        "geom_friction": every + (few if 1 < len(few) <= FEW else ()),
         "geom_compliance": every,
     }
 

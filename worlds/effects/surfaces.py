@@ -13,17 +13,31 @@ from bns.worlds.effects.parts import ANY, WIDE
 
 
 class GeomFriction(BodyEffect):
-    """A surface slides more, or less, easily than the model says."""
+    """A surface slides more, or less, easily than the model says.
+
+    A contact of two geoms of one priority takes the larger of their coefficients. So
+    where a floor's is as large, a tyre alone gets a higher priority, and that of their
+    contact, scaled; with it the contact is as soft as the tyre says.
+    """
 
     name = "geom_friction"
-    source = "MuJoCo's contact model: the sliding coefficient is scaled"
+    source = "MuJoCo documentation, Computation, Contact: the sliding coefficient"
     robots = ANY
     choices = parts.part("geom")
     parameter = factor((0.0, WIDE), "sliding friction over the model's", example=0.5)
 
     def _write(self, spec: Any) -> None:
-        for geom in parts.geoms(spec, self["part"]):
-            friction = np.array(geom.friction, dtype=float)
+        chosen = parts.geoms(spec, self["part"])
+        of_all = self["part"] == parts.ALL
+        floors = [] if of_all else [*parts.contact_geoms(spec.worldbody)]
+        for geom in chosen:
+            friction, top = np.array(geom.friction, dtype=float), int(geom.priority)
+            over = [floor for floor in floors if int(floor.priority) >= top]
+            if over and geom.parent.name != spec.worldbody.name:
+                top = max(int(floor.priority) for floor in over)
+                rivals = [f for f in (*over, geom) if int(f.priority) == top]
+                friction[0] = max(float(other.friction[0]) for other in rivals)
+                geom.priority = top + 1
             friction[0] *= self["factor"]
             geom.friction = friction
 

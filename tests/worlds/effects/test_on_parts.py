@@ -201,6 +201,17 @@ class TestSurfaces:
         with pytest.raises(BnsError, match="not round"):
             built("geom_radius:part=tyre,factor=1.2", xml=xml)
 
+    @pytest.mark.parametrize("floor", ["", ' friction="0.7"', ' priority="2"'])
+    def test_a_tyre_alone_is_slippery_on_a_floor_that_grips(self, floor):
+        xml = ROLLER.format('sphere" size="0.05" friction="0.5')
+        xml = xml.replace('0.1"/>', f'0.1"{floor}/>')
+        grips = []
+        for texts in ([], ["geom_friction:part=tyre,factor=0.2"]):
+            model = built(*texts, xml=xml)
+            data = at_rest(model, (0.0,))
+            grips += [float(data.contact.friction[0, 0])]
+        assert grips[1] == pytest.approx(0.2 * grips[0])
+
     def test_a_soft_floor_lets_sink_in(self):
         depths = []
         for solref in ("0.02 1", "-2500 -100"):  # the same, written in two ways
