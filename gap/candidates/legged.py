@@ -27,10 +27,11 @@ _SERVOS: tuple[tuple[str, str, float, float, float, dict[str, Any]], ...] = (
     ("servo_viscous", "coefficient", 0.2, 0, 1, {}),
     ("servo_armature", "inertia", 0.02, 0, 0.1, {}),
     ("servo_delay", "delay", 0.06, 0, 0.4, {"step": 0.012}),
-    ("servo_lag", "time_constant", 0.08, 0, 0.5, {"step": 0.012}),
+    ("servo_lag", "time_constant", 0.08, 0, 0.5, {"step": 0.012, "levels": (0.07,)}),
     ("servo_duty_limit", "factor", 0.3, 0.02, 1, {"levels": (0.08, 0.2, 0.4, 0.7)}),
     ("servo_offset", "angle", 0.1, -0.3, 0.3, {}),
 )  # fmt: skip
+PLAY = (0.06, 0.18, 0.45)  # [rad] of a horn, of which no slope tells
 HIDDEN = ("servo_offset",)
 """what a servo's own reading does not show, but its leg's place: every joint counts"""
 _BODY: tuple[tuple[str, str, float, float, float, dict[str, Any]], ...] = (
@@ -137,7 +138,7 @@ def _horns(joints: Sequence[str]) -> Iterable[Row]:
     for joint in joints:
         yield _row(
             "loose_horn", "angle", 0.15, 0, 0.6, part=joint, fixed={"joint": joint},
-            smooth=False, levels=(0.2,),
+            smooth=False, levels=PLAY,
         )  # fmt: skip
 
 
