@@ -49,6 +49,7 @@ RANGES = {
     "actuator_torque_limit": (LEAST, 3.0, "1"),
     "body_length": (0.7, 1.4, "1"),
     "body_tilt": (-TILT, TILT, "rad"),
+    "geom_friction": (0.02, 5.0, "1"),
     "geom_compliance": (0.2, 10.0, "1"),
     "geom_radius": (0.7, 1.4, "1"),
     "gravity_compensation": (-1.0, 1.0, "1"),

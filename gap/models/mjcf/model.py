@@ -23,7 +23,6 @@ from bns.worlds.trial import Trial
 LEAST = 0.3  # of the noise that is told: the smallest that is believed
 SHORT, SHARE = 5.0, 0.01  # of the noise, of a joint's travel: sooner by more is stopped
 FEW = 2  # trials on which longer steps of time are compared with the model's
-SOME = 0.25  # of the rows: as many may need the model's step beside longer ones
 STRIDE = 0.5  # [s] over which those of a free body are compared
 
 
@@ -178,22 +177,26 @@ class OwnModel(GapModel):
         From then on coarse paths have the longest step of time by which nearly all rows
         change the same; the model's own is for those that change otherwise.
         """
-        self._pace, self._fast = 1, frozenset()
+        self._pace, self._fast, rough = 1, frozenset(), 0.0
+        few = trials[:: max(len(trials) // FEW, 1)][:FEW]
         if self._touches:
-            some = self.physics.some(trials)
-            rows = roughness.stepped(rows, partial(self._changed, some))
-        rows, paces = tuple(rows), self.physics.paces
-        looked = partial(self._changed, trials[:: max(len(trials) // FEW, 1)][:FEW])
-        if paces:
-            own = roughness.derivatives(rows, looked)
-        for self._pace in paces:
-            off = roughness.apart(own, roughness.derivatives(rows, looked))
-            if off.mean() <= SOME:
-                names = (row.name for row in itertools.compress(rows, off))
-                self._fast = frozenset(names)
-                return rows
-        self._pace = 1
-        return rows
+            some = few if len(rows) > roughness.MOST else self.physics.some(trials)
+            changed = partial(self._changed, some)
+            rough = roughness.level(rows, changed)
+            rows = roughness.stepped(rows, changed, rough)
+        self._pace, self._fast = roughness.of_pace(
+            rows, self.physics.paces, partial(self._at_pace, few), rough
+        )
+        return tuple(rows)
+
+    def _at_pace(self, trials: Sequence[Trial], pace: float) -> roughness.Changed:
+        """What values of rows change at a pace."""
+
+        def changed(sets: Sequence[Mapping[str, float]]) -> np.ndarray:
+            self._pace, self._fast = pace, frozenset()
+            return self._changed(trials, sets)
+
+        return changed
 
     def _changed(
         self, trials: Sequence[Trial], sets: Sequence[Mapping[str, float]]

@@ -9,6 +9,7 @@ is trusted, or as far as they plausibly depart, where the motion is as linear so
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import compress
 
 import numpy as np
 
@@ -32,9 +33,28 @@ ABOVE = 5.0  # times the roughness that a step has to change
 ALIKE = 3.0  # times it, by which steps that tell the same derivative may differ
 CLOSE = 0.05  # of what a row changes: by as much a longer step of time may be off
 SLIGHT = 0.1  # of the noise, by a plausible departure: the same
+TWICE = 2.0  # times the roughness: two such motions differ by as much
+SOME = 0.25  # of the rows: as many may need the model's own step of time
 
 
-def stepped(rows: Sequence[Row], changed: Changed) -> tuple[Row, ...]:
+def level(rows: Sequence[Row], changed: Changed) -> float:
+    """What a simulation with contacts changes itself, in units of the noise.
+
+    Args:
+        rows: of a model.
+        changed: simulates values of rows.
+    """
+    tried = _tried([_as_far_as_trusted(row) for row in rows])
+    if not tried:
+        return 0.0
+    probed = tried[:: max(len(tried) // PROBED, 1)]
+    tiny = _sizes(changed([_moved(row, TINY * row.difference) for row in probed]))
+    large = _sizes(changed([_moved(row, row.difference) for row in probed]))
+    beyond = np.maximum(tiny - SHARE * TINY * large, 0.0)
+    return float(np.quantile(beyond, QUANTILE))
+
+
+def stepped(rows: Sequence[Row], changed: Changed, rough: float) -> tuple[Row, ...]:
     """Rows of which those whose step changes less than `ABOVE` times the roughness step
     as far as they plausibly depart, where the motion is as linear so far; as they are,
     where there is none, or rows are too many.
@@ -42,18 +62,11 @@ def stepped(rows: Sequence[Row], changed: Changed) -> tuple[Row, ...]:
     Args:
         rows: of a model.
         changed: simulates values of rows.
+        rough: the roughness, see `level`.
     """
     rows = tuple(_as_far_as_trusted(row) for row in rows)
-    tried = [row for row in rows if row.smooth and not row.nuisance and not row.joins]
-    if not tried or len(rows) > MOST:
-        return rows
-    probed = tried[:: max(len(tried) // PROBED, 1)]
-    tiny = _sizes(changed([_moved(row, TINY * row.difference) for row in probed]))
-    large = _sizes(changed([_moved(row, row.difference) for row in probed]))
-    beyond = np.maximum(tiny - SHARE * TINY * large, 0.0)
-    rough = float(np.quantile(beyond, QUANTILE))
-    small = [row for row in tried if row.difference < row.sd]
-    if rough < FELT or not small:
+    small = [row for row in _tried(rows) if row.difference < row.sd]
+    if rough < FELT or not small or len(rows) > MOST:
         return rows
     near = changed([_moved(row, row.difference) for row in small])
     lost = np.flatnonzero(_sizes(near) < ABOVE * rough)
@@ -66,6 +79,79 @@ def stepped(rows: Sequence[Row], changed: Changed) -> tuple[Row, ...]:
     return tuple(replace(r, step=r.sd) if r.name in names else r for r in rows)
 
 
+def of_pace(
+    rows: Sequence[Row],
+    paces: Sequence[float],
+    changed: Callable[[float], Changed],
+    rough: float,
+) -> tuple[float, frozenset[str]]:
+    """The longest step of time by which nearly all rows change the same as by the
+    model's own, and the names of those that do not.
+
+    Args:
+        rows: of a model.
+        paces: parts of its own step, the longest steps first; 1/4 = four in one.
+        changed: simulates values of rows at a pace.
+        rough: what the simulation changes itself, see `level`.
+
+    Returns:
+        a pace, 1 = the model's own, and names.
+    """
+    some = rows[:: max(len(rows) // PROBED, 1)]
+    own = _derivatives(some, changed(1)) if paces else np.zeros(0)
+    for pace in paces:
+        if _apart(some, own, _derivatives(some, changed(pace)), rough).mean() > SOME:
+            continue
+        near, far = (_derivatives(rows, changed(each)) for each in (1, pace))
+        off = _apart(rows, near, far, rough)
+        if off.mean() <= SOME:
+            return pace, frozenset(row.name for row in compress(rows, off))
+    return 1, frozenset()
+
+
+def _derivatives(rows: Sequence[Row], changed: Changed) -> np.ndarray:
+    """What a plausible departure of each row changes, in proportion to what its step
+    does, or a level in the middle where it has no slope, ``(E, N, C)``."""
+    steps = [row.inward(row.nominal, row.difference) for row in rows]
+    middle = [row.levels[len(row.levels) // 2] if row.levels else 0.0 for row in rows]
+    sets = [
+        {row.name: row.nominal + step if _sloped(row) else level}
+        for row, step, level in zip(rows, steps, middle, strict=True)
+    ]
+    made: np.ndarray = changed(sets) * _scale(rows)[:, None, None]
+    return made
+
+
+def _sloped(row: Row) -> bool:
+    return row.smooth or not row.levels
+
+
+def _scale(rows: Sequence[Row]) -> np.ndarray:
+    """Plausible departures over steps, ``(E,)``; 1 of what has no slope."""
+    steps = [abs(row.inward(row.nominal, row.difference)) for row in rows]
+    return np.array(
+        [
+            row.sd / step if _sloped(row) and step else 1.0
+            for row, step in zip(rows, steps, strict=True)
+        ]
+    )
+
+
+def _apart(
+    rows: Sequence[Row], near: np.ndarray, far: np.ndarray, rough: float
+) -> np.ndarray:
+    """Which rows, ``(E,)``, a longer step of time changes what they do, beyond what a
+    simulation changes itself; NaN where one diverged."""
+    lost = (np.isfinite(near) & ~np.isfinite(far)).any(axis=(1, 2))
+    most = SLIGHT + CLOSE * _sizes(near) + TWICE * rough * _scale(rows)
+    found: np.ndarray = lost | (_sizes(far - near) > most)
+    return found
+
+
+def _tried(rows: Sequence[Row]) -> list[Row]:
+    return [row for row in rows if row.smooth and not row.nuisance and not row.joins]
+
+
 def _as_far_as_trusted(row: Row) -> Row:
     plain = row.smooth and not row.nuisance and not row.step
     return replace(row, step=fit.FAR * row.sd) if plain else row
@@ -73,44 +159,12 @@ def _as_far_as_trusted(row: Row) -> Row:
 
 def _sizes(changes: np.ndarray) -> np.ndarray:
     """Root mean squares of changes ``(E, N, C)``, ``(E,)``; of what was seen."""
-    return np.sqrt(np.nan_to_num(np.nanmean(changes**2, axis=(1, 2))))
+    seen = np.isfinite(changes)
+    total = (np.where(seen, changes, 0.0) ** 2).sum(axis=(1, 2))
+    sizes: np.ndarray = np.sqrt(total / np.maximum(seen.sum(axis=(1, 2)), 1))
+    return sizes
 
 
 def _moved(row: Row, step: float) -> dict[str, float]:
     """The value a step away from the nominal one, by the row's name."""
     return {row.name: row.nominal + row.inward(row.nominal, step)}
-
-
-def derivatives(rows: Sequence[Row], changed: Changed) -> np.ndarray:
-    """What a plausible departure of each row changes, in proportion to what its step
-    does, or a level in the middle where it has no slope, ``(E, N, C)``.
-
-    Args:
-        rows: of a model.
-        changed: simulates values of rows.
-    """
-    steps = [row.inward(row.nominal, row.difference) for row in rows]
-    middle = [row.levels[len(row.levels) // 2] if row.levels else 0.0 for row in rows]
-    smooth = [row.smooth or not row.levels for row in rows]
-    sets = [
-        {row.name: row.nominal + step if even else level}
-        for row, step, level, even in zip(rows, steps, middle, smooth, strict=True)
-    ]
-    scale = [
-        row.sd / abs(step) if even and step else 1.0
-        for row, step, even in zip(rows, steps, smooth, strict=True)
-    ]
-    made: np.ndarray = changed(sets) * np.array(scale)[:, None, None]
-    return made
-
-
-def apart(near: np.ndarray, far: np.ndarray) -> np.ndarray:
-    """Which rows, ``(E,)``, a longer step of time changes what they do.
-
-    Args:
-        near: by the shorter step, see `derivatives`, ``(E, N, C)``.
-        far: by the longer one; NaN where a simulation diverged.
-    """
-    lost = (np.isfinite(near) & ~np.isfinite(far)).any(axis=(1, 2))
-    found: np.ndarray = lost | (_sizes(far - near) > CLOSE * _sizes(near) + SLIGHT)
-    return found

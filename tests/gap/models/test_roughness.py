@@ -28,6 +28,10 @@ def motion(*, rough, bent):
     return changed
 
 
+def steps_of(rows, changed):
+    return roughness.stepped(rows, changed, roughness.level(rows, changed))
+
+
 @pytest.mark.parametrize(
     ("rough", "bent", "share"),
     [
@@ -39,13 +43,13 @@ def motion(*, rough, bent):
     ],
 )
 def test_steps_stand_out_of_the_roughness(rough, bent, share):
-    made = roughness.stepped(ROWS, motion(rough=rough, bent=bent))
+    made = steps_of(ROWS, motion(rough=rough, bent=bent))
     assert [row.name for row in made] == [row.name for row in ROWS]
     assert {row.difference / row.sd for row in made} == {share}
 
 
 def test_of_many_rows_none_steps_farther_than_a_slope_is_trusted():
-    made = roughness.stepped(ROWS * 11, motion(rough=1.0, bent=0.0))
+    made = steps_of(ROWS * 11, motion(rough=1.0, bent=0.0))
     assert {row.difference / row.sd for row in made} == {FAR}
 
 
@@ -53,21 +57,63 @@ def test_what_has_no_slope_and_what_has_a_step_of_its_own_stay():
     band = Row("band", 0.0, SD, 0.0, 1.0, smooth=False)
     fixed = Row("fixed", 1.0, SD, -9.0, 9.0, step=0.5)
     still = motion(rough=0.0, bent=0.0)
-    assert roughness.stepped((band, fixed), still) == (band, fixed)
+    assert steps_of((band, fixed), still) == (band, fixed)
 
 
 def test_nuisances_keep_their_step():
     clock = Row("clock", 0.0, SD, -1.0, 1.0, nuisance=True, step=0.001)
-    *_, kept = roughness.stepped((*ROWS, clock), motion(rough=1.0, bent=0.0))
+    *_, kept = steps_of((*ROWS, clock), motion(rough=1.0, bent=0.0))
     assert kept == clock
 
 
-def test_a_longer_step_of_time_is_seen_where_it_changes_what_rows_do():
+def paced(off):
+    """What rows change at a pace: by a longer step, some by a share more or less."""
+
+    def at(pace):
+        plain = motion(rough=0.0, bent=0.0)
+
+        def changed(sets):
+            made = plain(sets)
+            for row, values in zip(made, sets, strict=True):
+                row *= 1 + off.get((pace, *values), 0.0)
+            return made
+
+        return changed
+
+    return at
+
+
+@pytest.mark.parametrize(
+    ("off", "pace", "own"),
+    [
+        ({}, 0.25, set()),
+        ({(0.25, "row3"): 0.04}, 0.25, set()),  # as close as need be
+        ({(0.25, "row3"): 0.5, (0.25, "row5"): np.nan}, 0.25, {"row3", "row5"}),
+        ({(0.25, row.name): 0.5 for row in ROWS[::2]}, 0.5, set()),
+        ({(p, row.name): 0.5 for row in ROWS[::2] for p in (0.25, 0.5)}, 1, set()),
+    ],
+)
+def test_the_longest_step_of_time_is_taken_that_changes_few_rows(off, pace, own):
+    found = roughness.of_pace(ROWS, (0.25, 0.5), paced(off), 0.0)
+    assert found == (pace, own)
+
+
+def test_what_a_simulation_changes_itself_rules_out_no_longer_step():
+    off = {(0.25, row.name): 0.5 for row in ROWS}
+    found = roughness.of_pace(ROWS, (0.25,), paced(off), 99.0)
+    assert found == (0.25, set())
+
+
+def test_of_what_has_no_slope_a_level_is_looked_at():
     band = Row("band", 0.0, SD, 0.0, 1.0, smooth=False, levels=(0.2, 0.6, 0.8))
-    rows = (*ROWS[:3], band)
-    near = roughness.derivatives(rows, motion(rough=0.0, bent=0.0))
-    whole = [SLOPE * SD] * 3 + [SLOPE * (0.6 - 1.0)]  # a departure; a level as it is
-    assert near[:, 0, 0] == pytest.approx(whole)
-    far = near * np.array([1.04, 1.0, 1.2, 0.9])[:, None, None]
-    far[1, 7] = np.nan  # diverged
-    assert roughness.apart(near, far).tolist() == [False, True, True, False]
+    seen = set()
+
+    def at(pace):
+        def changed(sets):
+            seen.update(tuple(values.items()) for values in sets)
+            return np.ones((len(sets), 5, 1))
+
+        return changed
+
+    assert roughness.of_pace((band,), (0.5,), at, 0.0) == (0.5, set())
+    assert seen == {(("band", 0.6),)}
