@@ -64,7 +64,8 @@ TENDONS = ("tendon_damping", "tendon_friction", "tendon_stiffness")
 """on every tendon; `tendon_slack` where it has a spring, `tendon_arm` about each joint
 of one that pulls several"""
 PUSHED = ("joint_damping", "joint_friction", "body_mass")
-"""... also on what is seen and has no motor: a block that is gripped, a door"""
+"""... also on what is seen and has no motor: a block that is gripped, a door;
+`joint_stiffness` where the model has a spring: a pad that gives way"""
 FEW = 6  # joints up to which `RARER` are considered, too; commands, readings
 RARER = (
     "joint_backlash",
@@ -120,6 +121,8 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
         "body_length": _long(model, sorted(owned)),
         **_surfaces(model, joints=(*moved, *pushed)),
     }
+    springs = [joint for joint in pushed if np.any(model.jnt_stiffness[joint])]
+    sprung = {"joint_stiffness": springs}
     made: dict[str, tuple[str, ...]] = {}
     rarer = RARER if len(moved) <= FEW else ()
     trims = OF_COMMANDS if min(len(moved), len(told)) <= FEW else ()
@@ -127,7 +130,8 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
         kind = effects.OWNERS.get(name)
         if kind in ("joint", "body") and name not in of:
             parts = _parts(model, kind, moved)
-            made[name] = parts + (_parts(model, kind, pushed) if name in PUSHED else ())
+            free = pushed if name in PUSHED else sprung.get(name, [])
+            made[name] = parts + _parts(model, kind, free)
         else:
             made[name] = tuple(of.get(name, (ALL,)))
     return {name: parts for name, parts in made.items() if parts}

@@ -185,9 +185,20 @@ class OwnModel(GapModel):
             rough = roughness.level(rows, changed)
             rows = roughness.stepped(rows, changed, rough)
         self._pace, self._fast = roughness.of_pace(
-            rows, self.physics.paces, partial(self._at_pace, few), rough
+            rows, self.physics.paces, partial(self._at_pace, few), rough, self._off(few)
         )
         return tuple(rows)
+
+    def _off(self, trials: Sequence[Trial]) -> float:
+        """Root mean square of what was recorded over the nominal motion, in units of
+        the noise."""
+        (paths,) = self.paths(trials, [[{}] * len(trials)], fine=False)
+        off = []
+        for trial, path in zip(trials, paths, strict=True):
+            both = np.stack([trial.observed, path])
+            seen, made = self.compare(trial, both, self.windows(trial))
+            off.append((seen - made) / self.resolution)
+        return float(np.sqrt(np.nanmean(np.concatenate(off) ** 2)))
 
     def _at_pace(self, trials: Sequence[Trial], pace: float) -> roughness.Changed:
         """What values of rows change at a pace."""

@@ -9,6 +9,7 @@ is trusted, or as far as they plausibly depart, where the motion is as linear so
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import compress
 
 import numpy as np
@@ -31,7 +32,8 @@ QUANTILE = 0.75  # of theirs: it is of the motion, not of the row; some change n
 FELT = 0.05  # of the noise: a roughness below is none
 ABOVE = 5.0  # times the roughness that a step has to change
 ALIKE = 3.0  # times it, by which steps that tell the same derivative may differ
-CLOSE = 0.05  # of what a row changes: by as much a longer step of time may be off
+CLOSE = 0.05  # of what a row changes: by as much a longer step of time may be off,
+HELD = 0.2  # or so much of the noise of what is to be explained, if that is less
 SLIGHT = 0.1  # of the noise, by a plausible departure: the same
 TWICE = 2.0  # times the roughness: two such motions differ by as much
 SOME = 0.25  # of the rows: as many may need the model's own step of time
@@ -84,6 +86,7 @@ def of_pace(
     paces: Sequence[float],
     changed: Callable[[float], Changed],
     rough: float,
+    gap: float,
 ) -> tuple[float, frozenset[str]]:
     """The longest step of time by which nearly all rows change the same as by the
     model's own, and the names of those that do not.
@@ -93,19 +96,21 @@ def of_pace(
         paces: parts of its own step, the longest steps first; 1/4 = four in one.
         changed: simulates values of rows at a pace.
         rough: what the simulation changes itself, see `level`.
+        gap: root mean square of what is to be explained, in units of the noise.
 
     Returns:
         a pace, 1 = the model's own, and names.
     """
     some = rows[:: max(len(rows) // PROBED, 1)]
     own = _derivatives(some, changed(1)) if paces else np.zeros(0)
+    off = partial(_apart, rough=rough, close=min(CLOSE, HELD / max(gap, 1e-9)))
     for pace in paces:
-        if _apart(some, own, _derivatives(some, changed(pace)), rough).mean() > SOME:
+        if off(some, own, _derivatives(some, changed(pace))).mean() > SOME:
             continue
         near, far = (_derivatives(rows, changed(each)) for each in (1, pace))
-        off = _apart(rows, near, far, rough)
-        if off.mean() <= SOME:
-            return pace, frozenset(row.name for row in compress(rows, off))
+        apart = off(rows, near, far)
+        if apart.mean() <= SOME:
+            return pace, frozenset(row.name for row in compress(rows, apart))
     return 1, frozenset()
 
 
@@ -138,12 +143,12 @@ def _scale(rows: Sequence[Row]) -> np.ndarray:
 
 
 def _apart(
-    rows: Sequence[Row], near: np.ndarray, far: np.ndarray, rough: float
+    rows: Sequence[Row], near: np.ndarray, far: np.ndarray, rough: float, close: float
 ) -> np.ndarray:
     """Which rows, ``(E,)``, a longer step of time changes what they do, beyond what a
     simulation changes itself; NaN where one diverged."""
     lost = (np.isfinite(near) & ~np.isfinite(far)).any(axis=(1, 2))
-    most = SLIGHT + CLOSE * _sizes(near) + TWICE * rough * _scale(rows)
+    most = SLIGHT + close * _sizes(near) + TWICE * rough * _scale(rows)
     found: np.ndarray = lost | (_sizes(far - near) > most)
     return found
 

@@ -94,13 +94,13 @@ def paced(off):
     ],
 )
 def test_the_longest_step_of_time_is_taken_that_changes_few_rows(off, pace, own):
-    found = roughness.of_pace(ROWS, (0.25, 0.5), paced(off), 0.0)
+    found = roughness.of_pace(ROWS, (0.25, 0.5), paced(off), 0.0, 1.0)
     assert found == (pace, own)
 
 
 def test_what_a_simulation_changes_itself_rules_out_no_longer_step():
     off = {(0.25, row.name): 0.5 for row in ROWS}
-    found = roughness.of_pace(ROWS, (0.25,), paced(off), 99.0)
+    found = roughness.of_pace(ROWS, (0.25,), paced(off), 99.0, 1.0)
     assert found == (0.25, set())
 
 
@@ -115,5 +115,5 @@ def test_of_what_has_no_slope_a_level_is_looked_at():
 
         return changed
 
-    assert roughness.of_pace((band,), (0.5,), at, 0.0) == (0.5, set())
+    assert roughness.of_pace((band,), (0.5,), at, 0.0, 1.0) == (0.5, set())
     assert seen == {(("band", 0.6),)}
