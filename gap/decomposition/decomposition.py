@@ -25,15 +25,13 @@ from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.shares import HeldOut, Part
 from bns.gap.decomposition.singles import Singles
+from bns.gap.decomposition.sizes import Sizes, share, worse
 from bns.progress import Tell, unheard
 
 MOST = 0.5  # share of the gap beyond which what is left is most of it
 PINNED = 0.15  # the same where an explanation ended at the edge of what is possible
 EDGE = 0.01  # plausible departures from a bound that are at it
-WITHIN = 0.1  # of what explanations leave: all but that is within the model's slack
 FELT = 0.02  # of the floor's variance: a gap below shows in no picture
-ALONE = 0.1  # the same of one of many features, where the others show none
-TENTH = 0.1  # of what scatters: explanations that take less of it off take next to none
 LARGE = 2.0  # variances of the floor: more than heavy tails of any camera's noise
 SCATTER = 3.0  # times what differs between repeats
 BEYOND_LATE = 25.0  # variances of the floor: five times as large as all it scatters
@@ -108,7 +106,7 @@ class Decomposition:
     @property
     def left(self) -> float:
         """Share of the gap that is left."""
-        return _share(self.after, self.before, self.after)
+        return share(self.after, self.before, self.after)
 
     @property
     def recurring(self) -> bool:
@@ -125,7 +123,7 @@ class Decomposition:
     def unexplained(self) -> float:
         """Share of the gap that is left and is not what differs between repeats."""
         apart = 0.0 if self.broken else self.scatter
-        return _share(self.after - apart, self.before, self.after)
+        return share(self.after - apart, self.before, self.after)
 
     @property
     def lasting(self) -> bool:
@@ -260,7 +258,7 @@ def _recurs(problem: Problem, point: Point, plain: np.ndarray) -> float:
 
 def _settled(
     problem: Problem, start: Point, point: Point, known: rest.Floor
-) -> tuple[Problem, Point, "_Sizes", dict[str, int]]:
+) -> tuple[Problem, Point, Sizes, dict[str, int]]:
     """A point without explanations that nothing confirms, that make held-out errors
     worse, that are no gap, or that close hardly any of it; the problem that takes some
     of these as slack; the sizes; and what one trial alone shows (`unconfirmed`)."""
@@ -277,20 +275,20 @@ def _settled(
             row.term for row in loose.rows if row.unsure and row.slack == row.unsure
         }
         problem, point = loose, refit.refitted(loose, point, point.support - slack)
-    if _worse(problem, start, point, known):
+    if worse(problem, start, point, known):
         point = refit.refitted(problem, point, frozenset())
-    size = _Sizes.of(problem, start, point, known)
+    size = Sizes.of(problem, start, point, known)
     support = shares.weighty(problem, point, size.unexplained)
     if support != point.support:
         point = refit.refitted(problem, point, support)
-        size = _Sizes.of(problem, start, point, known)
+        size = Sizes.of(problem, start, point, known)
     other = simpler.renamed(problem, point)
     if other is not point:
-        point, size = other, _Sizes.of(problem, start, other, known)
-    unseen = _unseen(start, point, size, known)
+        point, size = other, Sizes.of(problem, start, other, known)
+    unseen = size.unseen(start, point, known)
     if point.support and (unseen or size.foretells_worse(problem, start, point)):
         point = refit.refitted(problem, point, frozenset())
-        size = _Sizes.of(problem, start, point, known)
+        size = Sizes.of(problem, start, point, known)
     return problem, point, size, unconfirmed
 
 
@@ -322,86 +320,6 @@ def _begun(problem: Problem, seed: int) -> tuple[Problem, Point, rest.Floor]:
     return problem, descent.nothing(problem, start), known
 
 
-@dataclass(frozen=True, eq=False)
-class _Sizes:
-    """How large a gap is, and what a point leaves of it; see `Decomposition`.
-
-    Attributes:
-        plain: what the point leaves, its slack taken, ``(N, C)``.
-        strayed: windows of trials that went another way than their repeats, ``(N,)``.
-    """
-
-    inside: np.ndarray
-    strayed: np.ndarray
-    plain: np.ndarray
-    before: float
-    after: float
-    scatter: float
-
-    @classmethod
-    def of(
-        cls, problem: Problem, start: Point, point: Point, known: rest.Floor
-    ) -> "_Sizes":
-        """Of a point, beside the nominal model."""
-        linear = point.linear
-        full = linear.rest(linear.solve(linear.free))
-        inside = rest.kept(problem, full, point.noise.sd)
-        strayed = rest.strayed(problem, point.rest, known)
-        inside &= ~strayed[:, None]
-        plain, slack = point.rest, linear.solve(point.support)
-        if not point.noise.memory.factors.size:
-            plain = linear.rest(slack)
-        else:  # under a memory of residuals slack takes too much, unless it is all
-            within = HeldOut.of(problem, point).plain.rest(slack)
-            sizes = [rest.excess(x, known, inside) for x in (within, plain)]
-            plain = within if sizes[0] < WITHIN * sizes[1] else plain
-        return cls(
-            inside,
-            strayed,
-            plain,
-            before=rest.excess(start.rest, known, inside),
-            after=rest.excess(plain, known, inside),
-            scatter=rest.scattered(problem, plain, known, inside),
-        )
-
-    @property
-    def unexplained(self) -> float:
-        """Share of the gap that is left and is not what differs between repeats."""
-        return _share(self.after - self.scatter, self.before, self.after)
-
-    def foretells_worse(self, problem: Problem, start: Point, point: Point) -> bool:
-        """Whether explanations foretell motion that was not fitted worse than the
-        nominal model does: they describe the recording, not the robot."""
-        held = HeldOut.of(problem, point, shares.PIECES, self.inside)
-        none, some = held.compared(start.rest, point.support)
-        return some > none
-
-
-def _share(size: float, before: float, after: float) -> float:
-    """An excess over the floor as a share of the gap, the larger of what was there
-    before and after the fit."""
-    return max(size, 0.0) / max(before, after, 1e-9)
-
-
 def _numbers(problem: Problem, windows: np.ndarray) -> tuple[int, ...]:
     """Numbers of the trials that windows ``(N,)`` are of."""
     return tuple(problem.numbers[n] for n in np.unique(problem.trial[windows]))
-
-
-def _unseen(start: Point, point: Point, size: _Sizes, known: rest.Floor) -> bool:
-    """Whether no gap shows beyond the floor in any feature, and explanations leave most
-    of what scatters once all that is not known of trials is taken out: there is nothing
-    to explain."""
-    if size.before > 0 or rest.most(start.rest, known, size.inside) > ALONE:
-        return False
-    none, some = (point.linear.squares(s) for s in ((), point.support))
-    return bool(none - some < TENTH * none)
-
-
-def _worse(problem: Problem, start: Point, point: Point, known: rest.Floor) -> bool:
-    """Whether explanations make the plain error larger: an autoregression may like
-    what predictions do not."""
-    every = problem.seen
-    return bool(point.support) and rest.excess(point.rest, known, every) > rest.excess(
-        start.rest, known, every
-    )

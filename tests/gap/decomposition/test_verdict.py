@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.gap.decomposition import decomposition, fit
+from bns.gap.decomposition import fit
 from bns.gap.decomposition.decomposition import Decomposition
 from bns.gap.decomposition.row import Row
 
@@ -84,8 +84,8 @@ def test_what_foretells_worse_than_the_nominal_model_explains_nothing(
     monkeypatch, error, worse
 ):
     held = SimpleNamespace(compared=lambda rest, support: (100.0, error))
-    monkeypatch.setattr(decomposition.HeldOut, "of", lambda *given: held)
+    monkeypatch.setattr(sizes.HeldOut, "of", lambda *given: held)
     start, point = SimpleNamespace(rest=None), SimpleNamespace(support={"axle"})
-    sizes = SimpleNamespace(inside=None)
-    tells = decomposition._Sizes.foretells_worse
-    assert tells(sizes, problem(), start, point) is worse
+    size = SimpleNamespace(inside=None)
+    tells = sizes.Sizes.foretells_worse
+    assert tells(size, problem(), start, point) is worse
