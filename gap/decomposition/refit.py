@@ -20,7 +20,6 @@ DAMPING = (0.0, 2.0, 20.0, 200.0)  # added to the curvature, in units of the pri
 LONGEST = 4.0  # prior standard deviations of one step; of what is farther off, twice
 # as far: a load may be many times what its link plausibly departs by
 STILL = 0.02  # prior standard deviations below which a fit has converged
-NEGLIGIBLE = 0.02  # nats that a step promises: it is not worth a simulation
 SHARES = (1.0, 0.5, 0.2)  # of the way to where a linear model leads
 BACK = 8  # rows of a fit of which each is tried at its nominal value
 LOST = 1e3  # predicted by a simulation that diverged
@@ -289,8 +288,7 @@ class _Here:
 def _step(
     here: _Here, slopes: Mapping[int, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """One damped step that lowers the loss, or none where it promises next to nothing;
-    None if there is no such step."""
+    """One damped step that lowers the loss; None if there is none."""
     problem, known, which = here.problem, here.noise, np.array(here.which)
     weight = known.weights(here.rest, problem.seen).ravel()
     design = np.stack([known.innovations(slopes[k]).ravel() for k in which], axis=-1)
@@ -307,8 +305,6 @@ def _step(
     low, high = problem.bounds
     for damping in DAMPING:
         step = np.linalg.solve(curvature + damping * np.eye(len(which)), pull)
-        if not damping and step @ pull < 2 * NEGLIGIBLE:
-            return here.values, here.rest
         step *= min(1.0, 1 / ((np.abs(step) / longest).max() + 1e-30))
         there = here.values.copy()
         there[which] += step * problem.sd[which]

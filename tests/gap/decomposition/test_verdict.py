@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bns.gap.decomposition import fit
+from bns.gap.decomposition import fit, sizes
 from bns.gap.decomposition.decomposition import Decomposition
 from bns.gap.decomposition.row import Row
 
