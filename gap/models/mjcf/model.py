@@ -143,7 +143,7 @@ class OwnModel(GapModel):
             trials,
             self.dt,
             self._bodies,
-            stepped=self._parts > 1,
+            stepped=self._parts > 1 or self._touches,
             forces=loads.forces,
             ends=self._ends(trials, loads.travel),
         )
@@ -323,7 +323,7 @@ class OwnModel(GapModel):
         pairs: list[tuple[Trial, tuple[Effect, ...]]] = [
             (trial, ()) for trial in trials
         ]
-        fine = self.physics.predicted(pairs, self._parts)
+        fine = self.physics.predicted(pairs, max(self._parts, 2))
         for one, other in zip(fine, self.physics.predicted(pairs), strict=True):
             yield np.nan_to_num(one - other)
 

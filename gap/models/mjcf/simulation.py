@@ -36,6 +36,7 @@ FINEST, CUT = 0.0025, 4  # [s] longer steps are cut, shorter ones in so many par
 PACES = (1 / 8, 1 / 4, 1 / 2)  # of a step into parts: so many steps in one
 EXACT = 0.2  # of the noise: predictions that differ by less are alike
 BY_GEOMS = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+CHATTER = 0.8  # times what a step half as fine changed: it should be half
 TRIED = 4  # trials on which steps are compared, and forces and contacts looked at
 LOOKED = 500  # moments of a trial at which these are looked at
 
@@ -156,16 +157,22 @@ class Simulation:
 
     def needed(self, trials: Sequence[Trial]) -> int:
         """Into how many parts a step has to be cut for the nominal motion of trials: as
-        many as it takes until twice as many change next to nothing."""
+        many as it takes until twice as many change next to nothing; one, where these
+        change as much as half of them did: what wheels on their rims do is no nearer to
+        any robot by finer steps."""
         noise = np.array([item.noise for item in self.config.seen])
         few = [(trial, ()) for trial in self.some(trials)]
-        parts, made = 1, self.predicted(few)
+        parts, made, before = 1, self.predicted(few), np.inf
         while parts < self.finest:
             finer = self.predicted(few, min(2 * parts, self.finest))
-            apart = [np.abs(a - b) for a, b in zip(made, finer, strict=True)]
-            if (np.concatenate(apart) < EXACT * noise).all():
+            pairs = zip(made, finer, strict=True)
+            apart = np.concatenate([np.abs(a - b) for a, b in pairs]) / noise
+            size = float(np.sqrt(np.nanmean(apart**2)))
+            if size > CHATTER * before:
+                return 1
+            if (apart < EXACT).all():
                 break
-            parts, made = min(2 * parts, self.finest), finer
+            parts, made, before = min(2 * parts, self.finest), finer, size
         return parts
 
     def loads(self, trials: Sequence[Trial]) -> Loads:

@@ -104,3 +104,21 @@ def test_slopes_are_taken_by_a_longer_step_where_that_changes_none(roller):
     change = own[1:] - own[:1]
     assert longer[1:] - longer[:1] == pytest.approx(change, abs=2e-3)
     assert longer[2] - longer[0] == pytest.approx(change[1], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("off", "parts"),
+    [
+        (lambda cut: 0.0, 1),
+        (lambda cut: 0.01 / cut, 4),  # nearer and nearer
+        (lambda cut: 0.01 * np.random.default_rng(cut).normal(size=(9, 2)), 1),
+    ],
+)
+def test_steps_are_cut_as_long_as_finer_ones_come_nearer(
+    roller, monkeypatch, off, parts
+):
+    def predicted(pairs, cut=1):
+        return [np.zeros((9, 2)) + off(cut) for _ in pairs]
+
+    monkeypatch.setattr(roller.physics, "predicted", predicted)
+    assert roller.physics.needed([None]) == parts
