@@ -82,10 +82,7 @@ PLAUSIBLE = {
     "log_clock": (0.01, 0.003),
     "marker_mount": (0.01, 2e-4),
 }
-SLIPPERY = (
-    0.15,
-    0.4,
-)  # of a grip: of what rolls no slope tells that it slides with less
+SLIPPERY = (0.15, 0.4)  # of a grip: no slope tells that what rolls slides with less
 SHARE = 0.02  # slack of a number over its plausible departure
 SIZES = ("command_dead_zone", "command_play")  # of which everything has a little
 

@@ -147,7 +147,7 @@ class CommandPlay(_Command):
     """Play between what is told and what arrives: a horn, a rod, a cable in its sheath.
 
     What arrives stays until the command has gone through the play, and then follows it
-    at half of that behind (the play operator; Brokate and Sprekels 1996, section 2.2).
+    at half of that behind (the play operator of hysteresis).
     """
 
     name = "command_play"

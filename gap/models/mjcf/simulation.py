@@ -167,7 +167,7 @@ class Simulation:
             finer = self.predicted(few, min(2 * parts, self.finest))
             pairs = zip(made, finer, strict=True)
             apart = np.concatenate([np.abs(a - b) for a, b in pairs]) / noise
-            size = float(np.sqrt(np.nanmean(apart**2)))
+            size = float(np.sqrt((np.nan_to_num(apart, nan=np.inf) ** 2).mean()))
             if size > CHATTER * before:
                 return 1
             if (apart < EXACT).all():
