@@ -16,6 +16,7 @@ from bns.gap.candidates.mjcf_usual import usual
 from bns.gap.decomposition.row import Row
 from bns.gap.models.mjcf import effects, ties
 from bns.gap.models.mjcf.config import OwnConfig
+from bns.worlds.effects.base import SensorEffect
 from bns.worlds.effects.parts import ALL, FILTERS, WIDE
 
 DEAD = ("command_dead_band", "command_dead_zone", "command_play")  # sizes, from 0
@@ -220,27 +221,26 @@ def _range(
         return about.low, about.high, about.unit
     if kind:
         return _of_model(name, kind, part, model)
+    _channel(name, part, config)
     if name in ("command_delay", "reading_delay", "command_lag"):
-        _channel(part, config)
         return 0.0, LATE[-1], "s"
     if name == "command_fade":
-        _channel(part, config)
         return 0.0, FADED, "1"
     if name in ("command_gain", "reading_gain"):
-        _channel(part, config)
         return RATIOS[0], RATIOS[-1], "1"
     return _of_channel(name, part, config)
 
 
-def _channel(part: str, config: OwnConfig) -> None:
-    known = [item.channel.name for item in config.told]
-    known += [item.channel.name for item in config.seen]
+def _channel(name: str, part: str, config: OwnConfig) -> None:
+    """Refuse a channel that an effect on commands, or on readings, cannot be on."""
+    reads = issubclass(effects.CLASSES[name], SensorEffect)
+    known = [item.channel.name for item in (config.seen if reads else config.told)]
     if part != ALL and part not in known:
-        raise UnknownNameError("channel in [effects]", part, known)
+        kind = "observed channel" if reads else "command channel"
+        raise UnknownNameError(f"{kind} in [effects] {name}", part, known)
 
 
 def _of_channel(name: str, part: str, config: OwnConfig) -> tuple[float, float, str]:
-    _channel(part, config)
     told = {item.channel.name: item for item in config.told}
     seen = {item.channel.name: item for item in config.seen}
     if part in told:

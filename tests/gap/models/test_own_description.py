@@ -196,7 +196,13 @@ def test_commands_between_steps_of_the_model_begin_when_they_were_told(arm, tmp_
 
 
 @pytest.mark.parametrize(
-    ("effect", "part"), [("tendon_arm", "cord/elbow"), ("coupling_ratio", "elbow")]
+    ("effect", "part"),
+    [
+        ("tendon_arm", "cord/elbow"),
+        ("coupling_ratio", "elbow"),
+        ("command_play", "elbow"),  # which is observed
+        ("reading_gain", "elbow_goal"),  # which is told
+    ],
 )
 def test_effects_on_parts_that_the_model_lacks_are_refused_at_once(effect, part):
     config = replace(OwnConfig.read(ARM), effects={effect: (part,)}, bounds={})
