@@ -122,7 +122,7 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
         **_surfaces(model, joints=(*moved, *pushed)),
     }
     springs = [joint for joint in pushed if np.any(model.jnt_stiffness[joint])]
-    sprung = {"joint_stiffness": springs}
+    free = {**dict.fromkeys(PUSHED, pushed), "joint_stiffness": springs}
     made: dict[str, tuple[str, ...]] = {}
     rarer = RARER if len(moved) <= FEW else ()
     trims = OF_COMMANDS if min(len(moved), len(told)) <= FEW else ()
@@ -130,8 +130,7 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
         kind = effects.OWNERS.get(name)
         if kind in ("joint", "body") and name not in of:
             parts = _parts(model, kind, moved)
-            free = pushed if name in PUSHED else sprung.get(name, [])
-            made[name] = parts + _parts(model, kind, free)
+            made[name] = parts + _parts(model, kind, free.get(name, []))
         else:
             made[name] = tuple(of.get(name, (ALL,)))
     return {name: parts for name, parts in made.items() if parts}

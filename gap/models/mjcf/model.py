@@ -1,6 +1,5 @@
 """Any MJCF model, with a TOML file that maps its channels, as a nominal model."""
 
-import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -64,8 +63,7 @@ class OwnModel(GapModel):
         self.config = config = self.physics.config
         model, self.dt = self.physics.model, self.physics.dt
         self._parts = self.physics.finest
-        self._pace: float = 1
-        self._fast = frozenset[str]()
+        self._pace = roughness.Pace()
         self._touches = False
         self.listed = mjcf.candidates(config, model)
         self._bodies = {
@@ -177,50 +175,52 @@ class OwnModel(GapModel):
         From then on coarse paths have the longest step of time by which nearly all rows
         change the same; the model's own is for those that change otherwise.
         """
-        self._pace, self._fast, rough = 1, frozenset(), 0.0
-        few = trials[:: max(len(trials) // FEW, 1)][:FEW]
+        few, rough = trials[:: max(len(trials) // FEW, 1)][:FEW], 0.0
         if self._touches:
             some = few if len(rows) > roughness.MOST else self.physics.some(trials)
-            changed = partial(self._changed, some)
+            changed = partial(self._changed, some, 1)
             rough = roughness.level(rows, changed)
             rows = roughness.stepped(rows, changed, rough)
-        self._pace, self._fast = roughness.of_pace(
-            rows, self.physics.paces, partial(self._at_pace, few), rough, self._off(few)
-        )
+        self._pace, paces = roughness.Pace(), self.physics.paces
+        if paces:
+            self._pace = roughness.of_pace(
+                rows,
+                paces,
+                lambda pace: partial(self._changed, few, pace),
+                rough,
+                self._off(few),
+            )
         return tuple(rows)
 
     def _off(self, trials: Sequence[Trial]) -> float:
         """Root mean square of what was recorded over the nominal motion, in units of
         the noise."""
-        (paths,) = self.paths(trials, [[{}] * len(trials)], fine=False)
-        off = []
-        for trial, path in zip(trials, paths, strict=True):
-            both = np.stack([trial.observed, path])
-            seen, made = self.compare(trial, both, self.windows(trial))
-            off.append((seen - made) / self.resolution)
-        return float(np.sqrt(np.nanmean(np.concatenate(off) ** 2)))
-
-    def _at_pace(self, trials: Sequence[Trial], pace: float) -> roughness.Changed:
-        """What values of rows change at a pace."""
-
-        def changed(sets: Sequence[Mapping[str, float]]) -> np.ndarray:
-            self._pace, self._fast = pace, frozenset()
-            return self._changed(trials, sets)
-
-        return changed
+        (paths,) = self._paths(trials, [[{}] * len(trials)], 1)
+        seen, made = self._compared(trials, [[t.observed for t in trials], paths])
+        return float(np.sqrt(np.nanmean((seen - made) ** 2)))
 
     def _changed(
-        self, trials: Sequence[Trial], sets: Sequence[Mapping[str, float]]
+        self,
+        trials: Sequence[Trial],
+        parts: float,
+        sets: Sequence[Mapping[str, float]],
     ) -> np.ndarray:
-        """What values of rows change of the nominal motion, see `roughness.Changed`."""
+        """What values of rows change of the nominal motion, see `roughness.Changed`;
+        each step of the model cut into so many parts."""
         whole = [[values] * len(trials) for values in ({}, *sets)]
-        paths = self.paths(trials, whole, fine=False)
+        base, *others = self._compared(trials, self._paths(trials, whole, parts))
+        return np.stack(others) - base
+
+    def _compared(
+        self, trials: Sequence[Trial], paths: Sequence[Sequence[np.ndarray]]
+    ) -> np.ndarray:
+        """Features of sets of paths, in units of the noise, ``(E, N, C)``."""
         seen = [
             self.compare(trial, np.stack(mine), self.windows(trial))
             for trial, mine in zip(trials, zip(*paths, strict=True), strict=True)
         ]
-        base, *others = np.concatenate(seen, axis=1)
-        return (np.stack(others) - base) / self.resolution
+        made: np.ndarray = np.concatenate(seen, axis=1) / self.resolution
+        return made
 
     def untried(self) -> tuple[str, ...]:
         """See `GapModel.untried`."""
@@ -278,20 +278,9 @@ class OwnModel(GapModel):
     ) -> list[list[np.ndarray]]:
         """See `GapModel.paths`; the coarse step is that of the model or longer, see
         `stepped`. What finer steps change is that of the nominal motion."""
-        if fine or self._pace == 1:
-            return self._paths(trials, sets, self._parts if fine else 1)
-        fast = [any(values.keys() & self._fast for values in row) for row in sets]
-        if fast[0]:
-            return self._paths(trials, sets, 1)
-        slow = itertools.compress(sets, np.logical_not(fast))
-        made = self._paths(trials, [*slow], self._pace)
-        if any(fast):
-            moved = [sets[0], *itertools.compress(sets, fast)]
-            base, *others = self._paths(trials, moved, 1)
-            for at, paths in zip(np.flatnonzero(fast), others, strict=True):
-                parts = zip(made[0], paths, base, strict=True)
-                made.insert(int(at), [here + (b - a) for here, b, a in parts])
-        return made
+        if fine:
+            return self._paths(trials, sets, self._parts)
+        return self._pace.paths(sets, partial(self._paths, trials))
 
     def _paths(
         self,

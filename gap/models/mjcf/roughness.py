@@ -11,12 +11,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import compress
+from typing import NamedTuple
 
 import numpy as np
 
 from bns.gap.decomposition import fit
 from bns.gap.decomposition.row import Row
 
+Changes = Sequence[Mapping[str, float]]
+Paths = list[np.ndarray]
+Simulated = Callable[[Sequence[Changes], float], list[Paths]]
 Changed = Callable[[Sequence[Mapping[str, float]]], np.ndarray]
 """what each set of values changes of the nominal motion, in units of the noise,
 ``(E, N, C)``; values by row"""
@@ -37,6 +41,37 @@ HELD = 0.2  # or so much of the noise of what is to be explained, if that is les
 SLIGHT = 0.1  # of the noise, by a plausible departure: the same
 TWICE = 2.0  # times the roughness: two such motions differ by as much
 SOME = 0.25  # of the rows: as many may need the model's own step of time
+
+
+class Pace(NamedTuple):
+    """By which steps of time is simulated what rows change.
+
+    Attributes:
+        parts: into which the model's step is cut; 1/4 = four in one.
+        own: names of the rows that keep the model's own step.
+    """
+
+    parts: float = 1
+    own: frozenset[str] = frozenset()
+
+    def paths(self, sets: Sequence[Changes], simulated: Simulated) -> list[Paths]:
+        """Paths of sets of changes, for differences from the first. Sets with rows that
+        keep the model's own step differ from it by what they do at that.
+
+        Args:
+            sets: of each, by trial, the values of the rows that are not nominal.
+            simulated: simulates sets, each step of the model cut into so many parts.
+        """
+        own = [any(values.keys() & self.own for values in row) for row in sets]
+        if own[0]:
+            return simulated(sets, 1)
+        made = simulated([*compress(sets, np.logical_not(own))], self.parts)
+        if any(own):
+            base, *others = simulated([sets[0], *compress(sets, own)], 1)
+            for at, paths in zip(np.flatnonzero(own), others, strict=True):
+                parts = zip(made[0], paths, base, strict=True)
+                made.insert(int(at), [here + (b - a) for here, b, a in parts])
+        return made
 
 
 def level(rows: Sequence[Row], changed: Changed) -> float:
@@ -87,9 +122,9 @@ def of_pace(
     changed: Callable[[float], Changed],
     rough: float,
     gap: float,
-) -> tuple[float, frozenset[str]]:
-    """The longest step of time by which nearly all rows change the same as by the
-    model's own, and the names of those that do not.
+) -> Pace:
+    """That of the longest step of time by which nearly all rows change the same as by
+    the model's own.
 
     Args:
         rows: of a model.
@@ -97,49 +132,37 @@ def of_pace(
         changed: simulates values of rows at a pace.
         rough: what the simulation changes itself, see `level`.
         gap: root mean square of what is to be explained, in units of the noise.
-
-    Returns:
-        a pace, 1 = the model's own, and names.
     """
-    some = rows[:: max(len(rows) // PROBED, 1)]
-    own = _derivatives(some, changed(1)) if paces else np.zeros(0)
     off = partial(_apart, rough=rough, close=min(CLOSE, HELD / max(gap, 1e-9)))
     for pace in paces:
-        if off(some, own, _derivatives(some, changed(pace))).mean() > SOME:
-            continue
-        near, far = (_derivatives(rows, changed(each)) for each in (1, pace))
-        apart = off(rows, near, far)
-        if apart.mean() <= SOME:
-            return pace, frozenset(row.name for row in compress(rows, apart))
-    return 1, frozenset()
+        for looked_at in (rows[:: max(len(rows) // PROBED, 1)], rows):
+            near, far = (_derivatives(looked_at, changed(each)) for each in (1, pace))
+            apart = off(looked_at, near, far)
+            if apart.mean() > SOME:
+                break
+        else:
+            return Pace(pace, frozenset(row.name for row in compress(rows, apart)))
+    return Pace()
 
 
 def _derivatives(rows: Sequence[Row], changed: Changed) -> np.ndarray:
     """What a plausible departure of each row changes, in proportion to what its step
-    does, or a level in the middle where it has no slope, ``(E, N, C)``."""
-    steps = [row.inward(row.nominal, row.difference) for row in rows]
-    middle = [row.levels[len(row.levels) // 2] if row.levels else 0.0 for row in rows]
-    sets = [
-        {row.name: row.nominal + step if _sloped(row) else level}
-        for row, step, level in zip(rows, steps, middle, strict=True)
-    ]
-    made: np.ndarray = changed(sets) * _scale(rows)[:, None, None]
-    return made
+    does, or a level where it has no slope, ``(E, N, C)``."""
+    made: np.ndarray = changed([{row.name: _probe(row)[0]} for row in rows])
+    return made * _scales(rows)[:, None, None]
 
 
-def _sloped(row: Row) -> bool:
-    return row.smooth or not row.levels
+def _probe(row: Row) -> tuple[float, float]:
+    """The value at which a row is looked at, and plausible departures over the step to
+    it: a level in the middle, and 1, where it has no slope."""
+    if row.levels and not row.smooth:
+        return row.levels[len(row.levels) // 2], 1.0
+    step = row.inward(row.nominal, row.difference)
+    return row.nominal + step, row.sd / abs(step) if step else 1.0
 
 
-def _scale(rows: Sequence[Row]) -> np.ndarray:
-    """Plausible departures over steps, ``(E,)``; 1 of what has no slope."""
-    steps = [abs(row.inward(row.nominal, row.difference)) for row in rows]
-    return np.array(
-        [
-            row.sd / step if _sloped(row) and step else 1.0
-            for row, step in zip(rows, steps, strict=True)
-        ]
-    )
+def _scales(rows: Sequence[Row]) -> np.ndarray:
+    return np.array([_probe(row)[1] for row in rows])
 
 
 def _apart(
@@ -148,7 +171,7 @@ def _apart(
     """Which rows, ``(E,)``, a longer step of time changes what they do, beyond what a
     simulation changes itself; NaN where one diverged."""
     lost = (np.isfinite(near) & ~np.isfinite(far)).any(axis=(1, 2))
-    most = SLIGHT + close * _sizes(near) + TWICE * rough * _scale(rows)
+    most = SLIGHT + close * _sizes(near) + TWICE * rough * _scales(rows)
     found: np.ndarray = lost | (_sizes(far - near) > most)
     return found
 
