@@ -40,6 +40,7 @@ MOST = {
     "stribeck": 5.0,
     "armature": 1.0,
     "stiffness": 20.0,
+    "bumper": 2000.0,
 }
 """largest number of a joint or tendon over the inertia that it moves, SI; assumed"""
 SLACK = 0.02  # [m] of a tendon at most
@@ -90,6 +91,7 @@ EXCITE = {
     "marker_mount": "turns on the spot",
     "joint_stribeck": "slow motion and reversals of that joint",
     "joint_stop": "motion to where a stop may be",
+    "joint_bumper": "motion to where a spring may begin",
     "joint_backlash": "reversals of that joint under changing load",
     "output_backlash": "reversals of that joint under changing load",
     "encoder_offset": "motion against gravity, or between stops",
@@ -116,7 +118,7 @@ _DELAYS = {
 """alike where every command and every reading is late"""
 WHOLE = ("actuator_period", "gravity_compensation")
 """effects on actuators and bodies that may be on all of them"""
-UNSIGNED = ("joint_backlash", "output_backlash", "joint_stop")
+UNSIGNED = ("joint_backlash", "output_backlash", "joint_stop", "joint_bumper")
 """effects on joints that are no number added to the model's"""
 
 
@@ -313,6 +315,7 @@ def _of_joint(name: str, joint: int, model: mujoco.MjModel) -> tuple[float, floa
         "stribeck": (0.0, "N m"),
         "armature": (model.dof_armature[dof], "kg m2"),
         "stiffness": (model.jnt_stiffness[joint], "N m/rad"),
+        "bumper": (0.0, "N m/rad"),
     }[number]
     if slide:
         unit = {"N m s/rad": "N s/m", "N m": "N", "kg m2": "kg"}.get(unit, "N/m")

@@ -6,8 +6,9 @@ from functools import partial
 
 import numpy as np
 
+from bns.gap.candidates import mjcf_ends
 from bns.gap.candidates.mjcf import EXCITE
-from bns.gap.candidates.mjcf_usual import TOUCHING
+from bns.gap.candidates.mjcf_usual import ENDING, TOUCHING
 from bns.gap.decomposition.row import Row
 from bns.gap.models.mjcf import masses
 from bns.gap.models.mjcf.config import OwnConfig
@@ -41,9 +42,6 @@ LATER = 0.01  # [s] for derivatives: a lag has next to none where there is none
 CUT = (0.15, 0.3, 0.5, 0.7, 0.9)  # of what was told at most: levels of a limit of it
 TAKEN = (0.4, 0.6, 0.75, 0.88, 0.95, 0.99)  # quantiles of forces, for their limits
 PEAKS = (0.8, 0.88, 0.95)  # of the largest force: what cuts short peaks alone
-STOPPED = 0.995  # quantile of a joint's positions at which a stop may be
-BESIDE = (0.0, 0.02, -0.02)  # of its travel, beside which one is tried
-SOONER = 0.2  # of its travel, by which a stop may be sooner; later by a quarter of it
 MORE, FULL = (1.25, 1.6), 0.98  # limits that are tried where the model's own is reached
 TOLD = (0.05, 0.12, 0.2, 0.3, 0.4, 0.55)  # quantiles of what was told, for dead zones
 FADING = 3  # trials from which one sees that less is done in each
@@ -120,8 +118,8 @@ def rows(
             made += masses.rows(item, body, EXCITE[item.effect])
         elif item.later:
             made.append(item)
-        elif item.effect == "joint_stop":
-            made += _stop(item, (ends or {}).get(item.fixed["part"]))
+        elif item.effect in ENDING:
+            made += mjcf_ends.rows(item, (ends or {}).get(item.fixed["part"]))
         else:
             made += _of(item, trials, forces or {})
     edge = max(0.02, late)
@@ -258,6 +256,7 @@ def _of(
         high=item.high,
         unit=item.unit,
         excite=excite,
+        fixed=item.fixed,
         joins=item.joins,
     )
     third = (item.high - item.low) / 3
@@ -293,32 +292,6 @@ def _of(
         levels=(0.15, 0.3) if late else SLIPPERY if sliding else (),
         step=step,  # of a small one contacts show their chatter
         per_trial=item.effect == "command_fade",
-    )
-
-
-def _stop(item: Row, ends: np.ndarray | None) -> Iterable[Row]:
-    """A stop where the recorded motion ends before the nominal one does.
-
-    Args:
-        item: the candidate.
-        ends: of its joint, see `rows`; None = it ends nowhere sooner.
-    """
-    way, place = (1.0, 1) if item.parameter == "high" else (-1.0, 0)
-    if ends is None or way * (ends[1, place] - ends[0, place]) <= 0:
-        return
-    travel = float(np.ptp(ends[1]))
-    at, free = float(ends[0, place]), float(ends[1, place]) + way * SOONER * travel / 4
-    sooner = at - way * SOONER * travel
-    yield Row(
-        item.name,
-        free,
-        travel / 3,
-        min(free, sooner),
-        max(free, sooner),
-        unit=item.unit,
-        smooth=False,
-        levels=tuple(at + share * travel for share in BESIDE),
-        excite=EXCITE[item.effect],
     )
 
 

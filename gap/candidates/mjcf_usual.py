@@ -17,6 +17,7 @@ USUAL = (
     "joint_armature",
     "joint_stiffness",
     "joint_stop",
+    "joint_bumper",
     "tendon_damping",
     "tendon_friction",
     "tendon_stiffness",
@@ -55,11 +56,11 @@ gains the description gives, a limit of force of these and of servos of speed,
 `actuator_gain` and `command_limit` of all but position servos, `command_fade` of these
 (of all at once where there are no others, else of each of few), the tilt of what is
 bolted to the world, `gravity_compensation` and a fluid's numbers where the model has
-some; `joint_stop` of joints that are seen; `reading_delay` of each reading where there
-are few, else of places, by a camera, beside joints, by encoders; the radius of wheels
-and feet, and grip and softness of all that touch, where they touch something, the grip
-of each wheel or foot where there are few; where the marker sits of what is followed by
-x, y and yaw"""
+some; `joint_stop` and `joint_bumper` of joints that are seen; `reading_delay` of each
+reading where there are few, else of places, by a camera, beside joints, by encoders;
+the radius of wheels and feet, and grip and softness of all that touch, where they touch
+something, the grip of each wheel or foot where there are few; where the marker sits of
+what is followed by x, y and yaw"""
 TENDONS = ("tendon_damping", "tendon_friction", "tendon_stiffness")
 """on every tendon; `tendon_slack` where it has a spring, `tendon_arm` about each joint
 of one that pulls several"""
@@ -79,6 +80,8 @@ OF_COMMANDS = ("command_dead_zone", "command_offset", "command_play", "command_g
 """the same of a model of few joints or few commands, as a car has on many joints: a
 dead zone of the commands to all but position servos, a trim of the commands to these
 and play in them, a scale of those to servos of speed"""
+ENDING = ("joint_stop", "joint_bumper")
+"""what ends a joint's motion sooner"""
 LATE = ("command_delay", "command_lag")
 """of each command where there are few, and of all"""
 TOUCHING = ("geom_radius", "geom_friction", "geom_compliance")
@@ -102,9 +105,10 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
     tendons = tuple(
         name for n in range(model.ntendon) if (name := model.tendon(n).name)
     )
+    jointed = [item.part for item in config.seen if item.quantity == "joint"]
     of = {
         **_on_actuators(config, model),
-        "joint_stop": [item.part for item in config.seen if item.quantity == "joint"],
+        **dict.fromkeys(ENDING, jointed),
         **dict.fromkeys(LATE, channels if 1 < len(channels) <= FEW else (ALL,)),
         "reading_delay": seen if 1 < len(seen) <= FEW else _by_camera(config),
         "reading_gain": seen,

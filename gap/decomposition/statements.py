@@ -113,10 +113,12 @@ def _beside(problem: Problem, part: Part) -> list[str]:
     known = [
         about for about in effect.parameters if effect[about.name] != about.nominal
     ]
-    return [
-        f"{about.name} {effect[about.name]:.4g} {about.unit}".removesuffix(" 1")
-        for about in known[1:]
-    ]
+    units = {row.name: row.unit for row in problem.rows}
+    made = []
+    for about in known[1:]:
+        unit = units.get(f"{part.name}.{about.name}", about.unit)
+        made.append(f"{about.name} {effect[about.name]:.4g} {unit}".removesuffix(" 1"))
+    return made
 
 
 def magnitude(problem: Problem, part: Sized) -> tuple[float, tuple[float, float], str]:

@@ -38,10 +38,8 @@ class PartNumber(BodyEffect):
 
     def _write(self, spec: Any) -> None:
         for item in self._held(spec):
-            value = np.array(getattr(item, self.field), dtype=float)
-            flat = value.reshape(-1)
-            flat[0] = max(flat[0] + self["added"], 0.0)
-            setattr(item, self.field, value if value.ndim else float(value))
+            now = float(np.ravel(getattr(item, self.field))[0])
+            parts.put(item, self.field, max(now + self["added"], 0.0))
 
 
 class _JointNumber(PartNumber):
@@ -172,6 +170,43 @@ class JointStop(BodyEffect):
             if int(joint.limited) and joint.range[0] != joint.range[1]:
                 low, high = max(low, joint.range[0]), min(high, joint.range[1])
             joint.range, joint.limited = (low, max(high, low + NARROW)), True
+
+
+def _pushed(side: str, example: float) -> Parameter:
+    """Stiffness of a spring that is met on one side of a position."""
+    doc = f"stiffness of a spring that is met {side} a position"
+    return strength(side, "N m/rad or N/m", (0.0, WIDE), doc, example=example)
+
+
+def _from(end: str, side: str) -> Parameter:
+    """The position from which such a spring pushes back."""
+    return place(end, "rad or m", 0.0, (-WIDE, WIDE), f"{side} which it is met")
+
+
+class JointBumper(BodyEffect):
+    """A spring pushes a joint back from a position on: a bumper, a cable, a hose."""
+
+    name = "joint_bumper"
+    source = "MuJoCo's tendon springs, slack within a range (springlength)"
+    robots = ("own",)
+    choices = parts.part("joint")
+    resizes = True
+    parameters = (
+        _pushed("below", 40.0),
+        _from("low", "below"),
+        _pushed("above", 40.0),
+        _from("high", "above"),
+    )
+
+    def _write(self, spec: Any) -> None:
+        for joint in parts.joints(spec, self["part"]):
+            low, high = (self["low"], WIDE), (-WIDE, self["high"])
+            for side, slack in (("below", low), ("above", high)):
+                if self[side]:
+                    spring = spec.add_tendon(name=f"{joint.name}_{side}")
+                    spring.wrap_joint(joint.name, 1.0)
+                    spring.springlength = slack
+                    parts.put(spring, "stiffness", self[side])
 
 
 class EncoderOffset(BodyEffect):

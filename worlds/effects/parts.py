@@ -156,6 +156,19 @@ def _of(some: list[Any], which: str, kind: str) -> list[Any]:
     return [some[at] for at in among([item.name for item in some], which, kind)]
 
 
+def put(item: Any, field: str, value: float) -> None:
+    """Set a number of a part of an `MjSpec`, of a polynomial's the first.
+
+    Args:
+        item: the part, a joint or a tendon.
+        field: what an `MjSpec` calls the number.
+        value: of the number, in the units of the model's file.
+    """
+    whole = np.array(getattr(item, field), dtype=float)
+    whole.reshape(-1)[0] = value
+    setattr(item, field, whole if whole.ndim else value)
+
+
 def in_file(spec: Any, joint: Any, value: float) -> float:
     """A position of a joint [rad or m] in the units of the model's file.
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bns.gap.candidates import mjcf, mjcf_rows, mjcf_usual
+from bns.gap.candidates import mjcf, mjcf_ends, mjcf_rows, mjcf_usual
+from bns.gap.candidates.mjcf_ends import BUMPER
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, Windows
 from bns.gap.models.mjcf import cuts, log, masses, roughness, start
@@ -89,6 +90,7 @@ class OwnModel(GapModel):
         items = (*centres, *self.listed, *further)  # a centre may be listed
         self._terms = {item.name: item for item in items}
         self._tried = {item.effect for item in self._terms.values()}
+        self._springs: dict[str, Row] = {}
 
     @classmethod
     def read(cls, path: str | Path, *, threads: int = 2) -> "OwnModel":
@@ -136,7 +138,7 @@ class OwnModel(GapModel):
             items = mjcf_rows.touching(items, loads.touching)
         self._tried = {item.effect for item in items}
         self._touches = bool(loads.touching)
-        return mjcf_rows.rows(
+        made = mjcf_rows.rows(
             items,
             trials,
             self.dt,
@@ -145,6 +147,8 @@ class OwnModel(GapModel):
             forces=loads.forces,
             ends=self._ends(trials, loads.travel),
         )
+        self._springs = {row.name: row for row in made if row.effect == BUMPER}
+        return made
 
     def _ends(
         self, trials: Sequence[Trial], travel: Mapping[str, np.ndarray]
@@ -159,7 +163,7 @@ class OwnModel(GapModel):
         for column, item in enumerate(self.config.seen):
             if item.quantity == "joint":
                 went = np.concatenate([trial.observed[:, column] for trial in trials])
-                share = 1.0 - mjcf_rows.STOPPED
+                share = 1.0 - mjcf_ends.STOPPED
                 ends = np.nanquantile(went, (share, 1.0 - share))
                 free = travel.get(item.part, ends)
                 out = np.array([ends[0] - free[0], free[1] - ends[1]])
@@ -245,6 +249,8 @@ class OwnModel(GapModel):
         if item.effect == "body_mass":
             part = item.fixed["part"]
             return masses.added(term, values, part, self._bodies[part])
+        if item.effect == BUMPER:
+            return mjcf_ends.spring(self._springs[term], values)
         return item.make(values[term])
 
     def covered(self, term: str, values: Mapping[str, float]) -> Mapping[str, float]:
@@ -255,16 +261,19 @@ class OwnModel(GapModel):
     def _changes(self, values: Mapping[str, float]) -> tuple[Effect, ...]:
         """The effects that rows which are not nominal are simulated by."""
         made: list[Effect] = []
-        loads: dict[str, dict[str, float]] = {}
+        several: dict[str, dict[str, float]] = {}
         for name, value in values.items():
             whole = name if name in self._terms else name.rpartition(".")[0]
             item = self._terms.get(whole)
-            if item and item.effect == "body_mass":
-                loads.setdefault(item.name, {})[name] = value
+            if item and item.effect in ("body_mass", BUMPER):
+                several.setdefault(item.name, {})[name] = value
             elif item:
                 grown = item.make(value).in_trial(1)  # what grows comes as it has
                 made.append(grown)
-        for name, rows in loads.items():
+        for name, rows in several.items():
+            if name in self._springs:
+                made.append(mjcf_ends.spring(self._springs[name], rows))
+                continue
             part = self._terms[name].fixed["part"]
             made += masses.changes(name, rows, part, self._bodies[part])
         return tuple(made)

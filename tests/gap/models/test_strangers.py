@@ -226,6 +226,26 @@ def test_a_stop_that_the_model_does_not_know_is_found_where_it_is(tmp_path):
     )
 
 
+@pytest.mark.parametrize("stiffness", [40.0, 1000.0])
+def test_a_spring_that_is_met_on_the_way_is_found_with_where_it_begins(
+    stiffness, tmp_path
+):
+    spring = f"""<tendon><fixed name="cable" stiffness="{stiffness}"
+        springlength="-10 0.08"><joint joint="rail" coef="1"/></fixed></tendon>"""
+    nominal = "</worldbody>"
+    model = mujoco.MjModel.from_xml_string(LIFT.replace(nominal, nominal + spring))
+    model.opt.timestep = 0.0005
+    logged(tmp_path, model, span=0.3, commands=4, samples=40, noise=0.001)
+    _, own = described(tmp_path, LIFT, tmp_path / "log.csv")
+    found = diagnose(own.read_log(str(tmp_path / "log.csv")), own, full=False)
+    assert list(found.best.names) == ["joint_bumper.above[rail]"]
+    assert found.best.magnitudes[0] == pytest.approx(stiffness, rel=0.02)
+    assert "N/m [" in found.verdict.sentence
+    assert ", high 0.08" in found.verdict.sentence
+    (effect,) = map(own.parse, found.best.effects)
+    assert effect["high"] == pytest.approx(0.08, abs=0.001)
+
+
 def test_a_limit_that_cuts_the_highest_peaks_alone_is_found(tmp_path):
     servo = '<position name="drive" joint="rail" kp="120" kv="12"'
     nominal = LIFT.replace(servo, f'{servo} forcerange="-200 200"')

@@ -395,3 +395,18 @@ def test_a_stop_is_met_beside_those_that_the_model_has(limits, ends):
     model = built("joint_stop:part=knee,high=0.3", xml=xml)
     assert model.jnt_limited[0]
     assert tuple(model.jnt_range[0]) == pytest.approx(ends)
+
+
+@pytest.mark.parametrize(
+    ("effect", "forces"),
+    [("above=40,high=0.3", (0.0, 0.0, -4.0)), ("below=20,low=0.1", (4.0, 0.0, 0.0))],
+)
+def test_a_bumper_pushes_back_beyond_where_it_begins(effect, forces):
+    model = built(f"joint_bumper:part=elbow,{effect}", gravity=False)
+    data = mujoco.MjData(model)
+    for angle, force in zip((-0.1, 0.2, 0.4), forces, strict=True):
+        data.joint("elbow").qpos = angle
+        mujoco.mj_forward(model, data)
+        assert data.qfrc_spring[model.joint("elbow").dofadr[0]] == pytest.approx(
+            force, abs=0.01
+        )
