@@ -52,19 +52,6 @@ class GearRipple(CommandEffect):
         return values
 
 
-class ReverseGain(CommandEffect):
-    """The right wheel is weak in reverse only."""
-
-    name = "bench_reverse_gain"
-    doc = "a wheel is slow in reverse only"
-    parameters = (_strength(0.0, 0.0, 1.0),)
-
-    def apply(self, signal, active, rng):
-        values = signal.values.copy()
-        values[:, 1] *= np.where(values[:, 1] < 0, 1 - self["strength"], 1.0)
-        return values
-
-
 class CrossTalk(CommandEffect):
     """Each wheel gets a share of the other's command."""
 
@@ -139,8 +126,6 @@ def off_library() -> list:
     return [
         GearRipple({"strength": 0.15}),
         GearRipple({"strength": 0.4}),
-        ReverseGain({"strength": 0.1}),
-        ReverseGain({"strength": 0.3}),
         CrossTalk({"strength": 0.05}),
         CrossTalk({"strength": 0.15}),
         Quadratic({"strength": 0.1}),

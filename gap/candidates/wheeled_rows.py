@@ -11,6 +11,7 @@ from bns.gap.recordings import trial_conditions
 from bns.worlds.effects import registry
 from bns.worlds.effects.command import DIRECTION, TOP_SPEED
 from bns.worlds.effects.parameter import Parameter
+from bns.worlds.effects.surfaces import SLIDING
 from bns.worlds.effects.wheels import CONE
 from bns.worlds.trial import Trial
 
@@ -20,6 +21,8 @@ LEAD = "step_lead"
 """shift of the simulation in time that no effect is: its own steps lead or lag"""
 REASON = 4.0  # standard deviations by which a nuisance may be off: beyond is an effect
 BANDS = 10  # widths of a dead band that are tried
+GRIPS = (0.02, 0.03, 0.045, 0.065, 0.09, 0.13, 0.2, 0.35)
+"""friction over the model's, tried: between two of them a torque limit may do better"""
 DRAGS = (0.007, 0.02, 0.06, 0.2, 0.6)  # friction coefficients of a caster, tried
 STUCK = (0.02, 0.06, 0.2, 0.5, 1.0)  # how far a wheel may be stuck, tried
 
@@ -32,6 +35,7 @@ EXCITE = {
     "floor_friction": "large, sudden changes of speed",
     "payload": "large, sudden changes of speed",
     "centre_of_mass": "fast arcs and sudden changes of speed",
+    "reverse_gain": "drives backwards",
     "motor_lag": "steps in speed",
     "command_latency": "steps in speed",
     "tracker_latency": "steps in speed",
@@ -43,6 +47,7 @@ EXCITE = {
 # centre of mass, 0.2 mm and 1 mrad of a marker (all assumed).
 _SMOOTH: tuple[tuple[str, float, float, float, bool, dict[str, Any]], ...] = (
     ("wheel_gain", 0.06, 0, 2, True, {"slack": 0.003, "levels": (0.0, 0.5, 0.85)}),
+    ("reverse_gain", 0.06, 0, 2, True, {"slack": 0.003}),
     ("wheel_diameter", 0.04, 0.7, 1.3, True, {"levels": (0.93, 0.96, 1.04, 1.07)}),
     ("axle_length", 0.04, 0.7, 1.3, False, {"slack": 0.004}),
     ("motor_lag", 0.06, 0, 2, True, {"levels": (0.1, 0.25, 0.6), "step": 0.01}),
@@ -143,10 +148,11 @@ def rows(trials: Sequence[Trial]) -> tuple[Row, ...]:
         for cone in CONE.options
     ]  # fmt: skip
     made = [_joining(row) if row.name.endswith("[both]") else row for row in made]
-    made.append(
-        Row("floor_friction", 1.0, 0.3, 0.01, 3.0, smooth=False,
-            levels=(0.02, 0.05, 0.1, 0.25), excite=EXCITE["floor_friction"])
-    )  # fmt: skip
+    made += [
+        Row(f"floor_friction@{cone}", 1.0, 0.3, 0.01, 3.0, smooth=False, levels=GRIPS,
+            group="floor_friction", excite=EXCITE["floor_friction"])
+        for cone in SLIDING.options
+    ]  # fmt: skip
     return tuple(made)
 
 

@@ -143,6 +143,19 @@ class WheelGain(_EachCommand):
         return told * self["factor"]
 
 
+class ReverseGain(_EachCommand):
+    """A wheel turns at another share of what it is told backwards than forwards."""
+
+    name = "reverse_gain"
+    source = "drives and brushes that are set for one direction; bounds assumed"
+    parameter = factor(
+        (0.0, 2.0), "speed reached backwards over speed told", example=0.8
+    )
+
+    def _turned(self, told: np.ndarray) -> np.ndarray:
+        return np.where(told < 0.0, told * self["factor"], told)
+
+
 class DeadBand(_EachCommand):
     """Speeds below a magnitude give a stop."""
 

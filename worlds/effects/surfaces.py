@@ -7,7 +7,7 @@ import numpy as np
 
 from bns.errors import BnsError
 from bns.worlds.effects import parts
-from bns.worlds.effects.base import BodyEffect, factor, strength
+from bns.worlds.effects.base import BodyEffect, Choice, factor, strength
 from bns.worlds.effects.mass import Inertial
 from bns.worlds.effects.parts import ANY, WIDE
 
@@ -98,17 +98,43 @@ class GeomCompliance(BodyEffect):
             _soften(geom, self["factor"])
 
 
+SLIDING = Choice(
+    "cone",
+    ("model", "elliptic"),
+    "model",
+    "friction as the model's contacts have it, or alike in all directions",
+    quiet=True,
+)
+
+
+def set_cone(spec: Any, which: str) -> None:
+    """Set which friction contacts have.
+
+    Args:
+        spec: the `mujoco.MjSpec`.
+        which: "elliptic" = alike in all directions, "pyramidal" = MuJoCo's pyramid of
+            four sides; else as the model has it.
+    """
+    if which == "elliptic":
+        spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    elif which == "pyramidal":
+        spec.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
+
+
 class FloorFriction(BodyEffect):
     """The robot grips the floor more or less than in the model.
 
     A contact takes the friction of the geom with the higher priority or, where they are
     equal, the larger of the two: so the robot's and the floor's are both scaled. The
-    casters have a priority and a friction of their own and keep them.
+    casters have a priority and a friction of their own and keep them. A pyramid of four
+    sides, which does for wheels that roll, holds those that slide by a third more or
+    less, depending on how the robot stands in the world; a floor does not.
     """
 
     name = "floor_friction"
     source = "contact rule: MuJoCo documentation, Computation, Contact; bounds assumed"
     robots = ("wheeled", "legged")
+    choices = (SLIDING,)
     parameter = factor(
         (0.01, 3.0),
         "true friction coefficient over the model's; bounds assumed",
@@ -119,6 +145,7 @@ class FloorFriction(BodyEffect):
         for body in (*parts.grounded(spec), spec.worldbody):
             for geom in parts.contact_geoms(body):
                 geom.friction[0] *= self["factor"]
+        set_cone(spec, self["cone"])
 
 
 class FloorSlope(BodyEffect):

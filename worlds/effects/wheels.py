@@ -15,6 +15,7 @@ from bns.worlds.effects.base import (
     strength,
 )
 from bns.worlds.effects.command import WHEEL, Fading, columns, lagged, spans
+from bns.worlds.effects.surfaces import set_cone
 
 
 class AxleLength(BodyEffect):
@@ -210,8 +211,6 @@ class CasterDrag(BodyEffect):
         Raises:
             BnsError: the robot rests on its wheels alone.
         """
-        import mujoco
-
         base = parts.base(spec)
         casters = list(parts.contact_geoms(base))
         if not casters:
@@ -219,9 +218,7 @@ class CasterDrag(BodyEffect):
         for geom in casters:
             geom.condim = max(geom.condim, 3)  # 1 has no friction
             geom.friction[0] += self["friction"]
-        cones = mujoco.mjtCone
-        round_ = self["cone"] == "elliptic"
-        spec.option.cone = cones.mjCONE_ELLIPTIC if round_ else cones.mjCONE_PYRAMIDAL
+        set_cone(spec, self["cone"])
 
 
 class MotorLag(ActuatorEffect):

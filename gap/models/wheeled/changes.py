@@ -20,6 +20,7 @@ ORDER = (
     "wheel_stuck_max",
     "wheel_stuck_min",
     "wheel_gain",
+    "reverse_gain",
     "dead_band",
     "dead_zone",
     "speed_saturation",
@@ -120,7 +121,8 @@ def effect(name: str, values: Mapping[str, float]) -> Effect:
         return registry.make(stem, **given, **{size: length, way: np.arctan2(y, x)})
     if stem == "payload":
         return carried(values)
-    moved = [item for item in values.items() if item[1]] or [*values.items()]
+    every = [*values.items()]
+    moved = [item for item in every if item[1] != parameter(item[0]).nominal] or every
     for row, value in moved if stem in STICKS.values() else moved[:1]:
         if "@" in row:
             way = row.partition("@")[2]

@@ -88,3 +88,21 @@ def test_a_dragging_caster_is_named_whatever_the_law_of_its_friction(model, cone
     assert found.verdict.named == (("caster_drag",),)
     assert found.best.magnitudes[0] == pytest.approx(0.2, rel=0.03)
     assert f"cone={cone}" in found.best.effects[0]
+
+
+@pytest.mark.parametrize("cone", ["elliptic", "model"])
+def test_a_slippery_floor_is_no_weak_motor(model, cone):
+    trials = driven(f"floor_friction:factor=0.06,cone={cone}")
+    names = ("floor_friction", "torque_limit[both]", "wheel_diameter[left]")
+    found = diagnose(trials, model, rows=names, full=False)
+    assert found.verdict.named == (("floor_friction",),)
+    assert found.best.magnitudes[0] == pytest.approx(0.06, rel=0.05)
+    assert ("cone=elliptic" in found.best.effects[0]) == (cone == "elliptic")
+
+
+def test_a_wheel_that_is_slow_backwards_is_no_stuck_one(model):
+    trials = driven("reverse_gain:wheel=both,factor=0.9")
+    names = (*STUCK, "reverse_gain[both]", "reverse_gain[left]", "reverse_gain[right]")
+    found = diagnose(trials, model, rows=names, full=False)
+    assert found.verdict.named == (("reverse_gain[both]",),)
+    assert found.best.magnitudes[0] == pytest.approx(0.9, abs=0.01)

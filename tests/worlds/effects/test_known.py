@@ -101,6 +101,12 @@ class TestCommands:
         cut = apply("speed_saturation:limit=0.05", told)[:, 0]
         assert cut.tolist() == [0.01, -0.01, 0.05, -0.05, 0.05, -0.05]
 
+    def test_a_reverse_gain_is_of_speeds_backwards_alone(self):
+        told = control([0.1, -0.1, 0.0])
+        both = apply("reverse_gain:wheel=right,factor=0.8", told)
+        assert both[:, 0].tolist() == [0.1, -0.1, 0.0]
+        assert both[:, 1].tolist() == pytest.approx([0.1, -0.08, 0.0])
+
     def test_dead_zone_takes_its_speed_off(self):
         told = control([0.01, -0.01, 0.05, -0.05, 0.2, -0.2])
         left = apply("dead_zone:speed=0.03", told)[:, 0]
@@ -257,6 +263,13 @@ class TestBodies:
             mujoco.mj_step(model, data, nstep=round(1.0 / model.opt.timestep))
             turned.append(2 * np.arctan2(data.qpos[6], data.qpos[3]) - heading)
         assert turned == pytest.approx([turned[0]] * 3, rel=0.01)
+
+    def test_a_slippery_floor_may_hold_alike_in_all_directions(self):
+        model = compiled("floor_friction:factor=0.05,cone=elliptic")
+        assert model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
+        plain = compiled("floor_friction:factor=0.05")
+        assert plain.opt.cone == compiled().opt.cone
+        assert plain.geom_friction.tolist() == model.geom_friction.tolist()
 
     def test_wheel_diameter_moves_the_axle_with_the_radius(self):
         model = compiled("wheel_diameter:wheel=left,factor=1.1")
