@@ -20,7 +20,8 @@ TURNS = "turns in place and arcs"
 LEAD = "step_lead"
 """shift of the simulation in time that no effect is: its own steps lead or lag"""
 REASON = 4.0  # standard deviations by which a nuisance may be off: beyond is an effect
-BANDS = 10  # widths of a dead band that are tried
+BANDS = 10  # widths of a dead band that are tried, where there are more
+CREEP = 0.004  # [m/s] slower than any dead band that matters; assumed
 GRIPS = (0.02, 0.03, 0.045, 0.065, 0.09, 0.13, 0.2, 0.35)
 """friction over the model's, tried: between two of them a torque limit may do better"""
 DRAGS = (0.007, 0.02, 0.06, 0.2, 0.6)  # friction coefficients of a caster, tried
@@ -230,12 +231,14 @@ def _rough(side: str, trials: Sequence[Trial]) -> list[Row]:
 
 def _bands(speeds: np.ndarray) -> tuple[float, ...]:
     """Widths between the speeds told: between two of them a width does not matter. Of
-    more than `BANDS`, those that differ least by their ratio are left out."""
+    more than `BANDS`, those nearest to as many of equal ratios, from a creep on."""
     between = (speeds + np.append(speeds[1:], speeds[-1:] * 1.2)) / 2
     between = between[between < 0.2]
-    while len(between) > BANDS:
-        nearest = int(np.argmin(between[1:] / between[:-1]))
-        between = np.delete(between, nearest + 1)
+    if len(between) > BANDS:
+        low = max(float(between[0]), CREEP)
+        wanted = np.geomspace(low, max(float(between[-1]), low), BANDS)
+        apart = np.abs(np.log(between[:, None] / wanted))
+        between = np.unique(between[apart.argmin(axis=0)])
     return tuple(between.tolist())
 
 

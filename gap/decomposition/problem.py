@@ -224,6 +224,23 @@ class Problem:
         recorded = np.where(left_out[:, None], np.nan, self.recorded)
         return replace(self, recorded=recorded)
 
+    def some(self, numbers: Sequence[int]) -> "Problem":
+        """The same of some trials alone.
+
+        Args:
+            numbers: of the trials, in ascending order.
+        """
+        inside = np.isin(self.trial, numbers)
+        return replace(
+            self,
+            trials=tuple(self.trials[n] for n in numbers),
+            windows=tuple(self.windows[n] for n in numbers),
+            recorded=self.recorded[inside],
+            trial=np.searchsorted(numbers, self.trial[inside]),
+            block=np.unique(self.block[inside], return_inverse=True)[1],
+            numbers=tuple(self.numbers[n] for n in numbers),
+        )
+
     @cached_property
     def gap(self) -> np.ndarray:
         """Residuals of the nominal model, ``(N, C)``."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from bns.gap.decomposition import fit, levels, refit, simpler
-from bns.gap.decomposition.descent import NUMEROUS, descend, renewed, simplest
+from bns.gap.decomposition.descent import NUMEROUS, descend, nothing, renewed, simplest
 from bns.gap.decomposition.evidence import search
 from bns.gap.decomposition.evidence.linear import Support
 from bns.gap.decomposition.fit import Point, linearised, placed
@@ -24,6 +24,8 @@ LITTLE = 0.02  # of what all explain: the rest of a strong one's law
 NEARLY = 1.5  # the same where these, all together, only describe the recording
 STRETCHED = 4.0  # deviations of slack that are no slack any more
 ROUNDS = 2  # of levels
+GLANCE = 30.0  # [s] of a long recording, in which explanations are looked for first
+LONG = 2.5  # times as much, from which it is long
 WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
 
 
@@ -110,7 +112,9 @@ def _several(tried: Singles, found: Support, best: Point) -> Point:
     numbers: from a single one, and if that is not enough from those that it found, and
     from all where many depart."""
     problem = tried.problem
-    points = _simple(tried) + [best] * bool(best.support)
+    points = _glimpsed(tried)
+    if not any(enough(problem, point) for point in points):
+        points += _simple(tried) + [best] * bool(best.support)
     if not any(enough(problem, point) for point in points):
         if not best.support:
             points.append(_followed(problem, tried.start, found))
@@ -118,6 +122,21 @@ def _several(tried: Singles, found: Support, best: Point) -> Point:
             points.append(_from_all(problem, tried.start))
             return _from_others(tried, refit.better(problem, points))
     return refit.better(problem, points)
+
+
+def _glimpsed(tried: Singles) -> list[Point]:
+    """A point from what explains a part of a long recording, if it is long and anything
+    does: the same search costs as much less."""
+    problem, start = tried.problem, tried.start
+    whole = sum(trial.commands.duration for trial in problem.trials)
+    numbers = problem.sample(GLANCE)
+    if whole < LONG * GLANCE or len(numbers) == len(problem.trials):
+        return []
+    part = problem.some(numbers)
+    found = explained(Singles(part, nothing(part)))
+    if not found.support:
+        return []
+    return [descend(problem, found.values, found.support, start.noise, start)]
 
 
 def _from_others(tried: Singles, best: Point) -> Point:

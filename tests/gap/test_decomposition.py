@@ -17,12 +17,14 @@ from bns.gap.decomposition import (
     rest,
     shares,
     simpler,
+    starts,
     statements,
 )
 from bns.gap.decomposition.decomposition import Decomposition
 from bns.gap.decomposition.problem import Problem
 from bns.gap.decomposition.row import Row
 from bns.gap.decomposition.shares import Part
+from bns.gap.decomposition.singles import Singles
 from bns.gap.diagnose import diagnose
 from bns.gap.models.wheeled import changes, drives
 from bns.gap.recordings import check
@@ -242,6 +244,33 @@ def test_between_slow_commands_a_width_of_a_dead_band_is_tried_however_many_are_
     )
     rows = {row.name: row for row in wheeled_rows.rows([trial])}
     assert any(0.03 < level < 0.05 for level in rows["dead_band[both]"].levels)
+
+
+def test_widths_of_a_dead_band_lie_all_over_what_a_joystick_told():
+    told = np.arange(0.001, 0.21, 0.001)
+    levels = np.array(wheeled_rows._bands(told))
+    assert levels[0] < 0.006 and levels[-1] > 0.15
+    assert (levels[1:] / levels[:-1]).max() < 2
+
+
+def test_a_part_of_a_recording_has_its_trials_and_is_looked_at_first(
+    recorded, model, monkeypatch
+):
+    trials, _ = check.check(recorded[1], model)
+    whole = Problem.of(trials, model)
+    part = whole.some([1, 4])
+    assert part.trials == (whole.trials[1], whole.trials[4])
+    assert part.numbers == (1, 4)
+    at = np.isin(whole.trial, [1, 4])
+    np.testing.assert_array_equal(part.gap, whole.gap[at])
+    assert set(part.trial) == {0, 1}
+    problem = diagnosis.narrowed(whole, KEPT)
+    tried = Singles(problem, descent.nothing(problem))
+    assert starts._glimpsed(tried) == []  # no long recording
+    monkeypatch.setattr(starts, "GLANCE", 8.0)
+    (found,) = starts._glimpsed(tried)
+    assert found.support == {"wheel_gain[left]"}
+    assert found.rest.shape == problem.recorded.shape
 
 
 def test_speeds_told_are_averaged_over_a_step():
