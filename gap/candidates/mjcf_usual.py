@@ -51,8 +51,8 @@ USUAL = (
 )
 """considered where the user does not say which, on what the commands move:
 `actuator_kp` and `actuator_kd` of position servos, `actuator_gear` of servos of speed,
-`actuator_lag` of those whose control the model filters, `actuator_period` of all whose
-gains the description gives, a limit of force of these and of servos of speed,
+`actuator_lag` of those whose control the model filters, `actuator_period` of all that
+have both gains and turn joints, a limit of force of position and of speed servos,
 `actuator_gain` and `command_limit` of all but position servos, `command_fade` of these
 (of all at once where there are no others, else of each of few), the tilt of what is
 bolted to the world, `gravity_compensation` and a fluid's numbers where the model has
@@ -178,6 +178,9 @@ def _on_actuators(
     servos = {n for n in told if affine[n] and model.actuator_biasprm[n][1]}
     looped = servos | {n for n in told if affine[n] and model.actuator_biasprm[n][2]}
     others, paced = set(told) - servos, looped - servos
+    damped = affine & (model.actuator_biasprm[:, 1:3] != 0).all(axis=1)
+    joint = mujoco.mjtTrn.mjTRN_JOINT
+    jointed = bool((model.actuator_trntype[damped] == joint).all())
     on = {
         "actuator_gain": others,
         "actuator_gear": paced,
@@ -197,7 +200,7 @@ def _on_actuators(
 
     pushing = to(others)
     return named | {
-        "actuator_period": (ALL,) if any(item.kd for item in config.told) else (),
+        "actuator_period": (ALL,) if on["actuator_kd"] and jointed else (),
         "encoder_offset": _turned(model, (n for n in told if n in servos)),
         "output_backlash": _turned(model, (n for n in told if n not in servos)),
         "command_limit": pushing,

@@ -1,5 +1,6 @@
 """Numbers of a wheeled robot that may be off, and how far they plausibly are."""
 
+import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -21,6 +22,7 @@ LEAD = "step_lead"
 """shift of the simulation in time that no effect is: its own steps lead or lag"""
 REASON = 4.0  # standard deviations by which a nuisance may be off: beyond is an effect
 BANDS = 10  # widths of a dead band that are tried, where there are more
+RATIO = np.log(1.25)  # between two of them, beyond which up to twice as many are
 CREEP = 0.004  # [m/s] slower than any dead band that matters; assumed
 GRIPS = (0.02, 0.03, 0.045, 0.065, 0.09, 0.13, 0.2, 0.35)
 """friction over the model's, tried: between two of them a torque limit may do better"""
@@ -231,15 +233,25 @@ def _rough(side: str, trials: Sequence[Trial]) -> list[Row]:
 
 def _bands(speeds: np.ndarray) -> tuple[float, ...]:
     """Widths between the speeds told: between two of them a width does not matter. Of
-    more than `BANDS`, those nearest to as many of equal ratios, from a creep on."""
+    more than `BANDS`, some from a creep on, each in the middle of what was the widest
+    ratio between two with others inside."""
     between = (speeds + np.append(speeds[1:], speeds[-1:] * 1.2)) / 2
     between = between[between < 0.2]
-    if len(between) > BANDS:
-        low = max(float(between[0]), CREEP)
-        wanted = np.geomspace(low, max(float(between[-1]), low), BANDS)
-        apart = np.abs(np.log(between[:, None] / wanted))
-        between = np.unique(between[apart.argmin(axis=0)])
-    return tuple(between.tolist())
+    if len(between) <= BANDS:
+        return tuple(between.tolist())
+    size = np.log(between)
+    first = min(int(np.searchsorted(between, CREEP)), len(between) - BANDS)
+    kept = [first, len(between) - 1]
+    while len(kept) < 2 * BANDS:
+        pairs = [(i, k) for i, k in itertools.pairwise(kept) if k - i > 1]
+        wide = [(size[k] - size[i], i, k) for i, k in pairs]
+        most, low, high = max(wide, default=(0.0, 0, 0))
+        if len(kept) >= BANDS and most <= RATIO:
+            break
+        inside = np.arange(low + 1, high)
+        middle = np.abs(size[inside] - (size[low] + size[high]) / 2).argmin()
+        kept = sorted([*kept, int(inside[middle])])
+    return tuple(between[kept].tolist())
 
 
 def _limits(speeds: np.ndarray) -> tuple[float, ...]:

@@ -250,7 +250,9 @@ def test_widths_of_a_dead_band_lie_all_over_what_a_joystick_told():
     told = np.arange(0.001, 0.21, 0.001)
     levels = np.array(wheeled_rows._bands(told))
     assert levels[0] < 0.006 and levels[-1] > 0.15
-    assert (levels[1:] / levels[:-1]).max() < 2
+    assert (levels[1:] / levels[:-1]).max() < 1.35
+    some = wheeled_rows._bands(np.linspace(0.01, 0.19, 14))
+    assert 10 <= len(some) < 14 and max(some) > 0.18
 
 
 def test_a_part_of_a_recording_has_its_trials_and_is_looked_at_first(

@@ -128,18 +128,19 @@ class ActuatorPeriod(BodyEffect):
     parameter = strength("period", "s", (0.0, 0.5), "of the loop", example=0.02)
 
     def _write(self, spec: Any) -> None:
-        """See `BodyEffect.edit`.
+        """See `BodyEffect.edit`; what a damping ratio comes to stays.
 
         Raises:
-            BnsError: an actuator has no damping gain, or a damping ratio for it.
+            BnsError: an actuator has no damping gain.
         """
         period = self["period"]
-        for item in _servos(spec, self["part"], 2, "damping gain"):
-            if item.biasprm[2] > 0:
-                raise BnsError(
-                    f"Actuator {item.name!r} has a damping ratio, from which the gain "
-                    "of a loop does not follow: give its damping as `kv`."
-                )
+        chosen = _servos(spec, self["part"], 2, "damping gain")
+        if any(item.biasprm[2] > 0 for item in chosen):  # a damping ratio
+            model = spec.copy().compile()
+            for number, item in enumerate(spec.actuators):
+                if item in chosen:
+                    item.biasprm[2] = model.actuator_biasprm[number, 2]
+        for item in chosen:
             kp, kd = -item.biasprm[1], -item.biasprm[2]
             (joint,) = parts.joints(spec, item.target)
             joint.armature = max(joint.armature - kd * period * item.gear[0] ** 2, 0.0)

@@ -374,10 +374,15 @@ def test_a_valve_that_integrates_has_no_time_constant():
         built("actuator_lag:part=a,added=0.1", xml=xml)
 
 
-def test_the_period_of_a_loop_with_a_damping_ratio_is_refused():
-    servo = LOOP.format('<position name="a" joint="knee" kp="25" dampratio="1"/>')
-    with pytest.raises(BnsError, match="'a' has a damping ratio"):
-        built("actuator_period:part=a,period=0.005", xml=servo)
+def test_a_loop_with_a_damping_ratio_has_the_period_of_one_with_that_damping():
+    servo = LOOP.format('<position name="a" joint="knee" kp="25" {}/>')
+    whole = built(xml=servo.format('dampratio="1"'))
+    damping = f'kv="{-whole.actuator_biasprm[0, 2]}"'
+    slow = "actuator_period:part=a,period=0.005"
+    one, other = (built(slow, xml=servo.format(a)) for a in ('dampratio="1"', damping))
+    np.testing.assert_allclose(one.actuator_biasprm, other.actuator_biasprm)
+    np.testing.assert_allclose(one.dof_armature, other.dof_armature)
+    assert one.actuator_biasprm[0, 2] > whole.actuator_biasprm[0, 2]
 
 
 @pytest.mark.parametrize(
