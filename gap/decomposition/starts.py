@@ -20,7 +20,8 @@ INSTEAD = 3  # explanations one of which another may replace
 OTHERS = 3  # single explanations from which several are looked for again
 FEW = 2  # explanations that need no other start if they leave little
 ENOUGH = 1.2  # times what all explanations leave: little more
-LITTLE = 0.02  # of what all explain: the rest of a strong one's law
+LITTLE = 0.02  # of what all explain: the rest of a strong one's law,
+LEAST = 0.005  # and of two
 NEARLY = 1.5  # the same where these, all together, only describe the recording
 STRETCHED = 4.0  # deviations of slack that are no slack any more
 ROUNDS = 2  # of levels
@@ -159,9 +160,9 @@ def _from_others(tried: Singles, best: Point) -> Point:
 def enough(problem: Problem, point: Point, few: int = FEW) -> bool:
     """Whether few explanations leave little more than all together do.
 
-    Where many depart, it does for the strongest few: if a single one closes next to all
-    of the gap, since what is weak beside it needs no other start; and for somewhat more
-    where all together, a hundred numbers, foretell motion that was not fitted no
+    Where many depart, it does for the strongest few: if a single one, or two, close
+    next to all of the gap, since what is weak beside them needs no other start; and for
+    more where all together, a hundred numbers, foretell motion that was not fitted no
     better.
 
     Args:
@@ -177,7 +178,8 @@ def enough(problem: Problem, point: Point, few: int = FEW) -> bool:
     left, whole = linear.squares(best), linear.squares(linear.free)
     if many and support:
         strong = min(linear.squares({name}) for name in support)
-        if strong - whole < LITTLE * (linear.squares(()) - whole):
+        all_of_it = linear.squares(()) - whole
+        if strong - whole < LITTLE * all_of_it or left - whole < LEAST * all_of_it:
             return True
     if left < ENOUGH * whole or not many:
         return left < ENOUGH * whole

@@ -270,18 +270,44 @@ class Simulation:
             keys.append((parts, state, *_key(trial, physical)))
             if keys[-1] not in self._motions:
                 missing[keys[-1]] = trial, physical
-        jobs = [self._job(trial, items, parts) for trial, items in missing.values()]
-        motions = self._pool.map(jobs) if jobs else []
         dt = self.dt / parts
+        jobs = [self._job(trial, items, parts) for trial, items in missing.values()]
+        motions = self._settled(jobs, self._lead(dt)) if jobs else []
         for (key, (_, items)), motion in zip(missing.items(), motions, strict=True):
             model = self.compiled(items).model
-            states = motion.states[self._lead(dt) :: _every(dt)]
-            self._motions[key] = self._view(model).read(model, states)
+            self._motions[key] = self._view(model).read(model, motion[:: _every(dt)])
         found = [self._motions[key] for key in keys]
         most = READ // max((each.nbytes for each in found), default=1)
         while len(self._motions) > most:
             self._motions.popitem(last=False)
         return found
+
+    def _settled(self, jobs: Sequence[Job], lead: int) -> list[np.ndarray]:
+        """States ``(S + 1, n)`` of robots from where they have settled on, which those
+        that settle alike do once; NaN where one diverges.
+
+        Args:
+            jobs: of one segment each, settling included.
+            lead: steps that it takes.
+        """
+        if not lead:
+            return [motion.states for motion in self._pool.map(jobs)]
+        rests: dict[tuple, Job] = {}
+        keys = []
+        for begin, ((compiled, control), *_), *_ in jobs:
+            head = control[:lead]
+            keys.append((id(compiled), begin.tobytes(), head.tobytes()))
+            rests.setdefault(keys[-1], Job(begin, (Segment(compiled, head),)))
+        rested = dict(zip(rests, self._pool.map([*rests.values()]), strict=True))
+        further, made = {}, []
+        for number, (key, job) in enumerate(zip(keys, jobs, strict=True)):
+            rest, (compiled, control) = rested[key], job.segments[0]
+            left = Segment(compiled, control[lead:])
+            made.append(np.full((len(left.control) + 1, len(job.start)), np.nan))
+            if rest.diverged < 0:
+                further[number] = Job(rest.states[-1], (left,), rest.warm, made[-1])
+        self._pool.map([*further.values()])
+        return made
 
     def _put_together(
         self, pieces: Mapping[tuple, trees.Piece], found: Mapping[tuple, np.ndarray]
