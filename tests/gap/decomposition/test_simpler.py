@@ -1,5 +1,7 @@
 """One explanation for several: what is the same motion with less."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -59,6 +61,20 @@ def test_several_that_describe_a_wrong_start_give_way_to_a_single_one_with_anoth
     several = refit.fitted_at(problem, start, {GAINS, DAMPING, FRICTION})
     found = starts._from_others(Singles(problem, start), several)
     assert found.support == {HIP, FRICTION}
+
+
+@pytest.mark.parametrize(("weak", "closing"), [(0.005, True), (0.02, False)])
+def test_two_that_close_next_to_all_need_no_other_start(weak, closing):
+    """Of three that depart, the weakest has so much of the gap."""
+    parts = {"delay": 0.8, "load": 0.2 - weak, "friction": weak}
+
+    def squares(names):
+        return 1.0 + 1e4 * sum(parts[name] for name in parts if name not in names)
+
+    linear = SimpleNamespace(squares=squares, free=tuple(parts))
+    point = SimpleNamespace(linear=linear, support=frozenset(parts))
+    problem = SimpleNamespace(model=SimpleNamespace(many=True))
+    assert starts.enough(problem, point) == closing
 
 
 SERVOED = """

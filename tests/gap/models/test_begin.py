@@ -1,11 +1,15 @@
 """How trials of a log begin, guessed from the log and the model."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
 
+from bns.gap.bench import mjcf_cases
 from bns.gap.models.mjcf import command_steps, guesses, ties
-from tests.gap.own_robots import described
+from bns.gap.models.mjcf.model import OwnModel
+from tests.gap.own_robots import MOTORS, arm, described, of_motors
 
 SLIDE = """<body><joint name="{name}" type="slide" axis="0 0 1" damping="{damping}"
   stiffness="{stiffness}"/><geom size="0.05" mass="1" contype="0"
@@ -177,3 +181,23 @@ def test_a_place_that_is_a_slide_is_seen_as_that():
         assert old in SWIMMER
         other = mujoco.MjModel.from_xml_string(SWIMMER.replace(old, new, 1))
         assert ("head", "x") not in ties.slides(other)
+
+
+def test_robots_that_settle_alike_do_it_once_to_the_same_bytes(tmp_path, monkeypatch):
+    robot = arm(tmp_path, MOTORS, of_motors('joint_damping = ["FL_calf_joint"]'))
+    physics = OwnModel(replace(robot.config, settle=0.2), threads=1).physics
+    told = mjcf_cases.commands(robot, np.random.default_rng(0), 3)
+    trials = mjcf_cases.record(robot, told, [])
+    lead = physics._lead(physics.dt)
+    jobs = [physics._job(trial, (), 1) for trial in trials]
+    lost = jobs[0]._replace(start=jobs[0].start + 1e12)
+    whole = physics._pool.map([*jobs, lost])
+    asked, run = [], physics._pool.map
+    monkeypatch.setattr(
+        physics._pool, "map", lambda jobs: (asked.append(len(jobs)), run(jobs))[1]
+    )
+    made = physics._settled([*jobs, lost], lead)
+    assert asked == [2, len(jobs)]  # what diverges does so by itself
+    for motion, states in zip(whole[:-1], made[:-1], strict=True):
+        np.testing.assert_array_equal(states, motion.states[lead:])
+    assert whole[-1].diverged >= 0 and np.isnan(made[-1]).all()
