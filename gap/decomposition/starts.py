@@ -26,6 +26,7 @@ NEARLY = 1.5  # the same where these, all together, only describe the recording
 STRETCHED = 4.0  # deviations of slack that are no slack any more
 ROUNDS = 2  # of levels
 GLANCE = 30.0  # [s] of a long recording, in which explanations are looked for first
+BRIEF = 18.0  # [s] the same of a robot of which numerous explanations are tried
 LONG = 2.5  # times as much, from which it is long
 WORTH = 1.0  # by how much the evidence has to rise for a start to be followed
 
@@ -114,6 +115,8 @@ def _several(tried: Singles, found: Support, best: Point) -> Point:
     from all where many depart."""
     problem = tried.problem
     points = _glimpsed(tried)
+    if points and len(problem.terms) > NUMEROUS:
+        return refit.better(problem, points + [best] * bool(best.support))
     if not any(enough(problem, point) for point in points):
         points += _simple(tried) + [best] * bool(best.support)
     if not any(enough(problem, point) for point in points):
@@ -129,9 +132,10 @@ def _glimpsed(tried: Singles) -> list[Point]:
     """A point from what explains a part of a long recording, if it is long and anything
     does: the same search costs as much less."""
     problem, start = tried.problem, tried.start
+    glance = BRIEF if len(problem.terms) > NUMEROUS else GLANCE
     whole = sum(trial.commands.duration for trial in problem.trials)
-    numbers = problem.sample(GLANCE)
-    if whole < LONG * GLANCE or len(numbers) == len(problem.trials):
+    numbers = problem.sample(glance)
+    if whole < LONG * glance or len(numbers) == len(problem.trials):
         return []
     part = problem.some(numbers)
     found = explained(Singles(part, nothing(part)))

@@ -94,17 +94,21 @@ def _moved(trials: Sequence[Trial], model: GapModel) -> list[str]:
     """Stop at channels that move much farther than their commands can make them; those
     that move against the model."""
     (predicted,) = model.simulate(trials, [()])
+    pairs = [
+        _as_compared(trial, path, model)
+        for trial, path in zip(trials, predicted, strict=True)
+    ]
     notes = []
     for column, channel in enumerate(model.channels):
         shares, agree = [], []
-        for trial, path in zip(trials, predicted, strict=True):
+        for trial, path, (seen, made) in zip(trials, predicted, pairs, strict=True):
             good = np.isfinite(trial.observed).all(axis=1)
-            seen, made = trial.observed[good, column], path[good, column]
             told = np.ptp(path[:, column])
             if told > SHOWS * model.resolution[column]:  # not where it diverged
-                shares.append(np.ptp(seen) / told)
-                if min(np.ptp(seen), np.ptp(made)) > 0:
-                    agree.append(np.corrcoef(seen, made)[0, 1])
+                shares.append(np.ptp(trial.observed[good, column]) / told)
+                one, other = seen[:, column], made[:, column]
+                if len(one) and min(np.ptp(one), np.ptp(other)) > 0:
+                    agree.append(np.corrcoef(one, other)[0, 1])
         if shares and np.median(shares) > BEYOND:
             raise FormatError(
                 f"{channel.name} moves {np.median(shares):.3g} times as far as its "
@@ -117,6 +121,20 @@ def _moved(trials: Sequence[Trial], model: GapModel) -> list[str]:
                 f"{np.median(agree):.2f}): are its column and sign those of the model?"
             )
     return notes
+
+
+def _as_compared(
+    trial: Trial, path: np.ndarray, model: GapModel
+) -> tuple[np.ndarray, np.ndarray]:
+    """What was recorded and predicted ``(n, C)`` where all was seen, as the model
+    compares it, where that is by channel: a robot that goes over a floor may head
+    otherwise than its model, and its y is not turned for that."""
+    seen = trial.observed[:, : len(model.channels)]
+    if model.features == model.channels:
+        windows = model.windows(trial)
+        seen, path = (model.compare(trial, v, windows) for v in (seen, path))
+    good = np.isfinite(seen).all(axis=1) & np.isfinite(path).all(axis=1)
+    return seen[good], path[good]
 
 
 def _channels(trial: Trial, model: GapModel, label: str) -> None:

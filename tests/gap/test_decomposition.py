@@ -273,6 +273,13 @@ def test_a_part_of_a_recording_has_its_trials_and_is_looked_at_first(
     (found,) = starts._glimpsed(tried)
     assert found.support == {"wheel_gain[left]"}
     assert found.rest.shape == problem.recorded.shape
+    monkeypatch.setattr(starts, "NUMEROUS", 0)  # as if of a robot of many joints
+    monkeypatch.setattr(starts, "BRIEF", 8.0)
+    looked = []
+    monkeypatch.setattr(starts, "_simple", lambda tried: looked.append(tried) or [])
+    several = starts._several(tried, found.support, tried.start)
+    assert several.support == found.support
+    assert {len(each.problem.trials) for each in looked} <= {2, 3}  # of the part alone
 
 
 def test_speeds_told_are_averaged_over_a_step():
