@@ -299,14 +299,14 @@ class Simulation:
             keys.append((id(compiled), begin.tobytes(), head.tobytes()))
             rests.setdefault(keys[-1], Job(begin, (Segment(compiled, head),)))
         rested = dict(zip(rests, self._pool.map([*rests.values()]), strict=True))
-        further, made = {}, []
-        for number, (key, job) in enumerate(zip(keys, jobs, strict=True)):
+        further, made = [], []
+        for key, job in zip(keys, jobs, strict=True):
             rest, (compiled, control) = rested[key], job.segments[0]
             left = Segment(compiled, control[lead:])
             made.append(np.full((len(left.control) + 1, len(job.start)), np.nan))
             if rest.diverged < 0:
-                further[number] = Job(rest.states[-1], (left,), rest.warm, made[-1])
-        self._pool.map([*further.values()])
+                further.append(Job(rest.states[-1], (left,), rest.warm, made[-1]))
+        self._pool.map(further)
         return made
 
     def _put_together(
