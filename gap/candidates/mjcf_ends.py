@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from bns.gap.candidates.mjcf import EXCITE
 from bns.gap.decomposition.row import Row
 from bns.worlds.effects.base import Effect
 
@@ -36,10 +35,10 @@ def rows(item: Row, ends: np.ndarray | None) -> Iterable[Row]:
     if ends is None or way * (ends[1, place] - ends[0, place]) <= 0:
         return
     travel, at = float(np.ptp(ends[1])), float(ends[0, place])
-    free = float(ends[1, place]) + way * SOONER * travel / 4
     if item.effect == BUMPER:
         yield from _bumper(item, at, way * travel)
         return
+    free = float(ends[1, place]) + way * SOONER * travel / 4
     sooner = at - way * SOONER * travel
     yield replace(
         item,
@@ -49,8 +48,6 @@ def rows(item: Row, ends: np.ndarray | None) -> Iterable[Row]:
         high=max(free, sooner),
         smooth=False,
         levels=tuple(at + share * travel for share in BESIDE),
-        excite=EXCITE[item.effect],
-        effect="",
     )
 
 
@@ -69,7 +66,6 @@ def _bumper(item: Row, at: float, travel: float) -> Iterable[Row]:
         item,
         levels=tuple(share * item.high for share in STIFF),
         group=item.name,
-        excite=EXCITE[item.effect],
         fixed={**item.fixed, parameter: begins},
     )
     yield Row(
@@ -80,7 +76,7 @@ def _bumper(item: Row, at: float, travel: float) -> Iterable[Row]:
         high,
         unit="m" if item.unit == "N/m" else "rad",
         group=item.name,
-        excite=EXCITE[item.effect],
+        excite=item.excite,
     )
 
 

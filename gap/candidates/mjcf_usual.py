@@ -105,10 +105,10 @@ def usual(config: OwnConfig, model: mujoco.MjModel) -> dict[str, tuple[str, ...]
     tendons = tuple(
         name for n in range(model.ntendon) if (name := model.tendon(n).name)
     )
-    jointed = [item.part for item in config.seen if item.quantity == "joint"]
+    ending = [item.part for item in config.seen if item.quantity == "joint"]
     of = {
         **_on_actuators(config, model),
-        **dict.fromkeys(ENDING, jointed),
+        **dict.fromkeys(ENDING, ending),
         **dict.fromkeys(LATE, channels if 1 < len(channels) <= FEW else (ALL,)),
         "reading_delay": seen if 1 < len(seen) <= FEW else _by_camera(config),
         "reading_gain": seen,
@@ -179,8 +179,7 @@ def _on_actuators(
     looped = servos | {n for n in told if affine[n] and model.actuator_biasprm[n][2]}
     others, paced = set(told) - servos, looped - servos
     damped = affine & (model.actuator_biasprm[:, 1:3] != 0).all(axis=1)
-    joint = mujoco.mjtTrn.mjTRN_JOINT
-    jointed = bool((model.actuator_trntype[damped] == joint).all())
+    turning = model.actuator_trntype[damped] == mujoco.mjtTrn.mjTRN_JOINT
     on = {
         "actuator_gain": others,
         "actuator_gear": paced,
@@ -200,7 +199,7 @@ def _on_actuators(
 
     pushing = to(others)
     return named | {
-        "actuator_period": (ALL,) if on["actuator_kd"] and jointed else (),
+        "actuator_period": (ALL,) if on["actuator_kd"] and turning.all() else (),
         "encoder_offset": _turned(model, (n for n in told if n in servos)),
         "output_backlash": _turned(model, (n for n in told if n not in servos)),
         "command_limit": pushing,

@@ -182,8 +182,8 @@ def enough(problem: Problem, point: Point, few: int = FEW) -> bool:
     left, whole = linear.squares(best), linear.squares(linear.free)
     if many and support:
         strong = min(linear.squares({name}) for name in support)
-        all_of_it = linear.squares(()) - whole
-        if strong - whole < LITTLE * all_of_it or left - whole < LEAST * all_of_it:
+        gap = linear.squares(()) - whole
+        if strong - whole < LITTLE * gap or left - whole < LEAST * gap:
             return True
     if left < ENOUGH * whole or not many:
         return left < ENOUGH * whole
