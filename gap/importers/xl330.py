@@ -37,17 +37,14 @@ ENTRIES = {
 }
 METADATA = ("mass", "length", "kp", "vin", "trajectory")
 QUANTISATION = 2 * np.pi / 4096  # [rad] 12-bit encoder
-ERROR_GAIN = 4096 / (2 * np.pi) / 128 / 885
-"""[1/rad] duty per error at gain 1: 4096 counts a turn, gain register / 128, 885 = full
-PWM (control scheme of the maker's X series; assumed to hold for this firmware)"""
+SERVO = "xl330"  # whose law is nominal (`bns.models.xl330`)
 
 
 def read(directory: str | Path) -> list[Trial]:
     """All runs of a directory, by file name.
 
-    Conditions: run, mass [kg], lever [m], arm_mass [kg], gain, error_gain [1/rad],
-    voltage (median reading) and voltage_told [V], quantisation [rad], trajectory,
-    repeat, lost_samples.
+    Conditions: run, servo, mass [kg], lever [m], arm_mass [kg], gain, voltage (median
+    reading) and voltage_told [V], quantisation [rad], trajectory, repeat, lost_samples.
 
     Raises:
         FormatError: no JSON file, or one that is not such a run.
@@ -88,11 +85,11 @@ def _trial(file: Path) -> Trial:
     columns["angle"], lost = servo.despiked(columns["angle"])
     conditions = {
         "run": file.stem,
+        "servo": SERVO,
         "mass": mass,
         "lever": lever,
         "arm_mass": 0.0,
         "gain": gain,
-        "error_gain": ERROR_GAIN,
         "voltage": float(np.median(columns["voltage"])),
         "voltage_told": told,
         "quantisation": QUANTISATION,

@@ -16,11 +16,10 @@ from bns.gap.decomposition.row import Row
 from bns.gap.models.base import Windows
 from bns.gap.models.library import LibraryModel
 from bns.gap.models.servo import candidates as servo_candidates
-from bns.gap.models.servo.nominal import Nominal
+from bns.gap.models.servo.nominal import Nominal, usual
 from bns.gap.models.servo.runs import SAMPLE, Runs, runs
 from bns.gap.planning import servo_excitation
 from bns.gap.planning.excitation import Excitation
-from bns.models import servo_pendulum
 from bns.worlds.effects.base import Effect
 from bns.worlds.physics.servo_rollout import simulate
 from bns.worlds.trial import Channel, Trial
@@ -36,7 +35,7 @@ class ServoModel(LibraryModel):
     their trial.
 
     Args:
-        nominal: the law; None = the model's own numbers.
+        nominal: the law; None = that of the servo that trials are of (`usual`).
         process: see `GapModel.process` [rad per square root of a second].
         resolution: see `GapModel.resolution` [rad].
     """
@@ -44,6 +43,7 @@ class ServoModel(LibraryModel):
     name = "servo_pendulum"
     channels = (Channel("angle", "rad"),)
     features = (Channel("angle", "rad"),)
+    whole = True
     memory = 2
 
     def __init__(
@@ -56,7 +56,7 @@ class ServoModel(LibraryModel):
         kind = models.robot(self.name).kind
         if kind != "servo":
             raise BnsError(f"{self.name!r} is of kind {kind!r}; it has to be a servo.")
-        self.nominal = nominal or Nominal(servo_pendulum.law(), 0.0)
+        self.nominal = nominal
         self.process = np.array(process, dtype=float)
         self.resolution = np.array(resolution, dtype=float)
 
@@ -104,7 +104,8 @@ class ServoModel(LibraryModel):
         return made
 
     def _angles(self, batch: Runs, effects: Sequence[Sequence[Effect]]) -> np.ndarray:
-        law = servo_candidates.columns(self.nominal.told(batch), effects)
+        nominal = self.nominal or usual(batch)
+        law = servo_candidates.columns(nominal.told(batch), effects)
         made = simulate(law, batch.drive)
         return np.broadcast_to(made, (len(batch), len(effects), made.shape[-1]))
 

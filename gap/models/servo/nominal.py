@@ -7,7 +7,7 @@ import numpy as np
 
 from bns.errors import BnsError, UnknownNameError
 from bns.gap.models.servo.runs import Runs
-from bns.models import servo_pendulum
+from bns.models import servo_pendulum, xl330
 from bns.worlds.physics.servo_law import NUMBERS, Law, law
 from bns.worlds.physics.servo_rollout import simulate
 
@@ -27,6 +27,9 @@ FREE = (
 )
 """What a fit adjusts: what a data sheet does not say of one servo."""
 
+SERVOS = {"sts3215": servo_pendulum.law, "xl330": xl330.law}
+"""laws by what recordings call their servo, in the condition `servo`"""
+USUAL = "sts3215"  # where they do not say it
 NOT_TOLD = ("quantisation", "voltage_told")
 SOFT = 0.01  # [rad] residuals beyond it count linearly, not by their square
 ROUNDS = 15
@@ -58,6 +61,25 @@ class Nominal:
         return simulate(self.told(runs), runs.drive)[:, 0]
 
 
+def usual(runs: Runs) -> Nominal:
+    """The law of the servo that runs are of, as their condition `servo` says; without
+    it that of the STS3215.
+
+    Raises:
+        UnknownNameError: a servo whose law is not known.
+        BnsError: runs of several servos.
+    """
+    name, *others = sorted(set(runs.labels.get("servo", (USUAL,))))
+    if others:
+        raise BnsError(
+            f"The runs are of several servos ({name}, {', '.join(others)}); diagnose "
+            "one at a time."
+        )
+    if name not in SERVOS:
+        raise UnknownNameError("servo", name, SERVOS)
+    return Nominal(SERVOS[name](), 0.0)
+
+
 def fit(
     runs: Runs,
     *,
@@ -74,7 +96,7 @@ def fit(
         runs: with their settings told; several gains, levers or masses, and some that
             fall unpowered, or friction and inertia trade off.
         free: numbers to adjust.
-        start: values to start from; None = the nominal servo's.
+        start: values to start from in place of those of `usual`.
 
     Raises:
         UnknownNameError: a number that the law does not have.
@@ -88,7 +110,7 @@ def fit(
             f"{runs.angles.size} samples do not fix {len(free)} numbers of the law; "
             "give more runs or fewer free numbers."
         )
-    base = {**servo_pendulum.law(), **(start or {})}
+    base = {**usual(runs).values, **(start or {})}
     found = [_descend(runs, free, base)]
     weak = {"load_friction": 0.15, "coulomb": 0.15, "stribeck": 0.1, "delay": 0.015}
     other = {**base, **{k: v for k, v in weak.items() if k in free}}

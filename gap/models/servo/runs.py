@@ -108,9 +108,10 @@ def _row(trial: Trial, fine: np.ndarray, grid: np.ndarray) -> tuple:
         raise BnsError(
             f"A servo trial lasts {times[-1]:.2f} s, less than {grid[-1]:g}."
         )
-    index = np.searchsorted(times[:-1], fine + 1e-9, side="right") - 1
+    begun = np.concatenate([[0.0], np.cumsum(trial.commands.durations[:-1])])
+    index = np.searchsorted(begun, fine + 1e-9, side="right") - 1
     names = [channel.name for channel in trial.commands.channels]
-    told = trial.commands.values[np.maximum(index, 0)]
+    told = trial.commands.values[index]
     on = told[:, names.index("torque_on")] > 0.5
     early = times <= 0.05
     speed = np.polyfit(times[early], angle[early], 1)[0] if early.sum() > 2 else 0.0

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from bns.errors import BnsError
+from bns.errors import BnsError, UnknownNameError
 from bns.gap import diagnose
 from bns.gap.models import base
 from bns.gap.models.servo.model import ServoModel, angles_only
+from bns.gap.recordings import load_recordings
 from bns.worlds.effects import registry
 from bns.worlds.trial import Channel, Commands, Trial
 
@@ -63,6 +64,28 @@ def test_predictions_keep_the_samples_and_the_other_channels():
         assert np.abs(one[:, 0] - other[:, 0]).max() > 0.01
     batched = made.simulate(trials[:1], [()])[0][0]
     np.testing.assert_array_equal(batched, nominal[0])
+
+
+def test_commands_are_those_of_their_time_however_few_samples_are_kept():
+    made, whole = ServoModel(), trial(0)
+    few = load_recordings.thinned(whole, most=20)
+    assert len(few.times) < len(few.commands)
+    ((all_of_it,),) = made.simulate([whole], [()])
+    ((some,),) = made.simulate([few], [()])
+    at = np.searchsorted(whole.times, few.times)
+    np.testing.assert_array_equal(some[:, 0], all_of_it[at, 0])
+
+
+def test_the_law_is_that_of_the_servo_that_was_recorded():
+    made, sts = ServoModel(), trial(0)
+    other = sts.replace(conditions={**sts.conditions, "servo": "xl330"})
+    ((one,),), ((two,),) = (made.simulate([t], [()]) for t in (sts, other))
+    assert np.abs(one[:, 0] - two[:, 0]).max() > 0.1
+    unknown = sts.replace(conditions={**sts.conditions, "servo": "mx1"})
+    with pytest.raises(UnknownNameError, match="mx1"):
+        made.simulate([unknown], [()])
+    with pytest.raises(BnsError, match="several servos"):
+        made.simulate([other, unknown], [()])
 
 
 def test_windows_tile_what_was_seen_and_compare_angles():

@@ -9,8 +9,8 @@ from bns.gap.models.odometry.diagnosis import diagnose
 from bns.gap.models.odometry.motions import Motions
 from bns.gap.models.servo import diagnosis
 from bns.gap.models.servo.candidates import candidates
-from bns.gap.models.servo.nominal import Nominal
-from bns.gap.models.servo.runs import cells
+from bns.gap.models.servo.nominal import Nominal, fit, usual
+from bns.gap.models.servo.runs import cells, runs
 from bns.models import servo_pendulum
 
 CANDIDATES = (
@@ -78,6 +78,22 @@ def test_xl330_runs_are_read():
     assert len(trials) == 16
     assert {trial.conditions["gain"] for trial in trials} == {100, 200, 400, 800}
     assert all(np.abs(trial.channel("current")).max() < 3 for trial in trials)
+
+
+@needs("xl330")
+def test_an_xl330_departs_from_its_published_law_as_other_fits_of_it_do():
+    every = runs(xl330.read(real_data.needed("xl330")), seconds=5.9)
+    published = usual(every)
+    assert np.abs(published.predict(every) - every.angles).mean() < 0.06
+    found = fit(every)
+    assert found.error < 0.035
+    between = {  # what BAM's own models, M1 to M6, find
+        "torque_constant": (0.28, 0.39),
+        "resistance": (2.4, 3.5),
+        "armature": (0.0016, 0.0021),
+    }
+    for name, (low, high) in between.items():
+        assert low < found.values[name] < high, name
 
 
 @needs("mrclam6")
