@@ -23,6 +23,8 @@ FOLLOWED = "for its joint follows it, which the order of names does not say"
 DEGREES = 20.0  # times a joint's range: limits of control in degrees (57), not radians
 GOAL = {"goal", "des", "desired", "target"}
 """words for a position that a joint is told"""
+AS_FAR = np.log(1.5)  # ratio of two columns of an angle that are of one motion
+TURNED = (np.rad2deg(1.0), np.deg2rad(1.0))  # the same in degrees and radians
 
 
 @dataclass(eq=False)
@@ -294,12 +296,21 @@ def _no_loop(work: Work, column: Column, seen: Sequence[Column]) -> None:
     said = set(matching.words(column.name))
     goal = column.quantity == tables.POSITION or bool(said & GOAL)
     for other in measured[:1]:
-        goal = goal or matching.alike(column.values, other.values) > 0.95
+        goal = goal or _goes_with(column.values, other.values)
     if goal:
         raise BnsError(
             f"{column.name!r} is a goal of a joint, but its actuator in {work.path} is "
             "a motor: give the gains of the robot's position loop, --kp and --kd."
         )
+
+
+def _goes_with(told: np.ndarray, seen: np.ndarray) -> bool:
+    """Whether an angle goes as what is told, as far: what holds a joint against gravity
+    goes as its angle, too."""
+    if matching.alike(told, seen) <= 0.95:
+        return False
+    far = np.nanstd(seen) / np.nanstd(told)
+    return any(abs(np.log(far / unit)) < AS_FAR for unit in (1.0, *TURNED))
 
 
 def tolds(work: Work) -> list[Told]:

@@ -103,6 +103,26 @@ def test_goals_told_to_motors_need_a_loop(arm, tmp_path):
         describe(tmp_path / "robot.xml", tmp_path / "log.csv")
 
 
+def test_a_torque_that_holds_a_joint_against_gravity_is_no_goal(tmp_path):
+    (tmp_path / "tilt.xml").write_text(
+        "<mujoco><worldbody><body><joint name='tilt' axis='0 1 0'/>"
+        "<geom size='.05' pos='.2 0 0'/></body></worldbody>"
+        "<actuator><motor name='tilt' joint='tilt'/></actuator></mujoco>"
+    )
+    times = np.arange(0, 8, 0.02)
+    angle = np.sin(times)
+    for share, held in ((0.3, True), (1.0, False), (np.rad2deg(1.0), False)):
+        rows = np.stack([times, share * angle, angle], axis=1).round(5)
+        text = "\n".join(",".join(map(str, row)) for row in rows.tolist())
+        (tmp_path / "log.csv").write_text("time,tilt_cmd,tilt_angle\n" + text)
+        if held:
+            found = describe(tmp_path / "tilt.xml", tmp_path / "log.csv")
+            assert 'unit = "1"' in found.toml
+        else:
+            with pytest.raises(BnsError, match="is a goal of a joint"):
+                describe(tmp_path / "tilt.xml", tmp_path / "log.csv")
+
+
 def test_each_command_may_have_gains_of_its_own(arm, tmp_path):
     files = tmp_path / "robot.xml", tmp_path / "log.csv"
     found = describe(*files, kp=(20, 30), kd=1.5)
