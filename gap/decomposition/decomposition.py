@@ -98,7 +98,7 @@ class Decomposition:
             return 0.0
         held = HeldOut.of(problem, point, shares.PIECES, self.inside)
         none, some = held.compared(self.start.rest, point.support)
-        least = held.nominal(self.floor.sd)
+        least = held.floor(self.floor.sd)
         if not self.lasting:
             least = held.error(point.linear.free).sum()
         return float((none - some) / max(none - min(least, some), 1e-9))
@@ -277,19 +277,27 @@ def _settled(
         problem, point = loose, refit.refitted(loose, point, point.support - slack)
     if worse(problem, start, point, known):
         point = refit.refitted(problem, point, frozenset())
-    size = Sizes.of(problem, start, point, known)
-    support = shares.weighty(problem, point, size.unexplained)
-    if support != point.support:
-        point = refit.refitted(problem, point, support)
-        size = Sizes.of(problem, start, point, known)
+    point, size = _weighed(problem, start, point, known)
     other = simpler.renamed(problem, point)
-    if other is not point:
-        point, size = other, Sizes.of(problem, start, other, known)
+    if other is not point:  # what stood beside another one may go
+        point, size = _weighed(problem, start, other, known)
     unseen = size.unseen(start, point, known)
     if point.support and (unseen or size.foretells_worse(problem, start, point)):
         point = refit.refitted(problem, point, frozenset())
         size = Sizes.of(problem, start, point, known)
     return problem, point, size, unconfirmed
+
+
+def _weighed(
+    problem: Problem, start: Point, point: Point, known: rest.Floor
+) -> tuple[Point, Sizes]:
+    """A point without what closes hardly any of the gap, and the sizes."""
+    size = Sizes.of(problem, start, point, known)
+    support = shares.weighty(problem, point, size.unexplained)
+    if support == point.support:
+        return point, size
+    point = refit.refitted(problem, point, support)
+    return point, Sizes.of(problem, start, point, known)
 
 
 def _steady(

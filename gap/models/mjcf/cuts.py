@@ -11,9 +11,10 @@ the start was off. Compared all along, it would say nothing but that; compared o
 pieces that begin in the states of the data, it is a robot like others.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from types import MappingProxyType
 
 import mujoco
 import numpy as np
@@ -35,13 +36,20 @@ STILL = 0.1  # standard deviations of a start: it stays
 BENT = 0.1  # deviations of the noise by which a motion may be out of proportion
 
 
-def pieces(trial: Trial, config: OwnConfig) -> list[Trial]:
+Unseen = Callable[[Trial, Sequence[int]], list[dict[str, list[float]]]]
+"""what joints that nobody observed do at samples of a trial (`Simulation.unseen`)"""
+
+
+def pieces(
+    trial: Trial, config: OwnConfig, unseen: Unseen | None = None
+) -> list[Trial]:
     """A trial in pieces of about `config.cut` seconds; itself if it is not longer. The
     first begins as the trial did.
 
     Args:
         trial: recorded; each change of its commands is a command.
         config: of the robot; joints among its channels get a state.
+        unseen: what the other joints do; None = they begin in the model's pose.
     """
     span = float(trial.times[-1] - trial.times[0])
     count = round(span / config.cut)
@@ -52,9 +60,12 @@ def pieces(trial: Trial, config: OwnConfig) -> list[Trial]:
     rows = seen[np.clip(np.searchsorted(trial.times[seen], wanted), 0, len(seen) - 1)]
     rows = np.unique(np.append(rows[:-1], len(trial.times) - 1))
     made = [piece(trial, first, last) for first, last in pairwise(rows)]
+    begun = _begun(trial, trial, 0, config) if config.recorded else trial
+    inner = rows[1:-1].tolist()
+    others = unseen(begun, inner) if unseen else [{}] * len(inner)
     return [
-        _begun(part, trial, first, config) if first or config.recorded else part
-        for part, first in zip(made, rows[:-1], strict=True)
+        _begun(part, trial, first, config, beside) if first or config.recorded else part
+        for part, first, beside in zip(made, rows[:-1], [{}, *others], strict=True)
     ]
 
 
@@ -106,6 +117,7 @@ def _refined(
     """Trials with starts that were fitted in so many turns, fewer if they stay, and how
     far a motion was from one in proportion, in deviations of its noise."""
     joints = [k for k, item in enumerate(config.seen) if item.state]
+    told = {config.seen[k].state for k in joints}  # of others they say next to nothing
     made, noise = list(trials), np.array([config.seen[k].noise for k in joints])
     turning = [k for k in joints if config.seen[k].turning]
     expected: list[np.ndarray] = []
@@ -120,6 +132,7 @@ def _refined(
         expected, farthest = [], 0.0
         for number, (trial, path) in enumerate(zip(made, base, strict=True)):
             change = np.stack([way[number] - path for way in ways])
+            change[[start.inside(name) not in told for name in names]] = 0.0
             away = trial.observed - path
             away[:, turning] = wrapped(away[:, turning])
             units = away[:, joints] / noise
@@ -152,8 +165,14 @@ def _nearest(units: np.ndarray, change: np.ndarray) -> np.ndarray:
     return np.linalg.solve(curvature, design.T @ units[seen])
 
 
-def _begun(part: Trial, whole: Trial, first: int, config: OwnConfig) -> Trial:
-    found = state(whole, first, config)
+def _begun(
+    part: Trial,
+    whole: Trial,
+    first: int,
+    config: OwnConfig,
+    beside: Mapping[str, list[float]] = MappingProxyType({}),
+) -> Trial:
+    found = {**beside, **state(whole, first, config)}
     known = {joint: numbers[:2] for joint, numbers in found.items()}
     unsure = {joint: numbers[2:] for joint, numbers in found.items()}
     conditions = {**part.conditions, start.STATE: known, start.UNSURE: unsure}
@@ -262,7 +281,11 @@ TURNED = 0.3  # [rad] by which a free body may be turned otherwise than foreseen
 
 
 def foreseen(
-    trials: Sequence[Trial], config: OwnConfig, physics: mujoco.MjModel, model: GapModel
+    trials: Sequence[Trial],
+    config: OwnConfig,
+    physics: mujoco.MjModel,
+    model: GapModel,
+    unseen: Unseen | None = None,
 ) -> list[Trial]:
     """Trials in the pieces of the description; in shorter ones that begin in the states
     of the data, if any of them is not foreseen to its end and all that moves is
@@ -273,8 +296,9 @@ def foreseen(
         config: of the robot.
         physics: its MJCF, compiled.
         model: the nominal model.
+        unseen: see `pieces`.
     """
-    made = _cut(trials, config) if config.cut else list(trials)
+    made = _cut(trials, config, unseen) if config.cut else list(trials)
     length = np.inf
     if _observed(config, physics):
         length = min(_lengths(made, config, model), default=np.inf)
@@ -287,8 +311,10 @@ def foreseen(
     return found
 
 
-def _cut(trials: Sequence[Trial], config: OwnConfig) -> list[Trial]:
-    return [one for trial in trials for one in pieces(trial, config)]
+def _cut(
+    trials: Sequence[Trial], config: OwnConfig, unseen: Unseen | None = None
+) -> list[Trial]:
+    return [one for trial in trials for one in pieces(trial, config, unseen)]
 
 
 def _begun_anew(

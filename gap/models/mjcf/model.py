@@ -81,9 +81,11 @@ class OwnModel(GapModel):
             for column, item in enumerate(config.seen)
             if item.turning and column not in carried
         ]
+        read = {item.part for item in config.seen if item.quantity == "joint"}
         further = (
             *mjcf_rows.grouped(self.listed),
             *mjcf_rows.motors(self.listed),
+            *mjcf_rows.behind(self.listed, read),
             *mjcf_rows.gyros(self.listed, config),
         )
         centres = mjcf_rows.centres(self._bodies)
@@ -107,7 +109,8 @@ class OwnModel(GapModel):
         config = self.config.mapped(columns) if columns else self.config
         trials = start.held(log.read(path, config), config, self.physics.stood)
         log.possible(trials, config, self.physics.model)
-        return cuts.foreseen(trials, self.config, self.physics.model, self)
+        physics = self.physics
+        return cuts.foreseen(trials, self.config, physics.model, self, physics.unseen)
 
     def beside(
         self, trials: Sequence[Trial], known: Sequence[Mapping[str, float]]

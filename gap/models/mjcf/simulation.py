@@ -338,6 +338,31 @@ class Simulation:
         mujoco.mj_getState(self.model, data, state, STATE)
         return self._view(self.model).read(self.model, state[None])[0]
 
+    def unseen(self, trial: Trial, rows: Sequence[int]) -> list[dict[str, list[float]]]:
+        """Joints that nobody observed, as the nominal model moves them: at each of some
+        samples their position [rad or m] and speed, and how unsure both are.
+
+        Args:
+            trial: recorded trial.
+            rows: indices of its samples.
+        """
+        model = self.model
+        names = start.unseen(model, self.config)
+        (motion,) = self._pool.map([self._job(trial, (), 1)]) if names else (None,)
+        found: list[dict[str, list[float]]] = [{} for _ in rows]
+        if motion is None or motion.diverged >= 0:
+            return found
+        moments = trial.times[list(rows)] - trial.times[trial.boundaries[0]]
+        steps = self._lead(self.dt) + np.rint(moments / self.dt).astype(int)
+        for name in names:
+            joint = model.joint(name)
+            at = 1 + joint.qposadr[0], 1 + model.nq + joint.dofadr[0]
+            ways = motion.states[:, at]
+            if (unsure := start.LIMP * ways.std(axis=0)).all():
+                for each, way in zip(found, ways[steps], strict=True):
+                    each[name] = [*map(float, way), *map(float, unsure)]
+        return found
+
     def _lead(self, dt: float) -> int:
         return round(self.config.settle / dt)
 

@@ -185,8 +185,16 @@ def _hanging(model: mujoco.MjModel, config: OwnConfig) -> list[str]:
         model: of the robot.
         config: the description.
     """
-    if not config.recorded or config.settle:
-        return []
+    return [] if not config.recorded or config.settle else unseen(model, config)
+
+
+def unseen(model: mujoco.MjModel, config: OwnConfig) -> list[str]:
+    """Names of the hinges and slides that nobody observed.
+
+    Args:
+        model: of the robot.
+        config: the description.
+    """
     seen = {item.part for item in config.seen if item.quantity in ("joint", "speed")}
     joints = filter(partial(prepared.hinged, model), range(model.njnt))
     return [name for joint in joints if (name := model.joint(joint).name) not in seen]
@@ -232,7 +240,7 @@ def moved(trial: Trial, off: Mapping[str, float], config: OwnConfig) -> Trial:
         seen = trial.observed[np.isfinite(trial.observed).all(axis=1)][0]
         told = [(item.state, at) for item, at in zip(config.seen, seen, strict=True)]
         state = {name: [float(at), 0.0] for name, at in told if name}
-    hangs = {_inside(name): [0.0] for name in off}
+    hangs = {inside(name): [0.0] for name in off}
     state = {**hangs, **state}
     state = {
         joint: [
@@ -244,7 +252,7 @@ def moved(trial: Trial, off: Mapping[str, float], config: OwnConfig) -> Trial:
     return trial.replace(conditions={**trial.conditions, STATE: state})
 
 
-def _inside(name: str) -> str:
+def inside(name: str) -> str:
     """The joint, or way of a free body, of a number of a start."""
     return name.partition("[")[2].removesuffix("]")
 
