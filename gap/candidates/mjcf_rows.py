@@ -81,7 +81,6 @@ PLAUSIBLE = {
     "marker_mount": (0.01, 2e-4),
 }
 SLIPPERY = (0.15, 0.4)  # of a grip: no slope tells that what rolls slides with less
-PLAY, BEHIND = "joint_backlash", "output_backlash"
 SHARE = 0.02  # slack of a number over its plausible departure
 SIZES = ("command_dead_zone", "command_play")  # of which everything has a little
 
@@ -230,33 +229,6 @@ def motors(candidates: Sequence[Row]) -> list[Row]:
                 )
             )
     return made
-
-
-def behind(candidates: Sequence[Row], joints: Collection[str]) -> list[Row]:
-    """Further candidates: play before the encoder of a joint, in the place of play
-    behind it. What it carries moves alike.
-
-    Args:
-        candidates: of a model.
-        joints: names of those whose positions are read.
-    """
-    made = []
-    for item in candidates:
-        if item.effect == PLAY and item.fixed["part"] in joints:
-            made.append(
-                replace(
-                    item,
-                    name=item.name.replace(PLAY, BEHIND),
-                    effect=BEHIND,
-                    slack=0.0,
-                    later=True,
-                    levels=(),
-                    replaces=item.name,
-                    excite=EXCITE[BEHIND],
-                )
-            )
-    known = {item.name for item in candidates}
-    return [item for item in made if item.name not in known]
 
 
 def touching(candidates: Sequence[Row], names: Collection[str]) -> tuple[Row, ...]:

@@ -75,7 +75,7 @@ RARER = (
     "body_length",
 )
 """the same of a model of few joints: many would cost more than they tell; the zero of
-an encoder of position servos, play before the encoders of joints that motors turn"""
+an encoder of position servos, play before the encoders of joints"""
 OF_COMMANDS = ("command_dead_zone", "command_offset", "command_play", "command_gain")
 """the same of a model of few joints or few commands, as a car has on many joints: a
 dead zone of the commands to all but position servos, a trim of the commands to these
@@ -201,7 +201,7 @@ def _on_actuators(
     return named | {
         "actuator_period": (ALL,) if on["actuator_kd"] and turning.all() else (),
         "encoder_offset": _turned(model, (n for n in told if n in servos)),
-        "output_backlash": _turned(model, (n for n in told if n not in servos)),
+        "output_backlash": _turned(model, told),
         "command_limit": pushing,
         "command_dead_zone": pushing,
         "command_gain": to(paced),

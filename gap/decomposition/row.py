@@ -40,8 +40,6 @@ class Row:
             much. "" = its own.
         joins: rows that are this one where they hold alike: its change is the sum of
             theirs, or for a factor (nominally 1) their product.
-        replaces: the row in whose place it is looked at, at the same value; it is
-            `later`. "" = none.
         covers: explanations that this one can be, too: beside it they explain nothing.
         excite: which commands make it felt, in words.
         effect: name of the effect in the library that it is a number of; "" = the
@@ -70,7 +68,6 @@ class Row:
     group: str = ""
     family: str = ""
     joins: tuple[str, ...] = ()
-    replaces: str = ""
     covers: tuple[str, ...] = ()
     excite: str = ""
     effect: str = ""

@@ -89,22 +89,19 @@ def narrowed(problem: Problem, point: Point) -> Point:
 def renamed(problem: Problem, point: Point) -> Point:
     """A point with what is looked at for that alone (`Row.later`) in the place of
     others where it is as good: as few as do of what an explanation covers, a centre of
-    mass that lies elsewhere along one axis for a load of next to no mass; one for two
-    that it joins, a weak motor for both gains of its servo; and one for another of the
-    same size, play before an encoder for play behind it.
+    mass that lies elsewhere along one axis for a load of next to no mass; and one for
+    two that it joins, a weak motor for both gains of its servo.
 
     Args:
         problem: the recording.
         point: a fitted set.
     """
-    for number, row in enumerate(problem.rows):
-        parts = [k for k, one in enumerate(problem.rows) if one.name == row.replaces]
-        parts = parts or list(problem.joins.get(number, ()))
-        whole = {problem.rows[k].term for k in parts}
-        if row.later and parts and whole <= point.support:
+    for number, parts in problem.joins.items():
+        row, whole = problem.rows[number], {problem.rows[k].term for k in parts}
+        if row.later and whole <= point.support:
             values = point.values.copy()
-            values[number] = float(np.mean(values[parts]))
-            values[parts] = problem.nominal[parts]
+            values[number] = float(np.mean(values[list(parts)]))
+            values[list(parts)] = problem.nominal[list(parts)]
             begun = replace(point, values=values)
             other = refit.fitted_at(problem, begun, point.support - whole | {row.term})
             point = other if _as_good(problem, other, point) else point

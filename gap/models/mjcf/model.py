@@ -81,11 +81,9 @@ class OwnModel(GapModel):
             for column, item in enumerate(config.seen)
             if item.turning and column not in carried
         ]
-        read = {item.part for item in config.seen if item.quantity == "joint"}
         further = (
             *mjcf_rows.grouped(self.listed),
             *mjcf_rows.motors(self.listed),
-            *mjcf_rows.behind(self.listed, read),
             *mjcf_rows.gyros(self.listed, config),
         )
         centres = mjcf_rows.centres(self._bodies)

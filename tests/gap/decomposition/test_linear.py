@@ -375,3 +375,8 @@ def test_what_only_a_nuisance_beyond_reason_makes_up_for_is_no_trifle():
     change = 20.0 * problem.columns[1]  # of a level: what it does nothing pays for
     fixed = shares.HeldOut(linear, linear, linear.weight, {"b": (change, change)})
     assert fixed.loss(frozenset("ab")) < 1.01 * fixed.error("ab").sum()
+
+
+def test_what_scatters_in_one_channel_makes_up_for_nothing_in_another():
+    held = shares.HeldOut(None, None, np.array([[4.0, 1.0, 0.0]]), {})
+    assert held.floor(np.array([[0.1, 3.0, 1.0]])) == pytest.approx(0.04 + 1.0)
