@@ -98,7 +98,7 @@ class Decomposition:
             return 0.0
         held = HeldOut.of(problem, point, shares.PIECES, self.inside)
         none, some = held.compared(self.start.rest, point.support)
-        least = held.floor(self.floor.sd)
+        least = held.floor(self.floor.sd, some)
         if not self.lasting:
             least = held.error(point.linear.free).sum()
         return float((none - some) / max(none - min(least, some), 1e-9))

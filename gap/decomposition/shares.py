@@ -177,11 +177,17 @@ class HeldOut:
         of what is not smooth."""
         return float((self.weight * np.nan_to_num(rest) ** 2).sum())
 
-    def floor(self, sd: np.ndarray) -> float:
-        """Squared error of what measuring scatters, ``(N, C)`` standard deviations: of
-        each channel at most what the fit leaves, lest one in which nothing departs
-        makes up for what is left in another."""
-        return float(np.minimum(self.weight * sd**2, self.weight > 0).sum())
+    def floor(self, sd: np.ndarray, left: float) -> float:
+        """Squared error of what measuring scatters: of each channel at most its part of
+        what is left, lest one in which nothing departs makes up for what is left in
+        another.
+
+        Args:
+            sd: what measuring scatters, ``(N, C)``.
+            left: squared error of a set.
+        """
+        most = left / max((self.weight > 0).sum(), 1)
+        return float(np.minimum(self.weight * sd**2, most * (self.weight > 0)).sum())
 
     def compared(self, rest: np.ndarray, support: Iterable[str]) -> tuple[float, float]:
         """Squared error of the nominal model, see `nominal`, and that of a set.

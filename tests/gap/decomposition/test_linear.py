@@ -379,4 +379,5 @@ def test_what_only_a_nuisance_beyond_reason_makes_up_for_is_no_trifle():
 
 def test_what_scatters_in_one_channel_makes_up_for_nothing_in_another():
     held = shares.HeldOut(None, None, np.array([[4.0, 1.0, 0.0]]), {})
-    assert held.floor(np.array([[0.1, 3.0, 1.0]])) == pytest.approx(0.04 + 1.0)
+    scatter = np.array([[0.1, 3.0, 1.0]])
+    assert held.floor(scatter, left=2.4) == pytest.approx(0.04 + 1.2)
