@@ -17,6 +17,8 @@ LISTED = 8  # faults that are printed at most
 NONE = "none"
 """in place of a directory: print only"""
 RESULTS = Path("runs/gap")
+SERVO = "servo"
+"""condition that says in a word which servo's law holds"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -262,15 +264,16 @@ def _provenance(given: Diagnose, model: Any, trials: list[Any]) -> dict[str, Any
     }
 
 
-def shared(trials: list[Any]) -> dict[str, float]:
-    """Conditions in numbers that all trials share: settings of the robot."""
+def shared(trials: list[Any]) -> dict[str, float | str]:
+    """Conditions that all trials share: settings of the robot in numbers, and which
+    servo it has."""
     if not trials:
         return {}
     first, *others = (trial.conditions for trial in trials)
     return {
         name: value
         for name, value in first.items()
-        if isinstance(value, int | float)
+        if (isinstance(value, int | float) or name == SERVO)
         and all(other.get(name) == value for other in others)
     }
 

@@ -189,7 +189,7 @@ def _hanging(model: mujoco.MjModel, config: OwnConfig) -> list[str]:
 
 
 def unseen(model: mujoco.MjModel, config: OwnConfig) -> list[str]:
-    """Names of the hinges and slides that nobody observed.
+    """Names of the hinges and slides that nobody observed, of those that have one.
 
     Args:
         model: of the robot.
@@ -197,7 +197,8 @@ def unseen(model: mujoco.MjModel, config: OwnConfig) -> list[str]:
     """
     seen = {item.part for item in config.seen if item.quantity in ("joint", "speed")}
     joints = filter(partial(prepared.hinged, model), range(model.njnt))
-    return [name for joint in joints if (name := model.joint(joint).name) not in seen]
+    names = (model.joint(joint).name for joint in joints)
+    return [name for name in names if name and name not in seen]
 
 
 def unsure(

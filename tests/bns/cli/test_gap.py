@@ -2,11 +2,13 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from bns.__main__ import WRONG_INPUT, main
+from bns.cli.gap.diagnose import shared
 from bns.gap import request
 from bns.storage.lock import Lock
 from bns.worlds import registry
@@ -206,3 +208,9 @@ def test_a_directory_without_cases_is_not_diagnosed(tmp_path, capsys):
     words = ["gap", "bench", "run", str(tmp_path / "cases")]
     assert main([*words, "--said", str(tmp_path / "said.jsonl")]) == 2
     assert "holds no cases: make some with" in capsys.readouterr().err
+
+
+def test_settings_that_recordings_share_are_kept_for_plans():
+    told = {"gain": 8.0, "servo": "xl330", "trajectory": "sweep", "mass": 0.5}
+    trials = [SimpleNamespace(conditions=told | {"mass": mass}) for mass in (0.5, 0.7)]
+    assert shared(trials) == {"gain": 8.0, "servo": "xl330"}

@@ -81,6 +81,13 @@ def test_what_nobody_observed_begins_a_piece_as_the_model_moves_it(swinging):
     assert diagnose(trials, model, full=False).verdict.kind == "no gap"
 
 
+def test_what_has_no_name_begins_at_rest(swinging, monkeypatch):
+    carried = CARRIED.replace(' name="swing"', "")
+    monkeypatch.setitem(swinging.__globals__, "CARRIED", carried)
+    _, trials = swinging(played=False)
+    assert trials[1].conditions[start.UNSURE].keys() == {"rail"}
+
+
 def test_play_before_the_encoder_of_a_position_servo_is_found(swinging):
     model, trials = swinging(played=True)
     assert set(TRIED) <= set(mjcf_usual.usual(model.config, model.physics.model))
