@@ -23,7 +23,7 @@ TOLD = _set(
 SEEN = _set(
     "meas measured actual state obs observed observation fb feedback enc encoder real"
 )
-SPEED = _set("vel velocity velocities speed dq qd qvel omega")
+SPEED = _set("vel velocity velocities speed dq qd qvel omega dot")
 TORQUE = _set("torque torques tau effort force")
 EFFORT = TORQUE | _set("current load voltage temp")
 POSITION = _set("pos position positions angle q qpos joint jnt dof")
@@ -71,9 +71,10 @@ QUATERNION = _set("qw qx qy qz quat quaternion")
 
 
 def words(name: str) -> list[str]:
-    """The words and numbers in a name, in lower case."""
+    """The words and numbers in a name, in lower case; "d_elbow" is "dq elbow"."""
     split = re.sub(r"([a-z])([A-Z])", r"\1 \2", name)
-    return re.findall(r"[a-z]+|\d+", split.lower())
+    found = re.findall(r"[a-z]+|\d+", split.lower())
+    return ["dq", *found[1:]] if found[:1] == ["d"] and len(found) > 1 else found
 
 
 def unit(name: str) -> str:

@@ -236,6 +236,8 @@ def test_commands_are_found_where_no_goal_is(names, told):
         ("elbow velocity [deg/s]", "deg/s", tables.SPEED),
         ("elbow_deg_per_s", "deg/s", tables.SPEED),
         ("wheel_rpm", "rpm", tables.SPEED),
+        ("d_elbow", "", tables.SPEED),
+        ("elbow_dot", "", tables.SPEED),
         ("t_s", "s", tables.POSITION),
         ("elbow_deg", "deg", tables.POSITION),
     ],
