@@ -1,15 +1,18 @@
 """Rows of what ends a joint's motion sooner than its model does: a stop, or a spring
 that begins somewhere on its way."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from bns.gap.decomposition.row import Row
+from bns.gap.models.mjcf.described import Seen
 from bns.worlds.effects.base import Effect
+from bns.worlds.trial import Trial
 
 BUMPER = "joint_bumper"
+SHORT, SHARE = 5.0, 0.01  # of the noise, of a joint's travel: sooner by more is stopped
 STOPPED = 0.995  # quantile of a joint's positions at which a stop may be
 BESIDE = (0.0, 0.02, -0.02)  # of its travel, beside which one is tried
 SOONER = 0.2  # of its travel, by which a stop may be sooner; later by a quarter of it
@@ -20,6 +23,31 @@ UPWARD = {"high": True, "low": False, "above": True, "below": False}
 """whether a number is of what is met on the way up"""
 FROM = {"above": "high", "below": "low"}
 """the number that says where a spring begins"""
+
+
+def sooner(
+    seen: Sequence[Seen], trials: Sequence[Trial], travel: Mapping[str, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """Joints that went less far than the nominal motion, by name: lowest and highest
+    position recorded, and in that, ``(2, 2)``.
+
+    Args:
+        seen: what each observed column is.
+        trials: a recording.
+        travel: of the nominal motion of some trials, see `Loads`.
+    """
+    found = {}
+    for column, item in enumerate(seen):
+        if item.quantity == "joint":
+            went = np.concatenate([trial.observed[:, column] for trial in trials])
+            ends = np.nanquantile(went, (1.0 - STOPPED, STOPPED))
+            free = travel.get(item.part, ends)
+            out = np.array([ends[0] - free[0], free[1] - ends[1]])
+            least = max(SHORT * item.noise, SHARE * float(np.ptp(free)))
+            free = np.where(out > least, free, ends)
+            if (free != ends).any():
+                found[item.part] = np.stack([ends, free])
+    return found
 
 
 def rows(item: Row, ends: np.ndarray | None) -> Iterable[Row]:

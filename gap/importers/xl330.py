@@ -15,6 +15,7 @@ import numpy as np
 
 from bns.errors import FormatError
 from bns.gap.importers import servo
+from bns.gap.recordings.trial_conditions import SERVO
 from bns.storage import reading
 from bns.worlds.trial import Channel, Trial
 
@@ -37,7 +38,7 @@ ENTRIES = {
 }
 METADATA = ("mass", "length", "kp", "vin", "trajectory")
 QUANTISATION = 2 * np.pi / 4096  # [rad] 12-bit encoder
-SERVO = "xl330"  # whose law is nominal (`bns.models.xl330`)
+NAME = "xl330"  # of the servo whose law is nominal (`bns.models.xl330`)
 
 
 def read(directory: str | Path) -> list[Trial]:
@@ -80,12 +81,15 @@ def _trial(file: Path) -> Trial:
     except FormatError:
         raise
     except (ArithmeticError, KeyError, TypeError, ValueError) as error:
-        raise FormatError(f"{file} is no run of an XL330 ({error!r}).") from None
+        raise FormatError(
+            f"{file} is no run of an XL330: {error!r}. A run has {', '.join(METADATA)} "
+            f"and entries, each with {', '.join(ENTRIES.values())}."
+        ) from None
     columns["current"] = servo.signed(columns["current"]) * 1e-3
     columns["angle"], lost = servo.despiked(columns["angle"])
     conditions = {
         "run": file.stem,
-        "servo": SERVO,
+        SERVO: NAME,
         "mass": mass,
         "lever": lever,
         "arm_mass": 0.0,

@@ -124,26 +124,22 @@ def piece(trial: Trial, first: int, last: int) -> Trial:
 def _sampled(trial: Trial, first: int, last: int) -> tuple[Commands, np.ndarray]:
     """Commands between two samples, and the samples at which they begin and end: each
     lasts from its sample to the next one's."""
-    bounds = trial.boundaries
+    told, bounds = trial.commands, trial.boundaries
     begun, ends = trial.times[bounds], trial.times[[first, last]]
     inner = bounds[(begun > ends[0]) & (begun < ends[1])]
     marks = np.concatenate([[first], inner, [last]])
     index = np.searchsorted(begun, trial.times[marks[:-1]], side="right") - 1
     index = np.clip(index, 0, len(bounds) - 2)
     lasting = np.diff(trial.times[marks])
-    return Commands(
-        trial.commands.values[index], lasting, trial.commands.channels
-    ), marks
+    return Commands(told.values[index], lasting, told.channels), marks
 
 
 def _dense(trial: Trial, first: int, last: int) -> tuple[Commands, np.ndarray]:
     """The same where several commands fall between two samples: by their own times."""
     told, times = trial.commands, trial.times
-    begun = times[trial.boundaries[0]] + np.cumsum([0.0, *told.durations])
-    since, until = times[[first, last]]
+    begun, (since, until) = trial_conditions.begun(trial), times[[first, last]]
     low = max(int(np.searchsorted(begun, since, side="right")) - 1, 0)
-    low = min(low, len(told) - 1)
-    high = max(int(np.searchsorted(begun[:-1], until)), low + 1)
+    high = max(int(np.searchsorted(begun, until)), low + 1)
     edges = np.concatenate([[since], begun[low + 1 : high], [until]])
     marks = np.searchsorted(times, edges - 1e-9)
     marks[[0, -1]] = first, last

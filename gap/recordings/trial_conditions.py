@@ -14,6 +14,9 @@ NUMBER, RUN, RECORDING = "number", "run", "recording"
 """conditions that say which trial it was; `bns.gap.recordings.load_recordings` writes
 them"""
 
+SERVO = "servo"
+"""condition of a trial of a servo whose law is known: its name"""
+
 BETWEEN = "commands_between"
 """condition of a trial of which rows were lost: when commands began that were put
 between those that are known [s]"""

@@ -17,8 +17,6 @@ LISTED = 8  # faults that are printed at most
 NONE = "none"
 """in place of a directory: print only"""
 RESULTS = Path("runs/gap")
-SERVO = "servo"
-"""condition that says in a word which servo's law holds"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -267,6 +265,8 @@ def _provenance(given: Diagnose, model: Any, trials: list[Any]) -> dict[str, Any
 def shared(trials: list[Any]) -> dict[str, float | str]:
     """Conditions that all trials share: settings of the robot in numbers, and which
     servo it has."""
+    from bns.gap.recordings.trial_conditions import SERVO
+
     if not trials:
         return {}
     first, *others = (trial.conditions for trial in trials)

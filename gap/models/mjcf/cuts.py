@@ -22,6 +22,7 @@ import numpy as np
 from bns.gap.models.base import GapModel
 from bns.gap.models.mjcf import prepared, start
 from bns.gap.models.mjcf.config import OwnConfig
+from bns.gap.models.mjcf.simulation import Simulation
 from bns.gap.recordings.segments import piece
 from bns.worlds.data.units import wrapped
 from bns.worlds.trial import Trial
@@ -60,12 +61,13 @@ def pieces(
     rows = seen[np.clip(np.searchsorted(trial.times[seen], wanted), 0, len(seen) - 1)]
     rows = np.unique(np.append(rows[:-1], len(trial.times) - 1))
     made = [piece(trial, first, last) for first, last in pairwise(rows)]
-    begun = _begun(trial, trial, 0, config) if config.recorded else trial
-    inner = rows[1:-1].tolist()
-    others = unseen(begun, inner) if unseen else [{}] * len(inner)
+    beside: list[Mapping[str, list[float]]] = [{}] * len(made)
+    if unseen:
+        whole = _begun(trial, trial, 0, config) if config.recorded else trial
+        beside[1:] = unseen(whole, rows[1:-1].tolist())
     return [
-        _begun(part, trial, first, config, beside) if first or config.recorded else part
-        for part, first, beside in zip(made, rows[:-1], [{}, *others], strict=True)
+        _begun(part, trial, first, config, more) if first or config.recorded else part
+        for part, first, more in zip(made, rows[:-1], beside, strict=True)
     ]
 
 
@@ -283,9 +285,8 @@ TURNED = 0.3  # [rad] by which a free body may be turned otherwise than foreseen
 def foreseen(
     trials: Sequence[Trial],
     config: OwnConfig,
-    physics: mujoco.MjModel,
+    physics: Simulation,
     model: GapModel,
-    unseen: Unseen | None = None,
 ) -> list[Trial]:
     """Trials in the pieces of the description; in shorter ones that begin in the states
     of the data, if any of them is not foreseen to its end and all that moves is
@@ -294,13 +295,12 @@ def foreseen(
     Args:
         trials: of a log, not cut.
         config: of the robot.
-        physics: its MJCF, compiled.
+        physics: that simulates it.
         model: the nominal model.
-        unseen: see `pieces`.
     """
-    made = _cut(trials, config, unseen) if config.cut else list(trials)
+    made = _cut(trials, config, physics.unseen) if config.cut else list(trials)
     length = np.inf
-    if _observed(config, physics):
+    if _observed(config, physics.model):
         length = min(_lengths(made, config, model), default=np.inf)
     if np.isinf(length):
         return refined(made, config, model) if config.cut else made

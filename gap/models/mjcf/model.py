@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from bns.gap.candidates import mjcf, mjcf_ends, mjcf_rows, mjcf_usual
-from bns.gap.candidates.mjcf_ends import BUMPER
+from bns.gap.candidates.mjcf_terms import Terms
 from bns.gap.decomposition.row import Row
 from bns.gap.models.base import GapModel, Windows
-from bns.gap.models.mjcf import cuts, log, masses, roughness, start
+from bns.gap.models.mjcf import cuts, log, roughness, start
 from bns.gap.models.mjcf import effects as own_effects
 from bns.gap.models.mjcf.config import FLOOR, OwnConfig
 from bns.gap.models.mjcf.simulation import Simulation
@@ -21,7 +21,6 @@ from bns.worlds.effects.base import Effect
 from bns.worlds.trial import Trial
 
 LEAST = 0.3  # of the noise that is told: the smallest that is believed
-SHORT, SHARE = 5.0, 0.01  # of the noise, of a joint's travel: sooner by more is stopped
 FEW = 2  # trials on which longer steps of time are compared with the model's
 STRIDE = 0.5  # [s] over which those of a free body are compared
 
@@ -67,11 +66,7 @@ class OwnModel(GapModel):
         self._pace = roughness.Pace()
         self._touches = False
         self.listed = mjcf.candidates(config, model)
-        self._bodies = {
-            item.fixed["part"]: masses.Body.of(model, item.fixed["part"])
-            for item in self.listed
-            if item.effect == "body_mass"
-        }
+        self._terms = Terms(self.listed, config, model)
         free = start.free(self.physics.model)
         over = config.over_floor.items()
         self._carried = [columns for (_, part), columns in over if part in free]
@@ -81,16 +76,6 @@ class OwnModel(GapModel):
             for column, item in enumerate(config.seen)
             if item.turning and column not in carried
         ]
-        further = (
-            *mjcf_rows.grouped(self.listed),
-            *mjcf_rows.motors(self.listed),
-            *mjcf_rows.gyros(self.listed, config),
-        )
-        centres = mjcf_rows.centres(self._bodies)
-        items = (*centres, *self.listed, *further)  # a centre may be listed
-        self._terms = {item.name: item for item in items}
-        self._tried = {item.effect for item in self._terms.values()}
-        self._springs: dict[str, Row] = {}
 
     @classmethod
     def read(cls, path: str | Path, *, threads: int = 2) -> "OwnModel":
@@ -105,10 +90,9 @@ class OwnModel(GapModel):
     def read_log(self, path: str, columns: str = "") -> list[Trial]:
         """Trials of a log, none longer than the model foresees."""
         config = self.config.mapped(columns) if columns else self.config
-        trials = start.held(log.read(path, config), config, self.physics.stood)
+        trials = start.held(log.read(path, config), config, self.physics.starts.stood)
         log.possible(trials, config, self.physics.model)
-        physics = self.physics
-        return cuts.foreseen(trials, self.config, physics.model, self, physics.unseen)
+        return cuts.foreseen(trials, self.config, self.physics, self)
 
     def beside(
         self, trials: Sequence[Trial], known: Sequence[Mapping[str, float]]
@@ -131,48 +115,16 @@ class OwnModel(GapModel):
         From then on fine paths are simulated as finely as these trials need.
         """
         self._parts = self.physics.needed(trials)
-        usual = self.config.effects is None
         loads = self.physics.loads(trials)
         self.physics.apart(loads)
-        items = tuple(self._terms.values())
-        if usual:  # what the user asked for stays
-            items = mjcf_rows.touching(items, loads.touching)
-        self._tried = {item.effect for item in items}
         self._touches = bool(loads.touching)
-        made = mjcf_rows.rows(
-            items,
+        return self._terms.rows(
             trials,
             self.dt,
-            self._bodies,
+            loads,
+            mjcf_ends.sooner(self.config.seen, trials, loads.travel),
             stepped=self._parts > 1 or self._touches,
-            forces=loads.forces,
-            ends=self._ends(trials, loads.travel),
         )
-        self._springs = {row.name: row for row in made if row.effect == BUMPER}
-        return made
-
-    def _ends(
-        self, trials: Sequence[Trial], travel: Mapping[str, np.ndarray]
-    ) -> dict[str, np.ndarray]:
-        """See `mjcf_rows.rows`, of joints that went less far than the nominal motion.
-
-        Args:
-            trials: a recording.
-            travel: of the nominal motion of some trials, see `Loads`.
-        """
-        found = {}
-        for column, item in enumerate(self.config.seen):
-            if item.quantity == "joint":
-                went = np.concatenate([trial.observed[:, column] for trial in trials])
-                share = 1.0 - mjcf_ends.STOPPED
-                ends = np.nanquantile(went, (share, 1.0 - share))
-                free = travel.get(item.part, ends)
-                out = np.array([ends[0] - free[0], free[1] - ends[1]])
-                least = max(SHORT * item.noise, SHARE * float(np.ptp(free)))
-                free = np.where(out > least, free, ends)
-                if (free != ends).any():
-                    found[item.part] = np.stack([ends, free])
-        return found
 
     def stepped(self, trials: Sequence[Trial], rows: Sequence[Row]) -> tuple[Row, ...]:
         """See `GapModel.stepped`: a simulation is rough where something touches.
@@ -229,7 +181,7 @@ class OwnModel(GapModel):
 
     def untried(self) -> tuple[str, ...]:
         """See `GapModel.untried`."""
-        tried = self._tried
+        tried = self._terms.tried
         return tuple(name for name in sorted(own_effects.CLASSES) if name not in tried)
 
     def unlisted(self) -> "OwnModel | None":
@@ -243,41 +195,12 @@ class OwnModel(GapModel):
         return made
 
     def effect(self, term: str, values: Mapping[str, float]) -> Effect | None:
-        """The effect of an explanation; None for the shift in time and the step."""
-        if term in (mjcf_rows.LEAD, mjcf_rows.STEP):
-            return None
-        item = self._terms[term]
-        if item.effect == "body_mass":
-            part = item.fixed["part"]
-            return masses.added(term, values, part, self._bodies[part])
-        if item.effect == BUMPER:
-            return mjcf_ends.spring(self._springs[term], values)
-        return item.make(values[term])
+        """See `GapModel.effect`; None for the shift in time and the step."""
+        return self._terms.effect(term, values)
 
     def covered(self, term: str, values: Mapping[str, float]) -> Mapping[str, float]:
         """See `GapModel.covered`: a load that has no mass shifts its body's centre."""
-        part = self._terms[term].fixed["part"]
-        return masses.centred(term, values, part, self._bodies[part])
-
-    def _changes(self, values: Mapping[str, float]) -> tuple[Effect, ...]:
-        """The effects that rows which are not nominal are simulated by."""
-        made: list[Effect] = []
-        several: dict[str, dict[str, float]] = {}
-        for name, value in values.items():
-            whole = name if name in self._terms else name.rpartition(".")[0]
-            item = self._terms.get(whole)
-            if item and item.effect in ("body_mass", BUMPER):
-                several.setdefault(item.name, {})[name] = value
-            elif item:
-                grown = item.make(value).in_trial(1)  # what grows comes as it has
-                made.append(grown)
-        for name, rows in several.items():
-            if name in self._springs:
-                made.append(mjcf_ends.spring(self._springs[name], rows))
-                continue
-            part = self._terms[name].fixed["part"]
-            made += masses.changes(name, rows, part, self._bodies[part])
-        return tuple(made)
+        return self._terms.covered(term, values)
 
     def paths(
         self,
@@ -304,7 +227,7 @@ class OwnModel(GapModel):
             for trial, values in zip(trials, row, strict=True):
                 off = {n: v for n, v in values.items() if n.startswith(start.NUMBERS)}
                 begun = start.moved(trial, off, self.config) if off else trial
-                pairs.append((begun, self._changes(values)))
+                pairs.append((begun, self._terms.changes(values)))
                 leads.append(values.get(mjcf_rows.LEAD, 0.0))
                 shares.append(values.get(mjcf_rows.STEP, 1.0) - 1.0)
         moved = self.physics.predicted(pairs, parts, leads)

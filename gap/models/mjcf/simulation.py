@@ -318,26 +318,6 @@ class Simulation:
             made[:, piece.columns] = found[key]
         return made
 
-    def stood(
-        self, trial: Trial, lasting: float, told: np.ndarray | None
-    ) -> np.ndarray:
-        """Readings ``(C,)`` of the nominal model after it stood where a trial begins.
-
-        Args:
-            trial: recorded trial.
-            lasting: how long it stood [s].
-            told: commands ``(K,)``; None = the control at rest.
-        """
-        data = mujoco.MjData(self.model)
-        state = self.starts.begun(trial, self.model)
-        mujoco.mj_setState(self.model, data, state, STATE)
-        data.ctrl[:] = self.starts.rest(self.model)
-        if told is not None:
-            data.ctrl[self.actuators] = told
-        mujoco.mj_step(self.model, data, nstep=round(lasting / self.dt))
-        mujoco.mj_getState(self.model, data, state, STATE)
-        return self._view(self.model).read(self.model, state[None])[0]
-
     def unseen(self, trial: Trial, rows: Sequence[int]) -> list[dict[str, list[float]]]:
         """Joints that nobody observed, as the nominal model moves them: at each of some
         samples their position [rad or m] and speed, and how unsure both are.
@@ -348,9 +328,11 @@ class Simulation:
         """
         model = self.model
         names = start.unseen(model, self.config)
-        (motion,) = self._pool.map([self._job(trial, (), 1)]) if names else (None,)
         found: list[dict[str, list[float]]] = [{} for _ in rows]
-        if motion is None or motion.diverged >= 0:
+        if not names:
+            return found
+        (motion,) = self._pool.map([self._job(trial, (), 1)])
+        if motion.diverged >= 0:
             return found
         moments = trial.times[list(rows)] - trial.times[trial.boundaries[0]]
         steps = self._lead(self.dt) + np.rint(moments / self.dt).astype(int)

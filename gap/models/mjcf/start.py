@@ -158,6 +158,27 @@ class Starts:
         mujoco.mj_getState(model, data, state, FULL)
         return state
 
+    def stood(
+        self, trial: Trial, lasting: float, told: np.ndarray | None
+    ) -> np.ndarray:
+        """Readings ``(C,)`` of the nominal model after it stood where a trial begins.
+
+        Args:
+            trial: recorded trial.
+            lasting: how long it stood [s].
+            told: commands ``(K,)``; None = the control at rest.
+        """
+        model, state = self.model, self.begun(trial, self.model)
+        data = mujoco.MjData(model)
+        mujoco.mj_setState(model, data, state, FULL)
+        data.ctrl[:] = self.rest(model)
+        if told is not None:
+            for item, value in zip(self.config.told, told, strict=True):
+                data.actuator(item.actuator).ctrl[0] = value
+        mujoco.mj_step(model, data, nstep=round(lasting / model.opt.timestep))
+        mujoco.mj_getState(model, data, state, FULL)
+        return self._view(model).read(model, state[None])[0]
+
     def hung(self, trial: Trial) -> dict[str, tuple[float, float]]:
         """Where joints hang that nobody observed [rad or m], as a trial begins at rest
         by the nominal model, and in the model's pose."""

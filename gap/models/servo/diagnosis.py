@@ -66,8 +66,8 @@ def learn(
     if len(set(names)) < 5:
         raise BnsError(
             f"Runs of {len(set(names))} settings do not show how the nominal law errs; "
-            "record five settings or more without a change, or diagnose with "
-            "bns.gap.models.servo.model, which assumes it."
+            "record five settings or more without a change, or diagnose without a "
+            "reference, by the law that is known of the servo."
         )
     residuals = servo_curves.residuals(runs, nominal)
     discrepancy = score.learn(residuals, names, kinds, step=servo_curves.STEP)

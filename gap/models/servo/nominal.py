@@ -7,6 +7,7 @@ import numpy as np
 
 from bns.errors import BnsError, UnknownNameError
 from bns.gap.models.servo.runs import Runs
+from bns.gap.recordings.trial_conditions import SERVO
 from bns.models import servo_pendulum, xl330
 from bns.worlds.physics.servo_law import NUMBERS, Law, law
 from bns.worlds.physics.servo_rollout import simulate
@@ -69,7 +70,7 @@ def usual(runs: Runs) -> Nominal:
         UnknownNameError: a servo whose law is not known.
         BnsError: runs of several servos.
     """
-    name, *others = sorted(set(runs.labels.get("servo", (USUAL,))))
+    name, *others = sorted(set(runs.labels.get(SERVO, (USUAL,))))
     if others:
         raise BnsError(
             f"The runs are of several servos ({name}, {', '.join(others)}); diagnose "

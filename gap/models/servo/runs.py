@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bns.errors import BnsError
-from bns.gap.recordings.trial_conditions import as_number
+from bns.gap.recordings.trial_conditions import as_number, begun
 from bns.worlds.physics.servo_law import NUMBERS
 from bns.worlds.physics.servo_rollout import DT, Drive
 from bns.worlds.trial import Trial
@@ -108,10 +108,9 @@ def _row(trial: Trial, fine: np.ndarray, grid: np.ndarray) -> tuple:
         raise BnsError(
             f"A servo trial lasts {times[-1]:.2f} s, less than {grid[-1]:g}."
         )
-    begun = np.concatenate([[0.0], np.cumsum(trial.commands.durations[:-1])])
-    index = np.searchsorted(begun, fine + 1e-9, side="right") - 1
+    index = np.searchsorted(begun(trial), fine + 1e-9, side="right") - 1
     names = [channel.name for channel in trial.commands.channels]
-    told = trial.commands.values[index]
+    told = trial.commands.values[np.maximum(index, 0)]
     on = told[:, names.index("torque_on")] > 0.5
     early = times <= 0.05
     speed = np.polyfit(times[early], angle[early], 1)[0] if early.sum() > 2 else 0.0

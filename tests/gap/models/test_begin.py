@@ -153,7 +153,7 @@ def test_a_robot_that_settles_begins_where_it_was_put(tmp_path):
 def test_joints_that_nobody_saw_hang_where_the_others_were_put(tmp_path):
     _, own = described(tmp_path, PENDULUMS, put(tmp_path / "log.csv"))
     (trial, *_) = own.read_log(str(tmp_path / "log.csv"))
-    begun = own.physics.stood(trial, 0.0, None)
+    begun = own.physics.starts.stood(trial, 0.0, None)
     assert begun[0] == pytest.approx(trial.observed[0, 0])
     state = own.physics.starts.begun(trial, own.physics.model)
     angle = state[2]

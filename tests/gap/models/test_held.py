@@ -84,7 +84,7 @@ def test_what_was_not_seen_says_nothing_of_it(tmp_path):
     own, trials = lifted(tmp_path)
     blind = trials[0].replace(observed=np.full_like(trials[0].observed, np.nan))
     plain = [trial.replace(conditions={}) for trial in (blind, *trials[1:])]
-    stood = own.physics.stood
+    stood = own.physics.starts.stood
     made = start.held(plain, own.config, stood)
     assert all(start.BEFORE in trial.conditions for trial in made)
     assert start.held(plain[:1], own.config, stood) == plain[:1]
